@@ -1,8 +1,8 @@
-//! What exploring a whole object costs as touches grow: `make growth-around`.
+//! Cost of the exploration of a whole object as touches grow: `make growth-around`.
 //!
-//! A mug is touched where `active` asks; then the update with its refit, the choice of the next
-//! touch, and the mesh of the surface are timed on one thread. Prints a table with measured exponents
-//! and draws `docs/growth-around.svg` and `.png`.
+//! `active` chooses the touches on a mug. The update with its refit, the choice of the next touch,
+//! and the mesh of the surface are timed on one thread. Prints a table with measured exponents and
+//! draws `docs/growth-around.svg` and `.png`.
 
 #[path = "common/curves.rs"]
 mod curves;

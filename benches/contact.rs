@@ -1,8 +1,8 @@
-//! Contact by each geometry, on the bird: what a step of the PA-10 costs while its finger presses,
-//! and how far a rigid finger's contact is from the true, analytic surface.
+//! Comparison of collision geometries on the bird: the cost of a step of the PA-10 while its finger
+//! presses, and the distance of a rigid finger's contact from the true, analytic surface.
 //!
 //! One run, one thread. The finger is lowered along −y without masses, so that only the geometry
-//! speaks; steps are timed with the whole body, and the best of several counts.
+//! matters; steps are timed with the whole body, and the best of several measurements counts.
 
 use anyhow::{Context, ensure};
 use mujoco_rs::wrappers::mj_data::MjData;
@@ -21,7 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Places at which the finger is lowered, and those of them at which steps are timed.
+/// Places at which the finger is lowered, and the number of them at which steps are timed.
 const PLACES: usize = 60;
 const TIMED: usize = 6;
 
@@ -29,11 +29,11 @@ const TIMED: usize = 6;
 const STEPS: u32 = 50;
 const TURNS: usize = 10;
 
-/// How far the finger is pressed: into the skin, or against a geometry that hardly gives.
+/// Depth to which the finger is pressed: into the skin, or against a nearly rigid geometry.
 const DEEP_M: f64 = 1e-3;
 const AGAINST_M: f64 = 5e-5;
 
-/// A place and where the centre of the fingertip's hemisphere comes to rest over it.
+/// Place, with the rest position of the centre of the fingertip's hemisphere over it.
 struct Rest {
     target: Vec<f64>,
     y_m: f64,
@@ -59,10 +59,10 @@ fn main() -> anyhow::Result<()> {
         .collect();
     let ours = exact(&cast, &truth)?;
     println!(
-        "| contact | a step, µs | × the first | rests off, mm: median | 95 % | max \
-         | point off, mm: median | 95 % | max | steps in contact |\n|---|---|---|---|---|---|---|---|---|---|"
+        "| contact | a step, µs | × the first | rest error, mm: median | 95 % | max \
+         | point error, mm: median | 95 % | max | steps in contact |\n|---|---|---|---|---|---|---|---|---|---|"
     );
-    println!("| cast onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
+    println!("| hull swept onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
     let mut first_us = None;
     for (name, sets) in bodies {
         let dynamic = |arm: &[&str]| environment(&[sets, arm, &["body=\"dynamic\""]].concat());
@@ -90,7 +90,8 @@ fn environment(sets: &[&str]) -> anyhow::Result<Arc<Environment>> {
     Ok(Arc::new(Environment::build(Scene::load(&path, &sets)?)?))
 }
 
-/// Median, 95 % and largest of how far the rests and the points of contact are from the truth.
+/// Formats median, 95 % and largest distance of the rests and of the points of contact from the
+/// truth.
 fn errors(environment: &Environment, truth: &[Rest], found: &[Rest]) -> String {
     let rests = truth.iter().zip(found).map(|(truth, found)| (truth.y_m - found.y_m).abs());
     let points = found.iter().filter_map(|found| {
@@ -104,8 +105,8 @@ fn errors(environment: &Environment, truth: &[Rest], found: &[Rest]) -> String {
     format!("{} | {}", cells(rests.collect()), cells(points.collect()))
 }
 
-/// Where the hull rests on the analytic surface, by brute force: the highest that any place under
-/// it lifts it. None where there is no surface.
+/// Returns the rest position of the hull on the analytic surface, by brute force: the largest
+/// height to which any place under it lifts it; `None` where there is no surface.
 fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
     let scene = environment.scene();
     let lift = |dx_m: f64, dz_m: f64| {
@@ -130,7 +131,7 @@ fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
     Some(Rest { y_m, p_wc: Point3::new(target[0] + dx_m, on_y_m, target[1] + dz_m), target })
 }
 
-/// Where the hull rests on the exact mesh.
+/// Returns the rest positions of the hull on the exact mesh.
 fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     let mut probe = Simulator::new(Arc::clone(cast))?.probe(0)?;
     let mut rest = |target: &Vec<f64>| {
@@ -142,9 +143,10 @@ fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     truth.iter().map(|truth| rest(&truth.target)).collect()
 }
 
-/// Where MuJoCo first says contact when the finger is set down along −y on a stage.
+/// Returns the positions at which MuJoCo first reports contact while the finger is lowered along −y
+/// on a stage.
 fn lowered(stage: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
-    /// From above the highest that any geometry can lie, in steps, to below the lowest.
+    /// Search range: from above the highest surface of any geometry, in steps, to below the lowest.
     const ABOVE_M: f64 = 0.03;
     const BELOW_M: f64 = -0.01;
     const STEP_M: f64 = 2.5e-4;
@@ -177,8 +179,8 @@ fn lowered(stage: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>
     truth.iter().map(&mut rest).collect()
 }
 
-/// Median over some places of the time of a step, µs, while the PA-10 holds its finger `depth_m`
-/// beyond the rest, and the share of steps in which it feels anything.
+/// Returns the median over some places of the time of a step, µs, while the PA-10 holds its finger
+/// `depth_m` beyond the rest, and the fraction of steps with contact.
 fn step(
     environment: &Arc<Environment>,
     rests: &[Rest],

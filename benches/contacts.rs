@@ -1,4 +1,4 @@
-//! How far the electrodes' point of contact lies from the exact one, over shapes and attitudes:
+//! Distance of the electrodes' point of contact from the exact one, over shapes and attitudes:
 //! `make contacts`. Prints the table of `docs/finger.md`.
 
 #[path = "../tests/suite/common/shapes.rs"]
@@ -20,18 +20,18 @@ use palpate::sim::{Environment, Scene};
 use shapes::{grid, point, sphere_mesh, square};
 use std::path::Path;
 
-/// One tactile frame.
+/// Duration of one tactile frame.
 const TICK_S: f64 = 0.01;
 const APPROACH_M_S: f64 = 0.02;
 
-/// What one touch measured against what was so, in `T`.
+/// Measured minus true values of one touch, in `T`.
 struct Error {
     point_m: Vector3<f64>,
     normal_deg: f64,
 }
 
-/// Lowers the finger along −z onto `over` with `towards_t` of its skin first, as the servo does,
-/// and reads it.
+/// Lowers the finger along −z onto `over` with `towards_t` of its skin first, like the servo, and
+/// reads its sensor.
 fn touch(
     tip: &Fingertip,
     bvh: &MeshBvh,
@@ -158,7 +158,7 @@ fn tables(model: SkinModel) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
     let environment = Scene::load(&path, &[]).ok().and_then(|scene| Environment::build(scene).ok());
     if let Some(bird) = environment.as_ref().and_then(Environment::mesh) {
-        // The nose points along +y of W; here it points up, its tip at the origin.
+        // The nose points along +y of W; here it points up, with its tip at the origin.
         let up = Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
         let turned = bird.transformed(&Isometry3::from_parts(
             Default::default(),

@@ -1,5 +1,5 @@
-//! The force at which contact with a plane is told, and how often it is told of nothing:
-//! `make detection`. Prints the tables of `docs/finger.md`.
+//! Force at which contact with a plane is detected, and rate of false alarms: `make detection`.
+//! Prints the tables of `docs/finger.md`.
 
 #[path = "../tests/suite/common/shapes.rs"]
 #[allow(dead_code)]
@@ -17,17 +17,17 @@ use palpate::sim::finger::plate::{direction_t, pose};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use rayon::prelude::*;
 
-/// Sensors, or approaches of one, each from its own phase of a frame.
+/// Number of sensors, or of approaches of one sensor, each from its own phase of a frame.
 const APPROACHES: u64 = 40;
 /// Frames at rest before the first approach.
 const REST: usize = 20;
-/// From here on contact was not told.
+/// Force from which on contact counts as not detected.
 const MOST_N: f64 = 5.0;
-/// So slow that nothing is overrun; slow; and the default of a touch.
+/// Speeds: so slow that nothing is overrun; slow; and the default of a touch.
 const SPEEDS_M_S: [f64; 3] = [0.5e-3, 5e-3, 0.02];
-/// Untouched, of each kind of sensor.
+/// Duration without contact, for each kind of sensor.
 const HOURS: f64 = 10.0;
-/// Untouched frames between two tares of five.
+/// Frames without contact between two tares of five.
 const WAY: usize = 100;
 
 fn detections() -> [(&'static str, Detection); 4] {
@@ -53,7 +53,8 @@ fn frames(tip: &Fingertip, feel: &mut FingertipState, far: &MeshBvh, count: usiz
     frames
 }
 
-/// Force when each of the detectors says contact; infinite if it does not below [`MOST_N`].
+/// Returns the force at which each of the detectors reports contact; infinite if it does not below
+/// [`MOST_N`].
 fn approach(
     tip: &Fingertip,
     bvh: &MeshBvh,
@@ -67,7 +68,7 @@ fn approach(
     let reach_m = tip.skin().map_or(0.0, |skin| {
         skin.samples().iter().map(|s| s.point().coords.dot(towards_t)).fold(0.0, f64::max)
     });
-    // Ten frames of free way, and a part of one.
+    // Ten frames without contact, and a part of one.
     let phase = seed as f64 / APPROACHES as f64;
     let mut height_m = reach_m + speed_m_s * FRAME_S * (10.0 + phase);
     let mut told_n = [f64::INFINITY; 4];
@@ -90,7 +91,7 @@ fn approach(
     told_n
 }
 
-/// Median and largest.
+/// Formats median and maximum.
 fn told(mut forces_n: Vec<f64>) -> String {
     forces_n.sort_by(f64::total_cmp);
     let word =
@@ -134,7 +135,7 @@ impl Sensor {
         }
     }
 
-    /// False alarms of each detector in an hour.
+    /// Prints the false alarms of each detector in an hour.
     fn false_alarms(&self, bvh: &MeshBvh) {
         let frames_each = (HOURS * 3600.0 / FRAME_S / APPROACHES as f64) as usize;
         let counted: Vec<[u32; 4]> = (0..APPROACHES)

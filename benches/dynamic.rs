@@ -1,5 +1,4 @@
-//! What a touch of a dynamic body costs, and what of it each part does; one thread, best of
-//! several.
+//! Cost of a touch of a dynamic body, and of each of its parts; one thread, best of several.
 
 use nalgebra::Isometry3;
 use palpate::backend::Command;
@@ -17,7 +16,7 @@ use std::time::Instant;
 
 const TURNS: usize = 5;
 
-/// Least of several measurements.
+/// Returns the least of several measurements.
 fn best(mut run: impl FnMut() -> f64) -> f64 {
     (0..TURNS).map(|_| run()).fold(f64::INFINITY, f64::min)
 }

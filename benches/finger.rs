@@ -1,4 +1,4 @@
-//! What a step of the soft fingertip costs on the bird's 48 200 triangles.
+//! Cost of a step of the soft fingertip on the bird's 48 200 triangles.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
@@ -34,7 +34,7 @@ fn finger(c: &mut Criterion) {
     let touching_m = start.p0_w.y - hit.travel_m;
     let skin = Effects { skin: Some(SkinEffect::default()), ..Effects::default() };
     let wet = Effects { fluid: Some(Default::default()), ..skin.clone() };
-    // What a scene with a skin and nothing else should cost: the skin itself.
+    // Lower bound on the cost of a scene with a skin and nothing else: the skin itself.
     let bare = Fingertip::new(&environment.scene().finger, &skin);
     if let Some(bare) = bare.skin() {
         let mut pressed = bare.relaxed();
@@ -70,8 +70,9 @@ fn finger(c: &mut Criterion) {
     beside(&environment, bvh, |depth_m| at(touching_m - depth_m));
 }
 
-/// What a tick of 10 µm down to 1.5 mm costs with a shell, and beside it with columns, both with
-/// fluid: turn by turn so that the machine is the same for both, of each tick the quickest.
+/// Prints the cost of a tick of 10 µm down to 1.5 mm with a shell and with columns, both with
+/// fluid. They are timed in turns, so that other load is the same for both; each value is the
+/// minimum for its tick.
 fn beside(environment: &Environment, bvh: &MeshBvh, at: impl Fn(f64) -> TipMotion) {
     const TICKS: usize = 150;
     let pressed = |model| {

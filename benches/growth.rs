@@ -1,8 +1,8 @@
-//! How the cost of the Gaussian process grows with the number of touches: `make growth`.
+//! Growth of the Gaussian process's cost with the number of touches: `make growth`.
 //!
-//! Exact, and through at most 500 touches. Prints tables of seconds and of memory with measured
-//! exponents, what the approximation is off by, and the share of this machine's own matrix
-//! multiplication, and draws `docs/growth.svg` and `.png`. One thread.
+//! Compares the exact process with one of at most 500 inducing touches. Prints tables of seconds
+//! and of memory with measured exponents, the error of the approximation, and the fraction of this
+//! machine's own matrix multiplication; draws `docs/growth.svg` and `.png`. One thread.
 
 #[path = "../tests/suite/common/counting.rs"]
 #[allow(dead_code)]
@@ -26,12 +26,12 @@ use pieces::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 
 const COUNTS: [usize; 11] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000, 7000, 10_000];
-/// A cold fit of more takes minutes.
+/// Largest number of touches of a cold fit, because more take minutes.
 const FITTED_MAX: usize = 4000;
-/// Touches that the approximation goes through.
+/// Inducing touches of the approximation.
 const INDUCING: usize = 500;
 
-/// Curves of seconds, of megabytes, and how far the approximation is off.
+/// Measures curves of seconds, curves of megabytes, and the error of the approximation.
 fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
     let (at, bounds) = (hyperparameters(), search_box());
     let curve = |name, colour, expected| Curve { name, colour, expected, values: Vec::new() };
@@ -65,7 +65,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
             likelihood.values.push((n, value));
         });
         exact_mb.values.push((n, bytes as f64 / 1e6));
-        // A rough kernel, of which as many touches are kept as may be.
+        // A rough kernel, which keeps the largest number of touches.
         let induce = || Posterior::through(INDUCING, &Matern52, at.clone(), &touches);
         through.values.push((
             n,
@@ -115,7 +115,8 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
     (seconds, vec![exact_mb, through_mb], off)
 }
 
-/// How far means and deviations are from the exact ones, in units of the exact deviation.
+/// Formats the distance of means and deviations from the exact ones, in units of the exact
+/// deviation.
 fn distance(exact: &Posterior, induced: &Induced, places: &[[f64; 2]]) -> String {
     let [exact_at, ours_at] = [exact, &induced.posterior]
         .map(|posterior| posterior.predict(places.iter().map(|place| place.as_slice())));
@@ -140,9 +141,9 @@ fn main() -> anyhow::Result<()> {
     let (curves, megabytes, off) = measure();
     print("seconds", &curves);
     print("MB", &megabytes);
-    println!("through at most {INDUCING}, at 1000 places, hyperparameters known");
+    println!("at most {INDUCING} inducing touches, 1000 places, hyperparameters known");
     println!(
-        "kernel                 touches    kept  left, of a noise  mean off, of a sd   sd, of the exact"
+        "kernel                 touches    kept residual/noise sd     mean error/sd         sd/exact sd"
     );
     off.iter().for_each(|line| println!("{line}"));
     let mut product = product();

@@ -1,10 +1,10 @@
-//! What a touch tells beside its height: contact normals and swept free space, each against the
-//! same trials without, with the body's own contacts (exact, or found by electrodes) and with the
-//! errors of an estimate added.
+//! Information in a touch besides its height: contact normals and swept free space. Each is
+//! compared with the same trials without it, with the body's own contacts (exact, or located by
+//! electrodes) and with the errors of an estimate added.
 //!
 //! `cargo bench --bench information -- toy container bird` prints a table of each experiment; a
-//! number after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the
-//! others out.
+//! number after a name is its number of trials, and `own` or `estimated`, `active` or `slope`
+//! selects these alone.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::backend::Fault;
@@ -23,21 +23,21 @@ use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::time::Instant;
 
-/// Tilt about either tangent, normal about 0: with two of them the median angle is 1.177 times
-/// this, 17°, the middle of what a real BioTac's estimate has on a flat plate
+/// Standard deviation of the tilt about either tangent. With two tangents the median angle is 1.177
+/// times this, 17°, the middle of the range of a real BioTac's estimate on a flat plate
 /// (MiaoLi/syntouchcontact recordings).
 const TILT_RAD: f64 = 0.252;
-/// Error of each coordinate of the contact; chosen.
+// heuristic: error of each coordinate of the contact.
 const PLACE_SD_M: f64 = 1e-3;
 
-/// A probe whose contacts are estimates.
+/// Probe whose contacts are estimates.
 struct Estimating {
     exact: Box<dyn Probe>,
     rng: ChaCha8Rng,
 }
 
 impl Estimating {
-    /// Box–Muller.
+    /// Draws a standard normal number (Box–Muller).
     fn normal(&mut self) -> f64 {
         let [a, b]: [f64; 2] = [self.rng.random(), self.rng.random()];
         (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
@@ -72,7 +72,7 @@ impl Probe for Estimating {
     }
 }
 
-/// Name and settings of each belief; the first is what the others are held against.
+/// Name and settings of each belief; the first is the reference of the others.
 const BELIEFS: [(&str, &[&str]); 4] = [
     ("heights", &[]),
     ("normals", &["gp.normals=true"]),
@@ -80,7 +80,8 @@ const BELIEFS: [(&str, &[&str]); 4] = [
     ("both", &["gp.normals=true", "gp.free_space=true"]),
 ];
 
-/// Words that are no experiment: whose contacts, and which planner; neither said, both are meant.
+/// Arguments that are not experiments: source of the contacts, and planner; without one of a pair,
+/// both are run.
 const WORDS: [&str; 4] = ["own", "estimated", "active", "slope"];
 
 fn main() {
@@ -172,7 +173,7 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
     }
 }
 
-/// An estimate with its interval; a dash where the error is not reached.
+/// Formats an estimate with its interval; a dash if the error is not reached.
 fn shown(estimate: &Estimate, decimals: usize) -> String {
     let number = |value: f64| match value.is_finite() {
         true => format!("{value:.decimals$}"),
@@ -182,7 +183,7 @@ fn shown(estimate: &Estimate, decimals: usize) -> String {
     format!("{} [{}, {}]", number(estimate.value), number(low), number(high))
 }
 
-/// A measure of every trial after `count` touches.
+/// Returns a measure of every trial after `count` touches.
 fn after(rows: &[TrialRow], count: u32, measure: impl Fn(&Metrics) -> f64) -> Vec<f64> {
     let touches = rows.iter().filter_map(|row| row.touches.get(count as usize - 1));
     touches.filter_map(|touch| touch.metrics.as_ref().map(&measure)).collect()

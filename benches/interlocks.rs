@@ -1,4 +1,4 @@
-//! What the interlocks cost in a tick of the kinematic arm: far from everything, and near a table.
+//! Cost of the interlocks in a tick of the kinematic arm: far from everything, and near a table.
 
 use palpate::backend::interlock::InterlockSettings;
 use palpate::backend::{Backend, Command};
@@ -32,7 +32,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Swaying about home, as fast as a travelling arm.
+/// Returns the time of a tick while the arm sways about home, as fast as a travelling arm.
 fn tick_us(body: &mut dyn Backend, chain: &Chain) -> anyhow::Result<f64> {
     body.reset(1)?;
     let mut command = Command { qdot: vec![0.0; chain.joints.len()] };

@@ -1,4 +1,4 @@
-//! Each piece of a trial, with the operations or bytes that it does in a second, and a touch of the bird.
+//! Kernels of a trial, each with its operations or bytes in a second, and a touch of the bird.
 
 #[path = "common/pieces/mod.rs"]
 #[allow(dead_code)]

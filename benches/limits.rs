@@ -1,6 +1,7 @@
-//! How far each piece of a trial is from what the machine can do, on one thread: its operations and bytes
-//! in a second as shares of those of a product of matrices and of a triad over long arrays. Pieces are
-//! timed in turns, so that other load falls on all alike; numbers are medians over rounds.
+//! Efficiency of each piece of a trial relative to the machine, on one thread: its operations and
+//! bytes in a second as fractions of those of a matrix product and of a triad over long arrays.
+//! Pieces are timed in turns, so that other load affects all alike; numbers are medians over
+//! rounds.
 //!
 //! `cargo bench --bench limits -- PART` times the pieces whose name contains PART.
 
@@ -12,7 +13,7 @@ use pieces::{pieces, timing};
 
 const ROUNDS: usize = 15;
 
-/// Pieces of the machine, which come first.
+/// Number of reference pieces of the machine, which come first.
 const LIMITS: usize = 2;
 
 fn main() {

@@ -2,8 +2,8 @@
 one thread.
 
 Run by `make bench-peers`, which makes the environment. Prints processor seconds per trial, ratios to Palpate, and of
-the toy the touches after which the mean R (Eq. 5) first reaches 0.99. The others are told the bird's heights from a
-grid that Palpate has written; Palpate touches the mesh.
+the toy the touches after which the mean R (Eq. 5) first reaches 0.99. The others get the bird's heights from a grid
+that Palpate writes; Palpate touches the mesh.
 """
 
 import json
@@ -44,7 +44,7 @@ def correlation(f, g):
 
 
 class ScikitLearn:
-    """Two restarts, heights normalised, noise fitted: the settings a lab would start from."""
+    """Two restarts, heights normalised, noise fitted: typical settings."""
 
     def fit(self, x, y):
         kernel = ConstantKernel() * RBF(0.5, (1e-2, 10)) + WhiteKernel(1e-5, (1e-10, 1))
@@ -84,7 +84,7 @@ def next_touch(model, box):
 
 
 def explore(model, start, heights, box, touches, score=lambda model: None):
-    """The score after each touch, and seconds without it."""
+    """Returns the scores after each touch, and the seconds without scoring."""
     x = np.array(start)
     scores, seconds = [], 0.0
     while True:
@@ -113,7 +113,7 @@ def palpate(experiment, folder, trials, grid):
 
 
 def bird(folder):
-    """The bird's heights as a function of places, its box, and starts."""
+    """Returns the bird's heights as a function of places, its box, and the starts."""
     trials, _ = palpate("bird", folder, BIRD_TRIALS, 101)
     table = np.loadtxt(os.path.join(folder, "surface.csv"), delimiter=",", skiprows=1, usecols=(0, 1, 2))
     x, z = np.unique(table[:, 0]), np.unique(table[:, 1])

@@ -1,7 +1,7 @@
-//! What the plant adds to MuJoCo's own step, and what the controller costs.
+//! Overhead of the plant over MuJoCo's own step, and cost of the controller.
 //!
-//! Both are timed in turns and the best of many is kept, so that other load on the machine
-//! weighs on neither.
+//! Both are timed in turns and the best of many is kept, so that other load on the machine affects
+//! neither.
 
 use mujoco_rs::wrappers::mj_data::MjData;
 use palpate::backend::Wrench;

@@ -1,4 +1,4 @@
-//! A measure of one's own, of the trials of a run.
+//! Custom measure of the trials of a run.
 //!
 //! `cargo run --release --example own_measure`
 
@@ -7,8 +7,8 @@ use palpate::experiment::statistics::summary::typical;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 
-/// Mean RMSE over all touches so far: the area under the error curve, which rewards planners that
-/// are good early.
+/// Mean RMSE over all touches so far: the area under the error curve, which rewards planners with
+/// small errors early.
 pub const MEAN_RMSE: Measure = Measure {
     id: "mean_rmse_m",
     title: "RMSE, mean over touches",
@@ -26,7 +26,7 @@ pub const MEAN_RMSE: Measure = Measure {
     }),
 };
 
-/// Trials of two planners on the toy.
+/// Runs trials of two planners on the toy.
 pub fn rows() -> Result<Vec<TrialRow>, Box<dyn std::error::Error>> {
     let toy = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/toy.toml");
     let simulation = Simulation::new(Experiment::load(toy.as_ref(), &["touches=20".into()])?)?;

@@ -1,4 +1,4 @@
-//! A planner of one's own, for zones and whole objects alike, held against a built-in one.
+//! Custom planner, for zones and whole objects alike, compared with a built-in one.
 //!
 //! `cargo run --release --example own_planner`
 
@@ -6,7 +6,8 @@ use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner, sample};
 
-/// Takes the farthest from all earlier targets of thirty random ones (Mitchell 1991).
+/// Planner that takes the random target, of thirty, that is farthest from all earlier ones
+/// (Mitchell 1991).
 struct FarthestOfSome {
     rng: rand_chacha::ChaCha8Rng,
 }
@@ -27,15 +28,16 @@ impl Planner for FarthestOfSome {
     }
 }
 
-/// As an experiment names it.
+/// Entry with the name for experiments.
 pub static ENTRY: Entry = Entry {
     name: "farthest_of_some",
-    about: "the farthest from earlier targets of thirty random ones",
+    about: "of thirty random targets, the farthest from earlier ones",
     zone_only: None,
     make: |_, rng| Box::new(FarthestOfSome { rng }),
 };
 
-/// The error after the last touch of a trial: mm over a zone, the Chamfer distance around an object.
+/// Returns the error after the last touch of a trial: RMSE over a zone, Chamfer distance around an
+/// object, in m.
 pub fn error(planner: &Entry, experiment: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let path = format!("{}/experiments/{experiment}.toml", env!("CARGO_MANIFEST_DIR"));
     let simulation = Simulation::new(Experiment::load(path.as_ref(), &["touches=20".into()])?)?;

@@ -1,4 +1,4 @@
-//! A fingertip sensor of one's own: a switch, which tells that there is contact and not where.
+//! Custom fingertip sensor: a switch, which detects contact but not its location.
 //!
 //! `cargo run --release --example own_sensor`
 
@@ -9,8 +9,8 @@ use palpate::robot::Finger;
 use palpate::robot::sensor::{SensedContact, Sensor};
 use palpate::sim::{Environment, Scene, simulator::Simulator};
 
-/// Closes at 0.5 N above the force at rest, and takes the point of the tip that is ahead for the
-/// point of contact. A switch with its own driver would read [`Sample::Channels`].
+/// Switch that closes at 0.5 N above the force at rest, and reports the foremost point of the tip
+/// as the point of contact. A switch with its own driver would read [`Sample::Channels`].
 #[derive(Default)]
 pub struct Switch {
     force_n: Option<Vector3<f64>>,
@@ -37,7 +37,7 @@ impl Sensor for Switch {
     }
 }
 
-/// The true height of the container's middle above a contact there, m.
+/// Returns the true height of the container's middle above a contact there, m.
 pub fn touch() -> Result<f64, Box<dyn std::error::Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/container_finger.toml");
     let scene = Scene::load(path.as_ref(), &["effects={skin={}, fluid={}, wrench={}}".into()])?;

@@ -1,5 +1,5 @@
-//! Touches the object of an `[around]` scene from directions spread evenly over the sphere, at its
-//! middle and beside it, and says how the touches end and how far they are off the mesh.
+//! Touches of the object of an `[around]` scene from directions spread evenly over the sphere, at
+//! its middle and beside it; prints their outcomes and their distance from the mesh.
 //!
 //!     cargo run --release --example touch_around -- scenes/container_around_finger.toml 60
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     sweep(&Arc::new(environment), count)
 }
 
-/// Middle and 95th percentile.
+/// Returns median and 95th percentile.
 fn quantiles(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
     [0.5, 0.95].map(|q| {
@@ -46,7 +46,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();
     let (mut off_mm, mut turned_deg, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
     let (mut work_s, mut before_s) = (0.0, probe.time_s().unwrap_or(0.0));
-    // Neighbours on the spiral lie far apart: the finger goes long ways between them.
+    // Successive directions on the spiral are far apart, so the finger travels far between them.
     for i in 0..count {
         let outward_w = direction(i, count);
         let beside_w = direction((7 * i + 3) % count, count).into_inner() * (0.35 * ball.radius_m);
@@ -85,9 +85,12 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
     }
     let touched = seconds.len().max(1) as f64;
     println!("{ends:?}");
-    println!("off the mesh, median and 95 %: {:.2?} mm", quantiles(off_mm));
-    println!("normal, median and 95 %: {:.1?} deg", quantiles(turned_deg));
+    println!("distance from the mesh, median and 95 %: {:.2?} mm", quantiles(off_mm));
+    println!("angle of the normal, median and 95 %: {:.1?} deg", quantiles(turned_deg));
     let mean_s = seconds.iter().sum::<f64>() / touched;
-    println!("a touch: {mean_s:.1} s of the body, {:.1} ms of work", 1e3 * work_s / touched);
+    println!(
+        "mean of a touch: {mean_s:.1} s of robot time, {:.1} ms of computation",
+        1e3 * work_s / touched
+    );
     Ok(())
 }

@@ -1,7 +1,7 @@
-//! Makes the meshes in this folder from the analytic surfaces of `palpate::geometry`.
+//! Generator of the meshes in this folder from the analytic surfaces of `palpate::geometry`.
 //!
-//! `cargo run --release --example make_models` writes the same bytes each time and prints how far
-//! the triangles are from the surface. `SOURCE.md` describes the files.
+//! `cargo run --release --example make_models` writes the same bytes each time and prints the
+//! distance of the triangles from the surface. `SOURCE.md` describes the files.
 
 mod meshing;
 
@@ -14,15 +14,16 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-/// Edges whose middle is farther from the surface are split, metres. Chosen: the middle of an
-/// equal-sided triangle is 4/3 as far, well within the 0.05 mm that `tests/suite/models.rs` asks
-/// for.
+// Edges whose middle is farther from the surface, in metres, are split.
+// heuristic: the middle of an equal-sided triangle is 4/3 as far, well within the 0.05 mm that
+// `tests/suite/models.rs` requires.
 const EDGE_ERROR_M: f64 = 2.5e-5;
-/// Rounds of splits that are evened out by relaxing. Chosen: later ones find few edges.
+// heuristic: rounds of splits followed by relaxation; later ones find few edges.
 const SPLIT_ROUNDS: usize = 4;
-/// Rounds of relaxing before a split. Chosen: more hardly change the triangles.
+// heuristic: rounds of relaxation before a split; more hardly change the triangles.
 const RELAX_ROUNDS: usize = 5;
-/// Triangles are measured at the points whose barycentric coordinates are multiples of 1/6.
+/// Number of steps along an edge of the sample points, whose barycentric coordinates are multiples
+/// of 1/6.
 const SAMPLES_PER_EDGE: usize = 6;
 
 /// Base colour of the bird.
@@ -30,7 +31,7 @@ const PORCELAIN: (&str, [f64; 3]) = ("porcelain", [0.9, 0.9, 0.88]);
 
 fn main() -> Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
-    // Cells chosen: the bird's nose, 5 mm thick, needs the finer ones.
+    // heuristic: the bird's nose, 5 mm thick, needs the finer cells.
     for (name, cell_m, file, encode) in [
         ("container", 3.0e-3, "container.obj", obj as fn(&Mesh) -> Result<Vec<u8>>),
         ("bird", 2.0e-3, "bird.glb", |mesh| glb(mesh, "bird", PORCELAIN)),
@@ -45,8 +46,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The surface as triangles: surface nets on a grid, put onto the surface, evened out, and split
-/// until every edge follows the surface.
+/// Returns the surface as triangles: surface nets on a grid, projected onto the surface, relaxed,
+/// and split until every edge follows the surface.
 fn triangulate(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
     let mut mesh = nets(surface, cell_m)?;
     for _ in 0..SPLIT_ROUNDS {
@@ -55,7 +56,7 @@ fn triangulate(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
         }
         split(&mut mesh, surface)?;
     }
-    // Relaxing makes split edges longer again, so that the last splits go without.
+    // Relaxation makes split edges longer again, so the last splits go without.
     while split(&mut mesh, surface)? {}
     Ok(mesh)
 }
@@ -78,8 +79,8 @@ fn relax(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<()> {
     Ok(())
 }
 
-/// Splits every edge whose middle is off the surface; false if there was none. An edge's two
-/// triangles agree on whether it is split, so that the mesh stays closed.
+/// Splits every edge whose middle is off the surface; returns false if there is none. Both
+/// triangles of an edge split it alike, so the mesh stays closed.
 fn split(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<bool> {
     let Mesh { vertices, triangles } = mesh;
     let mut middles = HashMap::new();
@@ -97,7 +98,8 @@ fn split(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<bool> {
     Ok(!middles.is_empty())
 }
 
-/// The triangles that a triangle falls into when the edges with a `middle` are split there.
+/// Returns the triangles into which a triangle is divided if the edges with a `middle` are split
+/// there.
 fn parts(
     [a, b, c]: [usize; 3],
     middle: impl Fn(usize, usize) -> Option<usize>,
@@ -122,7 +124,7 @@ fn parts(
     }
 }
 
-/// Distance of a point near the surface from it, to second order: |f| / |∇f|.
+/// Returns the distance of a point near the surface from it, to second order: |f| / |∇f|.
 fn distance_m(surface: &dyn Implicit, p: Point3<f64>) -> f64 {
     let field = surface.field(p);
     field.value.abs() / field.gradient.norm()
@@ -163,7 +165,7 @@ fn describe(mesh: &Mesh, surface: &dyn Implicit) {
     );
 }
 
-/// Wavefront OBJ in millimetres, z up, front +y.
+/// Formats Wavefront OBJ in millimetres, z up, front +y.
 fn obj(mesh: &Mesh) -> Result<Vec<u8>> {
     let mut text = String::from(
         "# Steel container, made by models/make_models.rs of Palpate.\n\

@@ -1,9 +1,9 @@
-//! Makes the objects of the suite: `models/suite/NAME.glb` and the scenes that show them,
-//! `scenes/suite/NAME.toml` from one side and `scenes/suite/around/NAME.toml` from all.
+//! Generator of the suite's objects: `models/suite/NAME.glb` and their scenes,
+//! `scenes/suite/NAME.toml` from one side and `scenes/suite/around/NAME.toml` from all sides.
 //!
 //! `cargo run --release --example make_suite` writes the same bytes each time. All lengths are
-//! chosen, so that the objects differ: full faces and silhouettes over a third of their zone, holes,
-//! thin parts, steps, undercuts, reliefs, several pieces, tilted, small and large ones.
+//! heuristic, so that the objects differ: full faces and silhouettes over a third of their zone,
+//! holes, thin parts, steps, undercuts, reliefs, several pieces, tilted, small and large ones.
 
 mod meshing;
 
@@ -16,23 +16,23 @@ use std::path::Path;
 
 /// Cells along the longest side of an object.
 const CELLS: f64 = 36.0;
-/// How sharp edges are rounded, metres.
+/// Radius of rounded edges, metres.
 const EDGE_M: f64 = 0.003;
 /// Base colour.
 const CLAY: (&str, [f64; 3]) = ("clay", [0.75, 0.55, 0.4]);
 
-/// An object in its own frame, origin in its middle, front towards +y, z up, metres.
+/// Object in its own frame, origin in its middle, front towards +y, z up, metres.
 struct Shape {
     name: &'static str,
     /// Half of its extents.
     half_m: [f64; 3],
-    /// Which share of its extents beside and above the zone is.
+    /// Zone as a fraction of the object's extents in x and z.
     zone: f64,
     field: fn(Point3<f64>) -> Field,
 }
 
 const SHAPES: &[Shape] = &[
-    // For choosing.
+    // For the development of planners.
     Shape { name: "bumps", half_m: [0.055, 0.034, 0.055], zone: 0.9, field: bumps },
     Shape { name: "ring", half_m: [0.055, 0.014, 0.055], zone: 1.0, field: ring },
     Shape { name: "mug", half_m: [0.065, 0.036, 0.05], zone: 1.0, field: mug },
@@ -45,7 +45,7 @@ const SHAPES: &[Shape] = &[
     Shape { name: "cone", half_m: [0.021, 0.021, 0.024], zone: 1.0, field: cone },
     Shape { name: "boulder", half_m: [0.125, 0.08, 0.11], zone: 1.0, field: boulder },
     Shape { name: "cross", half_m: [0.05, 0.012, 0.06], zone: 1.0, field: cross },
-    // For reporting.
+    // For reported results.
     Shape { name: "waves", half_m: [0.06, 0.025, 0.05], zone: 0.9, field: waves },
     Shape { name: "horseshoe", half_m: [0.055, 0.016, 0.06], zone: 1.0, field: horseshoe },
     Shape { name: "bottle", half_m: [0.032, 0.032, 0.08], zone: 1.0, field: bottle },
@@ -77,7 +77,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The object half a metre up, 0.65 m before the robot, as container and bird.
+/// Returns the scene: the object half a metre up, 0.65 m in front of the robot, like container and
+/// bird.
 fn scene(shape: &Shape) -> String {
     let [x, _, z] = shape.half_m.map(|half_m| half_m * shape.zone);
     format!(
@@ -92,7 +93,7 @@ fn scene(shape: &Shape) -> String {
     )
 }
 
-/// The same from all sides, with a finger that touches with its apex.
+/// Returns the scene from all sides, with a finger that touches with its apex.
 fn scene_around(shape: &Shape) -> String {
     format!(
         "# Of the suite, from all sides; made by models/make_suite.rs.\nbody = \"cast\"\n\n[object]\n\
@@ -108,7 +109,7 @@ impl Implicit for Shape {
     }
 
     fn bounds(&self) -> [Point3<f64>; 2] {
-        // What blends add.
+        // Room for the blends.
         let half_m = Vector3::from(self.half_m).add_scalar(EDGE_M);
         [Point3::from(-half_m), Point3::from(half_m)]
     }
@@ -130,7 +131,7 @@ fn half_space(p: Point3<f64>, at: Point3<f64>, outward: Vector3<f64>) -> Field {
     Field::plane(p, at, outward.normalize())
 }
 
-/// A box with rounded edges.
+/// Returns a box with rounded edges.
 fn cuboid(p: Point3<f64>, at: Point3<f64>, half_m: [f64; 3]) -> Field {
     let sides = [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().zip(half_m);
     let planes = sides.flat_map(|(axis, half_m)| {
@@ -139,7 +140,7 @@ fn cuboid(p: Point3<f64>, at: Point3<f64>, half_m: [f64; 3]) -> Field {
     planes.reduce(|a, b| a.intersection(b, EDGE_M)).unwrap_or(Field::plane(p, at, Vector3::y()))
 }
 
-/// A disc that faces +y.
+/// Returns a disc that faces +y.
 fn disc(p: Point3<f64>, at: Point3<f64>, radius_m: f64, half_depth_m: f64) -> Field {
     let side = Field::ellipsoid(p - at, vector![radius_m, f64::INFINITY, radius_m]);
     let [front, back] = [Vector3::y(), -Vector3::y()]
@@ -147,18 +148,18 @@ fn disc(p: Point3<f64>, at: Point3<f64>, radius_m: f64, half_depth_m: f64) -> Fi
     side.intersection(front, EDGE_M).intersection(back, EDGE_M)
 }
 
-/// What `all` have together.
+/// Returns the union of `all`.
 fn together(all: impl IntoIterator<Item = Field>, blend_m: f64) -> Field {
     let far = Field { value: f64::MAX, gradient: Vector3::zeros() };
     all.into_iter().fold(far, |sum, each| sum.union(each, blend_m))
 }
 
-/// `a` without `b`.
+/// Returns `a` without `b`.
 fn without(a: Field, b: Field) -> Field {
     a.intersection(Field { value: -b.value, gradient: -b.gradient }, EDGE_M)
 }
 
-/// Eight directions around, the first up: of unit length up to a rounding.
+/// Eight directions around, the first up, of unit length up to rounding.
 const AROUND: [[f64; 2]; 8] = [
     [0.0, 1.0],
     [0.6, 0.8],
@@ -229,7 +230,7 @@ fn hammer(p: Point3<f64>) -> Field {
     handle.union(head, EDGE_M)
 }
 
-/// A box on one corner.
+/// Returns a box on one corner.
 fn block(p: Point3<f64>) -> Field {
     let axes = [vector![0.8, 0.36, 0.48], vector![-0.6, 0.48, 0.64], vector![0.0, -0.8, 0.6]];
     let planes = axes.into_iter().zip([0.034, 0.03, 0.036]).flat_map(|(axis, half_m)| {
@@ -377,7 +378,7 @@ fn vase(p: Point3<f64>) -> Field {
     )
 }
 
-/// A foot: a disc that lies at a height.
+/// Returns a foot: a horizontal disc at a height.
 fn disc_up(p: Point3<f64>, z: f64) -> Field {
     ellipsoid(p, point![0.0, 0.0, z], [0.03, 0.03, 0.007])
 }

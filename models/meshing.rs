@@ -7,13 +7,13 @@ use ndshape::{RuntimeShape, Shape};
 use palpate::geometry::implicit::Implicit;
 use serde_json::json;
 
-/// A closed triangle mesh, metres, wound counterclockwise as seen from outside.
+/// Closed triangle mesh, metres, wound counterclockwise as seen from outside.
 pub struct Mesh {
     pub vertices: Vec<Point3<f64>>,
     pub triangles: Vec<[usize; 3]>,
 }
 
-/// The surface as triangles: surface nets on a grid of cells, put onto the surface.
+/// Returns the surface as triangles: surface nets on a grid of cells, projected onto the surface.
 pub fn nets(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
     // A cell of air on every side, so that the mesh closes.
     let [low, high] = surface.bounds();
@@ -43,8 +43,9 @@ pub fn project(surface: &dyn Implicit, p: Point3<f64>) -> Result<Point3<f64>> {
     surface.project(p).with_context(|| format!("{p} does not project onto the surface"))
 }
 
-/// Binary glTF 2.0 (Khronos Group, "glTF 2.0 specification", section 4.4). The vertices are in the
-/// object's own frame, z up, front +y; the node's matrix turns them to glTF's +y up, +z front.
+/// Formats binary glTF 2.0 (Khronos Group 2021, glTF 2.0 specification, section 4.4). The vertices
+/// are in the object's own frame, z up, front +y; the node's matrix turns them to glTF's +y up, +z
+/// front.
 pub fn glb(mesh: &Mesh, name: &str, (material, colour): (&str, [f64; 3])) -> Result<Vec<u8>> {
     let vertices: Vec<[f32; 3]> =
         mesh.vertices.iter().map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect();

@@ -1,5 +1,5 @@
-//! Curves over the number of touches that benches measure: timed, printed with their exponents, and
-//! drawn with the laws that are expected.
+//! Curves over the number of touches: timed, printed with their exponents, and drawn with the
+//! expected laws.
 
 use palpate::report::axes::{Axis, Panel};
 use palpate::report::canvas::{Area, Canvas};
@@ -9,17 +9,17 @@ use palpate::report::style;
 use std::path::Path;
 use std::time::Instant;
 
-/// One measured quantity over the counts.
+/// Measured quantity over the counts.
 pub struct Curve {
     pub name: &'static str,
     pub colour: &'static str,
-    /// The power of n that its operations or its numbers grow with.
+    /// Expected exponent of n in its operations or numbers.
     pub expected: f64,
     pub values: Vec<(f64, f64)>,
 }
 
-/// Seconds of one call: the least of three rounds that last some ten milliseconds each, or of one
-/// call that lasts longer than a second.
+/// Returns the seconds of one call: the least of three rounds of some ten milliseconds each, or of
+/// one call that takes longer than a second.
 pub fn seconds(mut work: impl FnMut()) -> f64 {
     let begun = Instant::now();
     work();
@@ -36,7 +36,7 @@ pub fn seconds(mut work: impl FnMut()) -> f64 {
     (0..3).map(round).fold(once, f64::min)
 }
 
-/// Exponent between the last two counts.
+/// Returns the exponent between the last two counts.
 fn exponent(curve: &Curve) -> f64 {
     match curve.values.as_slice() {
         [.., (n, before), (m, after)] => (after / before).ln() / (m / n).ln(),
@@ -44,7 +44,7 @@ fn exponent(curve: &Curve) -> f64 {
     }
 }
 
-/// Panels below each other.
+/// Draws panels below each other.
 fn drawn(panels: &[(&str, &[Curve])]) -> Option<String> {
     let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
     // All panels use the same colours, and the first has them all.

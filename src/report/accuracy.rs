@@ -1,5 +1,5 @@
-//! The cost of accuracy: errors of the levels over wall time, their fall with the resolution, and
-//! the effects one by one.
+//! Figures on the cost of accuracy: errors of the levels over wall time, convergence with the
+//! resolution, and the effects one by one.
 
 use super::axes::{Axis, Panel};
 use super::canvas::{Anchor, Area, Canvas};
@@ -12,16 +12,16 @@ use crate::study::accuracy::deviation::Spread;
 use crate::study::accuracy::level::Level;
 use crate::study::accuracy::variant::Variant;
 
-/// The colour, by Okabe and Ito, and the name of a level's senses, then those of a shell.
+/// Colours (Okabe and Ito 2008) and names of the sensing levels of a model, and of a thin shell.
 const FAMILIES: [(&str, &str); 5] = [
     ("#000000", "rigid"),
     ("#e69f00", "soft skin"),
     ("#56b4e9", "and fluid"),
     ("#0072b2", "and electrodes"),
-    ("#009e73", "the same, a thin shell"),
+    ("#009e73", "electrodes, thin shell"),
 ];
 
-/// A number of a variant with its interval.
+/// Value of a variant with its interval.
 type Bar = (f64, [f64; 2]);
 
 const PANEL_PX: (f64, f64) = (350.0, 270.0);
@@ -29,21 +29,21 @@ const LEFT_PX: f64 = 74.0;
 const STEP_PX: f64 = 446.0;
 const ROW_PX: f64 = 354.0;
 const TOP_PX: f64 = 66.0;
-/// Height of an effect's line, and room for its name.
+/// Height of the row of an effect, and width of its name.
 const LINE_PX: f64 = 18.0;
 const NAME_PX: f64 = 140.0;
 
-/// An error of a variant, its unit and its name.
+/// Error of a variant, with its unit and name.
 type Measure = (fn(&Variant) -> Option<Spread>, f64, &'static str);
 
 const ERRORS: [Measure; 3] = [
-    (|it| it.contact_m, 1e-3, "contact off the reference's (mm)"),
-    (|it| it.force_n, 1.0, "force off the reference's (N)"),
-    (|it| it.off_truth_m, 1e-3, "contact off the true surface (mm)"),
+    (|it| it.contact_m, 1e-3, "contact error against reference (mm)"),
+    (|it| it.force_n, 1.0, "force error against reference (N)"),
+    (|it| it.off_truth_m, 1e-3, "contact error against true surface (mm)"),
 ];
 
-/// Draws levels and effects, as far as they were compared; `None` without a variant that differs
-/// from its reference.
+/// Draws the levels and effects that were compared; `None` if no variant differs from its
+/// reference.
 pub fn draw(
     levels: Option<&Comparison>,
     orders: &[Order],
@@ -55,8 +55,8 @@ pub fn draw(
     let size = [LEFT_PX + 3.0 * STEP_PX - 60.0, top_px + lines_px + bottom_px];
     let families = FAMILIES.iter().map(|(colour, words)| (Swatch::Circle(dot(colour)), *words));
     let entries = families.chain([
-        (Swatch::Diamond(INK), "the scene as it is"),
-        (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
+        (Swatch::Diamond(INK), "the scene"),
+        (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "Pareto front"),
         (Swatch::Line(reference_line()), "time of the reference"),
     ]);
     let first = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
@@ -130,7 +130,7 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
     let panel = Panel { area, x: x_axis, y: y_axis };
     let words = format!("order {:.2}; dashed: {}", order.observed, order.expected);
     panel.titled_frame(canvas, &words, order.axis, "mean error of the force (N)");
-    // The line of the expected order through the middle of the measured points.
+    // Line of the expected order through the middle of the measured points.
     let logs: Vec<f64> = (order.errors.iter())
         .map(|(at, error)| error.ln() + order.expected * at.ln())
         .filter(|log| log.is_finite())
@@ -145,11 +145,11 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
     }
 }
 
-/// The bar of a variant and the title of its panel.
+/// Value of a variant and the title of its panel.
 type TitledBar<'a> = (&'a dyn Fn(&Variant) -> Option<Bar>, &'a str);
 
-/// Draws each effect as a line: how far contacts move, the time of a touch, and the verdict's
-/// change.
+/// Draws a row for each effect: the shift of contacts, the time of a touch, and the change of the
+/// verdict.
 fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option<()> {
     let time = |variant: &Variant| -> Option<Bar> {
         let ratio = variant.time_ratio?;
@@ -161,9 +161,9 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
         Some((1e3 * change.mean, change.interval.unwrap_or([change.mean; 2]).map(|m| 1e3 * m)))
     };
     let panels: [TitledBar; 3] = [
-        (&|variant| Some(bar(variant.contact_m?, 1e-3)), "contact moves (mm)"),
-        (&time, "time of a touch changes (%)"),
-        (&verdict_mm, "active − random RMSE changes (mm)"),
+        (&|variant| Some(bar(variant.contact_m?, 1e-3)), "shift of the contact (mm)"),
+        (&time, "change of the time of a touch (%)"),
+        (&verdict_mm, "change of RMSE, active − random (mm)"),
     ];
     for (column, (measure, words)) in panels.into_iter().enumerate() {
         let inset = if column == 0 { NAME_PX } else { 0.0 };
@@ -171,7 +171,7 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
         let area = Area { left, width: first.width - inset, ..first };
         let bars = effects.iter().filter_map(measure);
         let ends = bars.flat_map(|(_, interval)| interval).chain([0.0]);
-        // So few ticks that there are none: the lines have names.
+        // No ticks, because the rows have names.
         let y = Axis::linear(0.5, effects.len() as f64 + 0.5, 1e-6);
         let panel = Panel { area, x: Axis::around(ends, 0.05, 5.0)?, y };
         panel.titled_frame(canvas, "", words, "");

@@ -1,15 +1,15 @@
-//! Axes: from data to pixels, with ticks at round numbers.
+//! Axes of a panel: conversion from data to pixels, with ticks at round numbers.
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use palpate_explore::task::Zone;
 
-/// A unit of length for labels.
+/// Unit of length for labels.
 #[derive(Clone, Copy, Debug)]
 pub struct Length {
-    /// How many make a metre.
+    /// Number of units in a metre.
     pub per_m: f64,
-    /// Its symbol.
+    /// Symbol of the unit.
     pub symbol: &'static str,
 }
 
@@ -17,7 +17,7 @@ pub struct Length {
 pub const MM: Length = Length { per_m: 1e3, symbol: "mm" };
 
 impl Length {
-    /// Metres for a zone of a metre or more, millimetres for a smaller one.
+    /// Returns metres for a zone of a metre or more, millimetres for a smaller one.
     pub fn of(zone: &Zone) -> Self {
         match zone.extents_m().iter().any(|&side| side >= 1.0) {
             true => Self { per_m: 1.0, symbol: "m" },
@@ -25,55 +25,55 @@ impl Length {
         }
     }
 
-    /// A name with the symbol behind it.
+    /// Returns a name with the symbol behind it.
     pub fn named(&self, name: &str) -> String {
         format!("{name} ({})", self.symbol)
     }
 }
 
-/// A range of values along one side of a panel.
+/// Range of values along one side of a panel.
 #[derive(Clone, Debug)]
 pub struct Axis {
     low: f64,
     high: f64,
     is_log: bool,
     aim: f64,
-    /// The smallest step from one tick to the next.
+    /// Smallest step from one tick to the next.
     step_min: f64,
 }
 
 impl Axis {
-    /// From `low` to `high`, with about `aim` ticks.
+    /// Creates a linear axis from `low` to `high`, with about `aim` ticks.
     pub fn linear(low: f64, high: f64, aim: f64) -> Self {
         let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
         Self { low, high, is_log: false, aim, step_min: 0.0 }
     }
 
-    /// The same for what is counted: ticks are whole numbers.
+    /// Creates a linear axis of counts, whose ticks are whole numbers.
     pub fn counts(low: f64, high: f64, aim: f64) -> Self {
         Self { step_min: 1.0, ..Self::linear(low, high, aim) }
     }
 
-    /// Around all `values` with a margin, as a fraction of their range.
+    /// Creates a linear axis around all `values` with a margin, as a fraction of their range.
     pub fn around(values: impl IntoIterator<Item = f64>, margin: f64, aim: f64) -> Option<Self> {
         let (low, high) = range(values)?;
         let margin = margin * (high - low);
         Some(Self::linear(low - margin, high + margin, aim))
     }
 
-    /// A logarithmic axis around the positive ones of `values`.
+    /// Creates a logarithmic axis around the positive ones of `values`.
     pub fn log(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (low, high) = range(values.into_iter().filter(|&value| value > 0.0))?;
         let [low, high] = [low / 1.25, high * 1.25];
         Some(Self { low, high, is_log: true, aim: 5.0, step_min: 0.0 })
     }
 
-    /// Smallest and largest value.
+    /// Returns the smallest and largest value.
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
-    /// How far along `value` lies, 0 to 1 between the ends.
+    /// Returns the position of `value` along the axis, 0 to 1 between the ends.
     pub fn fraction(&self, value: f64) -> f64 {
         match self.is_log {
             true => (value / self.low).ln() / (self.high / self.low).ln(),
@@ -81,12 +81,12 @@ impl Axis {
         }
     }
 
-    /// Values to label, with their labels.
+    /// Returns the ticks with their labels.
     pub fn ticks(&self) -> Vec<(f64, String)> {
         if self.is_log { self.log_ticks() } else { self.linear_ticks() }
     }
 
-    /// As many of them as stand apart along a side of this length, where each needs `room_px`.
+    /// Returns the ticks that fit along a side of this length, if each needs `room_px`.
     fn ticks_along(&self, side_px: f64, room_px: impl Fn(&str) -> f64) -> Vec<(f64, String)> {
         const APART_PX: f64 = 5.0;
         let mut axis = self.clone();
@@ -141,7 +141,7 @@ impl Axis {
     }
 }
 
-/// Smallest and largest of the finite values.
+/// Returns the smallest and largest of the finite values.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().filter(|value| value.is_finite()).fold(None, |range, value| {
         let (low, high) = range.unwrap_or((value, value));
@@ -149,32 +149,32 @@ pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// About the width of a tick's label: there are no font metrics here.
+/// Estimates the width of a tick's label, without font metrics.
 fn label_px(words: &str) -> f64 {
     0.57 * SMALL_PX * words.chars().count() as f64
 }
 
-/// A number without needless decimals, for a label.
+/// Formats a number without trailing decimals, for a label.
 pub fn rounded(value: f64) -> String {
-    // Adding zero turns a negative zero into a positive one.
+    // Adding 0.0 turns −0 into 0.
     let value = (value * 1e3).round() / 1e3 + 0.0;
     value.to_string().replace('-', "−")
 }
 
-/// A rectangle with two axes.
+/// Rectangle with two axes.
 #[derive(Clone)]
 pub struct Panel {
-    /// The rectangle that holds the data.
+    /// Rectangle of the data.
     pub area: Area,
-    /// To the right.
+    /// Horizontal axis, to the right.
     pub x: Axis,
-    /// Upwards.
+    /// Vertical axis, upwards.
     pub y: Axis,
 }
 
 impl Panel {
-    /// A panel at `most`'s top left and no larger, on whose axes a unit has the same length. A
-    /// side that would be shorter than a label needs shows more of its axis instead.
+    /// Creates a panel at the top left of `most` and no larger, with the same scale on both axes. A
+    /// side that would be too short for a label shows a larger range of its axis.
     pub fn equal(most: Area, x: Axis, y: Axis) -> Self {
         const LEAST_PX: f64 = 90.0;
         let lengths = [&x, &y].map(|axis| axis.high - axis.low);
@@ -190,7 +190,7 @@ impl Panel {
         Self { area: Area { width, height, ..most }, x, y }
     }
 
-    /// Where a value lies on the sheet.
+    /// Returns the position of a value in the drawing.
     pub fn at(&self, x: f64, y: f64) -> PointPx {
         [
             self.area.left + self.x.fraction(x) * self.area.width,
@@ -198,7 +198,7 @@ impl Panel {
         ]
     }
 
-    /// Grid lines, ticks and frame.
+    /// Draws grid lines, ticks and frame.
     pub fn frame(&self, canvas: &mut Canvas) {
         let Area { left, top, .. } = self.area;
         let (right, bottom) = (self.area.right(), self.area.bottom());
@@ -215,22 +215,23 @@ impl Panel {
         canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
     }
 
-    /// Grid lines, ticks and frame with a title and the names of the axes, unless they are empty.
+    /// Draws grid lines, ticks and frame with a title and the names of the axes, unless they are
+    /// empty.
     pub fn titled_frame(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
         self.frame(canvas);
         canvas.title([self.area.centre()[0], self.area.top - 9.0], title);
         self.name_axes(canvas, x, y);
     }
 
-    /// The names of the axes.
+    /// Draws the names of the axes.
     pub fn name_axes(&self, canvas: &mut Canvas, x: &str, y: &str) {
         let [centre_x, centre_y] = self.area.centre();
         canvas.text([centre_x, self.area.bottom() + 35.0], x, TEXT_PX, Anchor::Middle);
         canvas.upward_text([self.area.left - 46.0, centre_y], y, TEXT_PX, INK);
     }
 
-    /// A line through values, cut off at the frame; one that is not finite ends it and begins
-    /// another, one alone is a dot.
+    /// Draws a line through values, clipped to the frame. A value that is not finite starts a new
+    /// line; a single value is a dot.
     pub fn curve(&self, canvas: &mut Canvas, values: &[(f64, f64)], attributes: &str) {
         canvas.clipped(self.area, |canvas| {
             for part in values.split(|(_, y)| !y.is_finite()) {
@@ -243,8 +244,8 @@ impl Panel {
         });
     }
 
-    /// The area between two curves over the same places (x, low, high), cut off at the frame and
-    /// where they are not finite; at a place alone it is a bar.
+    /// Draws the area between two curves over the same places (x, low, high), clipped to the frame,
+    /// with gaps where they are not finite. A single place is a bar.
     pub fn band(&self, canvas: &mut Canvas, values: &[(f64, f64, f64)], colour: &str) {
         canvas.clipped(self.area, |canvas| {
             for part in values.split(|(_, low, high)| !(low + high).is_finite()) {
@@ -261,14 +262,14 @@ impl Panel {
     }
 }
 
-/// A [`colour_bar`] of heights above a datum, in a unit.
+/// Draws a [`colour_bar`] of heights above the datum, in a unit.
 pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64; 2]) {
     let [low, high] = heights_m.map(|height_m| height_m * unit.per_m);
     let (axis, words) = (Axis::linear(low, high, 6.0), unit.named("height above the datum"));
     colour_bar(canvas, area, &axis, &words, |t| style::height(t, 1.0));
 }
 
-/// A horizontal bar of colours with its scale below.
+/// Draws a horizontal bar of colours with its scale below.
 pub fn colour_bar(
     canvas: &mut Canvas,
     area: Area,

@@ -1,82 +1,82 @@
-//! A drawing, written as SVG.
+//! SVG canvas.
 //!
-//! Coordinates are pixels from the top left and keep their fractions; a plotting crate whose
-//! back end takes whole pixels would make steps of smooth curves. Points that are not finite
-//! are left out, so no drawing holds a NaN.
+//! Coordinates are pixels from the top left, with fractions; a plotting crate with whole pixels
+//! would draw smooth curves as steps. Points that are not finite are left out, so no drawing
+//! contains a NaN.
 
 use super::style::{FONT, INK, PAPER, TEXT_PX, stroke};
 
-/// A point in pixels, x to the right, y down.
+/// Point in pixels, x to the right, y down.
 pub type PointPx = [f64; 2];
 
-/// A rectangle in pixels.
+/// Rectangle in pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Area {
     /// Left edge.
     pub left: f64,
     /// Top edge.
     pub top: f64,
-    /// Size to the right.
+    /// Width.
     pub width: f64,
-    /// Size down.
+    /// Height.
     pub height: f64,
 }
 
 impl Area {
-    /// Right edge.
+    /// Returns the right edge.
     pub fn right(&self) -> f64 {
         self.left + self.width
     }
 
-    /// Bottom edge.
+    /// Returns the bottom edge.
     pub fn bottom(&self) -> f64 {
         self.top + self.height
     }
 
-    /// Whether a point lies in it.
+    /// Returns whether a point lies in the rectangle.
     pub fn contains(&self, [x, y]: PointPx) -> bool {
         (self.left..=self.right()).contains(&x) && (self.top..=self.bottom()).contains(&y)
     }
 
-    /// Its middle.
+    /// Returns the centre.
     pub fn centre(&self) -> PointPx {
         [self.left + 0.5 * self.width, self.top + 0.5 * self.height]
     }
 }
 
-/// Where a text stands relative to its point.
+/// Horizontal alignment of a text at its point.
 #[derive(Clone, Copy, Debug)]
 pub enum Anchor {
-    /// It begins there.
+    /// Text starts at the point.
     Start,
-    /// It is centred there.
+    /// Text is centred at the point.
     Middle,
-    /// It ends there.
+    /// Text ends at the point.
     End,
 }
 
-/// An SVG being drawn.
+/// SVG drawing under construction.
 pub struct Canvas {
     width: f64,
     height: f64,
     body: String,
-    /// Where the panels have their titles.
+    /// Titles of the panels with their positions.
     titles: Vec<(PointPx, String)>,
 }
 
 impl Canvas {
-    /// An empty sheet of whole pixels.
+    /// Creates an empty drawing of whole pixels.
     pub fn new(width: f64, height: f64) -> Self {
         let [width, height] = [width, height].map(f64::ceil);
         Self { width, height, body: String::new(), titles: Vec::new() }
     }
 
-    /// An open line.
+    /// Draws an open line.
     pub fn line(&mut self, points: impl IntoIterator<Item = PointPx>, attributes: &str) {
         self.path(points, "", attributes);
     }
 
-    /// A closed shape.
+    /// Draws a closed polygon.
     pub fn polygon(&mut self, points: impl IntoIterator<Item = PointPx>, attributes: &str) {
         self.path(points, "z", attributes);
     }
@@ -90,18 +90,18 @@ impl Canvas {
         self.outline(&(data + end), attributes);
     }
 
-    /// A path in SVG's own notation.
+    /// Draws a path in SVG notation.
     pub fn outline(&mut self, data: &str, attributes: &str) {
         self.push(&format!("<path d=\"{data}\" {attributes}/>"));
     }
 
-    /// A rectangle.
+    /// Draws a rectangle.
     pub fn rect(&mut self, area: Area, attributes: &str) {
         let (Area { left, top, .. }, right, bottom) = (area, area.right(), area.bottom());
         self.polygon([[left, top], [right, top], [right, bottom], [left, bottom]], attributes);
     }
 
-    /// A circle.
+    /// Draws a circle.
     pub fn circle(&mut self, [x, y]: PointPx, radius: f64, attributes: &str) {
         if x.is_finite() && y.is_finite() {
             let (x, y) = (number(x), number(y));
@@ -109,7 +109,8 @@ impl Canvas {
         }
     }
 
-    /// A diagonal cross with a rim of paper, so that it shows on any ground.
+    /// Draws a diagonal cross with an outline in the colour of the paper, visible on any
+    /// background.
     pub fn cross(&mut self, [x, y]: PointPx, colour: &str) {
         if !(x.is_finite() && y.is_finite()) {
             return;
@@ -121,18 +122,18 @@ impl Canvas {
         self.outline(&data, &stroke(colour, 1.9));
     }
 
-    /// A small square on its corner.
+    /// Draws a small square on its corner.
     pub fn diamond(&mut self, [x, y]: PointPx, attributes: &str) {
         const ARM: f64 = 4.0;
         self.polygon([[x - ARM, y], [x, y - ARM], [x + ARM, y], [x, y + ARM]], attributes);
     }
 
-    /// Words in ink.
+    /// Draws a text in ink.
     pub fn text(&mut self, at: PointPx, words: &str, size_px: f64, anchor: Anchor) {
         self.coloured_text(at, words, size_px, anchor, INK);
     }
 
-    /// Words in a colour.
+    /// Draws a text in a colour.
     pub fn coloured_text(
         &mut self,
         at: PointPx,
@@ -145,7 +146,7 @@ impl Canvas {
         self.words(words, size_px, anchor, colour, &attributes);
     }
 
-    /// Words in a colour that read upwards, centred at a point.
+    /// Draws a text in a colour that reads upwards, centred at a point.
     pub fn upward_text(&mut self, at: PointPx, words: &str, size_px: f64, colour: &str) {
         let attributes = format!(r#"transform="translate({}) rotate(-90)""#, pair(at));
         self.words(words, size_px, Anchor::Middle, colour, &attributes);
@@ -166,8 +167,8 @@ impl Canvas {
         ));
     }
 
-    /// The title of a panel, in the middle, behind its letter, the next one of the alphabet. A
-    /// panel alone needs no letter, so titles are written when the drawing is finished.
+    /// Sets the title of a panel, centred, after its letter (the next one of the alphabet). A
+    /// single panel has no letter, so titles are written when the drawing is finished.
     pub fn title(&mut self, at: PointPx, words: &str) {
         self.titles.push((at, words.into()));
     }
@@ -183,7 +184,7 @@ impl Canvas {
                 true => String::new(),
                 false => format!("<tspan font-weight=\"bold\">{}</tspan>", letter(i)),
             };
-            // Spaces that no reader of the SVG takes for one.
+            // Spaces that no SVG reader collapses.
             let gap = if is_alone || words.is_empty() { "" } else { "\u{a0}\u{a0}" };
             let (x, y, words) = (number(*x), number(*y), escape(words));
             self.push(&format!(
@@ -192,18 +193,18 @@ impl Canvas {
         }
     }
 
-    /// Draws with attributes that everything drawn shares.
+    /// Draws in a group with shared attributes.
     pub fn grouped(&mut self, attributes: &str, draw: impl FnOnce(&mut Self)) {
         self.push(&format!("<g {attributes}>"));
         draw(self);
         self.push("</g>");
     }
 
-    /// Draws with everything outside `area` cut off.
+    /// Draws with everything outside `area` clipped.
     pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Self)) {
         let [left, top] = [area.left, area.top].map(number);
         let [width, height] = [area.width, area.height].map(number);
-        // A nested drawing clips without an id, which would clash where drawings share a page.
+        // A nested SVG clips without an id, which could occur twice on a page.
         self.push(&format!(
             r#"<svg x="{left}" y="{top}" width="{width}" height="{height}" viewBox="{left} {top} {width} {height}">"#
         ));
@@ -216,7 +217,7 @@ impl Canvas {
         self.body.push('\n');
     }
 
-    /// The whole drawing.
+    /// Returns the finished drawing.
     pub fn finish(mut self) -> String {
         self.write_titles();
         let [width, height] = [self.width, self.height].map(number);
@@ -230,7 +231,7 @@ impl Canvas {
     }
 }
 
-/// a to z, then aa, ab and so on.
+/// Returns the letter of a panel: a to z, then aa, ab and so on.
 fn letter(index: usize) -> String {
     let last = char::from(b'a' + (index % 26) as u8);
     match index / 26 {
@@ -239,19 +240,19 @@ fn letter(index: usize) -> String {
     }
 }
 
-/// A coordinate with a tenth of a pixel, as short as it can be.
+/// Formats a coordinate to a tenth of a pixel, without trailing zeros.
 pub fn number(value: f64) -> String {
     let text = format!("{value:.1}");
     let text = text.strip_suffix(".0").unwrap_or(&text);
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// Two coordinates.
+/// Formats two coordinates.
 pub fn pair([x, y]: PointPx) -> String {
     format!("{} {}", number(x), number(y))
 }
 
-/// Text that is safe inside SVG and HTML, between tags and in quoted attributes.
+/// Escapes a text for SVG and HTML, between tags and in quoted attributes.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -261,7 +262,7 @@ pub fn escape(text: &str) -> String {
             '>' => safe += "&gt;",
             '"' => safe += "&quot;",
             '\'' => safe += "&#39;",
-            // XML knows no other control characters, not even escaped.
+            // XML allows no other control characters, not even escaped.
             c if c.is_control() && !matches!(c, '\t' | '\n' | '\r') => safe.push('\u{fffd}'),
             c => safe.push(c),
         }

@@ -1,5 +1,5 @@
-//! A check as tables and sentences, as Markdown, as the XML that continuous integration reads, and
-//! drawn.
+//! Report of a check: tables and sentences, Markdown, JUnit XML for continuous integration, and a
+//! drawing.
 
 use super::canvas::{Anchor, Area, Canvas};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
@@ -7,7 +7,7 @@ use super::table::{Cell, Column, Table};
 use crate::study::check::{Held, Judgement, Planner, Rules, Verdict};
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-/// The name of a verdict.
+/// Returns the name of a verdict.
 pub fn word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Identical => "identical",
@@ -19,9 +19,10 @@ pub fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// A row for each measure of each planner, or one for a planner without any.
+/// Returns a table with a row for each measure of each planner, or one row for a planner without
+/// measures.
 pub fn table(held: &Held) -> Table {
-    let heads = ["planner", "measure", "change", "95 % interval, at any time", "verdict", "trials"];
+    let heads = ["planner", "measure", "change", "95 % interval, any time", "verdict", "trials"];
     let mut table = Table::new(heads.map(Column::new));
     table.rows =
         (held.planners.iter().flat_map(rows)).map(|cells| cells.map(Cell::from).into()).collect();
@@ -50,16 +51,16 @@ fn percent(judgement: &Judgement, difference: f64) -> String {
     if percent.is_finite() { format!("{percent:+.1} %") } else { "–".into() }
 }
 
-/// Remarks on a check, a sentence each.
+/// Returns remarks on a check, a sentence each.
 pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
-    let settings = "settings, or the object's file, are not those of the baseline";
+    let settings = "settings or the object's file differ from the baseline";
     let mut remarks: Vec<String> =
         (!held.same_settings).then(|| settings.into()).into_iter().collect();
     for planner in &held.planners {
         let name = &planner.name;
         remarks.extend(planner.failed.as_ref().map(|(count, reason)| {
             format!(
-                "{name}: {count} trials failed that did not in the baseline; the first: {reason}"
+                "{name}: {count} trials failed that passed in the baseline; the first: {reason}"
             )
         }));
         remarks.extend(planner.judgements.first().map(|first| {
@@ -67,29 +68,31 @@ pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
             let wanted = first.wanted.map_or("more than 100000".into(), |count| count.to_string());
             let is_open = first.verdict == Verdict::Undecided;
             let then = if is_open {
-                format!("; {most} were allowed (--max-trials)")
+                format!("; the limit was {most} (--max-trials)")
             } else {
                 String::new()
             };
             let title = first.judged.title;
-            format!("{name}: a loss of {percent} % of {title} takes {wanted} trials to tell{then}")
+            format!(
+                "{name}: detecting a loss of {percent} % in {title} needs {wanted} trials{then}"
+            )
         }));
     }
     remarks
 }
 
-/// The whole check as Markdown.
+/// Formats the whole check as Markdown.
 pub fn markdown(name: &str, held: &Held, rules: &Rules, most: u32) -> String {
     let mut text = format!("### {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
     remarks(held, rules, most).iter().for_each(|remark| text += &format!("\n* {remark}"));
     text + "\n"
 }
 
-/// The check as JUnit XML, a test case for each planner: worse and missing are failures, undecided
-/// is an error, because it must not pass.
+/// Formats the check as JUnit XML, a test case for each planner. Worse and missing are failures;
+/// undecided is an error, because it must not pass.
 ///
 /// # Errors
-/// If a name cannot stand in XML.
+/// If a name contains a character that XML does not allow.
 pub fn junit(name: &str, held: &Held, rules: &Rules, most: u32) -> Result<String, SerializeError> {
     let mut report = Report::new("palpate check");
     let mut suite = TestSuite::new(name);
@@ -122,10 +125,10 @@ const RIGHT_PX: f64 = 90.0;
 const TOP_PX: f64 = 46.0;
 const LINE_PX: f64 = 22.0;
 
-/// The axis reaches from −4 to 4 tolerances; what lies beyond is cut off there.
+/// Range of the axis, in tolerances on each side; values beyond are clipped.
 const REACH: f64 = 4.0;
 
-/// Draws each measure's change with its interval, and what is tolerated.
+/// Draws each measure's change with its interval, and the tolerance.
 pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
     let lines: usize = held.planners.iter().map(|planner| planner.judgements.len().max(1)).sum();
     let bottom = TOP_PX + lines as f64 * LINE_PX + 6.0;
@@ -163,7 +166,7 @@ pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
         canvas.circle(at(sequence.mean), 4.0, &style::fill(colour, 1.0));
     }
     let percent = 100.0 * rules.tolerance;
-    let ticks = [format!("−{percent} %"), "as it was".into(), format!("+{percent} %")];
+    let ticks = [format!("−{percent} %"), "baseline".into(), format!("+{percent} %")];
     for (share, words) in [-1.0, 0.0, 1.0].into_iter().zip(ticks) {
         canvas.text([at(share), bottom + 14.0], &words, SMALL_PX, Anchor::Middle);
     }

@@ -1,10 +1,11 @@
-//! Planners over several runs, as tables, figures and a page: which is better on which object, by
-//! how much, and what it took.
+//! Comparison of planners over several runs, as tables, figures and a page: which is better on
+//! which object, by how much, and at what cost.
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
-use super::findings::HONEST;
-use super::html::{figure, page, tables};
+use super::findings::{HONEST, by_verdict, clauses};
+use super::glossary::explained;
+use super::html::{figure, fold, page, tables};
 use super::legend::{Sheet, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
@@ -18,10 +19,10 @@ use crate::study::compare::{
     profile,
 };
 
-/// The seed of all bootstraps.
+/// Seed of all bootstraps.
 const SEED: u64 = 0;
 
-/// A contender's error in units of the reference's on one object.
+/// Returns a planner's error on one object, relative to the reference.
 fn error_on(contender: &Contender, object: usize) -> Option<Estimate> {
     geometric(&[&contender.results[object].scores], SEED)
 }
@@ -31,22 +32,36 @@ fn judged(error: Option<Estimate>) -> Cell {
     Cell::estimate(error).judged(interval, 1.0, Direction::Less)
 }
 
-/// A row for each planner: over all objects.
+/// Returns a table with a row for each planner, over all objects.
 pub fn overall(compared: &Compared) -> Table {
     let count = compared.objects.len();
     let mut table = Table::new([
         Column::new("planner"),
-        Column::new("error"),
-        Column::new("better on"),
-        Column::new("worse on"),
-        Column::new("gap closed").unit("%", 100.0, 0),
-        Column::new("missed").unit("%", 100.0, 1),
-        Column::new("stalled").unit("%", 100.0, 1),
-        Column::new("travel").unit("m", 1.0, 2),
-        Column::new("in the band"),
-        Column::new("Brier").unit("", 1.0, 3),
-        Column::new("IoU").unit("", 1.0, 3),
-        Column::new(format!("better than {}", compared.against)).unit("", 1.0, 2),
+        Column::new("error")
+            .note("Error relative to the reference, geometric mean over trials and objects."),
+        Column::new("better on").note("Objects with the 95 % interval of the error below 1."),
+        Column::new("worse on").note("Objects with the 95 % interval of the error above 1."),
+        Column::new("gap closed")
+            .note("Fraction of the way from random to the oracle, in mean log error.")
+            .unit("%", 100.0, 0),
+        Column::new("missed")
+            .note("Fraction of the touches after the initial ones without contact.")
+            .unit("%", 100.0, 1),
+        Column::new("stalled")
+            .note("Fraction of these touches for which the planner's own rule found no target.")
+            .unit("%", 100.0, 1),
+        Column::new("travel").note("Mean lateral travel of a trial.").unit("m", 1.0, 2),
+        Column::new("in the band")
+            .note("Objects with 90 to 98 % of the truth in the 95 % band after the last touch."),
+        Column::new("Brier")
+            .note("Mean squared error of the probability that a place has a surface.")
+            .unit("", 1.0, 3),
+        Column::new("IoU")
+            .note("Intersection over union of the believed and the true silhouette.")
+            .unit("", 1.0, 3),
+        Column::new(format!("better than {}", compared.against))
+            .note("Probability that a trial has a smaller error than one of the reference.")
+            .unit("", 1.0, 2),
     ]);
     let all: Vec<usize> = (0..count).collect();
     let reference = compared.contenders.iter().find(|it| it.name == compared.against);
@@ -80,7 +95,7 @@ pub fn overall(compared: &Compared) -> Table {
     table.without_empty()
 }
 
-/// A row for each object, a column for each planner: geometric means.
+/// Returns a table of geometric means, with a row for each object and a column for each planner.
 pub fn each(compared: &Compared) -> Table {
     let rows = compared.objects.iter().enumerate().map(|(object, name)| (name.clone(), object));
     let columns = compared.contenders.iter().map(|it| (Column::new(&it.name), it)).collect();
@@ -89,7 +104,8 @@ pub fn each(compared: &Compared) -> Table {
     Table::cross("object", rows, columns, cell)
 }
 
-/// A row for each planner, a column for each object and one for all: interquartile means.
+/// Returns a table of interquartile means, with a row for each planner, a column for each object
+/// and one for all.
 pub fn interquartiles(compared: &Compared) -> Table {
     let rows = compared.contenders.iter().map(|it| (it.name.clone(), it.scores()));
     let objects = compared.objects.iter().enumerate();
@@ -105,59 +121,90 @@ pub fn interquartiles(compared: &Compared) -> Table {
     })
 }
 
-/// A note on the numbers.
+/// Returns the note that explains the numbers.
 pub fn note(against: &str) -> String {
     format!(
-        "Errors are exp(mean log error over the touches after the initial ones) in units of {against}'s \
-         in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
-         bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
-         that from {FLOOR} to {ORACLE}, which looks at the truth, in mean log error. Missed: touches \
-         that met nothing; stalled: plans that the planner's own rule could not decide. After the last touch: on \
-         how many objects the band of 95 % holds 90 to 98 % of the truth; and where the object does not \
-         fill its zone, the mean squared error of the probability that a place has a surface (Brier), and \
-         the silhouette's intersection over union (IoU). Last: the probability that a trial is better \
-         than one of {against}."
+        "Error: exp(mean log error over the touches after the initial ones), relative to {against} in \
+         the same trial; geometric mean over trials and objects, with the 95 % interval of a bootstrap \
+         over trials. Less is better; better and worse mean that the interval excludes 1. Gap closed: \
+         fraction of the way from {FLOOR} to {ORACLE}, which uses the ground truth, in mean log error. \
+         Missed: touches without contact. Stalled: plans for which the planner's own rule found no \
+         target. In the band: objects with 90 to 98 % of the truth in the 95 % band after the last \
+         touch. Brier and IoU, for objects that do not fill their zone: mean squared error of the \
+         probability that a place has a surface, and intersection over union of the silhouettes. Last \
+         column: probability that a trial has a smaller error than one of {against}."
     )
 }
 
-/// The page.
+/// Returns the verdict as a sentence; `None` without other planners than the reference.
+fn sentence(compared: &Compared) -> Option<String> {
+    let against = &compared.against;
+    let others = compared.contenders.iter().filter(|it| it.name != *against);
+    let verdicts = others.map(|it| {
+        let interval = geometric(&it.scores(), SEED).and_then(|error| error.interval);
+        (it.name.as_str(), verdict(interval, 1.0, Direction::Less))
+    });
+    let words = [
+        format!("a smaller error than {against}"),
+        format!("a larger error than {against}"),
+        format!("no established difference from {against}"),
+    ];
+    let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
+    Some(format!("Over {} objects, {clauses} (95 % intervals).", compared.objects.len()))
+}
+
+/// Returns the page: the verdict, the table over all objects, the figures, then each object.
 pub fn html(name: &str, question: &str, compared: &Compared) -> String {
     let note = note(&compared.against);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
-    let each = tables("Object by object", &[each(compared)], "named", "");
-    let profiles = "Which share of the trials has how small an error, averaged over the objects; further \
-                    left is better.";
-    let reliability = "Of the places that are given a probability of a surface, how many have one; on the \
-                       diagonal the belief is honest.";
+    let each = tables("", &[each(compared)], "named", "");
+    let each = fold("Object by object", &each);
+    let objects = compared.objects.len();
+    let trials = compared.contenders.iter().flat_map(Contender::scores).map(<[f64]>::len).max();
+    let profiles = format!(
+        "Performance profiles: fraction of the trials whose error is at most the value on the x axis, \
+         averaged over {objects} objects with up to {} trials each. A curve farther left is better.",
+        trials.unwrap_or_default()
+    );
+    let reliability = format!(
+        "Reliability diagram over {objects} objects: fraction of the places with a surface, against its \
+         predicted probability. A calibrated belief lies on the diagonal."
+    );
     let figures = [
         ("profiles", self::profiles(compared), profiles),
         ("reliability", self::reliability(compared), reliability),
     ];
-    let figures = figures
-        .map(|(id, svg, caption)| svg.map_or(String::new(), |svg| figure(id, &svg, caption)));
-    page("Palpate suite", name, question, &[over_all, figures.concat(), each].concat())
+    let figures = figures.map(|(id, svg, caption)| {
+        svg.map_or(String::new(), |svg| figure(id, &svg, explained(&caption)))
+    });
+    let verdict = sentence(compared);
+    let verdict = verdict
+        .map_or(String::new(), |it| format!("<p class=\"verdict\">{}</p>\n", explained(&it)));
+    page("Palpate suite", name, question, &[verdict, over_all, figures.concat(), each].concat())
 }
 
-/// The table of `suite.csv`: a row per object and planner.
+/// Returns the table of `suite.csv`, with a row per object and planner.
 pub fn file(compared: &Compared) -> Table {
     let mut table = Table::new([
-        Column::new("object").note("Which object."),
-        Column::new("planner").note("Which planner."),
-        Column::new("trials")
-            .note("Its trials that were finished, and have one of the reference beside them."),
+        Column::new("object").note("Name of the object."),
+        Column::new("planner").note("Name of the planner."),
+        Column::new("trials").note("Number of finished trials that the reference finished too."),
         Column::new("error")
-            .note("Geometric mean of its error in units of the reference's.")
+            .note("Geometric mean of the error, relative to the reference.")
             .interval(),
         Column::new("gap_closed")
-            .note("Share of the way from random to the oracle, in mean log error."),
-        Column::new("missed").note("Share of the touches after the initial ones that met nothing."),
+            .note("Fraction of the way from random to the oracle, in mean log error."),
+        Column::new("missed")
+            .note("Fraction of the touches after the initial ones without contact."),
         Column::new("stalled")
-            .note("Share of these touches that the planner's own rule could not decide."),
+            .note("Fraction of these touches for which the planner's own rule found no target."),
         Column::new("travel_m").note("Mean lateral travel of a trial."),
-        Column::new("coverage").note("Share of the truth in the 95 % band after the last touch."),
+        Column::new("coverage")
+            .note("Fraction of the truth in the 95 % band after the last touch."),
         Column::new("presence_brier")
-            .note("Mean squared error of the probability of a surface then."),
-        Column::new("silhouette_iou").note("Intersection over union of the silhouettes then."),
+            .note("Mean squared error of the probability of a surface after the last touch."),
+        Column::new("silhouette_iou")
+            .note("Intersection over union of the silhouettes after the last touch."),
     ]);
     for (object, name) in compared.objects.iter().enumerate() {
         for contender in &compared.contenders {
@@ -181,9 +228,10 @@ pub fn file(compared: &Compared) -> Table {
     table
 }
 
-/// Performance profiles: which share of the trials has how small an error; none without a score.
+/// Draws performance profiles: the fraction of trials with an error below each value; `None`
+/// without a score.
 pub fn profiles(compared: &Compared) -> Option<String> {
-    // Finer than the eye.
+    // Finer than visible.
     const STEPS: u32 = 300;
     let scores = compared.contenders.iter().flat_map(Contender::scores).flatten().copied();
     let x = Axis::log(scores.chain([1.0]))?;
@@ -193,17 +241,18 @@ pub fn profiles(compared: &Compared) -> Option<String> {
         (0..=STEPS).map(|i| (at(i), profile(contender, at(i)))).collect()
     });
     let area = Area { left: 70.0, top: 60.0, width: 460.0, height: 300.0 };
-    let x_name = format!("error over the touches, in units of {}'s", compared.against);
-    let names = [x_name.as_str(), "share of the trials"];
+    let x_name = format!("error over the touches, relative to {}", compared.against);
+    let names = [x_name.as_str(), "fraction of the trials"];
     Some(draw(compared, (area, x, names), curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
 }
 
-/// Reliability over all objects: of the places that are given a probability of a surface, how many
-/// have one; none where every object fills its zone.
+/// Draws the reliability over all objects: the fraction of places with a surface, over its
+/// predicted probability; `None` if every object fills its zone.
 fn reliability(compared: &Compared) -> Option<String> {
-    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
+    /// Smallest number of places of a point, over all objects and trials, a heuristic: 50 determine
+    /// a fraction to 7 %.
     const PLACES_MIN: u32 = 50;
-    // The middle of each tenth, and the share of its places that have a surface.
+    // Middle of each tenth, and the fraction of its places that have a surface.
     let curve = |contender: &Contender| -> Vec<(f64, f64)> {
         let share = |tenth: usize| {
             let counts = contender.results.iter().map(|result| result.reliability[tenth]);
@@ -216,14 +265,13 @@ fn reliability(compared: &Compared) -> Option<String> {
     };
     let curves: Vec<_> = compared.contenders.iter().map(curve).collect();
     let area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };
-    let names = ["probability of a surface, in tenths", "share that has one"];
+    let names = ["predicted probability of a surface", "fraction with a surface"];
     let is_known = curves.iter().any(|curve| !curve.is_empty());
     let axes = (area, Axis::linear(0.0, 1.0, 6.0), names);
     is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))
 }
 
-/// One panel with a curve for each contender, whose names are above it, and a dashed line of
-/// reference.
+/// Draws one panel with a curve for each planner, a legend above, and a dashed reference line.
 fn draw(
     compared: &Compared,
     (area, x, [x_name, y_name]): (Area, Axis, [&str; 2]),

@@ -1,7 +1,7 @@
-//! A drawing as files beside each other: SVG, PNG and PDF.
+//! Output of a drawing as SVG, PNG and PDF.
 //!
-//! PNG and PDF are drawn with a font that is part of this program, so they have the same bytes on
-//! every machine.
+//! PNG and PDF use a font that is part of this program, so they have the same bytes on every
+//! machine.
 
 use crate::experiment::store::write_whole;
 use anyhow::{Context, anyhow};
@@ -13,13 +13,13 @@ use std::io;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-/// The formats of a drawing, as file extensions.
+/// Formats of a drawing, as file extensions.
 pub const FORMATS: [&str; 3] = ["svg", "png", "pdf"];
 
 /// Pixels of a PNG per unit of the drawing.
 pub const PNG_SCALE: f32 = 2.0;
 
-/// A comment behind the end of a PDF, which readers pass over.
+/// Comment after the end of a PDF, which readers skip.
 const SIGNED: &[u8] = b"\n% drawn by Palpate\n";
 
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
@@ -46,15 +46,15 @@ pub fn write(path: &Path, svg: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Removes a drawing in every format, as far as it is there.
+/// Removes the files of a drawing in every format; missing files are not an error.
 ///
 /// # Errors
-/// If a file is there and cannot be removed.
+/// If a file exists and cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
     FORMATS.iter().try_for_each(|extension| files::remove(&path.with_extension(extension)))
 }
 
-/// The parsed tree of an SVG.
+/// Parses an SVG.
 ///
 /// # Errors
 /// If it is not an SVG.
@@ -63,14 +63,15 @@ pub fn tree(svg: &str) -> anyhow::Result<Tree> {
     Ok(Tree::from_str(svg, &options)?)
 }
 
-/// An SVG as PNG, at [`PNG_SCALE`], with the name of the program that drew it.
+/// Converts an SVG to PNG, at [`PNG_SCALE`], with the name of the program in its metadata.
 ///
 /// # Errors
 /// If it is not an SVG, or too large for memory.
 pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
     let tree = tree(svg)?;
-    let size = tree.size().to_int_size().scale_by(PNG_SCALE).context("it has no size")?;
-    let mut pixels = Pixmap::new(size.width(), size.height()).context("it is too large")?;
+    let size = tree.size().to_int_size().scale_by(PNG_SCALE).context("the drawing has no size")?;
+    let mut pixels =
+        Pixmap::new(size.width(), size.height()).context("the drawing is too large")?;
     resvg::render(&tree, Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
     let rgba = pixels.pixels().iter().flat_map(|pixel| {
         let colour = pixel.demultiply();
@@ -84,20 +85,19 @@ pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// An SVG as PDF, with lines as lines and words as words: a page of the size of the drawing, one
-/// point for each unit.
+/// Converts an SVG to PDF with vector lines and text: a page of the size of the drawing, one point
+/// for each unit.
 ///
 /// # Errors
 /// If it is not an SVG, or has no size.
 pub fn pdf(svg: &str) -> anyhow::Result<Vec<u8>> {
     let drawn = svg2pdf::to_pdf(&tree(svg)?, Default::default(), Default::default());
-    let drawn = drawn.map_err(|error| anyhow!("it cannot be drawn: {error}"))?;
+    let drawn = drawn.map_err(|error| anyhow!("the drawing cannot be written as PDF: {error}"))?;
     Ok([&in_order(&drawn), SIGNED].concat())
 }
 
-/// The same PDF with the entries of each dictionary of resources in order: svg2pdf writes them in
-/// the order of a hash map, another one each time. No entry changes its length, so that every
-/// object stays where the table of objects says.
+/// Sorts the entries of each resource dictionary of a PDF: svg2pdf writes them in the order of a
+/// hash map, which varies. No entry changes its length, so the table of object offsets stays valid.
 fn in_order(pdf: &[u8]) -> Vec<u8> {
     // As in `/gs0 7 0 R`.
     let is_entry = |line: &[u8]| {

@@ -1,4 +1,4 @@
-//! The findings of a run in sentences, from its rows, and its verdict.
+//! Findings of a run as sentences, and its verdict.
 
 use super::table::{digits, shown, verdict};
 use crate::experiment::measure::metrics::constant_r;
@@ -10,10 +10,10 @@ use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
 
-/// The mean of Eq. 5 that counts as found, as where the paper says "almost 1".
+/// Mean R (Eq. 5) from which a surface counts as found, for the paper's "almost 1".
 const R_FOUND: f64 = 0.99;
 
-/// Warnings before the numbers, a sentence each.
+/// Returns warnings for the top of the page, a sentence each.
 pub fn notices(run: &Run) -> Vec<String> {
     let total = run.experiment.trials as usize * run.experiment.planners.len();
     let is_partial = run.rows.len() < total;
@@ -21,7 +21,7 @@ pub fn notices(run: &Run) -> Vec<String> {
     is_partial.then_some(partial).into_iter().chain(run.notices()).collect()
 }
 
-/// Sentences, the most important first.
+/// Returns the findings as sentences, the most important first.
 pub fn sentences(run: &Run) -> Vec<String> {
     let planners = &run.experiment.planners;
     let curves: Vec<Curve> = (planners.iter())
@@ -29,9 +29,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
         .filter(|(_, points)| !points.is_empty())
         .collect();
     if curves.is_empty() {
-        return vec![
-            "No trial got as far as its first fit, so there is nothing to say yet.".into(),
-        ];
+        return vec!["No trial has reached its first fit, so there are no results yet.".into()];
     }
     let verified = verified(run, &curves);
     let found = if run.experiment.scene.around.is_some() {
@@ -45,7 +43,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
     verified.into_iter().chain(found.into_iter().flatten()).collect()
 }
 
-/// The touches after which each planner has found the surface by the mean of Eq. 5.
+/// Returns the touches after which each planner has found the surface, by the mean of Eq. 5.
 fn r_needed(run: &Run, curves: &[Curve]) -> Option<String> {
     let constant = constant_r(run.truth.heights_m.iter().flatten())
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));
@@ -54,10 +52,10 @@ fn r_needed(run: &Run, curves: &[Curve]) -> Option<String> {
     needed(run, curves, &goal, is_found)
 }
 
-/// A planner's name with its curve.
+/// Name of a planner with its curve.
 type Curve<'a> = (&'a str, Vec<CurvePoint>);
 
-/// Words on each planner that has some, behind its name; `None` if no planner has.
+/// Returns the words on each planner that has some, after its name; `None` if no planner has.
 fn each(curves: &[Curve], words: impl Fn(&[CurvePoint]) -> Option<String>) -> Option<Vec<String>> {
     let found =
         curves.iter().filter_map(|(name, points)| Some(format!("{name} {}", words(points)?)));
@@ -65,7 +63,8 @@ fn each(curves: &[Curve], words: impl Fn(&[CurvePoint]) -> Option<String>) -> Op
     (!found.is_empty()).then_some(found)
 }
 
-/// Agreement of the last beliefs with verification and repeated touches, where there were any.
+/// Returns the agreement of the last beliefs with verification and repeated touches, if there were
+/// any.
 fn verified(run: &Run, curves: &[Curve]) -> Option<String> {
     let words = |points: &[CurvePoint]| {
         let point = points.last().filter(|point| point.touches == run.experiment.touches)?;
@@ -81,12 +80,10 @@ fn verified(run: &Run, curves: &[Curve]) -> Option<String> {
         (!parts.is_empty()).then(|| parts.join("; "))
     };
     let found = each(curves, words)?.join(" · ");
-    Some(format!(
-        "At verification touches, which the last belief predicted and did not learn from: {found}."
-    ))
+    Some(format!("At held-out verification touches the last belief has: {found}."))
 }
 
-/// Scores at the last drawn touch count that any planner reached.
+/// Returns the scores at the last drawn touch count that any planner reached.
 fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
     let counts = run.experiment.drawn_touch_counts();
     let is_reached = |count: &u32| curves.iter().any(|(_, points)| at(points, *count).is_some());
@@ -107,7 +104,7 @@ fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
     Some(format!("After {count} touches the mean R (Eq. 5) is: {found}."))
 }
 
-/// Nearness of the believed shapes of whole objects after the last touch that is drawn.
+/// Returns the accuracy of the believed shapes of whole objects after the last drawn touch.
 fn shapes(run: &Run, curves: &[Curve]) -> Option<String> {
     let count = run.experiment.drawn_touch_counts().into_iter().next_back()?;
     let words = |points: &[CurvePoint]| {
@@ -123,17 +120,17 @@ fn shapes(run: &Run, curves: &[Curve]) -> Option<String> {
     Some(format!("After {count} touches the mean Chamfer distance is: {found}."))
 }
 
-/// A curve after `count` touches.
+/// Returns the point of a curve after `count` touches.
 fn at(points: &[CurvePoint], count: u32) -> Option<&CurvePoint> {
     points.iter().find(|point| point.touches == count)
 }
 
-/// The median of an error, in the unit it is shown in.
+/// Returns the median of an error, in its display unit.
 fn median(point: &CurvePoint, measure: &Measure) -> Option<String> {
     Some(digits(measure.unit.per_si * point.of(measure)?.median))
 }
 
-/// The touches after which each planner meets a goal, and keeps meeting it.
+/// Returns the touches after which each planner meets a goal, and keeps meeting it.
 fn needed(
     run: &Run,
     curves: &[Curve],
@@ -147,7 +144,7 @@ fn needed(
     Some(format!("Touches needed for {goal}: {}.", each(curves, words)?.join(", ")))
 }
 
-/// The touches that the others need to be as near the truth as the first baseline is at its end.
+/// Returns the touches that the other planners need for the first baseline's final error.
 fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     let name = *run.experiment.baselines().first()?;
     let error = run.experiment.error();
@@ -168,22 +165,23 @@ fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     needed(run, &others, &goal, is_met)
 }
 
-/// Shares of the truth in a 95 % band that count as calibrated. heuristic.
+/// Fractions of the truth inside a 95 % band that count as calibrated, a heuristic: close to 95 %.
 pub(super) const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
 
-/// The share of the truth that the 95 % band of a curve's last belief holds.
+/// Returns the fraction of the truth inside the 95 % band of a curve's last belief.
 pub(super) fn share_in_band(points: &[CurvePoint]) -> Option<f64> {
     Some(points.last()?.of(&COVERAGE)?.mean)
 }
 
-/// The shares of the truth that the bands of the last beliefs hold.
+/// Returns the fractions of the truth inside the bands of the last beliefs.
 fn honesty(curves: &[Curve]) -> Option<String> {
     let words = |points: &[CurvePoint]| Some(format!("{:.0} %", 100.0 * share_in_band(points)?));
     let shares = each(curves, words)?.join(", ");
-    Some(format!("Of the truth the 95 % band of the last belief holds: {shares}."))
+    Some(format!("Fraction of the truth inside the 95 % band of the last belief: {shares}."))
 }
 
-/// The verdict on a run in words: only what its intervals establish; empty without a belief.
+/// Returns the verdict on a run as sentences, only with what its intervals establish; empty without
+/// a belief.
 pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
     let baselines = run.experiment.baselines();
     let baseline = baselines.first().copied().unwrap_or_default();
@@ -194,35 +192,38 @@ pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
         .collect()
 }
 
-/// The planners that are nearer the truth after the last touch than the first baseline.
+/// Returns which planners have a smaller error after the last touch than the first baseline.
 fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let id = run.experiment.error().id;
     let found = analysis.comparisons.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
+    let trials = found.clone().map(|it| it.paired.trials).max()?;
     let verdicts =
         found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));
+    let error = run.experiment.error().title;
     let words = [
-        format!("nearer the truth than {baseline}"),
-        format!("farther from the truth than {baseline}"),
-        format!("not told apart from {baseline}"),
+        format!("a smaller {error} than {baseline}"),
+        format!("a larger {error} than {baseline}"),
+        format!("no established difference in {error} from {baseline}"),
     ];
-    let clauses = clauses(verdicts.map(by_verdict), ["is", "are"], words)?;
-    Some(format!("After {} touches {clauses}.", run.experiment.touches))
+    let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
+    let touches = run.experiment.touches;
+    Some(format!("After {touches} touches, {clauses} ({trials} trials, 95 % intervals)."))
 }
 
-/// The planners that need fewer touches than the first baseline for the error that it ends with.
+/// Returns which planners need fewer touches than the first baseline for its final error.
 fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let id = run.experiment.error().id;
     let found = analysis.equal_errors.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
     let verdicts = found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Less)));
-    let words = ["fewer touches", "more touches", "about as many, as far as these trials tell"];
+    let words = ["fewer touches", "more touches", "about as many (no established difference)"];
     let words = words.map(String::from);
     let clauses = clauses(verdicts.map(by_verdict), ["needs", "need"], words)?;
-    Some(format!("For the error that {baseline} reaches, {clauses}."))
+    Some(format!("To reach the final error of {baseline}, {clauses}."))
 }
 
-/// The planners whose last bands hold as much of the truth as they say.
+/// Returns which planners have calibrated bands after the last touch.
 fn trust(run: &Run) -> Option<String> {
     let groups = run.experiment.planners.iter().filter_map(|name| {
         let points = summary::curve(&run.experiment, &run.rows, name);
@@ -234,21 +235,22 @@ fn trust(run: &Run) -> Option<String> {
         Some((name.as_str(), group))
     });
     let words = [
-        "about as far off as it says",
-        "too sure of itself",
-        "less sure of itself than it could be",
+        "calibrated (90 to 98 % of the truth in its 95 % band)",
+        "overconfident (less than 90 %)",
+        "underconfident (more than 98 %)",
     ];
-    let clauses = clauses(groups, ["is", "is"], words.map(String::from))?;
-    Some(format!("The last belief of {clauses}."))
+    let clauses = clauses(groups, ["is", "are"], words.map(String::from))?;
+    Some(format!("Calibration of the last belief: {clauses}."))
 }
 
-/// A planner with its group: better, worse, neither.
-fn by_verdict<'a>((planner, verdict): (&'a str, Option<&str>)) -> (&'a str, usize) {
+/// Returns a planner with its group: better, worse, neither.
+pub(super) fn by_verdict<'a>((planner, verdict): (&'a str, Option<&str>)) -> (&'a str, usize) {
     (planner, verdict.map_or(2, |word| usize::from(word != "better")))
 }
 
-/// A clause for each of three groups of planners that is not empty; `None` without planners.
-fn clauses<'a>(
+/// Returns a clause for each of three groups of planners that is not empty; `None` without
+/// planners.
+pub(super) fn clauses<'a>(
     planners: impl Iterator<Item = (&'a str, usize)>,
     [one, many]: [&str; 2],
     words: [String; 3],

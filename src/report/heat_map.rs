@@ -1,27 +1,27 @@
-//! A map of colours over a zone with two sides.
+//! Heat map over a zone with two sides.
 
 use super::canvas::{Area, Canvas, number};
 use super::style;
 use palpate_explore::task::Zone;
 
-/// About the size of a cell in pixels.
+/// Approximate size of a cell in pixels.
 const CELL_PX: f64 = 4.0;
-/// Number of colours; neighbours in a row that share one become one rectangle.
+/// Number of colours; adjacent cells of a row with the same colour become one rectangle.
 const LEVELS: usize = 64;
 
-/// A place, the value there, and whether it is drawn.
+/// Place, the value there, and whether it is drawn.
 pub type Reading = (Vec<f64>, f64, bool);
 
 /// Values over a zone, x varying fastest.
 pub struct HeatMap {
     columns: usize,
     rows: usize,
-    /// The readings at the middles of the cells.
+    /// Readings at the middles of the cells.
     pub readings: Vec<Reading>,
 }
 
 impl HeatMap {
-    /// A map of the size of `area`; `read` is given the middles of its cells.
+    /// Creates a map of the size of `area`; `read` gets the middles of its cells.
     pub fn new(zone: &Zone, area: Area, read: impl FnOnce(Vec<Vec<f64>>) -> Vec<Reading>) -> Self {
         let cells = |side_px: f64| (side_px / CELL_PX).round().max(1.0) as usize;
         let (columns, rows) = (cells(area.width), cells(area.height));
@@ -30,7 +30,7 @@ impl HeatMap {
         Self { columns, rows, readings: read((0..columns * rows).map(at).collect()) }
     }
 
-    /// The largest value drawn; 0 of none.
+    /// Returns the largest value drawn, or 0 if no value is drawn.
     pub fn largest(&self) -> f64 {
         let drawn = self.readings.iter().filter(|(.., is_drawn)| *is_drawn);
         drawn.map(|(_, value, _)| *value).fold(0.0, f64::max)
@@ -44,7 +44,7 @@ impl HeatMap {
             is_drawn.then(|| ((share * LEVELS as f64) as usize).min(LEVELS - 1))
         };
         let levels: Vec<Option<usize>> = self.readings.iter().map(level).collect();
-        // Ends of cells are written as they are, so that neighbours meet without a gap.
+        // Ends of cells are rounded alike, so that neighbours meet without a gap.
         let left =
             |column: usize| number(area.left + column as f64 * area.width / self.columns as f64);
         let top = |row: usize| number(area.bottom() - row as f64 * area.height / self.rows as f64);

@@ -1,11 +1,12 @@
-//! Parts of pages, each a file that needs nothing beside it.
+//! HTML building blocks of the pages; each page is one self-contained file.
 
 use super::canvas::escape;
+use super::glossary::explained;
 use super::style::ON_DARK;
 use super::table::{Table, wide};
 use std::fmt::Display;
 
-/// A page of this kind about something called `name`; `question` may be empty.
+/// Returns a page of a kind, titled `name`; `question` may be empty.
 pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String {
     let name = escape(name);
     let question = match question.trim() {
@@ -21,35 +22,51 @@ pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String
     )
 }
 
-/// A section of a page with a title, unless that is empty; empty without a body.
+/// Returns a section with a title, unless that is empty; empty without a body.
 pub(super) fn section(title: &str, body: &str) -> String {
     let title = if title.is_empty() { String::new() } else { format!("<h2>{title}</h2>\n") };
     if body.is_empty() { String::new() } else { format!("<section>\n{title}{body}</section>\n") }
 }
 
-/// A section with tables that are not empty, and a note below them.
+/// Returns a section with the tables that are not empty, and a note below them.
 pub(super) fn tables(title: &str, tables: &[Table], class: &str, note: &str) -> String {
     let tables = tables.iter().filter(|table| !table.rows.is_empty());
     match tables.map(|table| table.html(class)).collect::<String>() {
         body if body.is_empty() => body,
-        body => section(title, &format!("{body}<p class=\"note\">{}</p>\n", escape(note))),
+        body => section(title, &format!("{body}{}", paragraph(note))),
     }
 }
 
-/// A drawing with its caption as HTML.
+/// Returns a note with tooltips; empty without words.
+fn paragraph(note: &str) -> String {
+    match note {
+        "" => String::new(),
+        note => format!("<p class=\"note\">{}</p>\n", explained(note)),
+    }
+}
+
+/// Returns a part of a page that opens on a click on `summary`; empty without a body.
+pub(super) fn fold(summary: &str, body: &str) -> String {
+    match body {
+        "" => String::new(),
+        body => format!("<details>\n<summary>{summary}</summary>\n{body}</details>\n"),
+    }
+}
+
+/// Returns a drawing with its caption.
 pub(super) fn figure(id: &str, svg: &str, caption: impl Display) -> String {
     let svg = wide(svg, "figure");
     format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
 }
 
-/// A list of sentences; empty without any.
+/// Returns a list of sentences; empty without any.
 pub(super) fn list(class: &str, items: &[String]) -> String {
     let items: String = items.iter().map(|it| format!("<li>{}</li>\n", escape(it))).collect();
     if items.is_empty() { items } else { format!("<ul{class}>\n{items}</ul>\n") }
 }
 
-/// Drawings keep their colours for light paper; on dark paper the page gives them others. Touches
-/// on a relief stay, because the relief does.
+/// Returns the style that replaces the colours of drawings on a dark page. Touches on a relief keep
+/// theirs, because the relief does.
 fn figures_on_dark() -> String {
     let rules = ON_DARK.iter().flat_map(|(light, dark)| {
         ["fill", "stroke"].map(|property| {

@@ -1,24 +1,24 @@
-//! A legend: swatches with their words, in as many rows as they need.
+//! Legend of a drawing: swatches with their labels, in as many rows as they need.
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::style::{self, INITIAL, LATER, TEXT_PX};
 use crate::experiment::store::Run;
 
-/// From one row to the next.
+/// Height of a row.
 const ROW_PX: f64 = 20.0;
-/// From an entry to its words, and from its words to the next entry.
+/// Distance from a swatch to its label, and from a label to the next swatch.
 const GAPS_PX: [f64; 2] = [28.0, 18.0];
-/// Width of a letter: there are no font metrics here, so that of the widest common sans-serif.
+/// Width of a letter of the widest common sans-serif font, as there are no font metrics here.
 const LETTER_PX: f64 = 7.4;
 
-/// Swatches with their words, each in its place.
+/// Legend entries with their positions.
 pub struct Legend<'a> {
-    /// Each with where it begins, from the left and from the first row.
+    /// Entries with their positions, from the left and from the first row.
     entries: Vec<(PointPx, Swatch, &'a str)>,
 }
 
 impl<'a> Legend<'a> {
-    /// Lays entries out in rows of a width; one that is wider has a row for itself.
+    /// Lays entries out in rows of a width; one that is wider gets its own row.
     pub fn new(width_px: f64, entries: impl IntoIterator<Item = (Swatch, &'a str)>) -> Self {
         let [mut x, mut y] = [0.0; 2];
         let mut placed = Vec::new();
@@ -33,12 +33,12 @@ impl<'a> Legend<'a> {
         Self { entries: placed }
     }
 
-    /// Room that the rows below the first need.
+    /// Returns the height of the rows below the first.
     pub fn more_px(&self) -> f64 {
         self.entries.last().map_or(0.0, |([_, y], ..)| *y)
     }
 
-    /// Draws it, the middle of its first row's left end at `at`.
+    /// Draws the legend, with the middle of its first row's left end at `at`.
     pub fn draw(&self, canvas: &mut Canvas, at: PointPx) {
         for ([x, y], swatch, words) in &self.entries {
             let [left, middle] = [at[0] + x, at[1] + y];
@@ -48,20 +48,20 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// A drawing with a legend above panels of one size in columns and rows.
+/// Drawing with a legend above panels of one size in columns and rows.
 pub struct Sheet {
-    /// The drawing, with the legend on it.
+    /// Drawing with the legend.
     pub canvas: Canvas,
     first: Area,
     step: [f64; 2],
-    /// The bottom edge of the drawing.
+    /// Bottom edge of the drawing.
     pub bottom: f64,
 }
 
 impl Sheet {
-    /// A drawing of `size` with a legend of a width, drawn in a group of `attributes`, and `step`
-    /// from one panel to the next. It grows, and `first` moves down, by the rows that the legend
-    /// needs behind the first.
+    /// Creates a drawing of `size` with a legend of a width, drawn in a group of `attributes`, and
+    /// a distance of `step` between panels. The drawing grows, and `first` moves down, by the
+    /// legend's additional rows.
     pub fn new<'a>(
         [width, height]: [f64; 2],
         (first, step): (Area, [f64; 2]),
@@ -80,24 +80,24 @@ impl Sheet {
         Self { canvas, first, step, bottom }
     }
 
-    /// The rectangle of a panel.
+    /// Returns the rectangle of a panel.
     pub fn area(&self, column: usize, row: f64) -> Area {
         let left = self.first.left + column as f64 * self.step[0];
         Area { left, top: self.first.top + row * self.step[1], ..self.first }
     }
 }
 
-/// The entry of touches that met nothing, if there are any.
+/// Returns the legend entry of missed touches, if there are any.
 pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
     let mut touches = run.rows.iter().flat_map(|row| &row.touches);
     let is_missed = touches.any(|touch| touch.contact.is_none());
     is_missed.then_some(MISS)
 }
 
-/// The entry of touches that met nothing.
-pub const MISS: (Swatch, &str) = (Swatch::Diamond(LATER), "touch that met nothing");
+/// Legend entry of missed touches.
+pub const MISS: (Swatch, &str) = (Swatch::Diamond(LATER), "touch without contact");
 
-/// The entries of touches on a surface that may hide them.
+/// Returns the legend entries of touches that a surface may hide.
 pub fn touch_entries() -> [(Swatch, &'static str); 3] {
     [
         (Swatch::Circle(style::visible(INITIAL)), "initial touch"),
@@ -106,19 +106,19 @@ pub fn touch_entries() -> [(Swatch, &'static str); 3] {
     ]
 }
 
-/// A mark in a legend.
+/// Swatch of a legend.
 pub enum Swatch {
-    /// A line with these attributes.
+    /// Line with these attributes.
     Line(String),
-    /// A band in this colour.
+    /// Band in this colour.
     Band(&'static str),
-    /// A cross in this colour.
+    /// Cross in this colour.
     Cross(&'static str),
-    /// A circle with these attributes.
+    /// Circle with these attributes.
     Circle(String),
-    /// A hollow diamond in this colour.
+    /// Hollow diamond in this colour.
     Diamond(&'static str),
-    /// A filled box in this colour.
+    /// Filled box in this colour.
     Box(&'static str),
 }
 

@@ -1,4 +1,4 @@
-//! Tables, figures and the page of a run, drawn from its rows: nothing is run again.
+//! Report of a run: tables, figures and a page, drawn from its recorded rows.
 
 pub mod accuracy;
 pub mod axes;
@@ -9,6 +9,7 @@ pub mod explorer;
 pub mod figures;
 pub mod files;
 pub mod findings;
+mod glossary;
 pub mod heat_map;
 mod html;
 pub mod legend;
@@ -22,7 +23,7 @@ pub mod solid;
 pub mod style;
 pub mod table;
 pub mod tables {
-    //! The tables of a run, on its page and in its folder.
+    //! Tables of a run, for its page and its folder.
 
     pub mod comparison;
     pub mod summary;
@@ -36,7 +37,7 @@ use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Ru
 use anyhow::Context;
 use std::path::Path;
 
-/// Every figure in the order of the page; one line to add one.
+/// Figures in the order of the page; one line adds a figure.
 pub const FIGURES: &[Figure] = &[
     figures::convergence::FIGURE,
     figures::curves::FIGURE,
@@ -60,7 +61,7 @@ pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Re
     files.iter().try_for_each(|(name, table)| table.write_csv(&folder.join(name)))
 }
 
-/// Draws everything into the run's folder: `figures/*.svg`, the same as `.png` and `.pdf`,
+/// Writes figures and page into the run's folder: `figures/*.svg`, with `.png` and `.pdf`, and
 /// `report.html`.
 ///
 /// # Errors
@@ -72,7 +73,7 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
     for figure in FIGURES {
         let path = figures.join(figure.name);
         let svg = (figure.draw)(run).with_context(|| path.display().to_string())?;
-        // A figure that does not apply leaves no older one behind.
+        // The files of a figure that no longer applies are removed.
         match &svg {
             Some(svg) => files::write(&path, svg)?,
             None => files::remove(&path).with_context(|| path.display().to_string())?,

@@ -1,30 +1,32 @@
-//! The page of a run: one file that needs nothing beside it.
+//! Page of a run: one self-contained HTML file.
 
 use super::canvas::escape;
 use super::figures::Figure;
 use super::files::FORMATS;
 use super::findings;
-use super::html::{self, list, section, tables};
+use super::glossary::explained;
+use super::html::{self, fold, list, section, tables};
 use super::tables::{comparison, summary};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::Run;
 
-/// Files of a run folder that the page points to.
+/// Files of a run folder that the page links to.
 const RAW: &[(&str, &str)] = &[
-    ("trials.jsonl", "a row per trial with every touch"),
+    ("trials.jsonl", "a row per trial, with every touch"),
     ("summary.csv", "the curves as a table"),
-    ("comparison.csv", "the planners against each other, every measure"),
+    ("comparison.csv", "paired comparison of planners, every measure"),
     ("equal_error.csv", "touches to equal error"),
     ("surface.csv", "the true surface on the test grid"),
-    ("resolved.toml", "every setting; can be run again"),
-    ("manifest.json", "what ran it"),
+    ("resolved.toml", "all settings; this file can be run again"),
+    ("manifest.json", "versions of the software, and the machine"),
 ];
 
-/// Failures listed one by one; more are only counted.
-const FAILURES_TOLD: usize = 10;
+/// Largest number of failures listed one by one; the others are only counted.
+const FAILURES_LISTED: usize = 10;
 
-/// The page as HTML; `explorer` is its moving part, `settings` and `manifest` are the texts of the
-/// files of that name, if they are there.
+/// Returns the page as HTML: verdict, error curves and interactive view, then everything else
+/// folded. `explorer` is the interactive view; `settings` and `manifest` are the texts of the files
+/// of that name, if they exist.
 pub fn html(
     run: &Run,
     analysis: &Analysis,
@@ -34,32 +36,51 @@ pub fn html(
 ) -> String {
     let equal = comparison::equal_errors(run, &analysis.equal_errors);
     let against = comparison::comparisons(run, &analysis.comparisons);
+    let figures = |is_curve: bool| -> String {
+        let drawings = drawings.iter().filter(|(it, _)| (it.name == CURVES) == is_curve);
+        drawings.map(|(it, svg)| figure(run, it, svg)).collect()
+    };
+    let claims = tables("", &[summary::claims(run)], "told", summary::CLAIMS_NOTE);
+    let summary = tables("", &[summary::table(run)], "counted", &summary::note(run));
+    let equal = tables("", &equal, "named", &comparison::equal_errors_note(run));
+    let against = tables("", &against, "named", &comparison::comparisons_note(run));
     let parts = [
         list(" class=\"notices\"", &findings::notices(run)),
+        verdict(run, analysis),
+        figures(true),
         explorer.into(),
-        found(run, analysis),
-        tables("The paper, and here", &[summary::claims(run)], "told", summary::CLAIMS_NOTE),
-        tables("", &[summary::table(run)], "counted", &summary::note(run)),
-        tables("Touches to equal error", &equal, "named", &comparison::equal_errors_note(run)),
-        tables("Planner against planner", &against, "named", &comparison::comparisons_note(run)),
-        events(run),
-        drawings.iter().map(|(it, svg)| figure(run, it, svg)).collect(),
-        details("Every setting, defaults written out", settings),
-        details("What ran it", manifest),
-        raw_files(drawings),
+        fold("Results next to the paper", &claims),
+        fold("Measures by number of touches", &summary),
+        fold("Touches to equal error", &equal),
+        fold("Paired comparison of planners", &against),
+        fold("Misses, aborted touches and failures", &events(run)),
+        fold("Beliefs and targets", &figures(false)),
+        fold("All settings, including defaults", &preformatted(settings)),
+        fold("Software and machine", &preformatted(manifest)),
+        fold("Files in this folder", &raw_files(drawings)),
     ];
     html::page("Palpate run", &run.experiment.name, &run.experiment.question, &parts.concat())
 }
 
-/// The verdict in words, then its numbers.
-fn found(run: &Run, analysis: &Analysis) -> String {
-    let verdict = match findings::verdicts(run, analysis).join(" ") {
-        words if words.is_empty() => words,
-        words => format!("<p class=\"verdict\">{}</p>\n", escape(&words)),
-    };
+/// Name of the figure that stays open: errors against touches.
+const CURVES: &str = "convergence";
+
+/// Returns the verdict: its first sentence alone, then the others, then the numbers folded.
+fn verdict(run: &Run, analysis: &Analysis) -> String {
     let numbers = findings::sentences(run);
-    let numbers: String = numbers.iter().map(|it| format!("<p>{}</p>\n", escape(it))).collect();
-    format!("<section>\n<h2>Found</h2>\n{verdict}{numbers}</section>\n")
+    let verdicts = findings::verdicts(run, analysis);
+    // Without a comparison the first of the numbers is the result.
+    let (first, others, numbers) = match (&verdicts[..], &numbers[..]) {
+        ([first, others @ ..], numbers) => (first.as_str(), others, numbers),
+        ([], [first, numbers @ ..]) => (first.as_str(), &[][..], numbers),
+        ([], []) => return String::new(),
+    };
+    let paragraphs = |sentences: &[String]| -> String {
+        sentences.iter().map(|it| format!("<p>{}</p>\n", explained(it))).collect()
+    };
+    let verdict = format!("<p class=\"verdict\">{}</p>\n", explained(first));
+    let numbers = fold("Findings in numbers", &paragraphs(numbers));
+    section("", &[verdict, paragraphs(others), numbers].concat())
 }
 
 fn events(run: &Run) -> String {
@@ -67,24 +88,21 @@ fn events(run: &Run) -> String {
     let failures = run.rows.iter().filter_map(|row| {
         Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
     });
-    items.extend(failures.take(FAILURES_TOLD));
-    section("What else happened", &list("", &items))
+    items.extend(failures.take(FAILURES_LISTED));
+    list("", &items)
 }
 
 fn figure(run: &Run, figure: &Figure, svg: &str) -> String {
     let name = figure.name;
     let links = FORMATS
         .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
-    let caption = escape(&(figure.caption)(run));
+    let caption = explained(&(figure.caption)(run));
     let caption = format!("{caption} <span class=\"files\">{}</span>", links.join(" "));
     html::figure(name, svg, caption)
 }
 
-fn details(summary: &str, text: Option<&str>) -> String {
-    text.map_or(String::new(), |text| {
-        let text = escape(text);
-        format!("<details>\n<summary>{summary}</summary>\n<pre>{text}</pre>\n</details>\n")
-    })
+fn preformatted(text: Option<&str>) -> String {
+    text.map_or(String::new(), |text| format!("<pre>{}</pre>\n", escape(text)))
 }
 
 fn raw_files(drawings: &[(&Figure, String)]) -> String {
@@ -95,5 +113,5 @@ fn raw_files(drawings: &[(&Figure, String)]) -> String {
     if !drawings.is_empty() {
         items += "<li><a href=\"figures/\">figures</a>: each figure as SVG, PNG and PDF</li>\n";
     }
-    section("Files beside this page", &format!("<ul>\n{items}</ul>\n"))
+    format!("<ul>\n{items}</ul>\n")
 }

@@ -1,26 +1,27 @@
-//! Points with normals, and triangles between them, as files that other programs open.
+//! Point clouds and triangle meshes with normals, as PLY and OBJ.
 
 use nalgebra::{Point3, Vector3};
 use std::fmt::Write;
 
-/// Points in `W`, in metres; joined to a surface or not.
+/// Points in `W`, in metres, optionally joined to a surface.
 #[derive(Default)]
 pub struct Points {
     /// Comments at the top of the file, a line each.
     pub comments: Vec<String>,
-    /// The points with their unit normals.
+    /// Points with their unit normals.
     pub points: Vec<(Point3<f64>, Vector3<f64>)>,
-    /// How sure each is: its standard deviation in m, and a colour that shows it. As many as
-    /// points, or none.
+    /// Standard deviation of each point in m, with a colour that shows it; as many as points, or
+    /// empty.
     pub deviations: Vec<(f64, [u8; 3])>,
-    /// How far each lies from the true surface, in m. As many as points, or none.
+    /// Distance of each point from the true surface, in m; as many as points, or empty.
     pub errors_m: Vec<f64>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[usize; 3]>,
 }
 
 impl Points {
-    /// As PLY: `x y z nx ny nz`, with deviations `red green blue sigma_m`, with errors `error_m`.
+    /// Formats the points as PLY: `x y z nx ny nz`, with deviations `red green blue sigma_m`, with
+    /// errors `error_m`.
     pub fn ply(&self) -> String {
         let mut text = String::from("ply\nformat ascii 1.0\n");
         self.comments.iter().for_each(|comment| text += &format!("comment {comment}\n"));
@@ -57,8 +58,8 @@ impl Points {
         text
     }
 
-    /// As OBJ, which knows no properties: the colour follows the coordinates, as most programs
-    /// read it, and deviation and error stand in a comment.
+    /// Formats the points as OBJ, which has no properties: the colour follows the coordinates, as
+    /// most programs read it, and deviation and error are in a comment.
     pub fn obj(&self) -> String {
         let mut text = String::new();
         self.comments.iter().for_each(|comment| text += &format!("# {comment}\n"));
@@ -89,7 +90,7 @@ impl Points {
     }
 }
 
-/// To a tenth of a micrometre.
+/// Formats a vector to a tenth of a micrometre.
 fn numbers(v: &Vector3<f64>) -> String {
     format!("{:.7} {:.7} {:.7}", v.x, v.y, v.z)
 }

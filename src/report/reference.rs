@@ -1,4 +1,4 @@
-//! The reference of settings and files, drawn from the types that read and write them.
+//! Generator of the reference of settings and files, from the types that read and write them.
 
 use crate::experiment::Experiment;
 use crate::experiment::measure::metrics::Metrics;
@@ -12,10 +12,10 @@ use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// An experiment with every table there is: what is allowed in it follows from its own rules.
+/// Experiment with every table, from whose checks the allowed values are taken.
 const COMPLETE: &str = include_str!("reference.toml");
 
-/// Every setting of an experiment, table by table, as Markdown.
+/// Returns every setting of an experiment, table by table, as Markdown.
 pub fn settings() -> String {
     let schema = schema_for!(Experiment).to_value();
     let mut text = String::new();
@@ -23,25 +23,25 @@ pub fn settings() -> String {
     text
 }
 
-/// Field of the experiment that its table `[gp]` fills around a whole object.
+/// Field of the experiment for the table `[gp]` of a whole object.
 const AROUND: &str = "space";
 
 fn allowed() -> BTreeMap<String, String> {
     let Ok(complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
     let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
     let rules = Rules::of(&complete).into_iter();
-    // A rule of every entry is listed once.
+    // A check that all entries share is listed once.
     rules.map(|(key, allowed)| (whole(&key), allowed)).collect()
 }
 
-/// `key` without the numbers of its entries.
+/// Returns `key` without the indices of its entries.
 fn whole(key: &str) -> String {
     let parts = key.split('[').map(|part| part.split_once(']').map_or(part, |(_, rest)| rest));
     parts.collect()
 }
 
-/// Adds the table of settings `prefix` and then the tables within it; `root` is the whole schema,
-/// and `allowed` holds the allowed values by key.
+/// Adds the table of settings `prefix`, then the tables within it; `root` is the whole schema, and
+/// `allowed` has the allowed values by key.
 fn add_table(
     text: &mut String,
     (root, allowed): (&Value, &BTreeMap<String, String>),
@@ -84,7 +84,7 @@ fn add_table(
     }
 }
 
-/// The schema behind a reference, or of a value that may be left out.
+/// Returns the schema behind a reference, or the schema of an optional value.
 fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
     let options = schema["anyOf"].as_array().or(schema["allOf"].as_array());
     let inner = options.and_then(|all| all.iter().find(|one| one["type"] != "null"));
@@ -114,7 +114,7 @@ fn kind(schema: &Value, entries: &Value) -> String {
     }
 }
 
-/// The names that a choice has.
+/// Returns the names of a choice.
 fn names(schema: &Value) -> Option<String> {
     let options = schema["oneOf"].as_array()?;
     let names = options.iter().flat_map(|option| match &option["const"] {
@@ -125,18 +125,18 @@ fn names(schema: &Value) -> Option<String> {
     (!names.is_empty()).then(|| names.join(", "))
 }
 
-/// The first paragraph of a documentation, without line breaks.
+/// Returns the first paragraph of a documentation, without line breaks.
 fn words(property: &Value, inner: &Value) -> String {
     let text = property["description"].as_str().or(inner["description"].as_str()).unwrap_or("");
     plain(text.split("\n\n").next().unwrap_or(""))
 }
 
-/// Text without line breaks.
+/// Returns a text without line breaks.
 fn plain(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The table of measures as Markdown: what `summary.csv` holds of each.
+/// Returns the table of measures as Markdown, with their columns in `summary.csv`.
 pub fn measures() -> String {
     let heads = ["measure", "what", "in files", "better", "columns of `summary.csv`"];
     let mut table = Table::new(heads.map(Column::new));
@@ -156,7 +156,7 @@ pub fn measures() -> String {
     table.markdown()
 }
 
-/// Fields with what they hold, as Markdown.
+/// Returns fields with their descriptions, as Markdown.
 fn fields<'a>(fields: impl IntoIterator<Item = (&'a String, String)>) -> String {
     let mut table = Table::new(["field", "what"].map(Column::new));
     let rows = fields.into_iter().map(|(name, words)| [format!("`{name}`"), plain(&words)]);
@@ -164,23 +164,23 @@ fn fields<'a>(fields: impl IntoIterator<Item = (&'a String, String)>) -> String 
     table.markdown()
 }
 
-/// The columns of a table in files as Markdown.
+/// Returns the file columns of a table, as Markdown.
 pub fn columns(table: &Table) -> String {
     fields(table.file_columns().iter().map(|(name, note)| (name, (*note).into())))
 }
 
-/// The fields of a file's records as Markdown.
+/// Returns the fields of a file's records, as Markdown.
 fn record<T: JsonSchema>() -> String {
     let schema = schema_for!(T).to_value();
     let properties = schema["properties"].as_object().into_iter().flatten();
     fields(properties.map(|(name, property)| (name, words(property, &Value::Null))))
 }
 
-/// The fields of a line of `trials.jsonl`, of each of its touches and of their parts.
+/// Returns the fields of a line of `trials.jsonl`, of each of its touches and of their parts.
 pub fn rows() -> String {
     format!(
-        "{}\nEach of `touches`:\n\n{}\nIts `metrics`:\n\n{}\nIts `shape`:\n\n{}\n\
-         Its `fit`:\n\n{}",
+        "{}\nEach of `touches`:\n\n{}\n`metrics` of a touch:\n\n{}\n`shape` of a touch:\n\n{}\n\
+         `fit` of a touch:\n\n{}",
         record::<TrialRow>(),
         record::<TouchRow>(),
         record::<Metrics>(),

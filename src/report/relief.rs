@@ -1,4 +1,4 @@
-//! A height field or a mesh as a shaded relief in a panel: orthographic view, painter's algorithm.
+//! Shaded relief of a height field or a mesh: orthographic view, painter's algorithm.
 
 use super::axes::{Axis, Length, rounded};
 use super::canvas::{Anchor, Area, Canvas, PointPx, pair};
@@ -7,21 +7,23 @@ use nalgebra::Vector3;
 
 /// Direction of the light: from the front, so that no relief is dark, and from the viewer's side.
 const LIGHT: Vector3<f64> = Vector3::new(0.45, 0.7, 0.55);
-/// Share of light that comes from everywhere.
+/// Fraction of ambient light.
 const AMBIENT: f64 = 0.35;
-/// Relief less deep than this share of the zone's longer side is stretched to it.
+/// Smallest depth of a relief as a fraction of the zone's longer side; a flatter one is stretched
+/// to it.
 const DEPTH_MIN: f64 = 0.25;
 
-/// The default azimuth of the viewer, turned about z from y, the direction of touch. heuristic:
+/// Default azimuth of the viewer, turned about z from y, the direction of touch; a heuristic:
 /// neither side of a bulge hides much.
 pub const AZIMUTH_DEG: f64 = 38.0;
-/// How far the viewer is raised. heuristic: likewise.
+// Elevation of the viewer.
+// heuristic: neither side of a bulge hides much.
 const ELEVATION_DEG: f64 = 24.0;
 
-/// Attributes of marks whose colours do not change with the paper's, because the relief's do not.
+/// Attributes of marks whose colours do not change on a dark page, because the relief's do not.
 pub const ON_RELIEF: &str = r#"class="relief""#;
 
-/// A viewer at infinity, and where a point lies on a sheet.
+/// Orthographic camera, with the mapping from points to the drawing.
 pub struct Camera {
     right: Vector3<f64>,
     up: Vector3<f64>,
@@ -33,7 +35,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A viewer turned about z from y towards x, with one pixel a metre about the sheet's corner.
+    /// Creates a camera turned about z from y towards x, with one pixel a metre about the drawing's
+    /// corner.
     pub fn toward(azimuth_deg: f64, stretch: f64) -> Self {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
         let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
@@ -42,20 +45,20 @@ impl Camera {
         Self { right, up: toward.cross(&right), toward, stretch, scale: 1.0, shift: [0.0, 0.0] }
     }
 
-    /// Pixels per metre at which all `points` fit into `area`.
+    /// Returns the scale, in pixels per metre, at which all `points` fit into `area`.
     pub fn scale(&self, points: &[Vector3<f64>], area: Area) -> f64 {
         let [low, high] = self.ends(points);
         (area.width / (high[0] - low[0])).min(area.height / (high[1] - low[1]))
     }
 
-    /// The same with so many pixels a metre, and all `points` about the middle of `area`.
+    /// Returns the camera with a scale of `px_per_m`, and all `points` about the middle of `area`.
     pub fn scaled(self, px_per_m: f64, points: &[Vector3<f64>], area: Area) -> Self {
         let ([low, high], centre) = (self.ends(points), area.centre());
         let shift = std::array::from_fn(|i| centre[i] - px_per_m * 0.5 * (low[i] + high[i]));
         Self { scale: px_per_m, shift, ..self }
     }
 
-    /// The corners of a rectangle around points of the sheet.
+    /// Returns the corners of a rectangle around the points in the drawing.
     fn ends(&self, points: &[Vector3<f64>]) -> [PointPx; 2] {
         let end = |start: f64, farther: fn(f64, f64) -> f64| {
             let at = points.iter().map(|point| self.at(point));
@@ -68,7 +71,7 @@ impl Camera {
         Vector3::new(p.x, p.y * self.stretch, p.z)
     }
 
-    /// Where a point in metres lies on the sheet.
+    /// Returns the position of a point in metres in the drawing.
     pub fn at(&self, p: &Vector3<f64>) -> PointPx {
         let p = self.stretched(p);
         [
@@ -77,25 +80,25 @@ impl Camera {
         ]
     }
 
-    /// How near the viewer a point is, in pixels.
+    /// Returns the distance of a point towards the viewer, in pixels.
     pub fn nearness(&self, p: &Vector3<f64>) -> f64 {
         self.scale * self.stretched(p).dot(&self.toward)
     }
 }
 
-/// The space that is drawn, in metres; heights grow towards the viewer.
+/// Space that is drawn, in metres; heights grow towards the viewer.
 #[derive(Clone, Copy, Debug)]
 pub struct Space {
-    /// Ends of x.
+    /// Range of x.
     pub x_m: [f64; 2],
-    /// Ends of z.
+    /// Range of z.
     pub z_m: [f64; 2],
-    /// Ends of the heights; what lies beyond is drawn at the end.
+    /// Range of the heights; values beyond are drawn at the end.
     pub height_m: [f64; 2],
 }
 
 impl Space {
-    /// Factor by which heights are stretched against x and z.
+    /// Returns the factor by which heights are stretched against x and z.
     pub fn stretch(&self) -> f64 {
         let length = |[low, high]: [f64; 2]| high - low;
         let side = length(self.x_m).max(length(self.z_m));
@@ -103,10 +106,10 @@ impl Space {
     }
 }
 
-/// Room for the title of a panel.
+/// Height of the title of a panel.
 const TITLE_PX: f64 = 42.0;
 
-/// The shortest side along which its name fits between the numbers at its ends.
+/// Shortest side along which its name fits between the numbers at its ends.
 const UPWARD_MIN_PX: f64 = 80.0;
 
 /// Writes the title of a panel and a score below it.
@@ -116,18 +119,18 @@ pub fn title(canvas: &mut Canvas, area: Area, title: &str, score: &str) {
     canvas.coloured_text([middle, area.top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
 }
 
-/// A panel with a title, a space in it, and the ends of its axes.
+/// Panel with a title, a space in it, and the ends of its axes.
 pub struct ReliefPanel {
-    /// The space that is drawn.
+    /// Space that is drawn.
     pub space: Space,
-    /// Where points (x, height, z) of the space lie on the sheet.
+    /// Camera that maps points (x, height, z) of the space to the drawing.
     pub camera: Camera,
     area: Area,
     unit: Length,
 }
 
 impl ReliefPanel {
-    /// Fits a space into an area.
+    /// Creates a panel that fits a space into an area.
     pub fn new(unit: Length, area: Area, space: Space) -> Self {
         let inner = Area {
             left: area.left + 24.0,
@@ -143,7 +146,7 @@ impl ReliefPanel {
         Self { space, camera: camera.scaled(px_per_m, &corners, inner), area, unit }
     }
 
-    /// Title, the zone behind the object, and the ends of its axes.
+    /// Draws the title, the zone behind the object, and the ends of its axes.
     pub fn frame(&self, canvas: &mut Canvas, title: &str, score: &str) {
         self::title(canvas, self.area, title, score);
         let Space { x_m: [x0, x1], z_m: [z0, z1], height_m: [back, front] } = self.space;
@@ -181,21 +184,21 @@ impl ReliefPanel {
     }
 }
 
-/// A part of a surface, as it is drawn.
+/// Face of a surface in the drawing.
 struct Face {
     outline: Vec<PointPx>,
     nearness: f64,
     colour: String,
 }
 
-/// A surface as faces, far ones first.
+/// Surface as faces, far ones first.
 pub struct Relief {
     faces: Vec<Face>,
 }
 
 impl Relief {
-    /// Joins heights over a grid of x (varying fastest) and z; where one is missing, so is the
-    /// surface. Heights are coloured along `axis`.
+    /// Creates a surface from heights over a grid of x (varying fastest) and z, with holes where
+    /// heights are missing. Heights are coloured along `axis`.
     pub fn new(
         panel: &ReliefPanel,
         [xs, zs]: [&[f64]; 2],
@@ -212,7 +215,7 @@ impl Relief {
         let face = |(i, j): (usize, usize)| {
             let around = [(i - 1, j - 1), (i, j - 1), (i, j), (i - 1, j)];
             let corners: Vec<_> = around.into_iter().filter_map(corner).collect();
-            // Three of four still make a face, which smooths the outline of an object.
+            // Three corners of four still make a face, which smooths the outline of an object.
             (corners.len() >= 3).then(|| {
                 let normal = normal(&panel.camera, &corners);
                 let colour = height_colour(axis, &corners, &normal);
@@ -222,8 +225,8 @@ impl Relief {
         Self::of(&panel.camera, cells.filter_map(face))
     }
 
-    /// The triangles that face the viewer, each in the colour of its place in the list, its corners
-    /// and its unit normal.
+    /// Creates a surface from the triangles that face the viewer; the colour function gets the
+    /// triangle's index, corners and unit normal.
     pub fn of_triangles(
         camera: &Camera,
         triangles: impl IntoIterator<Item = [Vector3<f64>; 3]>,
@@ -249,9 +252,9 @@ impl Relief {
         Self { faces }
     }
 
-    /// Draws it, far faces first.
+    /// Draws the surface, far faces first.
     pub fn draw(&self, canvas: &mut Canvas) {
-        // A rim in the face's own colour closes the hairlines between faces.
+        // A stroke in the face's own colour closes the hairlines between faces.
         let shared = r#"fill="currentColor" stroke="currentColor" stroke-width=".7""#;
         canvas.grouped(shared, |canvas| {
             for Face { outline, colour, .. } in &self.faces {
@@ -262,7 +265,7 @@ impl Relief {
         });
     }
 
-    /// Whether it hides a point, on the surface or behind it.
+    /// Returns whether the surface hides a point on it or behind it.
     pub fn hides(&self, camera: &Camera, p: &Vector3<f64>) -> bool {
         // A contact on the surface is not hidden by the faces around it.
         const ON_SURFACE_PX: f64 = 8.0;
@@ -286,10 +289,10 @@ impl Relief {
     }
 }
 
-/// Unit normal of a height field's face, towards the front.
+/// Returns the unit normal of a height field's face, towards the front.
 fn normal(camera: &Camera, corners: &[Vector3<f64>]) -> Vector3<f64> {
     let corners: Vec<_> = corners.iter().map(|corner| camera.stretched(corner)).collect();
-    // Of a quadrilateral, its diagonals span the mean plane.
+    // The diagonals of a quadrilateral span its mean plane.
     let (along, across) = match corners[..] {
         [a, b, c, d] => (c - a, d - b),
         _ => (corners[1] - corners[0], corners[2] - corners[0]),
@@ -298,18 +301,18 @@ fn normal(camera: &Camera, corners: &[Vector3<f64>]) -> Vector3<f64> {
     if normal.y < 0.0 { -normal } else { normal }
 }
 
-/// The colour of a face by the mean height of its corners along `axis`, and its light.
+/// Returns the colour of a face from the mean height of its corners along `axis`, and its light.
 pub fn height_colour(axis: &Axis, corners: &[Vector3<f64>], normal: &Vector3<f64>) -> String {
     let mean = corners.iter().map(|corner| corner.y).sum::<f64>() / corners.len() as f64;
     style::height(axis.fraction(mean), brightness(normal))
 }
 
-/// Brightness of a matt face of this unit normal (x, height, z), 0..1.
+/// Returns the brightness of a matt face with this unit normal (x, height, z), 0..1.
 pub fn brightness(normal: &Vector3<f64>) -> f64 {
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT.normalize()).max(0.0)
 }
 
-/// Whether a polygon contains a point, by the parity of its crossings.
+/// Returns whether a polygon contains a point, by the parity of its crossings.
 fn contains(outline: &[PointPx], [x, y]: PointPx) -> bool {
     let mut is_inside = false;
     for (i, &[ax, ay]) in outline.iter().enumerate() {

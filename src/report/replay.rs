@@ -1,4 +1,4 @@
-//! Beliefs as they were: a recorded trial's touches and hyperparameters, conditioned again.
+//! Replay of beliefs: a recorded trial's touches and hyperparameters, conditioned again.
 
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::store::Run;
@@ -14,26 +14,26 @@ use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 
-/// The score of a belief that there is none of.
+/// Score of a missing belief.
 pub const NOT_REACHED: &str = "not reached in this trial";
 
-/// One planner's belief after some touches of the trial that the report draws.
+/// Belief of one planner after some touches of the drawn trial.
 pub struct Replay<'a> {
-    /// The belief.
+    /// Belief.
     pub belief: HeightField,
-    /// The posterior of the surface.
+    /// Posterior of the surface.
     pub surface: Posterior,
-    /// Its agreement with the truth.
+    /// Agreement with the truth.
     pub metrics: Option<Metrics>,
-    /// The touches so far.
+    /// Touches so far.
     pub touches: &'a [TouchRow],
-    /// The touch that followed.
+    /// Next touch.
     pub next: Option<&'a TouchRow>,
     initial_touches: usize,
 }
 
 impl<'a> Replay<'a> {
-    /// The belief of `planner` after `count` touches; none if the trial is missing, ended
+    /// Replays the belief of `planner` after `count` touches; `None` if the trial is missing, ended
     /// before, or had no fit then.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl<'a> Replay<'a> {
         for touch in touches {
             let target = touch.target.place().filter(|it| it.len() == zone.dimension());
             let target = target.with_context(|| {
-                format!("{}: a target that is no place of the zone: {:?}", place(), touch.target)
+                format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
             // A normal that is not recorded was not observed.
             let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
@@ -71,13 +71,13 @@ impl<'a> Replay<'a> {
         }))
     }
 
-    /// Every touch with its colour.
+    /// Returns every touch with its colour.
     pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, &'static str)> {
         let colour = |i| style::touch(i < self.initial_touches);
         self.touches.iter().enumerate().map(move |(i, touch)| (touch, colour(i)))
     }
 
-    /// Its agreement with the truth, in words.
+    /// Returns the agreement with the truth as text.
     pub fn score(&self) -> String {
         self.metrics.map_or(String::new(), |metrics| {
             let centred = format!("{:.4}", metrics.centred_r).replace('-', "−");
@@ -86,14 +86,14 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Whether the belief is drawn at each of `places`: a Gaussian process says something
-    /// everywhere, also where the zone looks past the object.
+    /// Returns whether the belief is drawn at each of `places`: a Gaussian process has a value
+    /// everywhere, also where the zone reaches past the object.
     pub fn is_drawn<'p>(&self, places: impl IntoIterator<Item = &'p [f64]>) -> Vec<bool> {
         self.belief.presence().silhouette().is_likely(places)
     }
 
-    /// Draws its touches on a flat panel: a cross where a touch met something, a diamond of this
-    /// stroke width where it did not; `at` maps a place, and a height where there is one.
+    /// Draws the touches on a flat panel: a cross for a contact, a diamond of this stroke width for
+    /// a miss; `at` maps a place, and a height if there is one.
     pub fn draw_marks(
         &self,
         canvas: &mut Canvas,
@@ -112,35 +112,35 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// A caption's sentence on where beliefs are drawn; empty where the surface is everywhere.
+/// Returns a sentence of a caption on where beliefs are drawn; empty if the surface is everywhere.
 pub fn drawn_words(run: &Run) -> &'static str {
     match run.truth.count() < run.truth.places.len() {
         true => {
-            " A belief is drawn where its touches make a surface likelier than none, and all of it \
-             as long as each has met something."
+            " A belief is drawn where a surface is more probable than none; all of it as long as every \
+             touch has made contact."
         }
         false => "",
     }
 }
 
-/// Some places of the test grid: every so many along each side, x varying fastest.
+/// Subset of the test grid, evenly spaced along each side, x varying fastest.
 pub struct Grid<'a> {
     /// Places along each side.
     pub side: usize,
-    /// The places, with the true height at each.
+    /// Places, with the true height at each.
     pub places: Vec<(&'a [f64], Option<f64>)>,
 }
 
 impl<'a> Grid<'a> {
-    /// At most `most` places along each side of a zone of this dimension.
+    /// Creates a grid of at most `most` places along each side of a zone of this dimension.
     ///
     /// # Errors
-    /// If the truth is not of the experiment's grid.
+    /// If the truth is not on the experiment's grid.
     pub fn new(run: &'a Run, dimension: usize, most: usize) -> anyhow::Result<Self> {
         let (side, truth) = (run.experiment.grid as usize, &run.truth);
         ensure!(
             side > 1 && truth.places.len() == side.pow(dimension as u32),
-            "the true surface has {} places on a grid of {side} along each side",
+            "the true surface has {} places, but the experiment's grid has {side} along each side",
             truth.places.len()
         );
         let steps = (side - 1).min(most - 1);
@@ -151,32 +151,32 @@ impl<'a> Grid<'a> {
         Ok(Self { side: picked.len(), places: indices.map(at).collect() })
     }
 
-    /// The places alone.
+    /// Returns the places alone.
     pub fn places(&self) -> impl Iterator<Item = &'a [f64]> {
         self.places.iter().map(|(place, _)| *place)
     }
 
-    /// The coordinates along one side.
+    /// Returns the coordinates along one side.
     pub fn along(&self, side: usize) -> Vec<f64> {
         let step = if side == 0 { 1 } else { self.side };
         (0..self.side).map(|i| self.places[i * step].0[side]).collect()
     }
 }
 
-/// The row that the report draws of a planner.
+/// Returns the row of a planner in the drawn trial.
 pub fn row<'a>(run: &'a Run, planner: &str) -> Option<&'a TrialRow> {
     let trial = run.experiment.report.trial;
     run.rows.iter().find(|row| row.planner == planner && row.trial == trial)
 }
 
-/// The place (x) or (x, z) of a touch and its height above the datum; none for a miss.
+/// Returns the place (x) or (x, z) of a touch and its height above the datum; `None` for a miss.
 pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
     let p_wc = Point3::from(touch.contact?);
     Some((zone.place(&p_wc), zone.height_m(&p_wc)))
 }
 
-/// Every height that a drawing of beliefs of `planners` should have room for: true ones and
-/// touched ones.
+/// Returns every height that a drawing of beliefs of `planners` must show: true and touched
+/// heights.
 pub fn heights_m<'a>(
     run: &'a Run,
     planners: impl IntoIterator<Item = &'a str>,
@@ -189,7 +189,7 @@ pub fn heights_m<'a>(
     run.truth.heights_m.iter().flatten().copied().chain(touched)
 }
 
-/// A recorded touch as it was observed; `normal_w` is that of a contact without one.
+/// Returns a recorded touch as it was observed; `normal_w` is the normal of a contact without one.
 ///
 /// # Errors
 /// If there is a contact without a normal.
@@ -199,7 +199,7 @@ pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyho
             let normal_w = touch.normal.map(Vector3::from).or(normal_w);
             Touch::Contact(Contact {
                 p_wc,
-                normal_w: normal_w.context("a contact without its normal")?,
+                normal_w: normal_w.context("a recorded contact has no normal")?,
             })
         }
         None if touch.overload => Touch::Overload,
@@ -207,7 +207,7 @@ pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyho
     })
 }
 
-/// The volume that the finger swept in a recorded touch, if it is known.
+/// Returns the volume that the finger swept in a recorded touch, if it is known.
 pub(super) fn swept(finger: Finger, touch: &TouchRow) -> Option<Swept> {
     Some(Swept { finger, p_wt: Point3::from(touch.tip?) })
 }

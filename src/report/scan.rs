@@ -1,5 +1,5 @@
-//! The picture of a scene: the object with the zone on it; and of a scan, Fig. 2 of Yi et al. 2016,
-//! with what the finger felt of it.
+//! Picture of a scene (the object with the zone on it) and of a scan (Fig. 2 of Yi et al. 2016,
+//! with its points of contact).
 
 use super::axes::{Axis, Length, height_bar};
 use super::canvas::{Area, Canvas};
@@ -13,31 +13,31 @@ use palpate_geometry::mesh::Mesh;
 const ZONE_PX: [f64; 2] = [560.0, 560.0];
 const SCAN_PX: [f64; 2] = [430.0, 480.0];
 const FOOT_PX: f64 = 64.0;
-/// Places along each side of the zone from which its heights are known. heuristic: as a report.
+// heuristic: samples along each side of the zone for its heights, as many as in a report.
 const GRID: usize = 41;
 
-/// True height above the datum at a place of a zone, m; none where there is no surface.
+/// True height above the datum at a place of a zone, m; `None` where there is no surface.
 pub type Heights<'a> = &'a dyn Fn(&[f64]) -> Option<f64>;
 
-/// A point of contact with its normal, in `W`.
+/// Point of contact with its normal, in `W`.
 type Contact = (Point3<f64>, Vector3<f64>);
 
-/// A mesh in `W` with the rim of the zone on it as SVG, its heights above the datum coloured; none
-/// without a second coordinate or a surface.
+/// Draws a mesh in `W` with the outline of the zone on it as SVG, coloured by its height above the
+/// datum; `None` without a second coordinate or a surface.
 pub fn zone_picture(zone: &Zone, mesh: &Mesh, height_m: Heights) -> Option<String> {
     let heights_m = zone.grid(GRID).into_iter().filter_map(|place| height_m(&place));
     let axis = Axis::around(heights_m, 0.04, 5.0)?;
     draw((zone, mesh, height_m), &axis, None)
 }
 
-/// The object on the left with the zone's rim on it, the points of contact on the right, as SVG;
-/// none without points.
+/// Draws the object with the zone's outline on the left and the points of contact on the right, as
+/// SVG; `None` without points.
 pub fn picture(object: (&Zone, &Mesh, Heights), contacts: &[Contact]) -> Option<String> {
     let heights_m = contacts.iter().map(|(p_w, _)| object.0.height_m(p_w));
     draw(object, &Axis::around(heights_m, 0.04, 5.0)?, Some(contacts))
 }
 
-/// Heights are coloured along `axis`.
+/// Draws object and contacts, with heights coloured along `axis`.
 fn draw(
     object: (&Zone, &Mesh, Heights),
     axis: &Axis,
@@ -73,14 +73,14 @@ fn draw(
     Some(canvas.finish())
 }
 
-/// Room for the numbers on the left.
+/// Width of the numbers on the left.
 const LEFT_PX: f64 = 20.0;
 
-/// Places along each side of the zone's rim; more would not show.
+/// Points along each side of the zone's outline; more would not be visible.
 const PLACES: usize = 90;
 
-/// Draws the object in the zone's frame, with the zone's rim on it, into `area`, its heights above
-/// the datum coloured along `axis`.
+/// Draws the object in the zone's frame, with the zone's outline on it, into `area`; its heights
+/// above the datum are coloured along `axis`.
 fn draw_object(
     canvas: &mut Canvas,
     area: Area,
@@ -90,7 +90,7 @@ fn draw_object(
     let unit = Length::of(zone);
     let mesh = &mesh.transformed(&zone.x_wz().inverse());
     let (low, high) = mesh.bounds();
-    // Out to whole units, so that the ends of the axes are short to read.
+    // Rounded outwards to whole units, so that the labels at the ends of the axes are short.
     let around = |low: f64, high: f64| {
         [(low * unit.per_m).floor() / unit.per_m, (high * unit.per_m).ceil() / unit.per_m]
     };
@@ -99,17 +99,17 @@ fn draw_object(
         z_m: around(low.z, high.z),
         height_m: [low.y, high.y].map(|y_m| y_m - zone.datum_y_m()),
     };
-    // An object stands anywhere: the numbers on its left are longer than a zone's.
+    // The coordinates of an object have longer numbers than those of a zone.
     let area = Area { left: area.left + LEFT_PX, width: area.width - LEFT_PX, ..area };
     let panel = ReliefPanel::new(unit, area, space);
-    panel.frame(canvas, "the object, and the zone on it", "");
+    panel.frame(canvas, "object and zone", "");
     let at = |x_m, height_m, z_m| panel.camera.at(&Vector3::new(x_m, height_m, z_m));
     let datum = zone.datum_y_m() * Vector3::y();
     let triangles = mesh.iter_corners().map(|corners| corners.map(|p_z| p_z.coords - datum));
     let colour = |_, corners: &[Vector3<f64>], normal| height_colour(axis, corners, &normal);
     Relief::of_triangles(&panel.camera, triangles, colour).draw(canvas);
     for side in rim(zone) {
-        // Where the zone looks past the object, its rim is seen at the height of the datum.
+        // Where the zone reaches past the object, its outline is at the height of the datum.
         let at_datum = side.iter().map(|place| at(place[0], 0.0, place[1]));
         canvas.line(at_datum, &style::stroke(LATER, 0.6));
         let on_surface = side.iter().map(|place| Some(at(place[0], height_m(place)?, place[1])));
@@ -120,7 +120,7 @@ fn draw_object(
     }
 }
 
-/// The zone's four sides as places.
+/// Returns the zone's four sides as places.
 fn rim(zone: &Zone) -> [Vec<Vec<f64>>; 4] {
     let side = |at: fn(f64) -> [f64; 2]| -> Vec<Vec<f64>> {
         (0..=PLACES).map(|i| zone.at(&at(i as f64 / PLACES as f64))).collect()

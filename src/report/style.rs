@@ -1,52 +1,51 @@
-//! Colours, line widths and the font of all figures, in one place.
+//! Style of all figures: colours, line widths and the font.
 //!
-//! The categorical colours are those of Okabe and Ito, which differ for every kind of colour
+//! The categorical colours are those of Okabe and Ito 2008, which differ for every kind of colour
 //! vision; the colour map of deviations is viridis.
 
 use serde_json::{Value, json};
 
-/// Generic family, so that a browser takes its own and the PNG the embedded font.
+/// Generic font family: a browser uses its own font, PNG and PDF the embedded one.
 pub const FONT: &str = "sans-serif";
 /// Size of ordinary text in pixels.
 pub const TEXT_PX: f64 = 13.0;
 /// Size of tick labels and notes in pixels.
 pub const SMALL_PX: f64 = 11.5;
-/// Text and axes.
+/// Colour of text and axes.
 pub const INK: &str = "#222222";
-/// Text that steps back.
+/// Colour of secondary text.
 pub const FAINT_INK: &str = "#666666";
-/// Lines behind the data.
+/// Colour of grid lines.
 pub const GRID: &str = "#e4e4e4";
-/// Paper.
+/// Colour of the paper.
 pub const PAPER: &str = "#ffffff";
-/// The frame of a space in three dimensions.
+/// Colour of the frame of a space in three dimensions.
 pub const FRAME: &str = "#9a9a9a";
-/// The true surface.
+/// Colour of the true surface.
 pub const TRUTH: &str = "#009e73";
-/// Touches that every planner starts with.
+/// Colour of the initial touches, which all planners share.
 pub const INITIAL: &str = "#0046c8";
-/// Touches that a planner chose.
+/// Colour of touches chosen by a planner.
 pub const LATER: &str = "#d00000";
-/// The colour of a touch.
+/// Returns the colour of a touch.
 pub fn touch(is_initial: bool) -> &'static str {
     if is_initial { INITIAL } else { LATER }
 }
 
-/// The place where the belief is least sure.
+/// Colour of the place with the largest deviation.
 pub const MAXIMUM: &str = "#000000";
 
-/// How much of its colour a band has.
+/// Opacity of a band.
 pub const BAND_OPACITY: f64 = 0.22;
 
-/// Colours of planners that have none of their own: what is left of Okabe and Ito's, then others
-/// as dark.
+/// Colours of other planners: the rest of Okabe and Ito's, then others as dark.
 const SPARE: [&str; 8] =
     ["#e69f00", "#56b4e9", "#000000", "#7a5195", "#8c6d31", "#667788", "#2f8f8f", "#b0305c"];
 
-/// Planners with a colour of their own, as in the paper.
+/// Planners with a fixed colour, as in the paper.
 const OWN: [(&str, &str); 3] = [("active", "#0072b2"), ("random", "#d55e00"), ("sobol", "#cc79a7")];
 
-/// The colour of a planner.
+/// Returns the colour of a planner.
 pub fn planner(planners: &[String], name: &str) -> &'static str {
     let own = |name: &str| OWN.iter().find(|(planner, _)| *planner == name);
     let mut others = planners.iter().filter(|planner| own(planner).is_none());
@@ -56,7 +55,7 @@ pub fn planner(planners: &[String], name: &str) -> &'static str {
     )
 }
 
-/// Colours of drawings on light paper, each with the one that replaces it on dark paper.
+/// Colours of drawings on light paper, each with its replacement on dark paper.
 pub const ON_DARK: [(&str, &str); 19] = [
     (PAPER, "#16191d"),
     (INK, "#e6e6e6"),
@@ -79,13 +78,13 @@ pub const ON_DARK: [(&str, &str); 19] = [
     ("#b0305c", "#f07aa0"),
 ];
 
-/// A colour of drawings on light paper and what it is on dark.
+/// Returns a colour of drawings on light paper with its replacement on dark paper.
 pub fn on_both(colour: &'static str) -> [&'static str; 2] {
     let dark = ON_DARK.iter().find(|(light, _)| *light == colour).map(|(_, dark)| *dark);
     [colour, dark.unwrap_or(colour)]
 }
 
-/// The colours of a moving picture of touches, for its script.
+/// Returns the colours of the interactive view of touches, for its script.
 pub fn touch_colours() -> Value {
     json!({
         "deviation": DEVIATION.map(rgb),
@@ -97,72 +96,74 @@ pub fn touch_colours() -> Value {
     })
 }
 
-/// Attributes of a line.
+/// Returns the attributes of a line.
 pub fn stroke(colour: &str, width_px: f64) -> String {
     format!(
         r#"fill="none" stroke="{colour}" stroke-width="{width_px}" stroke-linejoin="round" stroke-linecap="round""#
     )
 }
 
-/// Attributes of a dashed line.
+/// Returns the attributes of a dashed line.
 pub fn dashed(colour: &str, width_px: f64, dash: &str) -> String {
     format!(r#"fill="none" stroke="{colour}" stroke-width="{width_px}" stroke-dasharray="{dash}""#)
 }
 
-/// Attributes of an area.
+/// Returns the attributes of an area.
 pub fn fill(colour: &str, opacity: f64) -> String {
     format!(r#"fill="{colour}" fill-opacity="{opacity}""#)
 }
 
-/// Attributes of a small point.
+/// Returns the attributes of a small point.
 pub fn dot(colour: &str) -> String {
     format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
 }
 
-/// Attributes of a touch that is seen.
+/// Returns the attributes of a visible touch.
 pub fn visible(colour: &str) -> String {
     format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
 }
 
-/// Attributes of a touch that a surface hides.
+/// Returns the attributes of a touch that a surface hides.
 pub fn hidden(colour: &str) -> String {
     format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
 }
 
-/// Viridis, dark to light.
+/// Colour map of deviations: viridis, dark to light.
 pub const DEVIATION: [u32; 9] =
     [0x440154, 0x472c7a, 0x3b518b, 0x2c718e, 0x21908d, 0x27ad81, 0x5cc863, 0xaadc32, 0xfde725];
 
-/// Slate to cream: pale enough for blue and red points to stand out under shading.
+/// Colour map of heights: slate to cream, pale enough for blue and red points to be visible under
+/// shading.
 pub const HEIGHT: [u32; 5] = [0x68869e, 0x96b2b8, 0xc4d3c4, 0xe6e4c1, 0xfceebe];
 
-/// ColorBrewer's PuOr: too low, right, too high; neither end is the colour of a touch.
+/// Colour map of errors: ColorBrewer's PuOr (too low, right, too high); neither end is the colour
+/// of a touch.
 pub const ERROR: [u32; 7] = [0x542788, 0x998ec3, 0xd8daeb, 0xf7f7f7, 0xfee0b6, 0xf1a340, 0xb35806];
 
-/// Red, green and blue of a colour, 0..255.
+/// Returns red, green and blue of a colour, 0..255.
 pub fn rgb(colour: u32) -> [f64; 3] {
     let [_, red, green, blue] = colour.to_be_bytes().map(f64::from);
     [red, green, blue]
 }
 
-/// Colour of a standard deviation, 0..1 of the largest.
+/// Returns the colour of a standard deviation, 0..1 of the largest.
 pub fn deviation(fraction: f64) -> String {
     lit(&DEVIATION, fraction, 1.0)
 }
 
-/// The same as red, green and blue.
+/// Returns the colour of a standard deviation as red, green and blue.
 pub fn deviation_rgb(fraction: f64) -> [u8; 3] {
     between(&DEVIATION, fraction).map(|channel| channel.round() as u8)
 }
 
-/// Colour at a fraction of `map`, under light of strength 0..1.
+/// Returns the colour at a fraction of `map`, under light of strength 0..1.
 pub fn lit(map: &[u32], fraction: f64, light: f64) -> String {
     let channels = between(map, fraction).map(|channel| (channel * light).round() as u8);
     let [red, green, blue] = channels;
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Colour of a height, 0..1 of the range, under light of strength 0..1.
+/// Returns the colour of a height, 0..1 of the range, under light of strength 0..1.
 pub fn height(fraction: f64, light: f64) -> String {
     lit(&HEIGHT, fraction, light)
 }

@@ -1,73 +1,74 @@
-//! A table and its writers: text for a terminal, CSV, HTML, JSON and Markdown.
+//! Table with its writers: text for a terminal, CSV, HTML, JSON and Markdown.
 //!
-//! Readers are shown rounded numbers in the column's unit; files hold every digit, in SI units.
+//! Terminal, page and Markdown have rounded numbers in the column's unit; files have every digit,
+//! in SI units.
 
 use crate::experiment::measure::{Direction, Measure};
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::store::write_whole;
 use crate::report::canvas::escape;
+use crate::report::glossary::tooltip;
 use anyhow::Context;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// Columns, and rows with a cell for each of them.
+/// Table of columns, and rows with a cell for each column.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
-    /// The columns, from the left.
+    /// Columns, from the left.
     pub columns: Vec<Column>,
-    /// The rows, from the top.
+    /// Rows, from the top.
     pub rows: Vec<Vec<Cell>>,
 }
 
-/// A column: its heads, and how its numbers are shown.
+/// Column: its heads, and the format of its numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Column {
     name: String,
     title: Option<String>,
     note: &'static str,
     symbol: &'static str,
-    /// How many of its unit make one of the SI unit, and decimals; three significant digits of the
-    /// SI unit where there are none.
+    /// Number of display units in one SI unit, and decimals; default: three significant digits in
+    /// the SI unit.
     scale: Option<(f64, usize)>,
     has_interval: bool,
 }
 
-/// A value in a table; the default is none.
+/// Cell of a table; empty by default.
 #[derive(Clone, Debug, Default)]
 pub struct Cell {
-    /// Words, a count, or a number in SI units, as files hold it.
+    /// Text, a count, or a number in SI units, as in files.
     value: Value,
-    /// The standard error of a mean.
+    /// Standard error of a mean.
     error: Option<f64>,
     interval: Option<[f64; 2]>,
-    /// The verdict: "better" or "worse".
+    /// Verdict: "better" or "worse".
     verdict: Option<&'static str>,
 }
 
 impl Column {
-    /// A column of words, counts, or numbers with three significant digits; `name` is its head on a
-    /// terminal and in files.
+    /// Creates a column of text, counts, or numbers with three significant digits; `name` is its
+    /// head on a terminal and in files.
     pub fn new(name: impl Into<String>) -> Self {
         Self { name: name.into(), ..Self::default() }
     }
 
-    /// With another head where there is room: on the page and in Markdown.
+    /// Sets a longer head for the page and for Markdown.
     pub fn title(self, title: impl Into<String>) -> Self {
         Self { title: Some(title.into()), ..self }
     }
 
-    /// With a sentence for the reference that says what it holds.
+    /// Sets a sentence for the reference that describes the column.
     pub fn note(self, note: &'static str) -> Self {
         Self { note, ..self }
     }
 
-    /// With the unit in which its numbers are shown, of which `per_si` make one of the SI unit, and
-    /// their decimals.
+    /// Sets the display unit, of which `per_si` make one SI unit, and the decimals.
     pub fn unit(self, symbol: &'static str, per_si: f64, decimals: usize) -> Self {
         Self { symbol, scale: Some((per_si, decimals)), ..self }
     }
 
-    /// With the ends of an interval behind it in files, as `NAME_low` and `NAME_high`.
+    /// Adds the ends of an interval in files, as `NAME_low` and `NAME_high`.
     pub fn interval(self) -> Self {
         Self { has_interval: true, ..self }
     }
@@ -81,7 +82,7 @@ impl Column {
         }
     }
 
-    /// The head with its unit: the title where there is room, the name on a terminal.
+    /// Returns the head with its unit: the title if there is room, the name on a terminal.
     fn head(&self, has_room: bool) -> String {
         let (head, before) = match (&self.title, has_room) {
             (Some(title), true) => (title, ", "),
@@ -93,20 +94,20 @@ impl Column {
 }
 
 impl Cell {
-    /// An estimate with its interval.
+    /// Creates a cell with an estimate and its interval.
     pub fn estimate(estimate: impl Into<Option<Estimate>>) -> Self {
         let estimate = estimate.into();
         let interval = estimate.and_then(|estimate| estimate.interval);
         Self { interval, ..Self::from(estimate.map(|estimate| estimate.value)) }
     }
 
-    /// A mean with its standard error.
+    /// Creates a cell with a mean and its standard error.
     pub fn mean(mean: f64, error: Option<f64>) -> Self {
         Self { error, ..Self::from(mean) }
     }
 
-    /// With what the interval of an estimate establishes in which `direction` is better and both
-    /// are as good at `even`.
+    /// Sets the verdict that the interval of an estimate establishes; `direction` is better, and
+    /// both are equal at `even`.
     pub fn judged(self, interval: Option<[f64; 2]>, even: f64, direction: Direction) -> Self {
         Self { verdict: verdict(interval, even, direction), ..self }
     }
@@ -133,13 +134,13 @@ impl<T: Into<Value>> From<T> for Cell {
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub fn new(columns: impl IntoIterator<Item = Column>) -> Self {
         Self { columns: columns.into_iter().collect(), rows: Vec::new() }
     }
 
-    /// A cell for every row and column, behind a column of the rows' names; rows and columns
-    /// without any are left out.
+    /// Creates a table with a cell for every row and column, after a column of the rows' names;
+    /// empty rows and columns are left out.
     pub fn cross<R, C>(
         corner: impl Into<String>,
         rows: impl IntoIterator<Item = (String, R)>,
@@ -158,7 +159,7 @@ impl Table {
         table.without_empty()
     }
 
-    /// The same without the columns that have no value in any row.
+    /// Returns the table without the columns that have no value in any row.
     pub fn without_empty(mut self) -> Self {
         for column in (0..self.columns.len()).rev() {
             if self.rows.iter().all(|row| row[column].value.is_null()) {
@@ -169,7 +170,7 @@ impl Table {
         self
     }
 
-    /// The words of its cells, each with its verdict.
+    /// Returns the texts of the cells, each with its verdict.
     fn words(&self) -> impl Iterator<Item = Vec<(String, Option<&'static str>)>> {
         let words = |(cell, column): (&Cell, &Column)| (cell.words(column), cell.verdict);
         self.rows.iter().map(move |row| row.iter().zip(&self.columns).map(words).collect())
@@ -179,7 +180,7 @@ impl Table {
         self.columns.iter().map(|column| column.head(has_room)).collect()
     }
 
-    /// Aligned columns for a terminal, a verdict behind its value; empty without rows.
+    /// Formats aligned columns for a terminal, each verdict after its value; empty without rows.
     pub fn text(&self) -> String {
         if self.rows.is_empty() {
             return String::new();
@@ -192,7 +193,7 @@ impl Table {
         aligned(&[self.heads(false)].into_iter().chain(lines).collect::<Vec<_>>())
     }
 
-    /// The columns in files, each with its note.
+    /// Returns the columns in files, each with its note.
     pub fn file_columns(&self) -> Vec<(String, &'static str)> {
         let columns = |Column { name, note, has_interval, .. }: &Column| {
             let low = (format!("{name}_low"), "Lower end of its 95 % bootstrap interval.");
@@ -212,10 +213,10 @@ impl Table {
         self.rows.iter().map(move |row| row.iter().zip(&self.columns).flat_map(values).collect())
     }
 
-    /// Writes it as CSV.
+    /// Writes the table as CSV.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn write_csv(&self, path: &Path) -> anyhow::Result<()> {
         let place = || path.display().to_string();
         let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
@@ -227,21 +228,28 @@ impl Table {
         Ok(write_whole(path, writer.into_inner().with_context(place)?)?)
     }
 
-    /// Its rows as JSON, by the names that columns have in files.
+    /// Returns the rows as JSON, with the column names used in files.
     pub fn json(&self) -> Vec<Map<String, Value>> {
         let columns = self.file_columns();
         let names = || columns.iter().map(|(name, _)| name.clone());
         self.file_rows().map(|row| names().zip(row).collect()).collect()
     }
 
-    /// A table of a page, in a box of its own; `class` is its class there.
+    /// Formats the table as HTML in a scrollable box; `class` is its CSS class.
     pub fn html(&self, class: &str) -> String {
-        let head = |head: &String| format!("<th>{}</th>", escape(head));
-        let heads: String = self.heads(true).iter().map(head).collect();
+        let title = |explanation: Option<&str>| {
+            explanation.map_or(String::new(), |it| format!(" title=\"{}\"", escape(it)))
+        };
+        let head = |(head, column): (&String, &Column)| {
+            let own = (!column.note.is_empty()).then_some(column.note);
+            format!("<th{}>{}</th>", title(own.or_else(|| tooltip(head))), escape(head))
+        };
+        let heads: String = self.heads(true).iter().zip(&self.columns).map(head).collect();
         let cell = |(i, (words, verdict)): (usize, (String, Option<&str>))| {
+            let title = if i == 0 { title(tooltip(&words)) } else { String::new() };
             let words = escape(&words);
             match verdict {
-                _ if i == 0 => format!("<th scope=\"row\">{words}</th>"),
+                _ if i == 0 => format!("<th scope=\"row\"{title}>{words}</th>"),
                 Some(word) => format!("<td class=\"{word}\">{words}: {word}</td>"),
                 None => format!("<td>{words}</td>"),
             }
@@ -257,7 +265,7 @@ impl Table {
         wide(&table, "table")
     }
 
-    /// A table in Markdown.
+    /// Formats the table as Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: Vec<String>| {
             let cells = cells.iter().map(|words| words.replace('|', "\\|").replace('\n', " "));
@@ -269,7 +277,8 @@ impl Table {
     }
 }
 
-/// The verdict of an interval that excludes `even`, where both are as good; `direction` is better.
+/// Returns the verdict of an interval that excludes `even`, where both are equal; `direction` is
+/// better.
 pub fn verdict(
     interval: Option<[f64; 2]>,
     even: f64,
@@ -285,8 +294,8 @@ pub fn verdict(
     }
 }
 
-/// Cells in aligned columns, the first to the left, the others to the right; every line has as many
-/// cells as the first.
+/// Formats cells in aligned columns, the first to the left, the others to the right; every line has
+/// as many cells as the first.
 pub fn aligned(lines: &[impl AsRef<[String]>]) -> String {
     let columns = lines.first().map_or(0, |line| line.as_ref().len());
     let width = |column| {
@@ -309,14 +318,14 @@ pub fn aligned(lines: &[impl AsRef<[String]>]) -> String {
     text
 }
 
-/// A box of a page that scrolls where the page is narrower, by keyboard too.
+/// Returns a box that scrolls if the page is narrower than its content, also by keyboard.
 pub(super) fn wide(content: &str, what: &str) -> String {
     format!(
         "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
     )
 }
 
-/// A number with three significant digits.
+/// Formats a number with three significant digits.
 pub fn digits(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
@@ -326,12 +335,12 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A value of a measure in the unit it is shown in.
+/// Formats a value of a measure in its display unit.
 pub fn shown(measure: &Measure, value: f64) -> String {
     format!("{:.*}", measure.unit.decimals, measure.unit.per_si * value)
 }
 
-/// A number and its interval, if it has one.
+/// Formats a number and its interval, if it has one.
 pub fn with_interval(
     value: f64,
     interval: Option<[f64; 2]>,
@@ -342,7 +351,7 @@ pub fn with_interval(
     format!("{}{interval}", shown(value))
 }
 
-/// The title of a measure with the unit it is shown in.
+/// Returns the title of a measure with its display unit.
 pub fn titled(measure: &Measure) -> String {
     match measure.unit.symbol {
         "" => measure.title.into(),

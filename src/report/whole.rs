@@ -1,5 +1,5 @@
-//! Beliefs of whole objects as they were: recorded touches and hyperparameters, conditioned again
-//! and made to surfaces.
+//! Replay of beliefs of whole objects: recorded touches and hyperparameters, conditioned again and
+//! converted to surfaces.
 
 use super::figures::Figure;
 use super::replay::{self, swept, touched};
@@ -16,15 +16,16 @@ use palpate_explore::task::Task;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::coarse::coarse;
 
-/// Triangles of a surface that is drawn. heuristic: a page stays a few megabytes.
+// Largest number of triangles of a surface that is drawn.
+// heuristic: a page stays a few megabytes.
 const TRIANGLES: usize = 3000;
 
-/// The true surface that the run keeps, with its search tree; none of a run without it.
+/// Returns the true surface that the run stores, with its search tree; `None` if it stores none.
 pub fn truth(run: &Run) -> Option<MeshBvh> {
     run.truth.mesh.as_deref().cloned().map(MeshBvh::new)
 }
 
-/// The part of the page that moves; empty of a run over a zone.
+/// Returns the interactive part of the page; empty for a run over a zone.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
@@ -41,13 +42,13 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     solid::section(&sequences, mesh, experiment.report.trial)
 }
 
-/// Believed whole objects, planner by planner and touch by touch; none of a run over a zone.
+/// Figure of believed whole objects, by planner and touch count; none for a run over a zone.
 pub const FIGURE: Figure = Figure {
     name: "solids",
     caption: |run| {
         format!(
-            "Believed surfaces of trial {} from the front and from behind, coloured by how far they \
-             may lie from where they are believed, with the touches.",
+            "Believed surfaces of trial {} from the front and from behind, coloured by their standard \
+             deviation, with the touches.",
             run.experiment.report.trial
         )
     },
@@ -62,8 +63,8 @@ pub const FIGURE: Figure = Figure {
     },
 };
 
-/// The beliefs of `planners` in the trial that the report draws, after `counts` touches; `truth`
-/// gives the errors.
+/// Replays the beliefs of `planners` in the drawn trial, after `counts` touches; `truth` gives the
+/// errors.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
@@ -78,7 +79,7 @@ fn sequences(
         let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
         let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
         for (i, touch) in row.touches.iter().enumerate() {
-            let no_aim = || format!("{}: a target that is no aim", place(i + 1));
+            let no_aim = || format!("{}: target is not an aim at a whole object", place(i + 1));
             let aim = touch.target.aim().with_context(no_aim)?;
             sequence.touches.push(Touch {
                 aim_w: aim.p_w,
@@ -97,8 +98,8 @@ fn sequences(
     planners.iter().filter_map(|planner| replay::row(run, planner)).map(sequence).collect()
 }
 
-/// The belief after `count` touches, made coarser if it has more than `most` triangles; none if the
-/// trial ended before, or had no fit then.
+/// Returns the surface of the belief after `count` touches, simplified to at most `most` triangles;
+/// `None` if the trial ended before, or had no fit then.
 ///
 /// # Errors
 /// If its touches cannot be conditioned on.
@@ -133,10 +134,10 @@ pub fn frame(
     }))
 }
 
-/// The belief after `touches`; none without a fit then.
+/// Returns the belief after `touches`; `None` without a fit then.
 ///
 /// # Errors
-/// If they do not belong to the object or cannot be conditioned on.
+/// If the touches do not belong to the object or cannot be conditioned on.
 pub fn belief(
     experiment: &Experiment,
     touches: &[TouchRow],
@@ -145,13 +146,13 @@ pub fn belief(
     let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
     let scene = &experiment.scene;
     let ball = scene.around.as_ref().and_then(|around| around.ball());
-    let ball = ball.context("the ball of [around] is not written out")?;
+    let ball = ball.context("the scene has no ball of [around]; resolved.toml is incomplete")?;
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
     let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
-        let aim = touch.target.aim().context("a target that is no aim")?;
-        // However the finger was rolled, it went the same way.
+        let aim = touch.target.aim().context("target is not an aim at a whole object")?;
+        // The roll of the finger does not change its path.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
         let swept = swept(scene.finger.clone(), touch);
         belief.observe(aim, &approach, (&touched(touch, None)?, swept.as_ref()));

@@ -1,4 +1,4 @@
-//! What never changes during a trial, shared by all threads.
+//! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
 use super::notice;
 use super::scene::{Body, Function, Object, Scene, Unit};
@@ -19,7 +19,7 @@ use palpate_geometry::surfaces;
 use palpate_input::error::Invalid;
 use std::borrow::Cow;
 
-/// A scene with its mesh loaded and its search tree built.
+/// Scene with its mesh loaded and its search tree built.
 pub struct Environment {
     scene: Scene,
     shape: Shape,
@@ -30,7 +30,7 @@ pub struct Environment {
     notices: Vec<String>,
 }
 
-/// What is touched.
+/// Surface to touch.
 pub enum Shape {
     /// An analytic curve.
     Function(Function),
@@ -38,23 +38,23 @@ pub enum Shape {
     Mesh {
         /// The mesh with its search tree.
         bvh: MeshBvh,
-        /// What its import found and repaired.
+        /// Report of the import: defects found and repaired.
         report: Box<MeshReport>,
     },
 }
 
-/// A scene that lacks `part`.
+/// Returns the error of a scene that lacks `part`.
 pub(super) fn missing(part: &str) -> Invalid {
     Invalid::new(format!("the scene has no {part}, which its body needs"))
 }
 
-/// The error with the message of another.
+/// Returns an [`Invalid`] with the message of another error.
 pub(super) fn invalid(error: impl std::fmt::Display) -> Invalid {
     Invalid::new(error.to_string())
 }
 
 impl Environment {
-    /// Loads what the scene names.
+    /// Loads the mesh that the scene names and builds the environment.
     ///
     /// # Errors
     /// If the mesh is unusable or lies wholly outside the zone.
@@ -62,11 +62,11 @@ impl Environment {
         Self::build_telling(scene, &|_| ())
     }
 
-    /// As [`build`](Self::build); `tell` is called with the name of each step that takes long for
-    /// a large mesh, as it begins.
+    /// Builds an environment like [`build`](Self::build), and calls `tell` with the name of each
+    /// step that takes long for a large mesh, as the step begins.
     ///
     /// # Errors
-    /// As [`build`](Self::build).
+    /// The errors of [`build`](Self::build).
     pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
         if scene.body == Body::Function {
             let function = scene.function.ok_or_else(|| missing("function"))?;
@@ -81,7 +81,7 @@ impl Environment {
         Self::around(scene, Shape::Mesh { bvh, report: report.into() })
     }
 
-    /// Puts a scene around a shape that is there already, in place of the object it names.
+    /// Builds an environment around a shape in memory, in place of the object that the scene names.
     ///
     /// # Errors
     /// If the shape lies wholly outside the zone.
@@ -131,22 +131,22 @@ impl Environment {
         Ok(Self { scene, shape, task, arm, arm_mjcf, fingertip, notices })
     }
 
-    /// What may not be meant.
+    /// Returns warnings about likely configuration mistakes.
     pub fn notices(&self) -> &[String] {
         &self.notices
     }
 
-    /// The scene it was built from, with what it left to the object written out.
+    /// Returns the scene, with the defaults that depend on the object filled in.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// What is touched.
+    /// Returns the surface to touch.
     pub fn shape(&self) -> &Shape {
         &self.shape
     }
 
-    /// The object in `W`, or none for a function.
+    /// Returns the object in `W`, or `None` for a function.
     pub fn mesh(&self) -> Option<&Mesh> {
         match &self.shape {
             Shape::Function(_) => None,
@@ -154,24 +154,24 @@ impl Environment {
         }
     }
 
-    /// The soft finger, if the scene has one.
+    /// Returns the soft finger, if the scene has one.
     pub fn fingertip(&self) -> Option<&Fingertip> {
         self.fingertip.as_ref()
     }
 
-    /// What the robot is told.
+    /// Returns the task: the region to explore and how to touch, without the true surface.
     pub fn task(&self) -> &Task {
         &self.task
     }
 
-    /// The arm or stage with its finger; none for a function.
+    /// Returns the arm or stage with its finger; `None` for a function.
     pub fn robot(&self) -> Option<Robot> {
         let (finger, is_soft) = (self.scene.finger.clone(), self.fingertip.is_some());
         Some(Robot { chain: self.chain()?, finger, is_soft })
     }
 
-    /// What carries the finger: the scene's arm, or a stage whose home is in front of the zone's
-    /// middle, clear of the object. None for a function.
+    /// Returns the kinematic chain that carries the finger: the scene's arm, or a stage whose home
+    /// is in front of the zone's middle, clear of the object. `None` for a function.
     pub fn chain(&self) -> Option<Chain> {
         self.mesh()?;
         let finger = &self.scene.finger;
@@ -195,12 +195,13 @@ impl Environment {
         })
     }
 
-    /// MJCF of the scene's arm, if the model has one.
+    /// Returns the MJCF of the scene's arm, if the model has one.
     pub fn arm_mjcf(&self) -> Option<&str> {
         self.arm_mjcf.as_deref()
     }
 
-    /// True height above the datum at `place`: the first surface met along the approach, or none.
+    /// Returns the true height above the datum at `place`, at the first surface along the approach;
+    /// `None` if there is no surface.
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
             Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
@@ -221,7 +222,8 @@ impl Environment {
         }
     }
 
-    /// The y in the zone's frame at which the mesh is first met along the approach to `place`.
+    /// Returns y, in the zone's frame, of the first point of the mesh along the approach to
+    /// `place`.
     pub(super) fn mesh_y_m(&self, place: &[f64]) -> Option<f64> {
         let Shape::Mesh { bvh, .. } = &self.shape else { return None };
         self.met_y_m(place, |start_w, ahead_w, reach_m| {
@@ -229,7 +231,8 @@ impl Environment {
         })
     }
 
-    /// The same of anything, of which `ray` gives the distance from a start along a direction.
+    /// Returns y, in the zone's frame, of the first surface along the approach to `place`; `ray`
+    /// gives the distance from a start along a direction.
     fn met_y_m(
         &self,
         place: &[f64],
@@ -243,7 +246,7 @@ impl Environment {
         Some(start_y_m - ray(start_w, zone.ahead_w(), reach_m)?)
     }
 
-    /// The point of the true surface nearest to `p_w`, if the object has an analytic one.
+    /// Returns the point of the true surface nearest to `p_w`, if the object has an analytic one.
     pub fn nearest_true_point(&self, p_w: &Point3<f64>) -> Option<Point3<f64>> {
         let (surface, object) = self.analytic()?;
         let x_wo = object.x_wo();
@@ -258,7 +261,7 @@ impl Environment {
     }
 }
 
-/// Smallest and largest coordinates of a shape in the frame of `zone`.
+/// Returns the smallest and largest coordinates of a shape in the frame of `zone`.
 fn extent(zone: &Zone, shape: &Shape) -> [Point3<f64>; 2] {
     match shape {
         Shape::Function(function) => {
@@ -288,7 +291,7 @@ fn check_overlap(
     let is_before_or_behind = -high.y > far_m || -low.y < near_m;
     match is_beside || is_before_or_behind {
         true => Err(Invalid::new(format!(
-            "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} \
+            "the object has no surface in the zone: in the zone's frame its bounds are x {} to {} m, z {} \
              to {} m and depth {} to {} m{}",
             low.x,
             high.x,
@@ -302,11 +305,12 @@ fn check_overlap(
     }
 }
 
-/// Places along each side of the zone over which the object is looked for; chosen, as many as a
-/// shipped experiment's test grid.
+// heuristic: samples along each side of the zone to find the object, as many as in the test grid of
+// a shipped experiment.
 const LOOKED_FOR_PER_SIDE: usize = 41;
 
-/// Depths at which the object is first met between two, over those places of the zone where it is.
+/// Returns the depths, between two limits, of the first surface over the samples of the zone that
+/// have one.
 fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f64> {
     let (x_wz, ahead_w) = (zone.x_wz(), zone.ahead_w());
     zone.grid(LOOKED_FOR_PER_SIDE).into_iter().filter_map(move |place| {
@@ -315,22 +319,23 @@ fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<
     })
 }
 
-/// Over the zone nothing of the object, which begins at a depth of `object_m`, may be in front of
-/// the nearest depth.
+/// Checks that, over the zone, no part of the object (which begins at depth `object_m`) lies in
+/// front of the nearest depth.
 fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result<(), Invalid> {
     if near_m <= object_m {
         return Ok(());
     }
     match met_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
         Some(front_m) if front_m < near_m => Err(Invalid::new(format!(
-            "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: \
+            "zone.depth_m begins at {near_m} m, behind the front of the object at {front_m} m: \
              allowed is a nearest depth of at most that"
         ))),
         _ => Ok(()),
     }
 }
 
-/// The middle of what the surface spans over the zone; of the depth range where there is none.
+/// Returns the middle of the range of y that the surface spans over the zone; the middle of the
+/// depth range if there is no surface.
 fn middle_y_m(zone: &Zone, bvh: &MeshBvh, depth_m @ [near_m, far_m]: [f64; 2]) -> f64 {
     let met_m: Vec<f64> = met_m(zone, bvh, [near_m - CLEARANCE_M, far_m + CLEARANCE_M]).collect();
     let [near_m, far_m] = match met_m.is_empty() {
@@ -343,13 +348,13 @@ fn middle_y_m(zone: &Zone, bvh: &MeshBvh, depth_m @ [near_m, far_m]: [f64; 2]) -
     -0.5 * (near_m + far_m)
 }
 
-/// Distance in front of and behind what may be touched at which rays begin and end.
+/// Margin in front of and behind the depth range at which rays begin and end.
 pub const CLEARANCE_M: f64 = 0.01;
 
-/// The ball of `around`; what it leaves out is written into it from what the object spans.
+/// Returns the ball of `around`; fills its missing settings from the object's bounds.
 ///
 /// # Errors
-/// If it leaves out the radius, and the object's size gives none that is allowed.
+/// If the radius is missing, and the object's size gives none that is allowed.
 fn ball_around(around: &mut Around, mesh: &Mesh) -> Result<Ball, Invalid> {
     let (low, high) = mesh.bounds();
     let own = Ball::about([low, high], around.lowest_m);
@@ -358,7 +363,7 @@ fn ball_around(around: &mut Around, mesh: &Mesh) -> Result<Ball, Invalid> {
     match RADIUS_M.contains(&radius_m) {
         true => Ok(Ball { centre_w: centre_m.into(), radius_m, ..own }),
         false => Err(Invalid::new(format!(
-            "the object is {:.3e} m large, and a ball around it has a radius of {radius_m:.3e} m; \
+            "the object's size is {:.3e} m, and the ball around it has a radius of {radius_m:.3e} m; \
              allowed is {} to {} m: are object.unit and object.scale right?",
             (high - low).norm(),
             RADIUS_M.start(),
@@ -367,7 +372,7 @@ fn ball_around(around: &mut Around, mesh: &Mesh) -> Result<Ball, Invalid> {
     }
 }
 
-/// The task of a body in `ball`, with what its arm reaches.
+/// Returns the task of exploring `ball`, restricted to approaches that the arm can reach.
 fn task_around(
     scene: &Scene,
     arm: Option<&Chain>,
@@ -380,7 +385,7 @@ fn task_around(
     if farthest_m > ball.radius_m {
         return Err(Invalid::new(format!(
             "around.radius_m is {} m, but the object reaches {farthest_m:.4} m from \
-             around.centre_m: the finger would set out inside it, or run into it on its way around",
+             around.centre_m: choose a larger radius, or the finger collides with it on its way around",
             ball.radius_m
         )));
     }
@@ -393,7 +398,7 @@ fn task_around(
     let inside_m = around.depth_m(&home_w);
     if inside_m > 0.0 {
         return Err(Invalid::new(format!(
-            "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too near to the object to go around \
+            "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too close to the object to go around \
              it: move object.position_m or arm.base_position_m, or choose another arm.home_deg",
             home_w.coords.map(|x| (1e3 * x).round() / 1e3).data.0[0]
         )));

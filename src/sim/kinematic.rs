@@ -1,4 +1,4 @@
-//! An arm or stage that moves exactly as commanded, carrying the soft finger.
+//! Kinematic backend: an arm or stage that moves exactly as commanded and carries the soft finger.
 
 use super::simulated_finger::SimulatedFinger;
 use crate::sim::Environment;
@@ -7,7 +7,7 @@ use palpate_explore::robot::arm::{Chain, Joints};
 use palpate_explore::robot::finger::TipMotion;
 use std::sync::Arc;
 
-/// No masses, no servo: joint positions are the sum of the velocities commanded.
+/// Backend without masses or servos: joint positions are the integral of the commanded velocities.
 pub struct Kinematic {
     chain: Chain,
     capabilities: Capabilities,
@@ -18,10 +18,10 @@ pub struct Kinematic {
 }
 
 impl Kinematic {
-    /// At the chain's home.
+    /// Creates the backend at the chain's home.
     ///
     /// # Errors
-    /// In an environment without an object or without a soft finger.
+    /// If the environment has no object or no soft finger.
     pub fn new(environment: &Arc<Environment>) -> Result<Self, Fault> {
         let chain = environment.chain().ok_or_else(|| Fault::lacks("an object"))?;
         let finger = SimulatedFinger::new(Arc::clone(environment), 0);

@@ -1,4 +1,4 @@
-//! A ball or a plate in place of a scene's object, for a robot that registers itself.
+//! Registration target, a ball or a plate, in place of a scene's object.
 
 use super::environment::{Environment, Shape, missing};
 use super::scene::{Body, Object, Scene, Unit};
@@ -11,13 +11,14 @@ use palpate_geometry::solids::{ball, block};
 use palpate_gp::math::pose::parts;
 use palpate_input::error::Invalid;
 
-/// Rings of a ball; chosen: its facets lie within 2 µm of a ball of 20 mm.
+// heuristic: 180 rings, so that the facets lie within 2 µm of a ball of 20 mm.
 const RINGS: u32 = 180;
 
-/// Half of a plate's sides, and its thickness; chosen: larger than any finger.
+// heuristic: half of a plate's side length, and its thickness, larger than any finger.
 const PLATE_M: [f64; 2] = [0.1, 0.02];
 
-/// `scene` with `body` instead of its object, touched as registration touches.
+/// Returns the environment of `scene` with `body` instead of its object, and the touch settings of
+/// registration.
 ///
 /// # Errors
 /// If the scene's body touches no object.
@@ -25,7 +26,7 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Inval
     if scene.body == Body::Function {
         return Err(missing("object"));
     }
-    // In a frame whose +y is the plate's normal; explored so far to each side.
+    // The frame's +y is the plate's normal; `half_m` is the half side of the zone explored.
     let ((points, triangles), half_m) = match *body {
         KnownBody::Ball { radius_m, .. } => (ball(Point3::origin(), radius_m, RINGS), radius_m),
         KnownBody::Plate { .. } => {
@@ -54,5 +55,5 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Inval
     Environment::around(scene, Shape::Mesh { bvh, report: report.into() })
 }
 
-/// In the place of a file's name.
+/// Placeholder for the file name of the mesh.
 const NAME: &str = "(known body)";

@@ -1,4 +1,4 @@
-//! What only a simulator knows: the object, the physics of the finger, the simulated bodies.
+//! Simulation: the object, the physics of the finger, and the simulated robots.
 
 pub mod environment;
 pub mod finger;

@@ -1,5 +1,5 @@
-//! What a user should know of a scene before it is run: it can be built, and may not be meant. Each
-//! notice says so and how to change it.
+//! Warnings about likely configuration mistakes in a scene that can be built; each says how to
+//! change it.
 
 use super::scene::Unit;
 use clap::ValueEnum;
@@ -8,34 +8,35 @@ use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{DIRECTIONS, Task, Zone};
 use palpate_geometry::spread::directions;
 
-/// A soft finger without tables has those of a BioTac.
-pub(super) const DEFAULT_FINGER: &str = "the scene names no effects: its finger has the default \
+/// Notice that a soft finger without tables gets those of a BioTac.
+pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger gets the default \
     [effects.skin], [effects.fluid] and [effects.electrodes]";
 
-/// Constants of the sensor stand in the scene's effects, as in version 0.1.
+/// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
 pub(super) fn moved_keys(keys: &[String]) -> String {
     format!(
-        "{}: constants of the sensor, which this version still reads here; put them into the table \
-         [effects.sensor] or a file named by effects.sensor, as `palpate calibrate` writes it",
+        "{}: constants of the sensor, which will no longer be read here in the next version; move them \
+         to the table [effects.sensor], or to a file (written by `palpate calibrate`) and set \
+         effects.sensor to its name",
         keys.join(", ")
     )
 }
 
-/// A soft finger has another radius than the BioTac's.
+/// Notice that the radius of a soft finger differs from the BioTac's.
 pub(super) fn scaled_finger(radius_m: f64) -> String {
     format!(
-        "finger.radius_m = {radius_m}: a BioTac scaled from {BIOTAC_RADIUS_M} m, which presses as hard \
-         before it detects contact; RMSE on the container after 20 touches was 0.39 mm at 0.005, 0.30 at \
+        "finger.radius_m = {radius_m}: this is a BioTac scaled from {BIOTAC_RADIUS_M} m that detects \
+         contact at the same force; RMSE on the container after 20 touches was 0.39 mm at 0.005, 0.30 at \
          0.007, 0.46 at 0.008 and 0.79 at 0.010, so gp.noise_sd_m of the shipped experiments may be too \
          small (docs/finger.md)"
     )
 }
 
-/// The sides of an object, named as from the middle of the robot's foot, or of the home of a stage.
+/// Sides of an object, seen from the middle of the robot's foot or from the home of a stage.
 const SIDES: [&str; 6] = ["behind", "the robot's side", "the left", "the right", "above", "below"];
 
-/// From where a robot that stands at `foot_w` cannot bring its finger to the middle of a whole
-/// object; `None` if it reaches it from everywhere.
+/// Returns a notice of the directions from which a robot with its foot at `foot_w` cannot reach the
+/// middle of a whole object; `None` if it reaches it from everywhere.
 pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> {
     let away_w = (task.ball()?.centre_w - foot_w).xy().try_normalize(1e-6);
     let away_w = away_w.unwrap_or_else(Vector2::x);
@@ -59,23 +60,23 @@ pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> 
         .collect();
     (!sides.is_empty()).then(|| {
         format!(
-            "from {} of {DIRECTIONS} directions the finger cannot be brought to the object: {}",
+            "the finger cannot reach the object from {} of {DIRECTIONS} directions: {}",
             unreached.len(),
             sides.join(", ")
         )
     })
 }
 
-/// Factor between the sizes of object and zone from which there is a notice.
-// heuristic: below that between an inch and a metre.
+// Ratio of the sizes of object and zone above which there is a notice.
+// heuristic: below the ratio of a metre to an inch.
 const MISMATCH: f64 = 20.0;
 
-/// Factor up to which an object fits its zone.
-// heuristic: far below the mismatch.
+// Largest ratio of sizes at which an object fits its zone.
+// heuristic: far below `MISMATCH`.
 const FITS: f64 = 5.0;
 
-/// An object that spans `low` to `high` in the frame of `zone` is far larger or smaller than the
-/// zone, as one is whose file is read in the wrong unit; `None` if it is not.
+/// Returns a notice if the object, which spans `low` to `high` in the frame of `zone`, is far
+/// larger or smaller than the zone (a sign of a wrong unit); otherwise `None`.
 pub(super) fn size_mismatch(
     zone: &Zone,
     unit: Unit,
@@ -93,9 +94,9 @@ pub(super) fn size_mismatch(
     let remedy = match fitting.filter(|fitting| off_in(fitting) < FITS.ln()) {
         Some(fitting) => {
             let would_m = object_m / unit.metres() * fitting.metres();
-            format!(", in \"{fitting}\" it would measure {would_m:.4} m")
+            format!("; with object.unit = \"{fitting}\" it would measure {would_m:.4} m")
         }
-        None => " and object.scale multiplies it".into(),
+        None => "; correct object.unit or object.scale".into(),
     };
     let (factor, how) = match object_m > zone_m {
         true => (object_m / zone_m, "larger"),

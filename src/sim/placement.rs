@@ -1,4 +1,4 @@
-//! Where a mesh that nobody has prepared could stand, and which zone of it could be explored.
+//! Automatic placement: pose, size and zone for a mesh without a scene.
 
 use super::scene::Unit;
 use clap::ValueEnum;
@@ -7,42 +7,43 @@ use palpate_explore::task::Zone;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::mesh::Mesh;
 
-/// A side of an object, as somebody names it who sees its front upright.
+/// Side of an object, named by an observer in front of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Side {
-    /// Towards +z where y is up, as in glTF; towards −y where z is up.
+    /// Front: towards +z if y is up, as in glTF; towards −y if z is up.
     #[default]
     Front,
-    /// The other one.
+    /// Back, opposite to the front.
     Back,
-    /// At the left hand of whoever sees the front.
+    /// Left, seen from the front: towards −x.
     Left,
-    /// At his right hand: towards +x.
+    /// Right, seen from the front: towards +x.
     Right,
-    /// Upwards.
+    /// Top.
     Top,
-    /// Downwards.
+    /// Bottom.
     Bottom,
 }
 
-/// The axis of a mesh file that is up.
+/// Axis of a mesh file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Up {
-    /// As glTF prescribes, and most programs write OBJ.
+    /// y is up: the rule of glTF and the habit of most programs that write OBJ.
     Y,
-    /// As is usual in CAD.
+    /// z is up, as is usual in CAD.
     Z,
 }
 
-/// A size that a finger can explore, largest extent, in m; chosen: from a mouse to a bucket.
+// heuristic: range of the largest extent, in m, that a finger can explore: from a mouse to a
+// bucket.
 const EXPLORABLE_M: [f64; 2] = [0.03, 0.4];
 
-/// Largest extent given to an object of another size; chosen.
+// heuristic: largest extent that an object of another size is scaled to.
 const SIZE_M: f64 = 0.15;
 
-/// The unit, and a factor on top of it, with which a mesh of this `extent`, the largest in its
-/// file's numbers, has a size that a finger can explore: without a `unit` the first of mm, m and cm
-/// in which it does, and metres with another factor than 1 where none does.
+/// Returns the unit and scale factor that give a mesh a size that a finger can explore. `extent` is
+/// the largest in the file's numbers. Without a `unit` it is the first of mm, m and cm that fits
+/// with a scale of 1; if none fits, metres with another scale.
 pub fn size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
     let fits = |unit: &Unit| {
         let size_m = extent * unit.metres();
@@ -58,7 +59,7 @@ pub fn size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
     }
 }
 
-/// Rounded to two digits, so that a person can read it.
+/// Returns the value rounded to two significant digits, for readability.
 fn two_digits(value: f64) -> f64 {
     let digit = 10f64.powf(value.log10().floor() - 1.0);
     let (count, inverse) = ((value / digit).round(), (1.0 / digit).round());
@@ -66,12 +67,12 @@ fn two_digits(value: f64) -> f64 {
     if digit < 1.0 { count / inverse } else { count * digit }
 }
 
-/// Where the front of the object stands, in `W`: within a PA-10's reach, at the height of its
-/// shoulder and elbow; chosen.
+// heuristic: position of the object's front in `W`, within a PA-10's reach, at the height of its
+// shoulder and elbow.
 const FRONT_Y_M: f64 = -0.6;
 const MIDDLE_Z_M: f64 = 0.5;
 
-/// Which way an object's front and top look in the frame of its mesh.
+/// Directions of an object's front and top in the frame of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facing {
     front_o: Vector3<f64>,
@@ -79,8 +80,8 @@ pub struct Facing {
 }
 
 impl Facing {
-    /// Of a file whose axis `up` is up, by the convention of programs that have it so: the front
-    /// towards +z where y is up, towards −y where z is.
+    /// Returns the directions for a file whose axis `up` is up, by the usual convention: the front
+    /// is towards +z if y is up, towards −y if z is up.
     pub fn of(up: Up) -> Self {
         match up {
             Up::Y => Self { front_o: Vector3::z(), up_o: Vector3::y() },
@@ -88,7 +89,7 @@ impl Facing {
         }
     }
 
-    /// The same of a glTF file, whose y has become z and whose z has become y when it was read.
+    /// Returns the directions for a glTF file, whose y axis became z, and z became y, on import.
     pub fn of_gltf(up: Up) -> Self {
         let turned = |v: Vector3<f64>| Vector3::new(-v.x, v.z, v.y);
         let Self { front_o, up_o } = Self::of(up);
@@ -96,9 +97,9 @@ impl Facing {
     }
 }
 
-/// Turns about the fixed axes x, y, z of `W`, in degrees, with which `side` of an object faces the
-/// finger, towards +y, and what was up stays up; if its top faces it, its back is up, and if its
-/// bottom does, its front.
+/// Returns the rotation about the fixed axes x, y, z of `W`, in degrees, that turns `side` of an
+/// object towards the finger (+y) and keeps its top up. If the top faces the finger, the back is
+/// up; if the bottom does, the front.
 pub fn rotation_deg(Facing { front_o, up_o }: Facing, side: Side) -> [f64; 3] {
     let right_o = up_o.cross(&front_o);
     let (faces_o, above_o) = match side {
@@ -112,12 +113,12 @@ pub fn rotation_deg(Facing { front_o, up_o }: Facing, side: Side) -> [f64; 3] {
     let beside_o = faces_o.cross(&above_o);
     let r_wo = Matrix3::from_columns(&[beside_o, faces_o, above_o]).transpose();
     let (x, y, z) = Rotation3::from_matrix_unchecked(r_wo).euler_angles();
-    // Quarter turns all; a zero without a sign.
+    // All are quarter turns; adding 0.0 turns −0 into 0.
     [x, y, z].map(|angle: f64| angle.to_degrees().round() + 0.0)
 }
 
-/// Where the origin of a mesh, turned already, must stand in `W` for its front to be in the
-/// finger's way, in whole tenths of a millimetre.
+/// Returns the position in `W` of the origin of a mesh, already rotated, that puts its front in the
+/// finger's path, rounded to 0.1 mm.
 pub fn position_m(turned: &Mesh) -> [f64; 3] {
     let (low, high) = turned.bounds();
     let middle = |axis: usize| 0.5 * (low[axis] + high[axis]);
@@ -128,28 +129,28 @@ fn tenth_mm(length_m: f64) -> f64 {
     (length_m * 1e4).round() / 1e4 + 0.0
 }
 
-/// Rays along each side of an object's silhouette; chosen.
+// heuristic: rays along each side of an object's silhouette.
 const RAYS: usize = 61;
 
-/// Share of a zone that has a surface; chosen, so that a rounded corner costs no row of places and
-/// no touch is spent on a rim.
+// heuristic: minimum share of a zone that has a surface, so that a rounded corner costs no row of
+// places and no touch is spent on a rim.
 const FILLED: f64 = 0.98;
 
-/// Room behind the farthest surface of a zone; chosen.
+// heuristic: margin behind the farthest surface of a zone.
 const BEHIND_M: f64 = 0.005;
 
-/// A zone on an object, and how much of it the object fills.
+/// Zone on an object, with the share of it that the object fills.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The zone, with datum and depth.
     pub zone: Zone,
-    /// Share of its places with a surface.
+    /// Share of the zone's places with a surface.
     pub filled: f64,
 }
 
-/// The largest rectangle of the silhouette, seen along −y, of which almost all has a surface; its
-/// datum in the middle of that surface, its depth from the object's front to a little behind the
-/// farthest surface. None if there is no surface along the approach.
+/// Returns the largest rectangle of the silhouette, seen along −y, in which almost every place has
+/// a surface. Its datum is the middle of that surface; its depth reaches from the object's front to
+/// a little behind the farthest surface. Returns `None` if there is no surface along the approach.
 pub fn zone(bvh: &MeshBvh) -> Option<Found> {
     let (low, high) = bvh.mesh().bounds();
     let whole = Zone::new([low.x, high.x], Some([low.z, high.z]));
@@ -157,7 +158,7 @@ pub fn zone(bvh: &MeshBvh) -> Option<Found> {
     if width_m <= 0.0 || height_m <= 0.0 {
         return None;
     }
-    // In the middles of cells, so that none is asked on the very rim.
+    // Rays go through the middles of cells, so that none hits the very rim.
     let at = |i: usize, j: usize| {
         whole.at(&[(i as f64 + 0.5) / RAYS as f64, (j as f64 + 0.5) / RAYS as f64])
     };
@@ -182,8 +183,8 @@ pub fn zone(bvh: &MeshBvh) -> Option<Found> {
     Some(Found { zone, filled: met().count() as f64 / inside().count() as f64 })
 }
 
-/// First and last column, first and last row (the last ones beyond) of the largest rectangle, by
-/// its area, that is filled; none if nothing is.
+/// Returns the columns and rows (first, and one past the last) of the filled rectangle with the
+/// largest area; `None` if there is none.
 fn largest(met: &[Option<f64>], [width, height]: [f64; 2]) -> Option<([usize; 2], [usize; 2])> {
     // sums[j][i]: cells with a surface before column i and row j.
     let mut sums = vec![0i64; (RAYS + 1) * (RAYS + 1)];
@@ -199,7 +200,7 @@ fn largest(met: &[Option<f64>], [width, height]: [f64; 2]) -> Option<([usize; 2]
     for z0 in 0..RAYS {
         for z1 in z0 + 1..=RAYS {
             for x0 in 0..RAYS {
-                // The widest that is larger than the best one and full enough.
+                // The widest rectangle that is larger than the best one and full enough.
                 for x1 in (x0 + 1..=RAYS).rev() {
                     let cells = (x1 - x0) * (z1 - z0);
                     let area = cells as f64 * width * height;

@@ -1,4 +1,4 @@
-//! Probes whose scenes ask for no dynamics.
+//! Probes without dynamics: analytic surface and swept hull.
 
 use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, Shape};
@@ -11,12 +11,12 @@ use palpate_geometry::bvh::SweepHit;
 use palpate_geometry::sweep::Capsule;
 use std::sync::Arc;
 
-/// Touches whatever stands in `environment`, exactly and at once.
+/// Returns a probe that touches the environment's surface exactly and at once.
 pub fn exact(environment: Arc<Environment>) -> Box<dyn Probe> {
     Box::new(Exact { environment, swept: None, tip: None })
 }
 
-/// Reads the scene's function where it is asked, or sweeps the finger's hull along the approach to
+/// Probe that evaluates the scene's function, or sweeps the finger's hull along the approach to
 /// first contact on the exact mesh.
 struct Exact {
     environment: Arc<Environment>,
@@ -61,15 +61,16 @@ impl Probe for Exact {
     }
 }
 
-/// The hull at rest on the object.
+/// Pose of the hull at rest on the object.
 pub struct Rest {
-    /// The centre of the fingertip's hemisphere in `W`.
+    /// Centre of the fingertip's hemisphere in `W`.
     pub p_wt: Point3<f64>,
-    /// Where it touches.
+    /// Contact point and normal.
     pub hit: SweepHit,
 }
 
-/// Where the hull comes to rest on its approach; none for a miss, or without a mesh.
+/// Returns the pose in which the hull comes to rest on its approach; `None` for a miss, or without
+/// a mesh.
 pub fn rest(environment: &Environment, approach: &Approach) -> Option<Rest> {
     let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
     let finger = &environment.scene().finger;
@@ -85,8 +86,8 @@ pub fn rest(environment: &Environment, approach: &Approach) -> Option<Rest> {
     Some(Rest { p_wt: start_w + ahead_w.scale(hit.travel_m), hit })
 }
 
-/// How far behind all that may be touched the centre of the fingertip's hemisphere turns back:
-/// around an object as near as every body does, for there may be something below.
+/// Returns how far behind the depth range the centre of the fingertip's hemisphere turns back.
+/// Around a whole object this is as near as for every other body, for there may be a table below.
 fn beyond_m(environment: &Environment, approach: &Approach) -> f64 {
     match approach.around {
         Some(_) => environment.scene().finger.radius_m + BEYOND_M,
@@ -94,8 +95,8 @@ fn beyond_m(environment: &Environment, approach: &Approach) -> f64 {
     }
 }
 
-/// How far in front of all that may be touched and behind it the centre of the fingertip's
-/// hemisphere sets out and turns back.
+/// Returns the distance, in front of and behind the depth range, at which the centre of the
+/// fingertip's hemisphere starts and turns back.
 fn reach_m(environment: &Environment) -> f64 {
     let finger = &environment.scene().finger;
     finger.radius_m + finger.length_m + CLEARANCE_M

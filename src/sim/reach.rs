@@ -1,8 +1,9 @@
-//! Where the finger can touch a surface at all: a groove narrower than the fingertip hides its
-//! ground.
+//! Reachable surface: the part that the fingertip can touch. A groove narrower than the fingertip
+//! hides its ground.
 //!
-//! Fingers resting on the surface all over the zone leave below them the morphological closing of
-//! the surface by the finger's hull; the surface is reachable where it touches that envelope.
+//! Fingers at rest on the surface all over the zone leave below them the morphological closing of
+//! the surface by the finger's hull. A point is reachable if the surface touches that envelope
+//! there.
 
 use super::probe::rest;
 use crate::sim::Environment;
@@ -12,20 +13,20 @@ use palpate_explore::task::Zone;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Height between surface and envelope that still counts as touching; chosen, a tenth of the
-/// smallest errors that a belief reaches.
+// heuristic: height between surface and envelope that still counts as contact, a tenth of the
+// smallest errors of a belief.
 const TOLERANCE_M: f64 = 1e-4;
 
-/// Fingers along a radius, and most of them along a side of the zone; chosen.
+// heuristic: fingers along a radius, and the largest number along a side of the zone.
 const PER_RADIUS: f64 = 8.0;
 const PER_SIDE_MAX: f64 = 128.0;
 
-/// More than rounding can take off a finger's width.
+/// Upper bound on the rounding error of a finger's width.
 const ROUNDING_M: f64 = 1e-9;
 
-/// Whether the finger, sent to some target in the zone, can touch the surface at each of `places`
-/// with the true height above the datum in `heights_m`; a place without a surface is none. `tell`
-/// is called with how far the work has come.
+/// Returns whether the finger, sent to some target in the zone, can touch the surface at each of
+/// `places`, whose true heights above the datum are `heights_m`. A place without a surface is not
+/// reachable. `tell` is called with the progress.
 pub fn is_reachable(
     environment: &Environment,
     places: &[Vec<f64>],
@@ -41,7 +42,7 @@ pub fn is_reachable(
     let mut is_reachable = Vec::with_capacity(places.len());
     for (places, heights_m) in places.chunks(part).zip(heights_m.chunks(part)) {
         let percent = 100 * is_reachable.len() / (PARTS * part);
-        tell(&format!("looking where the finger can touch the surface: {percent} %"));
+        tell(&format!("computing where the finger can touch the surface: {percent} %"));
         is_reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
             height_m.is_some_and(|height_m| fingers.touch(place, height_m, &lowest_y_m))
         }));
@@ -49,24 +50,23 @@ pub fn is_reachable(
     is_reachable
 }
 
-/// Parts of the work between which it is said how far it has come.
+/// Number of chunks after which progress is reported.
 const PARTS: usize = 20;
 
-/// Fingers all over the zone, each let down onto the object when first asked for.
+/// Fingers on a grid over the zone, each lowered onto the object on first use.
 struct Fingers<'a> {
     environment: &'a Environment,
     zone: &'a Zone,
     front: Front,
-    /// Their coordinates along each side of the zone, of which x varies fastest; z is 0 where the
-    /// zone has only x.
+    /// Coordinates along each side of the zone, x fastest; z is 0 if the zone has only x.
     sides_m: [Vec<f64>; 2],
-    /// The y in the zone's frame at which each tip rests; none for one that meets nothing.
+    /// y, in the zone's frame, of each tip at rest; `None` for a miss.
     tips_y_m: Vec<OnceLock<Option<f64>>>,
-    /// Height between surface and envelope up to which they touch.
+    /// Height between surface and envelope up to which they count as touching.
     tolerance_m: f64,
 }
 
-/// A row of targets near a finger, and the y of its front over each relative to its tip.
+/// Row of targets near a finger, with the y of its front over each relative to its tip.
 struct Strip {
     /// Rows and columns from the finger's own target to the first.
     row: isize,
@@ -86,7 +86,7 @@ impl<'a> Fingers<'a> {
             let at = |i| low + (high - low) * (i as f64 / steps);
             *targets_m = (0..=steps as usize).map(at).collect();
         }
-        // The nearest finger may stand half a step from the one that touches; on a plane that lifts
+        // The nearest finger is up to half a step from the one that touches; on a plane that lifts
         // the sphere off by the square of the distance over twice its radius.
         let missed_m: f64 = (zone.extents_m().into_iter())
             .map(|side_m| (side_m / steps(side_m)).powi(2) / (8.0 * radius_m))
@@ -102,8 +102,8 @@ impl<'a> Fingers<'a> {
         })
     }
 
-    /// Whether one of them touches the surface at `place`. Those are asked first that may come
-    /// lowest over it, and those that stay above it not at all, so that few are let down.
+    /// Returns whether a finger touches the surface at `place`. Fingers with the lowest bound come
+    /// first, and those whose bound lies above the place are skipped, so that few are lowered.
     fn touch(&self, place: &[f64], height_m: f64, lowest_y_m: &[f64]) -> bool {
         let datum_y_m = self.zone.datum_y_m();
         let is_touched =
@@ -118,8 +118,8 @@ impl<'a> Fingers<'a> {
         })
     }
 
-    /// For each a y in the zone's frame below which its tip does not come, from the surface at
-    /// every target: no hull lets it through.
+    /// Returns a lower bound on the y of each tip in the zone's frame, from the surface at every
+    /// target: no hull passes through it.
     fn lowest_y_m(&self) -> Vec<f64> {
         let surface_y_m = |finger| self.environment.mesh_y_m(&self.target(finger));
         let surface_y_m: Vec<f64> = (0..self.tips_y_m.len())
@@ -145,7 +145,7 @@ impl<'a> Fingers<'a> {
         (0..self.tips_y_m.len()).into_par_iter().map(lowest_y_m).collect()
     }
 
-    /// The hull's front over the targets around any finger, as targets stand at equal distances.
+    /// Returns the hull's front over the targets around any finger; targets are equally spaced.
     fn strips(&self) -> Vec<Strip> {
         let step_m = self.sides_m.each_ref().map(|side| match side[..] {
             [first, .., last] => (last - first) / (side.len() - 1) as f64,
@@ -168,8 +168,8 @@ impl<'a> Fingers<'a> {
         .collect()
     }
 
-    /// The fingers whose hull is over `place`, each with the y of its front there relative to its
-    /// tip.
+    /// Returns the fingers whose hull is over `place`, each with the y of its front there relative
+    /// to its tip.
     fn over(&self, place: &[f64]) -> impl Iterator<Item = (usize, f64)> {
         let radius_m = self.environment.scene().finger.radius_m + ROUNDING_M;
         let [x_m, z_m] = [place[0], place.get(1).copied().unwrap_or(0.0)];
@@ -188,7 +188,7 @@ impl<'a> Fingers<'a> {
         })
     }
 
-    /// The place that `finger` is sent to, with z where the zone has only x.
+    /// Returns the target of `finger`; its z is 0 if the zone has only x.
     fn target(&self, finger: usize) -> [f64; 2] {
         let [x_m, z_m] = &self.sides_m;
         [x_m[finger % x_m.len()], z_m[finger / x_m.len()]]

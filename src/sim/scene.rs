@@ -1,4 +1,4 @@
-//! What there is: the object, the finger, the zone, and which body carries out a touch.
+//! The scene: object, finger, zone, and the simulator that carries out a touch.
 
 use super::solver::SolverSettings;
 use crate::sim::finger::Effects;
@@ -21,62 +21,62 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// A scene means one thing: everything that decides what a touch returns stands in it.
+/// Settings of a scene, the file that decides everything a touch returns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// What carries out a touch.
+    /// Simulator that carries out a touch.
     pub body: Body,
-    /// The surface, if the body is `function`.
+    /// Analytic surface, if `body = "function"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub function: Option<Function>,
-    /// The rectangle explored, of one side of an object.
+    /// Rectangle to explore on one side of an object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zone: Option<Zone>,
-    /// The ball explored, of a whole object from all sides; in place of a zone.
+    /// Ball to explore around a whole object; replaces the zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub around: Option<Around>,
-    /// The object, if the body is not `function`.
+    /// Object to touch, unless `body = "function"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<Object>,
-    /// The finger; a `function` is touched without one.
+    /// Finger; not used by `body = "function"`.
     #[serde(default)]
     pub finger: Finger,
-    /// The arm that carries the finger; without one, a stage of three slides does, around a whole
-    /// object with a wrist.
+    /// Arm that carries the finger; default: a stage of three slides, with a wrist for a whole
+    /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmSettings>,
-    /// Optional physics of a body that feels, each a table of its own; the others leave it alone.
+    /// Optional physics of a body with a soft finger, one table per effect.
     #[serde(default, skip_serializing_if = "is_default")]
     pub effects: Effects,
-    /// How a `dynamic` body is integrated.
+    /// Solver settings of a `dynamic` body.
     #[serde(default, skip_serializing_if = "is_default")]
     pub solver: SolverSettings,
-    /// How a touch is carried out by a body that moves.
+    /// Motion of the finger during a touch.
     #[serde(default, skip_serializing_if = "is_default")]
     pub touch: TouchSettings,
 }
 
-/// A force must stand this many standard deviations of its noise above it to say contact: an
-/// approach is a thousand readings (chosen).
+// heuristic: contact is a force above this many standard deviations of its noise, because an
+// approach takes about a thousand readings.
 const SDS_OF_CONTACT: f64 = 5.0;
 
-/// How faithfully a touch is carried out, cheapest first.
+/// Simulator of a touch, cheapest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Body {
-    /// An analytic surface is read where it is asked.
+    /// Analytic surface, evaluated without a finger.
     Function,
-    /// The finger's hull is swept along the approach to first contact on the exact mesh.
+    /// Finger's rigid hull, swept along the approach to first contact on the exact mesh.
     Cast,
-    /// The soft finger is moved exactly as commanded and feels the exact mesh.
+    /// Soft finger, moved exactly as commanded, in contact with the exact mesh.
     Kinematic,
-    /// Masses, gravity, friction and velocity servos carry the finger, in MuJoCo.
+    /// Arm and finger with masses, gravity, friction and velocity servos, in MuJoCo.
     Dynamic,
 }
 
 impl Body {
-    /// As a scene file names it.
+    /// Returns the name used in a scene file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Function => "function",
@@ -86,22 +86,22 @@ impl Body {
         }
     }
 
-    /// Whether it moves a finger in time.
+    /// Returns whether the simulator moves a finger in time.
     pub fn moves(self) -> bool {
         matches!(self, Self::Kinematic | Self::Dynamic)
     }
 }
 
-/// An analytic one-dimensional surface y = f(x), touched without a finger.
+/// Analytic one-dimensional surface y = f(x), touched without a finger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Function {
-    /// Eq. 4 of Yi et al. 2016: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.
+    /// Sine bump of Yi et al. 2016, Eq. 4: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.
     Toy,
 }
 
 impl Function {
-    /// Height at `x`.
+    /// Returns the height at `x`.
     pub fn height_m(self, x: f64) -> f64 {
         match self {
             Self::Toy if x.abs() <= 1.0 => (4.0 * PI * x).sin() + 1.0,
@@ -109,14 +109,14 @@ impl Function {
         }
     }
 
-    /// Smallest and largest height.
+    /// Returns the smallest and largest height.
     pub fn heights_m(self) -> [f64; 2] {
         match self {
             Self::Toy => [0.0, 2.0],
         }
     }
 
-    /// Slope at `x`; at a kink that of the side nearer to 0.
+    /// Returns the slope at `x`; at a kink, the slope of the side nearer to 0.
     pub fn slope(self, x: f64) -> f64 {
         match self {
             Self::Toy if x.abs() <= 1.0 => 4.0 * PI * (4.0 * PI * x).cos(),
@@ -125,29 +125,29 @@ impl Function {
     }
 }
 
-/// A mesh and where it stands.
+/// Mesh and pose of the object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
-    /// Its file: .obj, .gltf, .glb, .stl or .ply, relative to the scene's file.
+    /// Mesh file: .obj, .gltf, .glb, .stl or .ply, relative to the scene file.
     pub mesh: PathBuf,
-    /// Whether a .gltf file may name buffers outside its own folder.
+    /// Permission for a .gltf file to name buffers outside its own folder.
     #[serde(default, skip_serializing_if = "is_default")]
     pub outside_buffers: bool,
-    /// Unit of the file's numbers.
+    /// Unit of the mesh file.
     #[serde(default)]
     pub unit: Unit,
-    /// Factor on top of the unit.
+    /// Scale factor, on top of the unit.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Where the mesh's origin stands in `W`.
+    /// Position of the mesh's origin in `W`.
     #[serde(default)]
     pub position_m: [f64; 3],
-    /// Turns about the fixed axes x, then y, then z of `W`.
+    /// Rotation about the fixed axes x, then y, then z of `W`.
     #[serde(default)]
     pub rotation_deg: [f64; 3],
-    /// Name of the analytic surface the mesh was made from; metrics then compare with it
-    /// instead of with the mesh.
+    /// Name of the analytic surface behind the mesh; errors are computed against it instead of the
+    /// mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<String>,
 }
@@ -156,13 +156,13 @@ fn one() -> f64 {
     1.0
 }
 
-/// Unit of a mesh file's numbers.
+/// Unit of length in a mesh file.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum, JsonSchema,
 )]
 #[serde(rename_all = "lowercase")]
 pub enum Unit {
-    /// Metres, as glTF prescribes.
+    /// Metres, the unit of glTF.
     #[default]
     M,
     /// Centimetres.
@@ -176,7 +176,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Metres per unit.
+    /// Returns the length of one unit, in m.
     pub fn metres(self) -> f64 {
         match self {
             Self::M => 1.0,
@@ -189,14 +189,14 @@ impl Unit {
 }
 
 impl fmt::Display for Unit {
-    /// As a scene file names it.
+    /// Writes the name used in a scene file.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         self.to_possible_value().map_or(Ok(()), |value| f.write_str(value.get_name()))
     }
 }
 
 impl Object {
-    /// Pose of the mesh's frame in `W`.
+    /// Returns the pose of the mesh's frame in `W`.
     pub fn x_wo(&self) -> Isometry3<f64> {
         pose(self.position_m, self.rotation_deg)
     }
@@ -247,7 +247,7 @@ impl Checked for Scene {
             given(rules, "object", self.object.is_some(), allowed);
             let allowed = "no around: body = \"function\" touches a curve";
             given(rules, "around", self.around.is_some(), allowed);
-            let allowed = "no arm: body = \"function\" is touched by none";
+            let allowed = "no arm: body = \"function\" needs none";
             given(rules, "arm", self.arm.is_some(), allowed);
             let is_deep = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
             let allowed = "no z_m: the surface of body = \"function\" is a curve over x";
@@ -260,8 +260,8 @@ impl Checked for Scene {
         }
         let turns = self.around.is_none() || self.arm.is_some() || self.body != Body::Dynamic;
         rules.require("body", "\"dynamic\"", turns, || {
-            "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must be turned, and \
-             the stage of body = \"dynamic\" has slides alone"
+            "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must turn, and the \
+             stage of body = \"dynamic\" has no wrist"
                 .into()
         });
         rules.table("effects", &self.effects);
@@ -293,11 +293,11 @@ impl Checked for Scene {
             });
         }
         let is_rigid = self.body == Body::Kinematic && self.felt_effects().skin.is_none();
-        let allowed = "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger \
-                       is body = \"cast\"; without any [effects] it has a BioTac's)";
+        let allowed = "a table, because body = \"kinematic\" needs a soft skin (for a rigid finger \
+                       use body = \"cast\"; without any [effects] the skin is a BioTac's)";
         lacks(rules, "effects.skin", is_rigid, allowed);
         let bumps = self.body != Body::Dynamic && self.effects.collision.is_some();
-        let allowed = "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo";
+        let allowed = "no collision: only body = \"dynamic\" computes collisions of links";
         given(rules, "effects.collision", bumps, allowed);
         if let (Some(wrench), false) = (&self.effects.wrench, self.frames_tell_contact()) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
@@ -305,7 +305,7 @@ impl Checked for Scene {
             rules.require("touch.detection_n", self.touch.detection_n, told, || {
                 format!(
                     "at least {least_n} N, {SDS_OF_CONTACT} standard deviations of effects.wrench, \
-                     because no frame says contact"
+                     because contact is detected from the force alone"
                 )
             });
         }
@@ -314,7 +314,7 @@ impl Checked for Scene {
             rules.require("touch.approach_m_s", approach_m_s, approach_m_s <= limit_m_s, || {
                 format!(
                     "at most {:.4}: with this period_s, detection.frames and timing a faster finger \
-                     is pressed past its skin before contact is told",
+                     compresses its skin fully before contact is detected",
                     (1e4 * limit_m_s).floor() / 1e4
                 )
             });
@@ -331,14 +331,14 @@ impl Checked for Scene {
 }
 
 impl Scene {
-    /// The scene with every effect, each as it is by default.
+    /// Returns the scene with every effect at its default settings.
     pub fn with_all_effects(self) -> Self {
         Self { effects: Effects::all(), ..self }
     }
 
-    /// Duration of one control tick: the scene's, or the body's own. That of a simulated arm is
-    /// the cycle of the PA-10's servo driver (`hydro`, Orca robotics); a body without inertia needs
-    /// no more than a tick for each tactile frame.
+    /// Returns the duration of one control tick: `touch.period_s`, or the default of the body. The
+    /// default of a simulated arm is the cycle of the PA-10's servo driver (`hydro`, Orca
+    /// robotics); a body without inertia needs only one tick for each tactile frame.
     pub fn period_s(&self) -> f64 {
         self.touch.period_s.unwrap_or(match self.body {
             Body::Dynamic => 0.002,
@@ -346,8 +346,8 @@ impl Scene {
         })
     }
 
-    /// The effects, or those of a BioTac (skin, fluid and electrodes, with their defaults) where
-    /// the body must feel and the scene names none.
+    /// Returns the effects in use: those of the scene, or those of a BioTac (skin, fluid and
+    /// electrodes with their defaults) if a `kinematic` scene names no effects.
     pub fn felt_effects(&self) -> Cow<'_, Effects> {
         match self.body == Body::Kinematic && self.effects == Effects::default() {
             true => Cow::Owned(Effects::biotac()),
@@ -355,14 +355,14 @@ impl Scene {
         }
     }
 
-    /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
-    /// object does to it.
+    /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin model
+    /// computes the contact force.
     pub fn collides(&self) -> bool {
         self.body == Body::Dynamic && self.effects.skin.is_none()
     }
 
-    /// Fastest approach at which contact is told before skin and fluid are used up in front of the
-    /// tip; none for a body that is not moved through contact.
+    /// Returns the fastest approach at which contact is detected before skin and fluid in front of
+    /// the tip are fully compressed; `None` for a body that does not move through contact.
     pub fn approach_limit_m_s(&self) -> Option<f64> {
         let effects = self.felt_effects();
         if self.body != Body::Kinematic || effects.skin.is_none() {
@@ -376,7 +376,7 @@ impl Scene {
         Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
     }
 
-    /// Whether contact is told by tactile frames, and not by force.
+    /// Returns whether contact is detected from tactile frames instead of force.
     fn frames_tell_contact(&self) -> bool {
         let effects = self.felt_effects();
         self.touch.detection.by.is_heard(effects.fluid.is_some(), effects.electrodes.is_some())
@@ -385,14 +385,14 @@ impl Scene {
     /// Reads a scene file and applies `--set` assignments.
     ///
     /// # Errors
-    /// The first thing that is wrong, with its place.
+    /// Returns the first invalid setting, with its place in the file.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
         if loader.has("planners") || loader.has("scene") {
             return Err(loader.other(
                 "an experiment",
-                "a scene is wanted here, as its key `scene` names one; palpate run, show and watch \
-                 take an experiment",
+                "a scene is needed here; use the file that the experiment's key `scene` names. palpate \
+                 run, show and watch take an experiment",
             ));
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
@@ -402,11 +402,12 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Makes the paths of a scene under `prefix` absolute, and puts the constants of its sensor
-    /// into its effects; returns the keys of constants that stand in the effects themselves.
+    /// Makes the paths of a scene under `prefix` absolute, and copies the constants of its sensor
+    /// into its effects. Returns the keys of sensor constants that are set in the effects
+    /// themselves.
     ///
     /// # Errors
-    /// If the sensor's file cannot be read, or holds what is not allowed.
+    /// If the sensor file cannot be read, or holds a value that is not allowed.
     pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
         loader.resolve_path(&format!("{prefix}object.mesh"));
         loader.resolve_path_ending(&format!("{prefix}arm.model"), ".toml");

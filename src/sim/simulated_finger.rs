@@ -1,4 +1,4 @@
-//! What the simulated finger feels of the scene's object, for every simulated body.
+//! Simulated finger in contact with the scene's object, for every simulated backend.
 
 use crate::sim::Environment;
 use crate::sim::environment::Shape;
@@ -11,27 +11,27 @@ use palpate_explore::robot::finger::TipMotion;
 use palpate_gp::math::seed;
 use std::sync::Arc;
 
-/// Forces below this have no place; far below any that is detected (chosen).
+// heuristic: forces below this have no contact point; far below any that is detected.
 const LEAST_FORCE_N: f64 = 1e-6;
 
-/// The finger's state during one trial.
+/// State of the finger during one trial.
 pub struct SimulatedFinger {
     environment: Arc<Environment>,
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
-    /// A fingertip that differs from the environment's; none if it does not.
+    /// Fingertip of this trial, if its sensor constants vary; otherwise the environment's is used.
     own: Option<Box<Fingertip>>,
     state: FingertipState,
     gauge: Option<Gauge>,
     misplaced: Option<Registration>,
     load: Load,
-    /// Whether the fluid tells of contact and the electrodes of its place.
+    /// Whether the scene has both fluid (detects contact) and electrodes (locate it).
     has_sensor: bool,
 }
 
 impl SimulatedFinger {
-    /// Untouched, with what is drawn for a trial by its seed; none in an environment without a soft
-    /// finger.
+    /// Creates an unloaded finger and draws its random constants from the trial's seed; `None` in
+    /// an environment without a soft finger.
     pub fn new(environment: Arc<Environment>, seed: u64) -> Option<Self> {
         let stream = |purpose| seed::stream(seed, 0, purpose);
         let scene = environment.scene();
@@ -67,17 +67,18 @@ impl SimulatedFinger {
         })
     }
 
-    /// Forgets everything.
+    /// Resets the finger to its state at the start of the trial with `seed`.
     pub fn reset(&mut self, seed: u64) {
         if let Some(new) = Self::new(Arc::clone(&self.environment), seed) {
             *self = new;
         }
     }
 
-    /// Goes on by `dt_s`, to `motion` at its end; what the object does to the finger then, in `T`.
+    /// Advances by `dt_s`, to `motion` at the end of the step. Returns the force and torque of the
+    /// object on the finger, in `T`.
     ///
     /// # Errors
-    /// As [`FingertipState::step`].
+    /// The errors of [`FingertipState::step`].
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
         let Self { own, state, misplaced, .. } = self;
         let tip = own.as_deref().or(self.environment.fingertip());
@@ -90,9 +91,9 @@ impl SimulatedFinger {
         Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }
 
-    /// Writes into `reading` what a control tick of `period_s` brought: the frames that arrived,
-    /// what a force/torque sensor under the load `mount` (in `T`) says, and the load where no
-    /// sensor tells it.
+    /// Writes the data of a control tick of `period_s` into `reading`: tactile frames that arrived,
+    /// the reading of a force/torque sensor under the load `mount` (in `T`), and the true load if
+    /// no sensor measures it.
     pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.samples.clear();
         reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));
@@ -103,7 +104,7 @@ impl SimulatedFinger {
         });
     }
 
-    /// The load where no sensor tells it.
+    /// Returns the true load, if no sensor measures it.
     fn ideal(&self) -> Option<IdealContact> {
         let force_n = self.load.force_n.norm();
         (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {

@@ -1,5 +1,5 @@
-//! What the trials of an experiment share: the environment, and what is compiled from it once;
-//! it makes their bodies and probes.
+//! Simulator shared by the trials of an experiment: the environment with its compiled models; it
+//! makes backends and probes.
 
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
@@ -18,7 +18,7 @@ use palpate_geometry::distance::OrientedBox;
 use palpate_input::error::Invalid;
 use std::sync::Arc;
 
-/// An environment with everything ready to put bodies into it.
+/// Environment with its compiled models, ready to create backends.
 #[derive(Clone)]
 pub struct Simulator {
     environment: Arc<Environment>,
@@ -27,10 +27,10 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Compiles what the scene's body needs.
+    /// Compiles the models that the scene's body needs.
     ///
     /// # Errors
-    /// If it cannot be simulated as the scene asks.
+    /// If the scene cannot be simulated.
     pub fn new(environment: Arc<Environment>) -> Result<Self, Invalid> {
         #[cfg(feature = "mujoco")]
         {
@@ -52,7 +52,8 @@ impl Simulator {
         &self.environment
     }
 
-    /// What of the scene may not be meant, and what is simulated otherwise than it asks.
+    /// Returns warnings about likely configuration mistakes, and differences between the scene and
+    /// the simulation.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = self.environment.notices().to_vec();
         let foot_w = self.environment.chain().map(|chain| match self.environment.scene().arm {
@@ -69,10 +70,10 @@ impl Simulator {
         notices
     }
 
-    /// Whether the scene's arm or stage can touch over all of its zone.
+    /// Checks that the scene's arm or stage can reach all of its zone.
     ///
     /// # Errors
-    /// If it cannot.
+    /// If a part of the zone is out of reach.
     pub fn check_reach(&self) -> Result<(), Invalid> {
         let environment = &self.environment;
         match (environment.scene().body, environment.robot()) {
@@ -83,7 +84,7 @@ impl Simulator {
         }
     }
 
-    /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.
+    /// Returns the probe of the scene's body; `seed` decides all the randomness of its sensors.
     ///
     /// # Errors
     /// If the body cannot be brought to its start.
@@ -94,19 +95,20 @@ impl Simulator {
         })
     }
 
-    /// What drives `body`, one of the scene's own or around one, through touches, with the usual
-    /// interlocks around it. They know of table and object where the scene lets those collide.
+    /// Returns the servo that drives `body` (the scene's own or a wrapper of it) through touches,
+    /// within the default interlocks. The interlocks include table and object if the scene lets
+    /// them collide.
     ///
     /// # Errors
-    /// If it cannot be brought to its start.
+    /// If the body cannot be brought to its start.
     pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
         self.servo_within(body, seed, &InterlockSettings::default())
     }
 
-    /// As [`servo`](Self::servo), within limits of one's own.
+    /// Returns a servo like [`servo`](Self::servo), within the given limits.
     ///
     /// # Errors
-    /// As [`servo`](Self::servo).
+    /// The errors of [`servo`](Self::servo).
     pub fn servo_within(
         &self,
         body: Box<dyn Backend>,
@@ -125,7 +127,8 @@ impl Simulator {
         Servo::new(robot, task.touch().clone(), Box::new(body), seed)
     }
 
-    /// The simulated body that the scene asks for, at its start; none where a touch is no motion.
+    /// Returns the simulated backend of the scene, at its start; `None` if a touch involves no
+    /// motion.
     ///
     /// # Errors
     /// If there is no memory for its state.

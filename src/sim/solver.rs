@@ -1,35 +1,35 @@
-//! How a body with masses is integrated over time.
+//! Time integration of a body with masses.
 
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Longest step: the servos' gains are chosen for it (`models/pa10/SOURCE.md`).
+/// Longest step: the servo gains are tuned for it (`models/pa10/SOURCE.md`).
 const LONGEST_STEP_S: f64 = 0.002;
 
 /// Longest step of an [explicit](Integrator::is_explicit) integrator with an arm. The largest rate
 /// of the PA-10's servos, the largest eigenvalue of M⁻¹ diag(kv), is 1740 /s (link set A: 1890 /s)
-/// over 3000 random postures (`tests/suite/rigid.rs`); Euler's steps are stable below 2 over that,
-/// Runge and Kutta's below 2.79.
+/// over 3000 random postures (`tests/suite/rigid.rs`). Euler steps are stable below 2 over that
+/// rate, Runge–Kutta steps below 2.79.
 const LONGEST_EXPLICIT_STEP_S: f64 = 0.001;
 
-/// How far a control period may be off a whole number of steps, in steps (chosen: rounding).
+// heuristic: largest rounding error of a control period, in steps.
 const ROUNDING: f64 = 1e-6;
 
-/// Table `[solver]`.
+/// Settings of the table `[solver]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverSettings {
-    /// Time step; a control period is one or several. The force of the skin is that of the step's
-    /// start.
+    /// Time step, s; a control period is one or several. The skin's force is constant during a
+    /// step.
     pub step_s: f64,
-    /// How a step is made.
+    /// Integrator.
     pub integrator: Integrator,
-    /// As what MuJoCo lets a finger without skin, or the links of `[effects.collision]`, meet the
-    /// object; left out, the default of [`Collision`].
+    /// Collision geometry of the object for parts that MuJoCo lets collide; default: that of
+    /// [`Collision`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub collision: Option<Collision>,
-    /// How `collision = "sdf"` looks for contact; left out, the default of [`Sdf`].
+    /// Contact search of `collision = "sdf"`; default: that of [`Sdf`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sdf: Option<Sdf>,
 }
@@ -45,24 +45,24 @@ impl Default for SolverSettings {
     }
 }
 
-/// MuJoCo's integrators that step rigid bodies. All are of first order here, whatever their own
-/// order: skin and servo integral are held through a step.
+/// MuJoCo's integrators of rigid bodies. Here all are of first order, whatever their own order:
+/// skin force and servo integral are constant during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Integrator {
-    /// Implicit in the joints' velocities but for Coriolis and centripetal forces.
+    /// Implicit in the joint velocities except for Coriolis and centripetal forces.
     #[default]
     ImplicitFast,
-    /// Implicit in the joints' velocities.
+    /// Implicit in the joint velocities.
     Implicit,
     /// Semi-implicit: explicit in the servos' damping, implicit in the joints' own.
     Euler,
-    /// Runge and Kutta's of fourth order: explicit.
+    /// Explicit Runge–Kutta method of fourth order.
     Rk4,
 }
 
 impl Integrator {
-    /// As a scene file names it.
+    /// Returns the name used in a scene file.
     pub fn name(self) -> &'static str {
         match self {
             Self::ImplicitFast => "implicitfast",
@@ -72,14 +72,14 @@ impl Integrator {
         }
     }
 
-    /// Whether a servo too stiff for the step makes it unstable.
+    /// Returns whether a servo that is too stiff for the step makes it unstable.
     fn is_explicit(self) -> bool {
         matches!(self, Self::Euler | Self::Rk4)
     }
 }
 
 impl SolverSettings {
-    /// The longest step with an arm; the stage's servos, 740 /s, bear any.
+    /// Returns the longest step with an arm; the stage's servos, 740 /s, allow any.
     pub fn longest_step_s(&self) -> f64 {
         match self.integrator.is_explicit() {
             true => LONGEST_EXPLICIT_STEP_S,
@@ -87,7 +87,7 @@ impl SolverSettings {
         }
     }
 
-    /// Steps in `period_s`, or none if they are not a whole number.
+    /// Returns the number of steps in `period_s`, or `None` if it is not whole.
     pub fn steps(&self, period_s: f64) -> Option<u32> {
         let steps = period_s / self.step_s;
         let whole = steps.round();
@@ -108,22 +108,22 @@ impl Checked for SolverSettings {
     }
 }
 
-/// As what the object is met by a finger without skin, which MuJoCo lets collide;
-/// `docs/physics.md` says how exact each is.
+/// Collision geometry of the object for a rigid finger in MuJoCo; `docs/physics.md` states the
+/// accuracy of each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Collision {
-    /// A height field over the zone, from rays along the approach onto the mesh.
+    /// Height field over the zone, from rays along the approach onto the mesh.
     #[default]
     HeightField,
-    /// The mesh's convex hull.
+    /// Convex hull of the mesh.
     Hull,
-    /// The mesh's signed distance field, interpolated in an octree.
+    /// Signed distance field of the mesh, interpolated in an octree.
     Sdf,
 }
 
 impl Collision {
-    /// As a scene file names it.
+    /// Returns the name used in a scene file.
     pub fn name(self) -> &'static str {
         match self {
             Self::HeightField => "height_field",
@@ -137,14 +137,14 @@ impl Collision {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sdf {
-    /// Most iterations of one descent.
+    /// Largest number of iterations of one descent.
     pub iterations: u32,
-    /// Places where descents begin; as many contacts at most.
+    /// Number of starting points of descents, and largest number of contacts.
     pub initpoints: u32,
 }
 
 impl Default for Sdf {
-    /// MuJoCo's own.
+    /// Returns MuJoCo's defaults.
     fn default() -> Self {
         Self { iterations: 10, initpoints: 40 }
     }

@@ -118,7 +118,7 @@ fn an_object_too_small_to_go_around_is_refused_at_once() {
     let folder = around();
     for scale in ["0.00001", "1000"] {
         let set = format!("scene.object.scale={scale}");
-        let says = ["the object is", "m large", "allowed is", "object.scale"];
+        let says = ["the object's size is", "m, and the ball", "allowed is", "object.scale"];
         fails(folder.path(), &["run", "small.toml", "--set", &set], &says);
     }
     assert!(!folder.path().join("runs").exists());

@@ -157,7 +157,7 @@ fn a_check_says_by_its_exit_code() {
     // Of a planner that differs little can be said after four trials.
     let (code, said) = check(&["--set", "gp.noise_sd_m=0.3", "--junit", junit]);
     assert!([Some(1), Some(3)].contains(&code), "{code:?} {said}");
-    assert!(said.contains("settings, or the object's file"), "{said}");
+    assert!(said.contains("settings or the object's file"), "{said}");
     let told = fs::read_to_string(junit).unwrap();
     assert!(told.contains("<failure") || told.contains("<error"), "{told}");
     let (code, said) = check(&["--set", "seed=5"]);

@@ -101,7 +101,7 @@ fn a_run_without_truth_is_told() {
         assert!(page.contains("nobody knows this surface"));
         let visible = page.split("<script").next().unwrap();
         assert!(!visible.contains("NaN") && !visible.contains("mean R (Eq. 5) is"), "{visible}");
-        assert_eq!(page.contains("At verification touches"), !with.is_empty());
+        assert_eq!(page.contains("At held-out verification touches"), !with.is_empty());
         let text = report::tables::summary::text(&run);
         assert!(text.contains("nobody knows this surface"), "{text}");
         assert_eq!(text.contains("verification rmse"), !with.is_empty(), "{text}");

@@ -89,7 +89,7 @@ fn partial_runs_are_drawn() {
         };
         let none = with(&|run| run.rows.clear());
         assert_eq!(none.keys().collect::<Vec<_>>(), ["report.html"]);
-        assert!(text(&none, "report.html").contains("nothing to say yet"));
+        assert!(text(&none, "report.html").contains("no results yet"));
         let one = with(&|run| run.rows.truncate(1));
         assert!(text(&one, "report.html").contains("Only 1 of"));
         let later = with(&|run| run.rows.retain(|row| row.trial == 1));
@@ -136,7 +136,7 @@ fn rows_of_another_zone_are_refused() {
         format!("{:#}", report::write(&run, &Analysis::of(&run), folder.path()).unwrap_err());
     assert!(
         error.contains(
-            "surfaces: trial 0 of random, touch 5: a target that is no place of the zone"
+            "surfaces: trial 0 of random, touch 5: target outside the zone's coordinates"
         ),
         "{error}"
     );

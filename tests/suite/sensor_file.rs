@@ -53,7 +53,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_place() {
             "[skin]\nflaten_pa_m = 1e6",
             "sensor.toml:2: unknown key `skin.flaten_pa_m`, did you mean",
         ),
-        ("[skin]\nsamples = 100", "settings of effects stand in the scene"),
+        ("[skin]\nsamples = 100", "settings of effects belong in the scene"),
         ("[fluid]\nquantise = 3", "sensor.toml:2: `fluid.quantise` = 3"),
         ("skin =", "not valid TOML"),
     ] {
@@ -64,7 +64,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_place() {
     for (set, said) in [
         ("effects.sensor=none.toml", "allowed is a readable file"),
         ("effects.sensor=takktile", "\"takktile\": allowed is \"biotac\", or a file"),
-        ("effects.flex={}", "removed: the skins are model = \"columns\" and model = \"shell\""),
+        ("effects.flex={}", "removed: use model = \"columns\" or model = \"shell\""),
     ] {
         let error = scene(&[set]).unwrap_err();
         assert!(error.contains(said), "{error}");

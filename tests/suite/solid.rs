@@ -222,7 +222,7 @@ fn a_figure_reads_well_and_has_a_panel_for_each_count_and_side() {
         assert!(svg.contains("standard deviation σ (mm)"));
         let panels = 2 * 2 * (counts.len() + 1);
         assert_eq!(svg.matches("<tspan font-weight=\"bold\">").count(), panels);
-        let lacking = svg.matches("no belief after so many").count();
+        let lacking = svg.matches("no belief at this count").count();
         assert_eq!(lacking, 2 * 2 * usize::from(counts.contains(&99)));
     }
 }

@@ -1,4 +1,4 @@
-//! Pieces of the Gaussian process and of the planners that ask it.
+//! Pieces of the Gaussian process and of the planners that use it.
 
 use super::Piece;
 use super::sample::{KERNEL, hyperparameters, place, search_box, touches};
@@ -7,10 +7,10 @@ use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
 use std::hint::black_box;
 
-/// Evaluations of a climb.
+/// Evaluations in one optimisation.
 const EVALUATIONS: usize = 16;
 
-/// Places that are asked for at once.
+/// Places of one query.
 const PLACES: usize = 1024;
 
 pub fn pieces() -> Vec<Piece> {
@@ -24,8 +24,8 @@ pub fn pieces() -> Vec<Piece> {
     pieces
 }
 
-/// n³/3 operations for the factor, as many for its inverse and for that of the matrix; buffers are
-/// shared by one fit's evaluations.
+/// Times the likelihood: n³/3 operations for the factor, as many for its inverse and for that of
+/// the matrix; the evaluations of one fit share buffers.
 fn likelihood(count: usize) -> Piece {
     let touches = touches(count);
     let (times, n) = (EVALUATIONS as f64, count as f64);
@@ -51,7 +51,7 @@ fn cold_fit(count: usize) -> Piece {
     })
 }
 
-/// A triangular solve of n² operations, which reads half of the matrix.
+/// Times a variance: a triangular solve of n² operations, which reads half of the matrix.
 fn variance(count: usize) -> Option<Piece> {
     let posterior = posterior(count)?;
     let mut scratch = Scratch::default();
@@ -66,7 +66,7 @@ fn variance(count: usize) -> Option<Piece> {
     })
 }
 
-/// Two triangular solves.
+/// Times a variance with gradient: two triangular solves.
 fn variance_gradient(count: usize) -> Option<Piece> {
     let posterior = posterior(count)?;
     let (mut scratch, mut slope) = (Scratch::default(), [0.0; 2]);
@@ -82,7 +82,7 @@ fn variance_gradient(count: usize) -> Option<Piece> {
     })
 }
 
-/// The variance at many places, which read the matrix together.
+/// Times the variance at many places, which share one pass over the matrix.
 fn variances(count: usize) -> Option<Piece> {
     let posterior = posterior(count)?;
     let places: Vec<[f64; 2]> = (0..PLACES).map(place).collect();
@@ -97,7 +97,7 @@ fn variances(count: usize) -> Option<Piece> {
     })
 }
 
-/// One touch more: a triangular solve for its row, and two for the weights.
+/// Times one more touch: a triangular solve for its row, and two for the weights.
 fn appended(count: usize) -> Option<Piece> {
     let posterior = posterior(count)?;
     let n = count as f64;
@@ -112,8 +112,8 @@ fn appended(count: usize) -> Option<Piece> {
     })
 }
 
-/// All of `count` touches through some of them: two products of a matrix for the touches, and a few
-/// of the order of those that are kept.
+/// Times `count` touches with inducing touches: two products of a matrix for the touches, and a few
+/// of the order of the inducing ones.
 fn through(most: usize, count: usize) -> Option<Piece> {
     let touches = touches(count);
     let induce = move || Posterior::through(most, &KERNEL, hyperparameters(), &touches);

@@ -1,16 +1,16 @@
-//! What this machine can do on one thread.
+//! Reference speeds of this machine on one thread.
 
 use super::Piece;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
-/// Order of the product: three matrices of 2 MB, as a large belief's.
+/// Order of the product: three matrices of 2 MB, as those of a large belief.
 const ORDER: usize = 512;
 
-/// Numbers in each of the arrays: together larger than any cache.
+/// Length of each array: together larger than any cache.
 const LONG: usize = 1 << 23;
 
-/// A product of two matrices: 2 n³ operations.
+/// Times a product of two matrices: 2 n³ operations.
 pub fn product() -> Piece {
     let number = |i: usize, j: usize| ((7 * i + 3 * j) % 11) as f64;
     let (a, b) = (Mat::from_fn(ORDER, ORDER, number), Mat::from_fn(ORDER, ORDER, number));
@@ -23,8 +23,8 @@ pub fn product() -> Piece {
     }
 }
 
-/// a = b + s c over long arrays (McCalpin's triad): two are read and one is written, which most
-/// processors read first.
+/// Times a = b + s c over long arrays (McCalpin 1995, STREAM triad): two are read and one is
+/// written, which most processors read first.
 pub fn stream() -> Piece {
     let (b, c) = (vec![1.0; LONG], vec![2.0; LONG]);
     let mut a = vec![0.0; LONG];

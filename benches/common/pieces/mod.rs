@@ -1,7 +1,7 @@
 //! Pieces of a trial that benches time.
 //!
-//! The first two say what the machine can do: a product of matrices the most operations in a second, a
-//! triad over long arrays the most bytes. To add a piece: a line in `gp` or `touch`.
+//! The first two measure the machine: a matrix product has the most operations in a second, a triad
+//! over long arrays the most bytes. A new piece needs one line in `gp` or `touch`.
 
 mod gp;
 pub mod machine;
@@ -9,25 +9,25 @@ pub mod sample;
 pub mod timing;
 mod touch;
 
-/// A piece of work that can be done again and again.
+/// Piece of work that can be repeated.
 pub struct Piece {
     pub name: String,
-    /// Floating-point operations in the leading order; 0 where they are not counted.
+    /// Floating-point operations in the leading order; 0 if they are not counted.
     pub flops: f64,
-    /// Bytes read and written that do not stay in registers; 0 where they are not counted.
+    /// Bytes read and written that do not stay in registers; 0 if they are not counted.
     pub bytes: f64,
-    /// Does it once.
+    /// Does the work once.
     pub run: Box<dyn FnMut()>,
 }
 
 impl Piece {
-    /// A piece whose operations are not counted.
+    /// Creates a piece whose operations are not counted.
     pub fn uncounted(name: impl Into<String>, run: impl FnMut() + 'static) -> Self {
         Self { name: name.into(), flops: 0.0, bytes: 0.0, run: Box::new(run) }
     }
 }
 
-/// All pieces, the two of the machine first.
+/// Returns all pieces, the two of the machine first.
 pub fn pieces() -> Vec<Piece> {
     let mut pieces = vec![machine::product(), machine::stream()];
     pieces.extend(gp::pieces());

@@ -1,17 +1,17 @@
-//! What pieces of the Gaussian process are made of.
+//! Data of the Gaussian-process pieces.
 
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::gp::{Mean, Observations, SearchBox, TouchNoise};
 
-/// The kernel of them all.
+/// Kernel of all pieces.
 pub static KERNEL: SquaredExponential = SquaredExponential;
 
-/// A low-discrepancy walk over the unit square.
+/// Returns point `i` of a low-discrepancy sequence on the unit square.
 pub fn place(i: usize) -> [f64; 2] {
     [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0]
 }
 
-/// `count` touches of a smooth surface.
+/// Returns `count` touches of a smooth surface.
 pub fn touches(count: usize) -> Observations {
     let mut touches = Observations::new(2);
     for place in (0..count).map(place) {
@@ -20,7 +20,7 @@ pub fn touches(count: usize) -> Observations {
     touches
 }
 
-/// Of a belief of them.
+/// Returns hyperparameters of a belief from these touches.
 pub fn hyperparameters() -> Hyperparameters {
     Hyperparameters {
         signal_sd: 1.0,
@@ -31,7 +31,7 @@ pub fn hyperparameters() -> Hyperparameters {
     }
 }
 
-/// The ranges that a belief searches by default.
+/// Returns the default search ranges of a belief.
 pub fn search_box() -> SearchBox {
     SearchBox {
         mean: Mean::Zero,

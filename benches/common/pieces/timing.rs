@@ -1,29 +1,29 @@
-//! Pieces timed in turns, so that what else the machine does falls on all alike.
+//! Timing of pieces in turns, so that other load affects all alike.
 
 use super::Piece;
 use std::time::Instant;
 
-/// Least time of a sample: far above a clock's tick (chosen).
+// heuristic: least time of a sample, far above a clock's tick.
 const SAMPLE_S: f64 = 2e-3;
 
-/// What one piece took.
+/// Timing of one piece.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timed {
-    /// Its name.
+    /// Name of the piece.
     pub name: String,
     /// Median time of doing it once.
     pub time_s: f64,
-    /// Operations in a second, 1e9; none if they are not counted.
+    /// Operations in a second, 1e9; `None` if they are not counted.
     pub gflops: Option<f64>,
-    /// Share of the first piece's operations in a second, median over rounds.
+    /// Fraction of the first piece's operations in a second, median over rounds.
     pub of_product: Option<f64>,
-    /// Bytes in a second, 1e9; none if they are not counted.
+    /// Bytes in a second, 1e9; `None` if they are not counted.
     pub gbytes: Option<f64>,
-    /// Share of the second piece's bytes in a second, median over rounds.
+    /// Fraction of the second piece's bytes in a second, median over rounds.
     pub of_stream: Option<f64>,
 }
 
-/// Times all of them in each of `rounds`. The others are held against the first two.
+/// Times all pieces in each of `rounds`, relative to the first two.
 pub fn time(pieces: &mut [Piece], rounds: usize) -> Vec<Timed> {
     let counts: Vec<usize> = pieces.iter_mut().map(calibrated).collect();
     let mut samples_s = vec![Vec::with_capacity(rounds); pieces.len()];
@@ -56,7 +56,7 @@ pub fn time(pieces: &mut [Piece], rounds: usize) -> Vec<Timed> {
         .collect()
 }
 
-/// How often a piece is done in a sample.
+/// Returns how often a piece is done in a sample.
 fn calibrated(piece: &mut Piece) -> usize {
     let mut count = 1;
     while seconds(piece, count) < SAMPLE_S {

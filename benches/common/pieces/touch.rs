@@ -14,12 +14,12 @@ use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use std::hint::black_box;
 
-/// A ball before the finger: its radius, and rings that make 48 000 triangles, as many as the bird
-/// has.
+/// Radius of a ball in front of the finger, and rings that make 48 000 triangles, as many as the
+/// bird has.
 const BALL_M: f64 = 0.04;
 const RINGS: u32 = 110;
 
-/// A tick of control, and the finger's speed.
+/// Control tick, and speed of the finger.
 const TICK_S: f64 = 0.002;
 const SPEED_M_S: f64 = 0.02;
 
@@ -56,8 +56,8 @@ fn geometry(bvh: &MeshBvh) -> Vec<Piece> {
     ]
 }
 
-/// A tick of a soft finger that goes to and fro by 0.5 mm around where its skin is `gap_m` from the
-/// ball.
+/// Times a tick of a soft finger that moves to and fro by 0.5 mm about the position in which its
+/// skin is `gap_m` from the ball.
 fn finger_tick(bvh: &MeshBvh, model: SkinModel, name: &str, gap_m: f64) -> Piece {
     let finger = Finger::default();
     let effects =
@@ -77,7 +77,7 @@ fn finger_tick(bvh: &MeshBvh, model: SkinModel, name: &str, gap_m: f64) -> Piece
     })
 }
 
-/// Resolved-rate control of a PA-10 near its home.
+/// Times the resolved-rate control of a PA-10 near its home.
 fn control_tick() -> Option<Piece> {
     let chain = ArmSettings::default().chain().ok()?;
     let home = chain.home;

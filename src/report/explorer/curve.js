@@ -1,4 +1,4 @@
-// A curve with its 95 % band, and its standard deviation below.
+// Curve with its 95 % band, and its standard deviation below.
 "use strict";
 
 function curveView(canvas) {
@@ -6,7 +6,7 @@ function curveView(canvas) {
   const [LEFT, RIGHT, TOP, GAP, BOTTOM] = [62, 16, 14, 34, 46];
   const { x: xs, unit } = data;
 
-  // A frame with ticks; returns where a value lies in it.
+  // Draws a frame with ticks; returns the function that maps a value into it.
   function panel(context, left, top, width, height, [x0, x1], [y0, y1], words) {
     const at = (x, y) => [left + width * (x - x0) / (x1 - x0), top + height * (y1 - y) / (y1 - y0)];
     context.lineWidth = 1;
@@ -37,7 +37,7 @@ function curveView(canvas) {
     return at;
   }
 
-  // A point that is not a number ends a line and begins another.
+  // A point that is not a number ends a line and starts another.
   function curve(context, at, values, ink, width) {
     context.beginPath();
     xs.forEach((x, i) => {
@@ -50,7 +50,7 @@ function curveView(canvas) {
     context.stroke();
   }
 
-  // A band is filled piece by piece, so that it ends where the belief does.
+  // A band is filled piece by piece, so that it ends with the belief.
   function band(context, at, { mean, deviation }, ink) {
     const rim = (i, sign) => at(xs[i], mean[i] + sign * BAND_SD * deviation[i]);
     context.beginPath();

@@ -1,4 +1,4 @@
-// The controls of the explorer: they set `state`, and a view draws it.
+// Controls of the interactive view: they set `state`, and a view draws it.
 "use strict";
 
 const explorer = document.getElementById("explorer");
@@ -8,24 +8,24 @@ const state = { planner: 0, frame: 0, colour: null, truth: false };
 const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 const codes = (text) => new Uint16Array(bytes(text).buffer);
 
-// Numbers of sixteen bits between two ends; the highest is none.
+// Decodes numbers of sixteen bits between two ends; the highest code is null.
 function numbers(text, [low, high]) {
   return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low + (high - low) * code / 65534));
 }
 
-// The same between the ends of the logarithm of their range.
+// Decodes numbers between the ends of the logarithm of their range.
 function deviations(text) {
   const [low, high] = data.deviation_range;
   return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low * Math.pow(high / low, code / 65534)));
 }
 
-// The page's own colours, for light or for dark paper; data has a pair of each of its colours.
+// Page colours for light or dark paper; the data has a pair of each of its colours.
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const paint = (name) => getComputedStyle(explorer).getPropertyValue(`--${name}`).trim();
 const onPaper = (pair) => pair[dark.matches ? 1 : 0];
 dark.addEventListener("change", () => draw());
 
-// About `aim` round numbers between two ends.
+// Returns about `aim` round numbers between two ends.
 function roundNumbers(low, high, aim) {
   const rough = (high - low) / aim;
   const power = Math.pow(10, Math.floor(Math.log10(rough)));
@@ -35,13 +35,13 @@ function roundNumbers(low, high, aim) {
   return numbers;
 }
 
-// A number as a label, with the minus sign of the printed figures.
+// Formats a number as a label, with the minus sign of the printed figures.
 function label(number) {
   return String(Number(number.toPrecision(6))).replace("-", "−");
 }
 
-// Sizes a canvas to its place on the page, in the screen's own pixels; returns what draws on it in
-// pixels of the page.
+// Sizes a canvas to its place on the page, in screen pixels; returns its context, scaled to page
+// pixels.
 function pen(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
@@ -68,7 +68,7 @@ function draw() {
   });
 }
 
-// Touches that are shown: as many as the slider says, or as near as this planner has them.
+// Returns the visible touches: the slider's count, or the nearest count of this planner.
 function show(touches) {
   const { name, frames } = data.planners[state.planner];
   const later = frames.findIndex((frame) => frame.touches >= touches);
@@ -114,7 +114,7 @@ play.addEventListener("click", () => {
   }, 160);
 });
 
-// Browsers keep what was chosen when a page is loaded again.
+// Browsers restore inputs when a page is reloaded.
 for (const input of explorer.querySelectorAll("input:checked")) {
   if (input.name === "planner") state.planner = Number(input.value);
   if (input.name === "colour") state.colour = input.value;

@@ -1,8 +1,8 @@
-//! The interactive part of the page: one planner's belief touch by touch, to turn and to colour.
-//! This is its frame: choices, slider, words, data, script.
+//! Interactive part of the page: one planner's belief touch by touch, to turn and to colour. This
+//! module writes its frame: choices, slider, texts, data, script.
 //!
-//! It is drawn by a few hundred lines of script of our own. A plotting library would add three to
-//! four megabytes to every page, and still leave the touches behind a surface to be told apart.
+//! It uses a few hundred lines of own script. A plotting library would add three to four megabytes
+//! to every page, and would not separate the touches behind a surface.
 
 pub mod zone;
 
@@ -11,34 +11,36 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
-/// The script that views of surfaces share.
+/// Script shared by the views of surfaces.
 pub const PARTS: &str = include_str!("parts.js");
 const CONTROLS: &str = include_str!("explorer.js");
 const STYLE: &str = include_str!("explorer.css");
 
-/// Most bytes that all frames may take. heuristic: a page stays below three megabytes.
+// Largest size of all frames, in bytes.
+// heuristic: a page stays below three megabytes.
 const BYTES_MAX: usize = 1_600_000;
 
-/// Deviations smaller than this share of the largest are shown as that. heuristic.
+// heuristic: smallest share of the largest deviation that is shown apart.
 pub(super) const LEAST_SHARE: f64 = 1e-4;
 
-/// A picture that moves, touch by touch.
+/// Interactive view of a belief, touch by touch.
 pub struct Shell<'a> {
-    /// The colour maps: the name that scripts know, and the label. The first one is shown at first.
+    /// Colour maps: name in the scripts, and label. The first one is the default.
     pub colours: &'a [(&'a str, &'a str)],
-    /// Whether the true surface is shown at first; none if it is not known.
+    /// Whether the true surface is visible by default; `None` if it is not known.
     pub truth: Option<bool>,
-    /// The class of its canvas.
+    /// CSS class of the canvas.
     pub class: &'a str,
-    /// The explanation below it, as HTML.
+    /// Explanation below the canvas, as HTML.
     pub note: String,
-    /// Scripts with a function `viewOf` of a canvas, which returns what draws a state on it.
+    /// Scripts with a function `viewOf` of a canvas, which returns the function that draws a state
+    /// on it.
     pub scripts: &'a [&'a str],
 }
 
 impl Shell<'_> {
-    /// The section as HTML around `data`, which the scripts are given: `planners`, each with its
-    /// `name` and its `frames`. The first planner is shown at first, after its last frame.
+    /// Returns the section as HTML around `data` for the scripts: `planners`, each with its `name`
+    /// and its `frames`. The default is the first planner after its last frame.
     pub fn html(&self, data: &Value) -> String {
         let planners = data["planners"].as_array().map_or(&[][..], Vec::as_slice);
         let names = planners.iter().map(|planner| planner["name"].as_str().unwrap_or_default());
@@ -53,12 +55,12 @@ impl Shell<'_> {
                 "<label><input type=\"checkbox\" name=\"truth\"{checked}> true surface</label>\n"
             );
         }
-        // Nothing in the data may end the script it stands in.
+        // `<` is escaped so that the data cannot close the script element.
         let json = data.to_string().replace('<', "\\u003c");
         let last = planners[0]["frames"].as_array().map_or(0, Vec::len).saturating_sub(1);
         format!(
             "<section id=\"explorer\">\n<style>{STYLE}</style>\n<h2>Touch by touch</h2>\n\
-             <noscript><p class=\"note\">This part needs JavaScript; the figures below do not.</p>\
+             <noscript><p class=\"note\">This view needs JavaScript; the figures do not.</p>\
              </noscript>\n<div class=\"controls\">\n{controls}</div>\n\
              <canvas class=\"{}\" role=\"img\" tabindex=\"0\"></canvas>\n\
              <div class=\"time\"><button type=\"button\">Play</button>\
@@ -73,15 +75,15 @@ impl Shell<'_> {
     }
 }
 
-/// Touch counts with a frame: as many as there is room for, the first and the last among them,
-/// where the frames of one count take `bytes`.
+/// Returns the touch counts with a frame: as many as fit, including the first and the last, if the
+/// frames of one count take `bytes`.
 pub fn counts(first: u32, last: u32, bytes: usize) -> Vec<u32> {
     let room = (BYTES_MAX / bytes.max(1)).max(2);
     let step = (last.saturating_sub(first) as usize).div_ceil(room - 1).max(1);
     (first..last).step_by(step).chain([last]).collect()
 }
 
-/// Radio buttons, the first one chosen.
+/// Returns radio buttons with the first one checked.
 fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T, T)>) -> String {
     let buttons: String = (options.enumerate())
         .map(|(i, (value, words))| {
@@ -95,12 +97,13 @@ fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T, T)
     format!("<fieldset><legend>{name}</legend>{buttons}</fieldset>\n")
 }
 
-/// A number with no more digits than show; one that is not finite becomes null in JSON.
+/// Rounds a number to the digits that are visible; one that is not finite becomes null in JSON.
 pub fn short(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-/// Numbers from 0 to 1 as text: sixteen bits each, the lower eight first; the highest code is none.
+/// Encodes numbers from 0 to 1 as text: sixteen bits each, the lower eight first; NaN is the
+/// highest code.
 pub fn encode(shares: impl Iterator<Item = f64>) -> String {
     let code = |share: f64| match share.is_nan() {
         true => u16::MAX,
@@ -109,7 +112,7 @@ pub fn encode(shares: impl Iterator<Item = f64>) -> String {
     STANDARD.encode(shares.flat_map(|share| code(share).to_le_bytes()).collect::<Vec<u8>>())
 }
 
-/// Positive numbers as text by their logarithms, from 0 at `least` to 1 at `most`.
+/// Encodes positive numbers as text by their logarithms, from 0 at `least` to 1 at `most`.
 pub fn encode_log([least, most]: [f64; 2], values: impl Iterator<Item = f64>) -> String {
     encode(values.map(|value| match value.is_finite() {
         true => (value / least).ln() / (most / least).ln(),

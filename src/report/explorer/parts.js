@@ -1,7 +1,7 @@
-// What the views of surfaces share: scales of colours, marks of touches, turning by hand.
+// Shared parts of the views of surfaces: colour scales, marks of touches, turning by hand.
 "use strict";
 
-// A colour scale: its stops, where a value lies from 0 to 1, values to label, words.
+// Colour scale: its stops, the position of a value from 0 to 1, values to label, words.
 function deviationScale([least, most]) {
   const at = (value) => Math.log(value / least) / Math.log(most / least);
   const powers = Array.from({ length: 13 }, (_, i) => 10 ** (i - 6));
@@ -9,7 +9,7 @@ function deviationScale([least, most]) {
   return { stops: data.colours.deviation, at, ticks, words: "standard deviation σ" };
 }
 
-// Finer towards zero, so that early and late errors are told apart on one scale.
+// Finer towards zero, so that early and late errors can be distinguished on one scale.
 function errorScale(limit, words) {
   const fine = (value) => Math.asinh(value / (0.03 * limit));
   const at = (value) => 0.5 + 0.5 * fine(value) / fine(limit);
@@ -26,7 +26,7 @@ function colour({ stops }, fraction) {
 }
 
 function drawColours(context, width, height, scale) {
-  // Where there is no room for the words beside the bar, they stand above it.
+  // Without room beside the bar, the words are above it.
   const length = Math.min(320, width - 40);
   const isNarrow = width < 720;
   const [left, top] = [(width - length) / 2, height - 44];
@@ -47,7 +47,7 @@ function drawColours(context, width, height, scale) {
   }
 }
 
-// A touch: full where it is seen, hollow where it is hidden, a diamond for a miss.
+// Draws a touch: full if visible, hollow if hidden, a diamond for a miss.
 function drawTouch(context, [x, y], pair, kind, isLast) {
   // Points lie on the surface, which is as pale on dark paper.
   const ink = kind === "miss" ? onPaper(pair) : pair[0];
@@ -65,7 +65,7 @@ function drawTouch(context, [x, y], pair, kind, isLast) {
   context.stroke();
 }
 
-// Turns what is seen by dragging and by the arrow keys; `turn.isDragged` says when.
+// Turns the view by dragging and by the arrow keys; `turn.isDragged` is true during a drag.
 function turnable(canvas, turn, turnBy) {
   canvas.addEventListener("pointerdown", (event) => {
     turn.isDragged = true;

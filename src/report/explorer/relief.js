@@ -1,10 +1,10 @@
-// A height field in three dimensions. Every pixel is coloured here against a depth buffer: that
-// needs neither WebGL nor a library, and looks the same on every machine.
+// Height field in three dimensions. Every pixel is coloured here with a depth buffer, which needs
+// neither WebGL nor a library and looks the same on every machine.
 "use strict";
 
 function reliefView(canvas) {
-  // From where it is seen at first, and where light falls from: as in the printed figures. More of
-  // it comes from everywhere, so that colours can be read on a slope.
+  // Initial view and direction of light, as in the printed figures, with more ambient light, so
+  // that colours are readable on a slope.
   const turn = { azimuth: 38, elevation: 24, isDragged: false };
   const [LIGHT, AMBIENT, DIRECT] = [unit([0.45, 0.7, 0.55]), 0.5, 0.62];
   const { x: xs, z: zs, stretch } = data;
@@ -28,7 +28,8 @@ function reliefView(canvas) {
     return v.map((part) => part / length);
   }
 
-  // How space lies on the canvas now: orthographic, of one size from wherever it is seen.
+  // Returns the mapping from space to canvas: orthographic, with the same scale from every
+  // direction.
   function projection(width, height) {
     const [a, e] = [turn.azimuth, turn.elevation].map((degrees) => degrees * Math.PI / 180);
     const [sa, ca, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
@@ -44,7 +45,7 @@ function reliefView(canvas) {
     };
   }
 
-  // Colours and depths of a height field; `tint` gives the colour of a place.
+  // Computes colours and depths of a height field; `tint` returns the colour of a place.
   function render(field, tint, project, width, height) {
     const layer = { depth: new Float32Array(width * height).fill(-Infinity), pixels: new Uint8ClampedArray(4 * width * height) };
     // Per corner: x, y and depth on the canvas, light, height, red, green, blue.
@@ -70,7 +71,7 @@ function reliefView(canvas) {
     return layer;
   }
 
-  // One triangle: each property is a plane over the canvas.
+  // Rasterises one triangle: each property is a plane over the canvas.
   function fill({ depth, pixels }, corners, width, height, a, b, c) {
     const [xs, ys, nearness] = corners;
     const [ux, uy, vx, vy] = [xs[b] - xs[a], ys[b] - ys[a], xs[c] - xs[a], ys[c] - ys[a]];
@@ -96,7 +97,7 @@ function reliefView(canvas) {
           const property = corners[axis];
           value[axis] = property[a] + s * (property[b] - property[a]) + t * (property[c] - property[a]);
         }
-        // A line of equal height is as thin on a slope as on the flat.
+        // A contour line has the same width on a slope as on flat ground.
         const off = Math.abs(value[4] / contourStep - Math.round(value[4] / contourStep)) * contourStep;
         const isLine = off < 0.8 * gradient;
         const light = value[3] * (isLine ? 0.8 : 1);
@@ -106,7 +107,7 @@ function reliefView(canvas) {
     }
   }
 
-  // Lays the true surface over the belief where it stands out of it.
+  // Overlays the true surface in front of the belief.
   function overlay(belief, truth) {
     const lift = 0.003 * size;
     for (let pixel = 0; pixel < belief.depth.length; pixel++) {
@@ -126,7 +127,7 @@ function reliefView(canvas) {
     context.stroke();
   }
 
-  // The zone behind the surface and the floor below it, with the ends of their axes.
+  // Draws the zone behind the surface and the floor below it, with the ends of their axes.
   function drawSpace(context, project) {
     const [[x0, x1], [h0, h1], [z0, z1]] = ends;
     context.strokeStyle = paint("frame");
@@ -144,7 +145,7 @@ function reliefView(canvas) {
     write(`z (${data.unit})`, project(x1, h0, z1), -8, -14, "right");
   }
 
-  // Touches so far: full in front of the surface, hollow behind it, a diamond for a miss.
+  // Draws the touches so far: full in front of the surface, hollow behind it, a diamond for a miss.
   function drawTouches(context, project, frame, planner, isHidden) {
     const shown = data.planners[planner].contacts.slice(0, frame.touches);
     shown.forEach(([x, h, z], i) => {
@@ -165,8 +166,8 @@ function reliefView(canvas) {
       error: (k) => frame.mean[k] - data.truth[k],
     }[state.colour];
     const project = projection(width, height);
-    // Four pixels are painted for one of an ordinary screen, which smooths the rims; while it is
-    // dragged, one.
+    // Four pixels are computed for one of an ordinary screen, which smooths the edges; one while
+    // the view is dragged.
     const dense = turn.isDragged ? 1 : Math.max(ratio, 2);
     const [wide, tall] = [Math.round(width * dense), Math.round(height * dense)];
     const fine = (...point) => project(...point).map((part, axis) => (axis < 2 ? part * dense : part));
@@ -185,7 +186,7 @@ function reliefView(canvas) {
     drawColours(context, width, height, scale);
   }
 
-  // Turning keeps the front in front: the object's back was never touched.
+  // Turning keeps the front in front, because the object's back was never touched.
   function turnBy(right, up) {
     turn.azimuth = Math.min(Math.max(turn.azimuth + right, -80), 80);
     turn.elevation = Math.min(Math.max(turn.elevation + up, -30), 85);

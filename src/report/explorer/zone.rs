@@ -1,4 +1,4 @@
-//! Beliefs over a zone on a grid after many touch counts, in few bytes.
+//! Interactive view of beliefs over a zone: values on a grid after many touch counts, in few bytes.
 
 use super::{LEAST_SHARE, PARTS, Shell, counts, encode, encode_log, short};
 use crate::experiment::store::Run;
@@ -14,23 +14,23 @@ use serde_json::{Value, json};
 const SCRIPTS: [&str; 4] =
     [PARTS, include_str!("relief.js"), include_str!("curve.js"), include_str!("heights.js")];
 
-/// The colour maps of a surface: their names in scripts, and their labels.
+/// Colour maps of a surface: names in scripts, and labels.
 const COLOURS: [(&str, &str); 3] = [("height", "height"), ("deviation", "σ"), ("error", "error")];
 
-/// The section as HTML; empty if no planner has a belief to show.
+/// Returns the section as HTML; empty if no planner has a belief to show.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the zone or cannot be conditioned on.
 pub fn section(run: &Run) -> anyhow::Result<String> {
     let Some(data) = data(run)? else { return Ok(String::new()) };
-    // In a curve the truth hides nothing, so there it is shown from the start.
+    // The true curve hides nothing, so it is visible by default.
     let (class, colours, is_shown, help) = match data["z"].is_null() {
-        true => ("curve", &[][..], true, "Drag the slider, or use the arrow keys."),
+        true => ("curve", &[][..], true, "Drag the slider, or press the arrow keys."),
         false => ("surface", &COLOURS[..], false, HELP),
     };
     let note = format!(
-        "Trial {}. Blue: the {} initial touches; red: those the planner chose; the last one is \
-         larger.{} {help}",
+        "Trial {}. Blue: the {} initial touches; red: those of the planner; the last one is larger.{} \
+         {help}",
         run.experiment.report.trial,
         run.experiment.initial_touches,
         drawn_words(run)
@@ -38,24 +38,24 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     Ok(Shell { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }.html(&data))
 }
 
-const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Green: where the \
-                    true surface stands out of the belief. Lines join equal heights. Drag the \
-                    surface to turn it, the slider to go through the touches; both also follow the \
+const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \
+                    Green: the true surface in front of the belief. Lines join equal heights. Drag \
+                    the surface to turn it and the slider to step through the touches, or press the \
                     arrow keys.";
 
-/// Most places along the side of a curve and of a surface. heuristic: more would not show at the
-/// size of the page.
+// Largest number of places along the side of a curve and of a surface.
+// heuristic: more would not be visible at the size of the page.
 const PLACES_MAX: [usize; 2] = [301, 41];
 /// Bytes of one place in one frame: two for the mean, two for the deviation, in base 64.
 const BYTES_OF_PLACE: usize = 6;
-/// Room above and below the heights of a curve, for its bands, and of a surface. heuristic.
+// heuristic: margin above and below the heights of a curve, for its bands, and of a surface.
 const MARGIN: [f64; 2] = [0.3, 0.08];
 
-/// A belief on the grid, in metres.
+/// Belief on the grid, in metres.
 struct Frame {
     touches: u32,
     score: String,
-    /// None where no belief is drawn.
+    /// Means; `None` where no belief is drawn.
     means_m: Vec<Option<f64>>,
     deviations_m: Vec<f64>,
 }
@@ -73,8 +73,8 @@ impl Frame {
     }
 }
 
-/// The data of the trial that the report draws, replayed; lengths are in the unit of the page.
-/// `None` if there is nothing to show.
+/// Returns the replayed data of the drawn trial, with lengths in the unit of the page; `None` if
+/// there is nothing to show.
 fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     let experiment = &run.experiment;
     let Some(zone) = &experiment.scene.zone else { return Ok(None) };
@@ -103,7 +103,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     let Some((least, most)) = axes::range(all_m.copied()) else { return Ok(None) };
     let (low, high) = axis.range();
     let unit = Length::of(zone);
-    // The ends of the codes of heights and of deviations, which are along their logarithm.
+    // Ranges of the codes of heights and of deviations (logarithmic).
     let height_range_m = [low - (high - low), high + (high - low)];
     let deviation_range_m = [least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most];
     let heights = |heights_m: &mut dyn Iterator<Item = Option<f64>>| {
@@ -137,7 +137,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
         "unit": unit.symbol,
         "x": axis(0),
         "z": zone.z_m.map(|_| axis(1)),
-        // The ends of the heights drawn, and how much they are stretched.
+        // Range of the heights drawn, and their stretch.
         "space": in_unit([low, high]),
         "stretch": space.map_or(1.0, |space| space.stretch()),
         "height_range": in_unit(height_range_m),
@@ -149,7 +149,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     })))
 }
 
-/// x, height and z of a touch, in the unit of the page.
+/// Returns x, height and z of a touch, in the unit of the page.
 fn contact(zone: &Zone, touch: &TouchRow, unit: Length) -> (f64, Option<f64>, Option<f64>) {
     let met = replay::contact(zone, touch);
     let height = met.as_ref().map(|(_, height_m)| short(height_m * unit.per_m));

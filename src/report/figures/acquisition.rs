@@ -1,4 +1,4 @@
-//! Where the belief is unsure and what touching there changes, Fig. 6 of Yi et al. 2016.
+//! Figure of the remaining deviation and the effect of a touch on it, Fig. 6 of Yi et al. 2016.
 
 use super::Figure;
 use super::curves;
@@ -18,16 +18,15 @@ pub(crate) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 fn caption(run: &Run) -> String {
     let planner = planner(run).unwrap_or("the planner");
     format!(
-        "Standard deviation that another touch could still remove, before and after one more \
-         touch of {planner} in trial {}: the circle marks the largest that \
-         was found. Crosses are points of contact, which may lie beside their targets.{} \
-         Corresponds to Fig. 6 of the paper.",
+        "Standard deviation that another touch could remove, before and after one touch of \
+         {planner} in trial {}. Circle: largest value found. Crosses: points of contact, which may \
+         lie beside their targets.{} Corresponds to Fig. 6 of the paper.",
         run.experiment.report.trial,
         drawn_words(run)
     )
 }
 
-/// The planner drawn: the one that follows this map, if it is there.
+/// Returns the planner drawn: the one that maximises this map, if it is there.
 fn planner(run: &Run) -> Option<&str> {
     let planners = run.experiment.drawn_planners();
     planners.iter().find(|&&name| name == "active").or(planners.first()).copied()
@@ -48,12 +47,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     })
 }
 
-/// Standard deviation that a touch asked for at `place` could still remove.
+/// Returns the standard deviation at `place` that a touch aimed there could still remove.
 fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f64 {
     belief.explorable().map_or(f64::NAN, |known| known.variance(place, scratch).sqrt())
 }
 
-/// Where the deviation is largest: what the planner found, or else the largest of `read`.
+/// Returns the place of the largest deviation: the planner's, or else that of `read`.
 fn maximum<'a>(replay: &'a Replay, read: &'a [Reading]) -> Option<&'a [f64]> {
     let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.stall.is_none());
     let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -72,13 +71,13 @@ fn ring(colour: &str) -> String {
 const LEFT_PX: f64 = 72.0;
 const TOP_PX: f64 = 66.0;
 
-/// Places at which the deviation of a curve is read.
+/// Places at which the deviation of a curve is computed.
 const STEPS: usize = 300;
 /// Width of a panel, heights of those of beliefs and of deviations.
 const CURVE_PX: (f64, f64, f64) = (420.0, 210.0, 130.0);
-/// Height of a panel of beliefs whose axes are equal, at most.
+/// Largest height of a panel of beliefs with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 420.0;
-/// From one panel to the next, and from a belief to its deviation.
+/// Distance between panels, and between a belief and its deviation.
 const GAPS_PX: (f64, f64) = (66.0, 40.0);
 
 fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
@@ -130,9 +129,9 @@ fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
     places.into_iter().zip(drawn).map(read).collect()
 }
 
-/// Size of a map at most: its axes are equal.
+/// Largest size of a map with equal axes.
 const MAP_PX: (f64, f64) = (400.0, 640.0);
-/// Least room from one map to the next: below it are the words of the colour bar.
+/// Smallest distance between maps: below them is the label of the colour bar.
 const MAP_STEP_PX: f64 = 330.0;
 
 fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {

@@ -1,4 +1,4 @@
-//! Errors against touches, Fig. 4 of Yi et al. 2016.
+//! Figure of errors against touches, Fig. 4 of Yi et al. 2016.
 
 use super::Figure;
 use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale, metrics};
@@ -13,7 +13,7 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 pub(crate) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
 
-/// Eq. 5 of any positive constant.
+/// Returns Eq. 5 of any positive constant.
 fn constant_r(run: &Run) -> Option<f64> {
     metrics::constant_r(run.truth.heights_m.iter().flatten())
 }
@@ -21,15 +21,14 @@ fn constant_r(run: &Run) -> Option<f64> {
 fn caption(run: &Run) -> String {
     let score = constant_r(run).map_or(String::new(), |score| {
         format!(
-            " R is not centred: a positive constant, however high, scores {score:.3} here (dashed), \
-             so the centred correlation stands beside it."
+            " R is not centred: any positive constant scores {score:.3} here (dashed), so the centred \
+             correlation is shown too."
         )
     });
     format!(
-        "Agreement with the true surface against touches, over {} trials of each planner, from the \
-         first belief on: all planners share the {} initial touches. Bands are one standard error \
-         of a mean and the 95 % bootstrap interval of a median.{score} Corresponds to Fig. 4 of \
-         the paper.",
+        "Accuracy of the belief against the number of touches, n = {} trials of each planner; all \
+         planners share the {} initial touches. Bands: one standard error of a mean, 95 % bootstrap \
+         interval of a median.{score} Corresponds to Fig. 4 of the paper.",
         run.experiment.trials, run.experiment.initial_touches
     )
 }
@@ -39,11 +38,10 @@ const LEFT_PX: f64 = 70.0;
 const PANEL: (f64, f64) = (446.0, 262.0);
 const GAP: (f64, f64) = (96.0, 78.0);
 
-/// A planner's colour and curve.
+/// Colour and curve of a planner.
 type Curve = (&'static str, Vec<CurvePoint>);
 
-/// A measure after some touches: (touches, value, what is dotted beside it, its band), in the unit
-/// it is shown in.
+/// Measure after some touches, in its display unit: (touches, value, dotted value, band).
 type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
@@ -109,7 +107,7 @@ fn draw_measure(
     });
     let y = match measure.scale {
         Scale::Log | Scale::LogBeside(_) => Axis::log(values),
-        // A band may reach beyond the best there is.
+        // A band may reach beyond the largest possible value.
         Scale::UpToOne => {
             let up_to_one = values.chain(constant).map(|value| value.min(1.0));
             Axis::around(up_to_one.chain([1.0]), 0.04, 5.0)
@@ -134,7 +132,7 @@ fn draw_measure(
     }
 }
 
-/// The value of a measure after some touches: its median, or its mean if it has no median.
+/// Returns the value of a measure after some touches: its median, or its mean if it has no median.
 fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> {
     let per_si = measure.unit.per_si;
     let summary = point.of(measure)?;
@@ -149,7 +147,7 @@ fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> 
     Some((touches, in_unit(value), beside.map(in_unit), band.map(|ends| ends.map(in_unit))))
 }
 
-/// A measure with the unit it is shown in.
+/// Returns the name of a measure with its display unit.
 fn named(measure: &Measure) -> String {
     match measure.unit.symbol {
         "" => measure.title.into(),
@@ -157,7 +155,7 @@ fn named(measure: &Measure) -> String {
     }
 }
 
-/// The statistic that the solid line shows, and that of the dotted one.
+/// Returns the statistics that the solid and the dotted line show.
 fn told(measure: &Measure) -> String {
     match (measure.scale, measure.aggregate) {
         (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),
@@ -167,7 +165,7 @@ fn told(measure: &Measure) -> String {
     }
 }
 
-/// The line at what any constant scores.
+/// Returns the attributes of the line at the score of any constant.
 fn constant_line() -> String {
     style::dashed(FAINT_INK, 1.0, "5 4")
 }

@@ -1,4 +1,4 @@
-//! Beliefs of a curve after some touches, Fig. 3 of Yi et al. 2016.
+//! Figure of the beliefs of a curve after some touches, Fig. 3 of Yi et al. 2016.
 
 use super::Figure;
 use crate::experiment::store::Run;
@@ -14,22 +14,22 @@ pub(crate) const FIGURE: Figure = Figure { name: "curves", caption, draw };
 
 fn caption(run: &Run) -> String {
     format!(
-        "Beliefs of trial {} after some touches: posterior mean, its 95 % band, and the true \
-         surface. Blue crosses are the {} initial touches, red ones those the planner chose.{} \
-         Corresponds to Fig. 3 of the paper.",
+        "Beliefs of trial {} by number of touches: posterior mean, its 95 % band, and the true \
+         surface. Blue crosses: the {} initial touches; red: those of the planner.{} Corresponds to \
+         Fig. 3 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
         drawn_words(run)
     )
 }
 
-/// Places at which curves are read.
+/// Places at which curves are computed.
 const STEPS: usize = 300;
 /// Half-width of a 95 % band in standard deviations.
 const BAND_SD: f64 = 1.96;
 const MARGIN: (f64, f64) = (72.0, 80.0);
 const PANEL: (f64, f64) = (236.0, 188.0);
-/// Height of a panel whose axes are equal, at most.
+/// Largest height of a panel with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 340.0;
 const GAP: (f64, f64) = (22.0, 68.0);
 
@@ -72,8 +72,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     Ok(Some(sheet.canvas.finish()))
 }
 
-/// A panel of heights over the zone, as large as `most`; its axes are equal where both are
-/// millimetres, and then it is as high as that needs, `height_px` at most.
+/// Creates a panel of heights over the zone, as large as `most`. If both axes are in millimetres
+/// they have the same scale, and the panel is as high as needed, up to `height_px`.
 pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f64) -> Panel {
     let unit = Length::of(zone);
     let [low, high] = zone.x_m.map(|x| x * unit.per_m);
@@ -84,13 +84,13 @@ pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f6
     }
 }
 
-/// Room for the truth and every drawn touch, and nearly as much again for the bands.
+/// Returns an axis for the truth and every drawn touch, and nearly as much again for the bands.
 pub(super) fn height_axis(run: &Run, unit: Length) -> Option<Axis> {
     let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
     Axis::around(heights_m.map(|height_m| height_m * unit.per_m), 0.4, 5.0)
 }
 
-/// The entries of a legend for [`draw_belief`], with `more` behind those of touches.
+/// Returns the legend entries for [`draw_belief`], with `more` after those of touches.
 pub(super) fn entries(
     run: &Run,
     more: impl IntoIterator<Item = (Swatch, &'static str)>,
@@ -105,7 +105,7 @@ pub(super) fn entries(
     entries.into_iter().chain(more).chain(miss_entry(run))
 }
 
-/// The belief in `panel`: band, truth, mean, touches.
+/// Draws the belief in `panel`: band, truth, mean, touches.
 pub(super) fn draw_belief(
     canvas: &mut Canvas,
     panel: &Panel,
@@ -136,7 +136,7 @@ pub(super) fn draw_belief(
     });
 }
 
-/// (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
+/// Returns (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
 fn read(replay: &Replay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
     let places = replay.belief.zone().grid(STEPS);

@@ -1,4 +1,4 @@
-//! The figures of runs over a zone, a file each.
+//! Figures of runs over a zone, one file each.
 
 pub(super) mod acquisition;
 pub(super) mod convergence;
@@ -11,12 +11,12 @@ pub use surfaces::FIGURE as SURFACES;
 
 use crate::experiment::store::Run;
 
-/// A drawing of a run.
+/// Figure of a run.
 pub struct Figure {
-    /// Names its files.
+    /// Name of its files.
     pub name: &'static str,
-    /// Says what it shows, and which figure of Yi et al. 2016 it corresponds to.
+    /// Caption, with the figure of Yi et al. 2016 that it corresponds to.
     pub caption: fn(&Run) -> String,
-    /// Draws it as SVG; none if the run has nothing to show in it.
+    /// Draws the figure as SVG; `None` if the run has nothing to show in it.
     pub draw: fn(&Run) -> anyhow::Result<Option<String>>,
 }

@@ -1,4 +1,4 @@
-//! Beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
+//! Figure of the beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
 
 use super::Figure;
 use crate::experiment::store::Run;
@@ -12,27 +12,27 @@ use nalgebra::Vector3;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
-/// Beliefs beside the true surface.
+/// Figure of beliefs next to the true surface.
 pub const FIGURE: Figure = Figure { name: "surfaces", caption, draw };
 
 fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
     let stretch = zone.and_then(|zone| space(run, zone)).map_or(1.0, |space| space.stretch());
     let stretched = match stretch > 1.0 {
-        true => format!(" Heights are stretched {stretch:.1} times."),
+        true => format!(" Heights are scaled by {stretch:.1}."),
         false => String::new(),
     };
     format!(
-        "Posterior mean over the zone in trial {} after some touches, and the true object on the \
-         right, all in the same view, scale and colours. Blue points are the {} initial touches, \
-         red ones those the planner chose.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
+        "Posterior mean over the zone in trial {} by number of touches, and the true object on the \
+         right, with the same view, scale and colours. Blue points: the {} initial touches; red: those \
+         of the planner.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
         drawn_words(run)
     )
 }
 
-/// Places along each side of a relief; more would not show at this size.
+/// Places along each side of a relief; more would not be visible at this size.
 const PLACES: usize = 41;
 const MARGIN: (f64, f64) = (24.0, 44.0);
 const PANEL: (f64, f64) = (252.0, 316.0);
@@ -88,22 +88,23 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         let heights = grid.places.iter().map(|(_, height_m)| *height_m);
         relief(&mut sheet.canvas, &panel, heights.collect());
     }
-    // Its words are on the left, in whatever font a browser has.
+    // The label is on the left; its width depends on the browser's font.
     let left = (0.5 * width - 60.0).max(BAR_LEFT_MIN_PX);
     let bar = Area { left, top: sheet.bottom - FOOT_PX + 14.0, width: 320.0, height: 13.0 };
     height_bar(&mut sheet.canvas, bar, unit, space.height_m);
     Ok(Some(sheet.canvas.finish()))
 }
 
-/// The drawn space: the zone, and heights around the truth and the drawn touches; none in 1-D.
+/// Returns the drawn space: the zone, and heights around the truth and the drawn touches; `None`
+/// for a curve.
 fn space(run: &Run, zone: &Zone) -> Option<Space> {
     let (low, high) =
         Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
     Some(Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] })
 }
 
-/// Marks touches: a point where one met the surface, hollow if that is hidden; a diamond at the
-/// back where it met nothing.
+/// Marks touches: a point for a contact, hollow if the surface hides it; a diamond at the back for
+/// a miss.
 fn mark(panel: &ReliefPanel, canvas: &mut Canvas, zone: &Zone, relief: &Relief, replay: &Replay) {
     for (touch, colour) in replay.marks() {
         match replay::contact(zone, touch) {

@@ -1,4 +1,4 @@
-//! Where the finger was sent and where it met the object, seen along the approach.
+//! Figure of targets and contacts, seen along the approach.
 
 use super::Figure;
 use crate::experiment::statistics::summary::median_shift_m;
@@ -16,25 +16,25 @@ fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
     let shift = match zone.and_then(|zone| median_shift_m(zone, &run.rows)) {
         Some(shift_m) => format!(
-            " Over all trials, half of the contacts lie more than {} mm beside their target.",
+            " Over all trials, the median lateral distance from target to contact is {} mm.",
             digits(1e3 * shift_m)
         ),
         None => String::new(),
     };
     format!(
-        "Targets (rings) and contacts (points) of trial {}, seen along the approach: the finger is \
-         as wide as it is, and touches a slope beside its tip.{shift}",
+        "Targets (rings) and contacts (points) of trial {}, seen along the approach. Because \
+         of its width, the finger touches a slope beside its tip.{shift}",
         run.experiment.report.trial
     )
 }
 
-/// Size of a panel at most: its axes are equal.
+/// Largest size of a panel with equal axes.
 const PANEL_PX: (f64, f64) = (300.0, 380.0);
 const LEFT_PX: f64 = 66.0;
 const TOP_PX: f64 = 66.0;
-/// Room for the words of a legend.
+/// Smallest width, for the labels of a legend.
 const WIDTH_MIN_PX: f64 = 420.0;
-/// Share of the zone's side drawn around it: contacts may lie outside.
+/// Margin around the zone as a fraction of its side, because contacts may lie outside.
 const MARGIN: f64 = 0.12;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
@@ -54,7 +54,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let mut entries = vec![
         (Swatch::Circle(ring(LATER)), "target"),
         (Swatch::Circle(dot(INITIAL)), "contact of an initial touch"),
-        (Swatch::Circle(dot(LATER)), "of a later one"),
+        (Swatch::Circle(dot(LATER)), "contact of a later touch"),
     ];
     entries.extend(miss_entry(run));
     let most = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };

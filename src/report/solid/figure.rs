@@ -1,4 +1,5 @@
-//! The same surfaces as a figure: a row of touch counts for each planner and each side.
+//! Figure of believed surfaces: a row for each planner and each side, a column for each touch
+//! count.
 
 use super::panel::{View, inner, scale};
 use super::section::{TRUTH_TRIANGLES, deviation_range};
@@ -14,20 +15,20 @@ use palpate_geometry::mesh::Mesh;
 const PANEL: (f64, f64) = (236.0, 258.0);
 const MARGIN: (f64, f64) = (20.0, 40.0);
 const FOOT_PX: f64 = 56.0;
-/// The bar of colours: where it begins at least, behind its words, and its length.
+/// Smallest left edge of the colour bar, after its label, and its length.
 const BAR_LEFT_MIN_PX: f64 = 380.0;
 const BAR_PX: f64 = 300.0;
 const WIDTH_MIN_PX: f64 = BAR_LEFT_MIN_PX + BAR_PX;
-/// A touch, and the last one.
+/// Radius of a touch, and of the last one.
 const RADII_PX: [f64; 2] = [3.1, 4.6];
-/// The colour of a surface where its number is not known.
+/// Colour of a surface where its value is not known.
 const UNKNOWN: [u32; 2] = [0xcdcdcd; 2];
-/// Where of its colours the true surface lies, which has no numbers.
+/// Position in the colour map of the true surface, which has no values.
 const PLAIN: f64 = 0.6;
 
-/// Surfaces after some touch counts from the front and from behind, coloured by their standard
-/// deviation, with the touches on them and the true one on the right, as SVG; none if there is
-/// nothing to be drawn, or no number to colour it by. Everything is of one scale.
+/// Draws the surfaces after some touch counts from the front and from behind, coloured by their
+/// standard deviation, with the touches on them and the true surface on the right, as SVG; `None`
+/// if there is nothing to draw, or no value to colour by. All have one scale.
 pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> Option<String> {
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
     let frames = sequences.iter().flat_map(|sequence| &sequence.frames);
@@ -73,10 +74,10 @@ pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> O
 fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32), axis: &Axis) {
     let title = format!("{}, {count} touches", sequence.planner);
     let Some(frame) = sequence.frames.iter().find(|frame| frame.touches == count) else {
-        return view.title(canvas, &title, "no belief after so many");
+        return view.title(canvas, &title, "no belief at this count");
     };
     view.title(canvas, &title, &frame.score);
-    // The colour of a triangle by the mean of its corners.
+    // Colour of a triangle by the mean of its corners.
     let colour = |triangle: usize, light: f64| {
         let shares = frame.mesh.1[triangle].map(|vertex| {
             let sd_m = frame.sd_m.get(vertex as usize).copied().unwrap_or(f64::NAN);
@@ -93,7 +94,7 @@ fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32),
             let colour = style::touch(touch.is_initial);
             let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;
             let at = view.camera.at(&p_w);
-            // A touch that met nothing may have been sent beside all that is drawn.
+            // The target of a missed touch may lie outside of the drawing.
             if touch.contact_w.is_some() {
                 let radius = RADII_PX[usize::from(i + 1 == count as usize)];
                 relief.mark(canvas, (&view.camera, &p_w), radius, colour);

@@ -1,6 +1,6 @@
 //! Beliefs of whole objects, as closed surfaces: to turn on the page, as a figure, as files.
 //!
-//! A surface is given as plain triangles with numbers at their vertices, in `W` and metres.
+//! A surface is a list of triangles with values at their vertices, in `W` and metres.
 
 mod figure;
 mod panel;
@@ -16,51 +16,51 @@ use crate::report::style;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::solids::{Triangles, normals};
 
-/// The touches of a planner and its beliefs after some of them.
+/// Touches of a planner with its beliefs after some of them.
 #[derive(Clone, Debug, Default)]
 pub struct Sequence {
-    /// Whose.
+    /// Name of the planner.
     pub planner: String,
-    /// Every touch, in order.
+    /// Touches, in order.
     pub touches: Vec<Touch>,
-    /// Believed surfaces, by rising touch counts.
+    /// Believed surfaces, by increasing touch count.
     pub frames: Vec<Frame>,
 }
 
-/// A touch.
+/// Touch of a whole object.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
-    /// The point aimed at.
+    /// Target point.
     pub aim_w: Point3<f64>,
-    /// The unit vector along which the finger went.
+    /// Unit vector of the finger's motion.
     pub along_w: Vector3<f64>,
-    /// Where it met the object; none for a miss or a touch broken off.
+    /// Contact point; `None` for a miss or a touch broken off.
     pub contact_w: Option<Point3<f64>>,
-    /// Whether it is one that every planner begins with.
+    /// Whether it is one of the initial touches, which all planners share.
     pub is_initial: bool,
 }
 
-/// A believed surface.
+/// Believed surface.
 #[derive(Clone, Debug, Default)]
 pub struct Frame {
-    /// After how many touches.
+    /// Number of touches.
     pub touches: u32,
     /// Vertices in `W`, in metres, and triangles of them, counter-clockwise seen from outside;
     /// empty if there is no surface.
     pub mesh: Triangles,
-    /// Standard deviation of the surface along its normal at each vertex, in metres; one that is
-    /// not finite is not known.
+    /// Standard deviation of the surface along its normal at each vertex, in metres; unknown if not
+    /// finite.
     pub sd_m: Vec<f64>,
-    /// Distance of each vertex from the true surface in metres, negative inside the true object;
-    /// empty if the truth is not known.
+    /// Signed distance of each vertex from the true surface in metres, negative inside the true
+    /// object; empty if the truth is not known.
     pub error_m: Vec<f64>,
-    /// How well it agrees with the truth, in words; may be empty.
+    /// Agreement with the truth, as text; may be empty.
     pub score: String,
 }
 
 impl Frame {
-    /// Its vertices with their normals, σ and errors, coloured by σ from 0 to the largest, and its
-    /// triangles; what the file says of itself stands in `comments`.
+    /// Returns the vertices with their normals, σ and errors, coloured by σ from 0 to the largest,
+    /// and the triangles; `comments` describe the file.
     pub fn points(&self, comments: Vec<String>) -> Points {
         let (vertices, triangles) = &self.mesh;
         let finite = self.sd_m.iter().copied().filter(|sd_m| sd_m.is_finite());

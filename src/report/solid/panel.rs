@@ -1,4 +1,4 @@
-//! One view of a solid on a sheet: from the front or from behind, lit by the viewer.
+//! View of a solid in a drawing: from the front or from behind, lit from the viewer.
 
 use crate::report::axes::{Axis, MM};
 use crate::report::canvas::{Anchor, Area, Canvas, PointPx};
@@ -7,24 +7,24 @@ use crate::report::style::{self, INK, SMALL_PX};
 use nalgebra::Vector3;
 use palpate_geometry::solids::{Triangles, normals};
 
-/// Room for the title above a surface, and on every side of it.
+/// Height of the title above a surface, and margin on every side of it.
 const TITLE_PX: f64 = 38.0;
 const GAP_PX: f64 = 8.0;
-/// The most that the bar of the scale is long.
+/// Largest length of the scale bar.
 const SCALE_PX: f64 = 60.0;
 
-/// The viewer in front, on the side that a finger touches along −y, or behind.
+/// Returns the camera in front, on the side that a finger touches along −y, or behind.
 fn camera(is_behind: bool) -> Camera {
     Camera::toward(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 }, 1.0)
 }
 
-/// Pixels per metre, so that `points` fit into a panel from both sides.
+/// Returns the scale, in pixels per metre, at which `points` fit into a panel from both sides.
 pub(super) fn scale(points: &[Vector3<f64>], panel: Area) -> f64 {
     let scales = [false, true].map(|is_behind| camera(is_behind).scale(points, inner(panel)));
     scales[0].min(scales[1])
 }
 
-/// Where on a panel its surface is drawn.
+/// Returns the part of a panel in which its surface is drawn.
 pub(super) fn inner(area: Area) -> Area {
     Area {
         left: area.left + GAP_PX,
@@ -34,7 +34,7 @@ pub(super) fn inner(area: Area) -> Area {
     }
 }
 
-/// A panel and how space lies on it.
+/// Panel with its camera.
 pub(super) struct View {
     pub(super) area: Area,
     is_behind: bool,
@@ -42,7 +42,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// A panel in which `points` are in the middle.
+    /// Creates a panel with `points` in the middle.
     pub(super) fn new(area: Area, is_behind: bool, px_per_m: f64, points: &[Vector3<f64>]) -> Self {
         let camera = camera(is_behind).scaled(px_per_m, points, inner(area));
         Self { area, is_behind, camera }
@@ -53,8 +53,8 @@ impl View {
         relief::title(canvas, self.area, &format!("{words}{behind}"), score);
     }
 
-    /// Draws the triangles that face the viewer, each as bright as its corners are and in the
-    /// colour that its place in the list and its light have.
+    /// Draws the triangles that face the viewer, with the colour for their index and their
+    /// brightness.
     pub(super) fn relief(
         &self,
         canvas: &mut Canvas,
@@ -62,7 +62,7 @@ impl View {
         colour: impl Fn(usize, f64) -> String,
     ) -> Relief {
         let outward = normals(vertices, triangles);
-        // The light goes with the viewer.
+        // The light moves with the viewer.
         let lit = |normal: Vector3<f64>| match self.is_behind {
             true => Vector3::new(-normal.x, -normal.y, normal.z),
             false => normal,
@@ -78,7 +78,7 @@ impl View {
         relief
     }
 
-    /// Draws a bar of a round number of millimetres.
+    /// Draws a scale bar of a round number of millimetres.
     pub(super) fn draw_scale(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
         let most_mm = SCALE_PX / px_per_m * MM.per_m;
         let ticks = Axis::linear(0.0, most_mm, 3.0).ticks();

@@ -1,4 +1,4 @@
-//! The reachable part of a whole object: its surface, and the sides from which the finger comes.
+//! Reachable part of a whole object: its surface, and the sides from which the finger can approach.
 
 use super::panel::{View, scale};
 use super::section::TRUTH_TRIANGLES;
@@ -16,15 +16,16 @@ const MARGIN: (f64, f64) = (20.0, 40.0);
 const FOOT_PX: f64 = 40.0;
 const RADIUS_PX: f64 = 4.0;
 
-/// Colours of reached and unreached parts, of surfaces and of marks. heuristic: they
-/// differ in print and for the colour-blind.
+// Colours of reached and unreached parts, of surfaces and of marks.
+// heuristic: they differ in print and for the colour-blind.
 const SURFACE: [[u32; 2]; 2] = [[0xb2becd; 2], [0xd55e00; 2]];
 const MARKS: [&str; 2] = ["#0072b2", "#d55e00"];
 const LEGEND: [&str; 2] = ["#b2becd", "#d55e00"];
 
-/// An object from the front and from behind, as SVG: `spots` are points spread over it, and whether
-/// the finger can touch each, empty if that is not known; `sides` are where the finger sets out on
-/// its way to the middle, and whether it can be brought there. Everything is in `W` and metres.
+/// Draws an object from the front and from behind, as SVG. `spots` are points spread over it, each
+/// with whether the finger can touch it; empty if not known. `sides` are starting points of
+/// straight approaches to the middle, each with whether the finger can reach it. Everything is in
+/// `W` and metres.
 pub fn picture(
     mesh: &Mesh,
     spots: &[(Point3<f64>, bool)],
@@ -37,10 +38,10 @@ pub fn picture(
     let width = 2.0 * PANEL.0;
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + PANEL.1 + FOOT_PX];
     let entries = [
-        (spots, Swatch::Box(LEGEND[0]), "the finger can touch it"),
-        (spots, Swatch::Box(LEGEND[1]), "no straight way leads there"),
-        (sides, Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
-        (sides, Swatch::Cross(MARKS[1]), "side it cannot come from"),
+        (spots, Swatch::Box(LEGEND[0]), "reachable"),
+        (spots, Swatch::Box(LEGEND[1]), "not reachable by a straight approach"),
+        (sides, Swatch::Circle(style::visible(MARKS[0])), "possible direction of approach"),
+        (sides, Swatch::Cross(MARKS[1]), "impossible direction of approach"),
     ];
     let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
     let entries = entries.map(|(_, swatch, words)| (swatch, words));
@@ -50,7 +51,7 @@ pub fn picture(
     for (column, is_behind) in [false, true].into_iter().enumerate() {
         let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);
         let canvas = &mut sheet.canvas;
-        view.title(canvas, "what can be touched", "");
+        view.title(canvas, "reachable surface", "");
         let relief = view.relief(canvas, &drawn, |triangle, light| {
             style::lit(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
         });
@@ -71,7 +72,7 @@ pub fn picture(
     sheet.canvas.finish()
 }
 
-/// Of each triangle, whether the finger can touch the spot that is nearest to its middle.
+/// Returns, for each triangle, whether the finger can touch the spot nearest to its middle.
 fn triangles_reached(
     (vertices, triangles): &Triangles,
     spots: &[(Point3<f64>, bool)],
@@ -90,8 +91,8 @@ fn triangles_reached(
 mod tests {
     use super::*;
 
-    /// A tetrahedron of which one side is reached: each triangle has the colour of the spot that is
-    /// nearest to its middle, and what is not asked has no legend.
+    /// A tetrahedron with one reachable side: each triangle has the colour of the spot nearest to
+    /// its middle, and unused marks have no legend.
     #[test]
     fn surfaces_take_the_colour_of_the_nearest_spot() {
         let corner = |x, y, z| Point3::new(x, y, z);
@@ -109,8 +110,8 @@ mod tests {
         let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
         let sides = [(corner(2.0, 0.0, 0.0), true), (corner(-2.0, 0.0, 0.0), false)];
         let svg = picture(&mesh, &spots, &sides);
-        assert!(svg.contains("side it cannot come from") && svg.contains("no straight way"));
+        assert!(svg.contains("impossible direction") && svg.contains("not reachable by"));
         let svg = picture(&mesh, &[], &[]);
-        assert!(!svg.contains("side it") && !svg.contains("straight way"));
+        assert!(!svg.contains("direction of") && !svg.contains("reachable by"));
     }
 }

@@ -1,5 +1,5 @@
-//! The section of the page: a believed surface touch by touch, to turn and to colour; lengths are
-//! in millimetres, and meshes are coded as text of few bytes.
+//! Interactive section of the page: a believed surface touch by touch, to turn and to colour.
+//! Lengths are in millimetres, and meshes are encoded as compact text.
 
 use super::{Frame, Sequence, Touch};
 use crate::report::axes::{self, MM};
@@ -18,20 +18,20 @@ use serde_json::{Value, json};
 
 const SCRIPTS: [&str; 3] = [PARTS, include_str!("surface.js"), include_str!("solid.js")];
 
-/// Most triangles of the true surface that are shown. heuristic: 80 kB of a page.
+// Largest number of triangles of the true surface.
+// heuristic: 80 kB of a page.
 pub(super) const TRUTH_TRIANGLES: usize = 8000;
 
 const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
 
-/// Touch counts to draw beliefs after, as many as there is room for on a page, the first and the
-/// last among them, where the surfaces of `planners` planners have about `triangles` triangles
-/// each.
+/// Returns the touch counts whose beliefs are drawn: as many as fit on a page, including the first
+/// and the last, if the surfaces of `planners` planners have about `triangles` triangles each.
 pub fn counts(first: u32, last: u32, planners: usize, triangles: usize) -> Vec<u32> {
     explorer::counts(first, last, BYTES_OF_TRIANGLE * planners * triangles)
 }
 
-/// The section as HTML; empty if no planner has a belief to show. `trial` is said in words, and
-/// `truth` is what can be laid over.
+/// Returns the section as HTML; empty if no planner has a belief to show. `trial` is named in the
+/// note, and `truth` can be overlaid.
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
@@ -43,7 +43,7 @@ pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyh
     let Some(data) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
     let initial = first.touches.iter().filter(|touch| touch.is_initial).count();
     let green = match truth {
-        Some(_) => " Green: where the true surface stands out of the belief.",
+        Some(_) => " Green: the true surface in front of the belief.",
         None => "",
     };
     let shell = Shell {
@@ -51,25 +51,26 @@ pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyh
         truth: truth.as_ref().map(|_| false),
         class: "surface",
         note: format!(
-            "Trial {trial}. Blue: the {initial} initial touches; red: those the planner chose; the \
-             last one is larger, and an arrow shows how the finger came.{green} {HELP}"
+            "Trial {trial}. Blue: the {initial} initial touches; red: those of the planner; the last \
+             one is larger, with an arrow along the approach.{green} {HELP}"
         ),
         scripts: &SCRIPTS,
     };
     Ok(shell.html(&data))
 }
 
-const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Drag the surface \
-                    to turn it, the slider to go through the touches; both also follow the arrow \
-                    keys. Two fingers, the keys + and −, or the wheel once the surface was clicked \
-                    zoom; 0 is as at first.";
+const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \
+                    Drag the surface to turn it and the slider to step through the touches, or press \
+                    the arrow keys. Zoom with two fingers, the keys + and −, or the wheel after a \
+                    click on the surface; 0 resets the view.";
 
-/// The least share where all are alike. heuristic.
+// heuristic: smallest share of the range if all values are alike.
 const ALIKE_SHARE: f64 = 0.1;
-/// Ends of deviations where there are none. heuristic.
+// heuristic: range of deviations if there are none.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
-/// The data of beliefs in an object and of its true surface; `None` if there is nothing to draw.
+/// Returns the data of beliefs in an object and of its true surface; `None` if there is nothing to
+/// draw.
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
@@ -96,9 +97,9 @@ fn data(sequences: &[&Sequence], truth: Option<&Triangles>) -> anyhow::Result<Op
     let truth = truth.map(|mesh| Coded::new(cube, mesh));
     Ok(Some(json!({
         "unit": MM.symbol,
-        // The ends of the codes of a position, from the middle of everything.
+        // Range of the codes of a position, from the middle of everything.
         "cube": in_mm([-0.5 * cube.side_m, 0.5 * cube.side_m]),
-        // No vertex and no contact is farther from the middle.
+        // Largest distance of a vertex or contact from the middle.
         "reach": MM.per_m * points().map(|p| (p - middle).norm()).fold(0.0, f64::max),
         "deviation_range": in_mm(deviations),
         "error_range": errors.map(in_mm),
@@ -108,21 +109,22 @@ fn data(sequences: &[&Sequence], truth: Option<&Triangles>) -> anyhow::Result<Op
     })))
 }
 
-/// Ends of the finite deviations above zero, apart, if there is one.
+/// Returns the range of the finite deviations above zero, widened if it is empty; `None` without
+/// any.
 pub(super) fn deviation_range<'a>(sds_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     let (least, most) = axes::range(sds_m.copied().filter(|&sd_m| sd_m > 0.0))?;
     let least = least.max(LEAST_SHARE * most);
     Some(if least < most { [least, most] } else { [ALIKE_SHARE * most, most] })
 }
 
-/// Ends around zero of the finite errors, if there is one.
+/// Returns the range, symmetric about zero, of the finite errors; `None` without any.
 fn error_range<'a>(errors_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     let (low, high) = axes::range(errors_m.copied())?;
     let most = high.max(-low).max(f64::MIN_POSITIVE);
     Some([-most, most])
 }
 
-/// A belief with its numbers coded between the ends of deviations and of errors, in metres.
+/// Encodes a belief with its values between the ends of deviations and of errors, in metres.
 fn coded<'a>(
     frame: &'a Frame,
     cube: Cube,
@@ -147,7 +149,7 @@ fn coded<'a>(
     }))
 }
 
-/// A touch, from the middle of everything.
+/// Returns a touch, relative to the middle of everything.
 fn marked(touch: &Touch, cube: Cube) -> Value {
     let from_middle = |p_w| <[f64; 3]>::from((p_w - cube.middle()) * MM.per_m).map(short);
     json!({
@@ -158,27 +160,27 @@ fn marked(touch: &Touch, cube: Cube) -> Value {
     })
 }
 
-/// Most vertices of a mesh: indices have sixteen bits where they are drawn.
+/// Largest number of vertices of a mesh: indices have sixteen bits where they are drawn.
 const VERTICES_MAX: usize = u16::MAX as usize;
 
-/// The code from which on a number takes two more bytes.
+/// Code from which on a number takes two more bytes.
 const LONG: u8 = u8::MAX;
 
-/// Bytes of a triangle in base 64, about: half a vertex of five numbers of two bytes, and three
-/// corners of little more than a byte.
+/// Approximate bytes of a triangle in base 64: half a vertex of five numbers of two bytes, and
+/// three corners of little more than a byte.
 const BYTES_OF_TRIANGLE: usize = 11;
 
-/// A cube that positions are written in, as sixteen bits each.
+/// Cube in which positions are encoded, with sixteen bits for each coordinate.
 #[derive(Clone, Copy, Debug)]
 struct Cube {
-    /// Its lower corner, in metres.
+    /// Lower corner, in metres.
     low: Point3<f64>,
-    /// Its side, in metres.
+    /// Side, in metres.
     side_m: f64,
 }
 
 impl Cube {
-    /// The smallest around all of `points`, with their middle as its own.
+    /// Returns the smallest cube around all of `points`, with the same middle.
     fn around<'a>(points: impl Iterator<Item = &'a Point3<f64>>) -> Option<Self> {
         let [low, high] = extent(points)?;
         let side_m = (high - low).max().max(f64::MIN_POSITIVE);
@@ -191,22 +193,22 @@ impl Cube {
     }
 }
 
-/// Triangles whose vertices are numbered as they are first used.
+/// Triangles whose vertices are numbered in the order of first use.
 #[derive(Serialize)]
 struct Coded {
     /// x, y, z of each vertex: sixteen bits along the cube, the lower eight first.
     positions: String,
-    /// How far each corner lies behind the next new vertex, 0 being that one; 255 stands before
-    /// two bytes that say it, the lower first. Chun, *WebGL Models: End-to-End*, in *OpenGL
-    /// Insights*, 2012, codes indices so.
+    /// Distance of each corner behind the next new vertex, which is 0; 255 precedes a distance of
+    /// two bytes, the lower first. Chun 2012, *WebGL Models: End-to-End*, in *OpenGL Insights*,
+    /// encodes indices this way.
     corners: String,
-    /// Which vertices these are of those given.
+    /// Indices of these vertices in the given mesh.
     #[serde(skip)]
     order: Vec<u32>,
 }
 
 impl Coded {
-    /// Every position is off by half a code at most, `side_m` / 131 068.
+    /// Encodes a mesh; every position has an error of half a code at most, `side_m` / 131 068.
     ///
     /// # Errors
     /// If more vertices are used than sixteen bits can count.
@@ -228,7 +230,10 @@ impl Coded {
             }
         }
         let count = order.len();
-        ensure!(count <= VERTICES_MAX, "a mesh of {count} vertices; {VERTICES_MAX} can be drawn");
+        ensure!(
+            count <= VERTICES_MAX,
+            "a mesh of {count} vertices cannot be drawn: at most {VERTICES_MAX} are allowed"
+        );
         let offsets = order.iter().map(|&vertex| vertices[vertex as usize] - cube.low);
         let shares = offsets.flat_map(|offset| <[f64; 3]>::from(offset / cube.side_m));
         Ok(Self { positions: encode(shares), corners: STANDARD.encode(corners), order })

@@ -1,4 +1,4 @@
-// A believed surface all around an object, to turn and to zoom.
+// Believed surface all around an object, to turn and to zoom.
 "use strict";
 
 function frameOf(state) {
@@ -12,13 +12,13 @@ function frameOf(state) {
 }
 
 function viewOf(canvas) {
-  // From where it is seen at first, and where light falls from, to the right, up and towards the
-  // viewer: as in the printed figures at first. More of it comes from everywhere, so that colours
-  // can be read on a slope.
+  // Initial view and direction of light (to the right, up and towards the viewer), as in the
+  // printed figures, with more ambient light, so that colours are readable on a slope.
   const FIRST = { azimuth: 38, elevation: 24, zoom: 1 };
   const turn = { ...FIRST, isDragged: false };
   const [LIGHT, STRENGTH] = [[0.08, 0.17, 0.98], [0.45, 0.6]];
-  // Share of the true surface's colour where it stands out, and how far it must, of the size.
+  // Opacity of the true surface in front of the belief, and the least distance for it, relative to
+  // the size.
   const [OPACITY, LIFT] = [0.62, 0.004];
   const FOOT = 74;
   const truth = data.truth && meshOf(data.truth);
@@ -30,11 +30,12 @@ function viewOf(canvas) {
   const paintAll = painter(() => window.draw());
   if (!paintAll) {
     explorer.classList.add("lacking");
-    const words = "This part needs WebGL, which this browser does not offer here; the figures below do not.";
+    const words = "This view needs WebGL, which this browser does not provide; the figures do not.";
     canvas.insertAdjacentHTML("beforebegin", `<p class="notices">${words}</p>`);
   }
 
-  // How space lies on the canvas now: orthographic, of one size from wherever it is seen.
+  // Returns the mapping from space to canvas: orthographic, with the same scale from every
+  // direction.
   function camera(width, height) {
     const [a, e] = [turn.azimuth, turn.elevation].map((degrees) => degrees * Math.PI / 180);
     const [sa, ca, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
@@ -48,7 +49,7 @@ function viewOf(canvas) {
     };
   }
 
-  // The picture of the surface, of the true one where it stands out, if it is to be shown.
+  // Draws the surface, and the true one in front of it if it is selected.
   function surface({ rows, middle, scale }, frame, values, [width, height, ratio], isTruthShown) {
     const tints = new Uint8Array(3 * values.length);
     const shown = scales[state.colour];
@@ -64,7 +65,7 @@ function viewOf(canvas) {
     return paintAll(view, { mesh: frame.mesh, tints }, over);
   }
 
-  // Whether the surface hides a point of it or behind it.
+  // Returns whether the surface hides a point on it or behind it.
   function hider({ positions, indices }, at) {
     const corners = [];
     for (let i = 0; i < positions.length; i += 3) corners.push(at(positions.subarray(i, i + 3)));
@@ -82,10 +83,10 @@ function viewOf(canvas) {
     };
   }
 
-  // The way of the finger to where it was sent, pale where the surface hides it.
+  // Draws the path of the finger to its target, pale where the surface hides it.
   function drawArrow(context, { aim, along }, at, isHidden, ink) {
     const [PIECES, HEAD] = [40, 9];
-    // It begins outside, farther from the middle than anything reaches.
+    // It begins outside, farther from the middle than any point.
     const ahead = aim[0] * along[0] + aim[1] * along[1] + aim[2] * along[2];
     const square = aim[0] ** 2 + aim[1] ** 2 + aim[2] ** 2 - (1.2 * data.reach) ** 2;
     const length = Math.max(ahead + Math.sqrt(Math.max(ahead ** 2 - square, 0)), 0.3 * data.reach);
@@ -101,7 +102,7 @@ function viewOf(canvas) {
       context.stroke();
     };
     for (let i = 0; i < PIECES; i++) line([points[i], points[i + 1]], isHidden(points[i + 1]));
-    // Seen from its end or its tip it has no length.
+    // Seen along its axis, it has no length.
     if (Math.hypot(to[0] - from[0], to[1] - from[1]) > HEAD) {
       const side = (angle) => [to[0] - HEAD * Math.cos(direction + angle), to[1] - HEAD * Math.sin(direction + angle)];
       line([side(0.45), to, side(-0.45)], isHidden(to));
@@ -109,7 +110,7 @@ function viewOf(canvas) {
     context.globalAlpha = 1;
   }
 
-  // Which way W lies, and how long a round number of millimetres is.
+  // Draws the axes of W and a scale bar of a round number of millimetres.
   function drawFrame(context, { rows, scale }, height) {
     const [ARM, x0, y0] = [26, 46, height - FOOT - 22];
     context.lineWidth = 1.5;
@@ -140,7 +141,7 @@ function viewOf(canvas) {
     const values = frame[state.colour] ?? new Float32Array(frame.deviation.length).fill(NaN);
     const eye = camera(width, height);
     const isHidden = hider(frame.mesh, eye.at);
-    // However near it is seen, the colours below stay free.
+    // At any zoom, the colour bar below stays visible.
     context.save();
     context.rect(0, 0, width, height - FOOT + 6);
     context.clip();
@@ -177,7 +178,7 @@ function viewOf(canvas) {
       window.draw();
     }
   });
-  // A page that is scrolled goes past the picture; a pinch on a touch pad is a wheel with Ctrl.
+  // Scrolling the page does not zoom the view; a pinch on a touch pad is a wheel event with Ctrl.
   canvas.addEventListener("wheel", (event) => {
     if (!event.ctrlKey && document.activeElement !== canvas) return;
     event.preventDefault();

@@ -1,7 +1,7 @@
-// A mesh of triangles and its picture by WebGL.
+// Triangle mesh and its rendering by WebGL.
 "use strict";
 
-// Corners are said by how far they lie behind the next new vertex; 255 stands before two bytes.
+// Corners are encoded as the distance behind the next new vertex; 255 precedes two bytes.
 function corners(text) {
   const code = bytes(text);
   const indices = [];
@@ -18,8 +18,8 @@ function corners(text) {
   return Uint16Array.from(indices);
 }
 
-// Positions from the middle of everything, corners of triangles, and normals of vertices: the mean
-// of the triangles around each, by their areas.
+// Returns positions from the middle of everything, corners of triangles, and normals of vertices:
+// the mean of the triangles around each, weighted by area.
 function meshOf(coded) {
   const positions = numbers(coded.positions, data.cube);
   const indices = corners(coded.corners);
@@ -33,7 +33,7 @@ function meshOf(coded) {
   return { positions, indices, normals };
 }
 
-// From W to the picture: the rows of `turn` point to the right, up and towards the viewer.
+// Maps W to the picture: the rows of `turn` point to the right, up and towards the viewer.
 const VERTEX = `
   attribute vec3 position, normal, tint;
   uniform mat3 turn;
@@ -44,7 +44,7 @@ const VERTEX = `
     paint = tint;
     gl_Position = vec4(scale * (turn * position) + shift, 1.0);
   }`;
-// Light falls from where the viewer is, so that no side is dark.
+// The light comes from the viewer, so that no side is dark.
 const FRAGMENT = `
   precision mediump float;
   uniform vec3 light;
@@ -57,7 +57,7 @@ const FRAGMENT = `
     gl_FragColor = vec4(paint * bright * opacity, opacity);
   }`;
 
-// What draws meshes on a sheet of its own, or null without WebGL.
+// Returns a renderer of meshes with its own canvas, or null without WebGL.
 function painter(redraw) {
   const sheet = document.createElement("canvas");
   const gl = sheet.getContext("webgl");
@@ -76,7 +76,7 @@ function painter(redraw) {
     buffers = ["position", "normal", "tint", "corners"].map(() => gl.createBuffer());
   }
   start();
-  // A machine that sleeps, or draws too much elsewhere, takes the context away for a while.
+  // After sleep or under load the browser may take the context away for a while.
   sheet.addEventListener("webglcontextlost", (event) => event.preventDefault());
   sheet.addEventListener("webglcontextrestored", () => {
     start();
@@ -96,12 +96,12 @@ function painter(redraw) {
     return () => gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_SHORT, 0);
   }
 
-  // `view`: width and height in pixels, turn by columns, scale and shift to −1 … 1, light with its
-  // shares from everywhere and from one side. A mesh laid over stands out by `lift` at least.
+  // `view`: width and height in pixels, turn by columns, scale and shift to −1 … 1, ambient and
+  // directed light. An overlaid mesh is drawn where it is in front by `lift` at least.
   function paintAll(view, { mesh, tints }, over) {
     [sheet.width, sheet.height] = [view.width, view.height];
     gl.viewport(0, 0, view.width, view.height);
-    // A sheet that keeps its size keeps its picture.
+    // A canvas that keeps its size keeps its picture.
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.useProgram(program);
     const uniform = (name) => gl.getUniformLocation(program, name);
@@ -120,7 +120,7 @@ function painter(redraw) {
     const [right, up, back] = view.shift;
     gl.uniform3fv(uniform("shift"), [right, up, back + over.lift]);
     gl.uniform1f(uniform("opacity"), over.opacity);
-    // Its nearest triangle alone: depths first, then colours.
+    // Draws the nearest triangles alone: depths first, then colours.
     gl.colorMask(false, false, false, false);
     lay();
     gl.colorMask(true, true, true, true);

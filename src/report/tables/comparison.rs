@@ -1,5 +1,5 @@
-//! The planners of a run against its baselines, in every measure and in touches to equal error: as
-//! tables of the page and as files.
+//! Comparison of the planners of a run with its baselines, in every measure and in touches to equal
+//! error: tables of the page and of files.
 
 use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
 use crate::experiment::statistics::comparison::Comparison;
@@ -7,18 +7,19 @@ use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, digits, titled, with_interval};
 
-/// The table of `comparison.csv`: a row per planner, baseline and measure after the last touch.
+/// Returns the table of `comparison.csv`, with a row per planner, baseline and measure after the
+/// last touch.
 pub fn comparison_file(found: &[Comparison]) -> Table {
     let mut table = Table::new([
-        Column::new("planner").note("Which planner."),
-        Column::new("baseline").note("Against which."),
-        Column::new("measure").note("In which measure."),
+        Column::new("planner").note("Name of the planner."),
+        Column::new("baseline").note("Planner that it is compared with."),
+        Column::new("measure").note("Measure that is compared."),
         Column::new("trials").note("Trials that both finished."),
         Column::new("difference")
             .note("Mean of the planner's value minus the baseline's, in the same trial.")
             .interval(),
         Column::new("won")
-            .note("Share of the trials in which the planner is better; a tie is half."),
+            .note("Fraction of the trials in which the planner is better; a tie counts half."),
     ]);
     for Comparison { planner, baseline, measure, paired } in found {
         let difference = Estimate { value: paired.mean, interval: paired.interval };
@@ -29,7 +30,7 @@ pub fn comparison_file(found: &[Comparison]) -> Table {
     table
 }
 
-/// A table for each baseline: a row for each measure, a column for each other planner.
+/// Returns a table for each baseline: a row for each measure, a column for each other planner.
 pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
     let table = |baseline: &str| {
         let rows = MEASURES.iter().map(|measure| (titled(measure), measure));
@@ -44,17 +45,16 @@ pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
     tables(run, table)
 }
 
-/// A note on the cells of [`comparisons`].
+/// Returns the note that explains the cells of [`comparisons`].
 pub fn comparisons_note(run: &Run) -> String {
     let more: Vec<&str> = in_files(&run.rows)
         .filter(|measure| measure.direction == Direction::More)
         .map(|measure| measure.title)
         .collect();
     format!(
-        "Differences after {} touches in the same trial: mean, its 95 % bootstrap interval, and \
-         the share of trials in which the planner is better; better is more for {}, less for all \
-         else. Bold, with the word beside it: the interval excludes 0, so the difference is \
-         established.",
+        "Differences after {} touches in the same trial: mean, its 95 % bootstrap interval, and the \
+         percentage of trials in which the planner is better. For {} more is better, for all others \
+         less. Bold values with a verdict: the interval excludes 0.",
         run.experiment.touches,
         more.join(", ")
     )
@@ -72,21 +72,21 @@ fn difference(comparison: &Comparison) -> Cell {
     Cell::from(words).judged(paired.interval, 0.0, measure.direction)
 }
 
-/// The table of `equal_error.csv`: a row per planner, baseline and error; a count or ratio is left
-/// out where the error is not reached.
+/// Returns the table of `equal_error.csv`, with a row per planner, baseline and error; a count or
+/// ratio is empty if the error is not reached.
 pub fn equal_error_file(found: &[EqualError]) -> Table {
     let mut table = Table::new([
-        Column::new("planner").note("Which planner."),
-        Column::new("baseline").note("Whose error is the goal."),
-        Column::new("measure").note("Which error."),
+        Column::new("planner").note("Name of the planner."),
+        Column::new("baseline").note("Planner whose error is the goal."),
+        Column::new("measure").note("Measure of the error."),
         Column::new("trials").note("Trials that both finished."),
         Column::new("goal").note("The baseline's median error after the goal's touches."),
         Column::new("baseline_touches")
-            .note("Touches until the baseline itself has met it; empty: never."),
-        Column::new("touches").note("Touches until the planner has.").interval(),
-        Column::new("ratio").note("The planner's touches over the baseline's.").interval(),
+            .note("Touches until the baseline itself reaches the goal; empty: never."),
+        Column::new("touches").note("Touches until the planner reaches the goal.").interval(),
+        Column::new("ratio").note("Ratio of the planner's touches to the baseline's.").interval(),
         Column::new("path_ratio")
-            .note("The planner's lateral way after the initial touches over the baseline's.")
+            .note("Ratio of the planner's lateral travel after the initial touches to the baseline's.")
             .interval(),
     ]);
     for it in found {
@@ -98,7 +98,7 @@ pub fn equal_error_file(found: &[EqualError]) -> Table {
     table
 }
 
-/// A table for each baseline: a row for each other planner, a column for each error.
+/// Returns a table for each baseline: a row for each other planner, a column for each error.
 pub fn equal_errors(run: &Run, found: &[EqualError]) -> Vec<Table> {
     let most = run.experiment.touches;
     let table = |baseline: &str| {
@@ -123,14 +123,14 @@ pub fn equal_errors(run: &Run, found: &[EqualError]) -> Vec<Table> {
     tables(run, table)
 }
 
-/// A note on the cells of [`equal_errors`].
+/// Returns the note that explains the cells of [`equal_errors`].
 pub fn equal_errors_note(run: &Run) -> String {
     format!(
-        "Touches, initial ones included, after which a planner\u{2019}s median error stays at or \
-         below the one in the column\u{2019}s head, which is the baseline\u{2019}s after {} touches; \
-         behind \u{d7} their ratio to the baseline\u{2019}s own count, and that of the lateral ways \
-         after the initial touches. All with the 95 % interval of a bootstrap over trials. Bold, with \
-         the word beside it: the interval of the touches\u{2019} ratio excludes 1.",
+        "Touches, including the initial ones, after which a planner\u{2019}s median error stays at or \
+         below the goal in the column\u{2019}s head, the baseline\u{2019}s error after {} touches. After \
+         \u{d7}: their ratio to the baseline\u{2019}s own count; then the ratio of the lateral travel \
+         after the initial touches. All with the 95 % interval of a bootstrap over trials. Bold values \
+         with a verdict: the interval of the touches\u{2019} ratio excludes 1.",
         run.experiment.goal_touches()
     )
 }
@@ -139,7 +139,7 @@ fn effort(equal: &EqualError, most: u32) -> Cell {
     // Without a count there is no ratio, and of its interval at most the lower end.
     if !equal.touches.value.is_finite() {
         let low = equal.touches.interval.map_or(f64::INFINITY, |[low, _]| low);
-        let some = if low.is_finite() { format!(", {low:.0} at least") } else { String::new() };
+        let some = if low.is_finite() { format!(", at least {low:.0}") } else { String::new() };
         return format!("{}{some}", touches(f64::INFINITY, most)).into();
     }
     let shown = |estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
@@ -147,7 +147,7 @@ fn effort(equal: &EqualError, most: u32) -> Cell {
     };
     let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };
     let words = format!(
-        "{} \u{d7} {}; way \u{d7} {}",
+        "{} \u{d7} {}; travel \u{d7} {}",
         shown(&equal.touches, &|count| touches(count, most)),
         shown(&equal.ratio, &ratio),
         shown(&equal.path_ratio, &ratio),
@@ -159,12 +159,12 @@ fn touches(count: f64, most: u32) -> String {
     if count.is_finite() { format!("{count:.0}") } else { format!("over {most}") }
 }
 
-/// The planners of a run as columns.
+/// Returns the planners of a run as columns.
 fn planners(run: &Run) -> Vec<(Column, &String)> {
     run.experiment.planners.iter().map(|planner| (Column::new(planner), planner)).collect()
 }
 
-/// The tables of all baselines that have rows.
+/// Returns the tables of all baselines that have rows.
 fn tables(run: &Run, table: impl Fn(&str) -> Table) -> Vec<Table> {
     let tables = run.experiment.baselines().into_iter().map(table);
     tables.filter(|table| !table.rows.is_empty()).collect()

@@ -1,5 +1,5 @@
-//! The curves of a run as tables: of the page, of the terminal and as a file; and what a
-//! publication says beside what came out.
+//! Curves of a run as tables for the page, the terminal and files; and the claims of a publication
+//! next to the results.
 
 use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
@@ -8,7 +8,8 @@ use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, shown, titled};
 use serde_json::{Value, json};
 
-/// A row for each planner and tabled touch count; columns without a value are left out.
+/// Returns a table with a row for each planner and tabled touch count; columns without a value are
+/// left out.
 pub fn table(run: &Run) -> Table {
     let aggregates: Vec<(&Measure, bool)> = (MEASURES.iter())
         .filter(|measure| measure.is_tabled)
@@ -43,12 +44,12 @@ pub fn table(run: &Run) -> Table {
     table.without_empty()
 }
 
-/// A note on the cells of [`table`].
+/// Returns the note that explains the cells of [`table`].
 pub fn note(run: &Run) -> String {
-    format!("± is one standard error of the mean over {} trials.", run.experiment.trials)
+    format!("n = {} trials; ± is one standard error of the mean.", run.experiment.trials)
 }
 
-/// The table for the terminal, then what else happened.
+/// Returns the table for the terminal, followed by the other events.
 pub fn text(run: &Run) -> String {
     let mut text = format!("{}\n{}", run.experiment.name, table(run).text());
     happened(run).iter().for_each(|line| text += &format!("{line}\n"));
@@ -56,8 +57,8 @@ pub fn text(run: &Run) -> String {
     text.trim_end().into()
 }
 
-/// The table of `summary.csv`: a row for each planner and each of its touch counts that
-/// `is_wanted`.
+/// Returns the table of `summary.csv`, with a row for each planner and each of its touch counts for
+/// which `is_wanted` is true.
 pub fn file(run: &Run, is_wanted: impl Fn(u32) -> bool) -> Table {
     let names = ["planner", "touches", "trials"].map(String::from).into_iter();
     let names = names.chain(columns(&run.experiment, &run.rows));
@@ -72,8 +73,8 @@ pub fn file(run: &Run, is_wanted: impl Fn(u32) -> bool) -> Table {
     }
 }
 
-/// The summary for programs: for each planner and tabled touch count the columns of `summary.csv`,
-/// and what a reader should know.
+/// Returns the summary for programs: the columns of `summary.csv` for each planner and tabled touch
+/// count, and the notices.
 pub fn json(run: &Run) -> Value {
     let counts = run.experiment.tabled_touch_counts();
     let mut rows = file(run, |count| counts.contains(&count)).json();
@@ -92,10 +93,10 @@ pub fn json(run: &Run) -> Value {
     })
 }
 
-/// The claims of a publication beside the results: a row for each measure of each claim.
+/// Returns the claims of a publication with the results: a row for each measure of each claim.
 pub fn claims(run: &Run) -> Table {
     let planners = &run.experiment.planners;
-    let heads = ["paper", "it says", "here after", "measure"].map(Column::new).into_iter();
+    let heads = ["paper", "reported", "here after", "measure"].map(Column::new).into_iter();
     let mut table = Table::new(heads.chain(planners.iter().map(Column::new)));
     let possible = run.experiment.initial_touches..=run.experiment.touches;
     let claims = run.experiment.report.claims.iter();
@@ -120,33 +121,30 @@ pub fn claims(run: &Run) -> Table {
     table
 }
 
-/// A note on the cells of [`claims`].
-pub const CLAIMS_NOTE: &str = "What Yi et al. 2016 say, and the same here, over the trials.";
+/// Note that explains the cells of [`claims`].
+pub const CLAIMS_NOTE: &str =
+    "Values reported by Yi et al. 2016, next to those of this run over the trials.";
 
-/// Events in the trials besides their errors, a line for each planner.
+/// Returns the events in the trials besides their errors, a line for each planner.
 pub fn happened(run: &Run) -> Vec<String> {
     let of = |planner: &String| told(planner, &summary::events(&run.rows, planner));
     let unlisted = (run.unlisted > 0).then(|| {
-        format!(
-            "{} trials in the folder are kept but not shown, because the experiment does not list \
-             them",
-            run.unlisted
-        )
+        format!("{} stored trials are not shown: the experiment does not list them", run.unlisted)
     });
     run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
 }
 
-/// The events in a planner's trials, in a line; none if there were none.
+/// Returns the events in a planner's trials, in a line; `None` without events.
 fn told(planner: &str, events: &Events) -> Option<String> {
     let counts = [
         (events.failures, "failed trials"),
-        (events.misses, "touches met nothing"),
-        (events.overloads, "touches were broken off: too much force, or no place was felt"),
+        (events.misses, "touches without contact"),
+        (events.overloads, "touches aborted: force limit, or no contact location"),
         (
             events.collapsed,
-            "plans went to a random place instead, because the belief was sure of the best one",
+            "random targets instead of planned ones: no variance left at the best one",
         ),
-        (events.repeated, "plans went to a random place instead, because they repeated a target"),
+        (events.repeated, "random targets instead of planned ones: repeated target"),
     ];
     let told: Vec<String> = counts
         .iter()

@@ -1,4 +1,4 @@
-//! The fingertip, put together from the effects a scene names, and the frames its sensor sends.
+//! Fingertip composed of the effects that a scene names, with the frames of its sensor.
 
 use super::effects::electrodes::{Common, Electrodes, Shear};
 use super::effects::fluid::Filter;
@@ -19,10 +19,10 @@ use palpate_geometry::bvh::MeshBvh;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
-/// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
+// heuristic: longest step; in longer ones a frame's signals would be mostly interpolated.
 const LONGEST_STEP_S: f64 = 1.0;
 
-/// What never changes about a fingertip; shared by trials.
+/// Fingertip model: constant, shared by trials.
 #[derive(Clone, Debug)]
 pub struct Fingertip {
     skin: Option<Skin>,
@@ -32,7 +32,7 @@ pub struct Fingertip {
 }
 
 impl Fingertip {
-    /// A BioTac in the finger's size.
+    /// Creates a BioTac of the finger's size.
     pub fn new(finger: &Finger, effects: &Effects) -> Self {
         let profile = Profile::biotac(finger);
         let cavity_pa_m3 = effects.fluid.as_ref().map_or(0.0, |fluid| fluid.stiffness_pa_m3);
@@ -49,7 +49,7 @@ impl Fingertip {
         }
     }
 
-    /// The same of a sensor that differs.
+    /// Creates a fingertip with the constants of one particular `sensor`.
     pub fn varied(finger: &Finger, effects: &Effects, sensor: &Sensor) -> Self {
         let own = Effects {
             skin: effects.skin.as_ref().map(|skin| sensor.skin(skin)),
@@ -63,12 +63,12 @@ impl Fingertip {
         tip
     }
 
-    /// Its skin.
+    /// Returns the skin.
     pub fn skin(&self) -> Option<&Skin> {
         self.skin.as_ref()
     }
 
-    /// Bytes held by skin and electrodes.
+    /// Returns the bytes held by skin and electrodes.
     pub fn bytes(&self) -> usize {
         self.skin.as_ref().map_or(0, Skin::bytes)
             + self.electrodes.as_ref().map_or(0, Electrodes::bytes)
@@ -76,7 +76,7 @@ impl Fingertip {
     }
 }
 
-/// What one fingertip feels during one trial.
+/// State of a fingertip during one trial.
 #[derive(Clone, Debug)]
 pub struct FingertipState {
     time_s: f64,
@@ -86,7 +86,7 @@ pub struct FingertipState {
 }
 
 impl FingertipState {
-    /// At the start of a trial, untouched; `rng` is the only randomness.
+    /// Creates the unloaded state at the start of a trial; `rng` is the only randomness.
     pub fn new(tip: &Fingertip, rng: &ChaCha8Rng) -> Self {
         let mut state = Self {
             time_s: 0.0,
@@ -101,16 +101,17 @@ impl FingertipState {
         state
     }
 
-    /// The skin in its last pose.
+    /// Returns the skin in its last pose.
     pub fn pressed(&self) -> Option<&Pressed> {
         self.pressed.as_ref()
     }
 
-    /// Goes on by `dt_s`, to `motion` at its end, against an object that stands in `W`.
+    /// Advances by `dt_s`, to `motion` at the end of the step, against an object in `W`.
     ///
     /// # Errors
     /// [`Fault::Diverged`] if a number is not finite or the step is longer than a second,
-    /// [`Fault::Inside`] if the object encloses the fingertip's centre; the state is as before.
+    /// [`Fault::Inside`] if the object encloses the fingertip's centre; the state is then
+    /// unchanged.
     pub fn step(
         &mut self,
         tip: &Fingertip,
@@ -147,13 +148,13 @@ impl FingertipState {
         Ok(load)
     }
 
-    /// Bytes of this trial's state: what an effect that is off does not hold.
+    /// Returns the bytes held by this trial's state; effects that are off hold none.
     pub fn bytes(&self) -> usize {
         let pressed = self.pressed.as_ref().map_or(0, Pressed::bytes);
         pressed + self.effects.bytes() + self.converter.as_ref().map_or(0, Converter::bytes)
     }
 
-    /// The oldest tactile frame that has arrived and was not asked for yet.
+    /// Returns the oldest tactile frame that has arrived and was not read yet.
     pub fn frame(&mut self) -> Option<Frame> {
         let converter = self.converter.as_mut()?;
         converter.ready = converter.ready.checked_sub(1)?;
@@ -181,30 +182,31 @@ impl FingertipState {
     }
 }
 
-/// Frames kept for a reader that does not come, one second of them; then the oldest is lost
-/// (chosen).
+// heuristic: largest number of unread frames, one second of them; beyond it the oldest is lost.
 const KEPT: usize = 100;
 
-/// A slot this close to the end of a step, in seconds, belongs to it: sums of time steps round.
+/// Tolerance in s by which a slot belongs to the end of a step, because sums of time steps round.
 const SOON_S: f64 = 1e-9;
 
-/// What the channels would read without noise, at one instant.
+/// Noise-free values of the channels at one instant.
 #[derive(Clone, Copy, Debug, Default)]
 struct Signals {
-    /// E1 to E19.
+    /// Counts of E1 to E19.
     electrode_counts: [f64; ELECTRODES],
     /// Fluid pressure above rest.
     pressure_pa: f64,
     /// Temperature of the fluid.
     temperature_c: f64,
-    /// Its rate of change within the sensor's band.
+    /// Rate of change of the temperature, within the sensor's band.
     warming_c_s: f64,
-    /// Speed at which the skin slips on the object, during the whole step that ends now.
+    /// Speed at which the skin slips on the object, during the whole step that ends at this
+    /// instant.
     slip_m_s: f64,
 }
 
-/// The converter of one trial: electrodes, PDC, PAC, thermistor and slip each draw noise from a
-/// stream of their own, so that switching one leaves the others' noise as it was.
+/// Analogue-to-digital converter of one trial. Electrodes, PDC, PAC, thermistor and slip each draw
+/// noise from their own random stream, so that switching one off does not change the noise of the
+/// others.
 #[derive(Clone, Debug)]
 struct Converter {
     before: Signals,
@@ -251,12 +253,12 @@ impl Converter {
         }
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     fn bytes(&self) -> usize {
         size_of_val(self) + self.queue.capacity() * size_of::<Frame>()
     }
 
-    /// Samples every slot until `time_s`; signals between the last call and now are
+    /// Samples every slot until `time_s`; signals between the last call and this one are
     /// interpolated.
     fn advance(&mut self, tip: &Fingertip, time_s: f64, now: &Signals) {
         let (start_s, before) = (self.time_s, self.before);
@@ -287,7 +289,7 @@ impl Converter {
         (self.time_s, self.before) = (time_s, *now);
     }
 
-    /// Notes in the frame at hand whether the skin slips.
+    /// Records in the current frame whether the skin slips.
     fn note_slip(&mut self, tip: &Fingertip, now: &Signals) {
         if tip.effects.friction.is_some() {
             *self.frame.slip.get_or_insert(false) |= now.slip_m_s > 0.0;
@@ -310,7 +312,7 @@ impl Converter {
         }
     }
 
-    /// PAC, to whose pressure the object's texture adds while the skin slips.
+    /// Returns PAC; the object's texture adds to the pressure while the skin slips.
     fn pac(&mut self, tip: &Fingertip, i: usize, mut pressure_pa: f64, slip_m_s: f64) {
         let Some(fluid) = &tip.effects.fluid else { return };
         let Some(vibration) = &fluid.vibration else { return };
@@ -371,7 +373,7 @@ impl Converter {
     }
 }
 
-/// Frames that arrive together.
+/// Returns the number of frames that arrive together.
 fn batch_frames(tip: &Fingertip) -> usize {
     tip.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames)
 }

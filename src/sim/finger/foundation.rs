@@ -1,43 +1,44 @@
-//! The skin as columns that share the fluid's pressure and know nothing else of each other.
+//! Elastic foundation: the skin as columns that are coupled only by the fluid's pressure.
 //!
-//! One column of the fingertip, from the core out: fluid film, membrane, compressible skin.
+//! A column of the fingertip has, from the core out: fluid film, membrane, compressible skin.
 //!
-//! The object compresses the column by e; the skin yields e − u, its inner side moves inwards by
-//! u. Per area the column stores
+//! The object compresses the column by e; the skin yields e − u, and its inner side moves inwards
+//! by u. The energy of the column per area is
 //!
 //! W(e, u) = ½ kₛ (e − u)₊² + ½ k(u) u² + ½ k_c (u − g)₊²
 //!
-//! with the skin's stiffness kₛ, the membrane's k (one value inwards, one outwards), the core's k_c
-//! beyond the gap g. The fluid's pressure p works against u. W is convex, so u is unique, and the
-//! stress on the object is ∂W/∂e. Everything is linear between the kinks: no iteration.
+//! with the skin's stiffness kₛ, the membrane's k (one value inwards, one outwards), and the core's
+//! k_c beyond the gap g. The fluid's pressure p works against u. W is convex, so u is unique, and
+//! the stress on the object is ∂W/∂e. Everything is linear between the kinks, so no iteration is
+//! needed.
 
 use super::samples::SkinSample;
 use nalgebra::{Point3, Vector3};
 
-/// The balance is linear between the kinks of the columns, so Newton's steps end; this bounds the
-/// bisections among them (chosen).
+// The balance is linear between the kinks of the columns, so Newton's method terminates.
+// heuristic: bound on the number of steps, which include bisections.
 const STEPS: usize = 100;
 
-/// Relative accuracy of the pressure (chosen).
+// heuristic: relative accuracy of the pressure.
 const ACCURACY: f64 = 1e-13;
 
 /// Stiffnesses of a column, in Pa per metre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
-    /// The skin's: modulus over thickness.
+    /// Stiffness of the skin: modulus over thickness.
     pub skin_pa_m: f64,
-    /// The membrane's, where the skin is pressed in.
+    /// Stiffness of the membrane against inward motion of the skin.
     pub flatten_pa_m: f64,
-    /// The membrane's, where the fluid pushes the skin out.
+    /// Stiffness of the membrane against outward motion by the fluid.
     pub inflate_pa_m: f64,
-    /// The core's, once the gap is closed.
+    /// Stiffness of the core, once the gap is closed.
     pub core_pa_m: f64,
 }
 
-/// What a column does under compression and pressure.
+/// Response of a column to compression and pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Response {
-    /// u: how far the inner side of the skin moved towards the core, in metres.
+    /// u: inward motion of the skin's inner side, in metres.
     pub inward_m: f64,
     /// Stress between skin and object, in Pa.
     pub stress_pa: f64,
@@ -81,7 +82,7 @@ impl Column {
     }
 }
 
-/// What all touches together do, but for the energy of their own responses.
+/// Balance of all contacts together, without the energy of their own responses.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Balance {
     pub pressure_pa: f64,
@@ -89,38 +90,39 @@ pub(super) struct Balance {
     pub energy_j: f64,
 }
 
-/// A column whose ray meets the object.
+/// Contact of a column whose ray meets the object.
 #[derive(Clone, Debug)]
 pub(super) struct SkinContact {
     pub sample: usize,
     pub section_m2: f64,
     pub gap_m: f64,
-    /// Whether the column stands in the fluid; a dry one feels no pressure and displaces nothing.
+    /// Whether there is fluid under the column; a dry column feels no pressure and displaces
+    /// nothing.
     pub wet: bool,
-    /// Negative where only a bulging skin would reach the object.
+    /// Indentation; negative if only a bulging skin would reach the object.
     pub indentation_m: f64,
-    /// Where it is met, in `T`.
+    /// Contact point, in `T`.
     pub point_t: Point3<f64>,
     /// Normal of the object, towards the finger, in `T`.
     pub normal_t: Vector3<f64>,
-    /// Between ray and normal.
+    /// Cosine of the angle between ray and normal.
     pub cosine: f64,
     pub response: Response,
 }
 
-/// An elastic foundation; never changes.
+/// Elastic foundation; constant.
 #[derive(Clone, Debug)]
 pub(super) struct Foundation {
     pub column: Column,
-    /// Section of all columns that stand in the fluid.
+    /// Section of all columns with fluid.
     pub wet_m2: f64,
     /// Pressure per displaced volume, in Pa/m³; 0 without fluid.
     pub cavity_pa_m3: f64,
 }
 
 impl Foundation {
-    /// Finds the pressure, every touch's response to it, and how far the skin moved in at each
-    /// sample.
+    /// Computes the pressure, the response of every contact to it, and the inward motion of the
+    /// skin at each sample.
     pub fn balance(
         &self,
         touches: &mut [SkinContact],
@@ -148,10 +150,12 @@ impl Foundation {
         Balance { pressure_pa, displaced_m3, energy_j }
     }
 
-    /// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
+    /// Computes the pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and the response of every contact
+    /// to it.
     ///
-    /// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure,
-    /// so there is one root; a Newton step that leaves the bracket is replaced by a bisection.
+    /// The other wet columns, with a total section of `free_m2`, are free. The volume falls with
+    /// the pressure, so there is one root; a Newton step that leaves the bracket is replaced by a
+    /// bisection.
     fn pressure_pa(&self, touches: &mut [SkinContact], free_m2: f64) -> f64 {
         let Self { column, cavity_pa_m3, .. } = *self;
         let mut volume = |pressure_pa: f64| {

@@ -1,11 +1,12 @@
-//! The physics of the fingertip: its soft skin, and the effects a scene names.
+//! Physics of the fingertip: its soft skin, and the effects that a scene names.
 //!
-//! `effects` has the table of them and each in a file of its own, the skin first. `profile` and
-//! `samples` say where skin and fluid of a BioTac are, `patches` which of them may meet an object.
-//! `foundation` is a skin of columns that the fluid's pressure couples; `shell` carries load to its
-//! neighbours instead, over triangles between samples. `fingertip` puts together the effects that a
-//! scene names and makes tactile frames of what they sense. `plate` presses the finger on a flat
-//! plate and says how stiff the skin is, `calibration` fits the constants to a recording of it.
+//! `effects` has their table, and a file for each of them, the skin first. `profile` and `samples`
+//! define the geometry of skin and fluid of a BioTac; `patches` selects the parts of it that may
+//! touch an object. `foundation` models the skin as columns coupled by the fluid's pressure;
+//! `shell` models it as triangles between samples, which carry load to their neighbours.
+//! `fingertip` combines the effects of a scene and makes tactile frames of their signals. `plate`
+//! presses the finger on a flat plate and measures the skin's stiffness; `calibration` fits the
+//! constants to a recording.
 
 pub mod calibration;
 pub mod effects;

@@ -1,16 +1,16 @@
-//! Gaussian numbers out of a stream of bits, and counts with them.
+//! Gaussian random numbers, and noisy counts.
 
 use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// A number from the standard normal distribution (Marsaglia & Tsang 2000, by `rand_distr`).
+/// Draws a number from the standard normal distribution (Marsaglia & Tsang 2000, by `rand_distr`).
 pub(crate) fn normal(rng: &mut impl Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// What a converter sends of ideal counts with white noise of this standard deviation: a whole
-/// number from 0 to 4095 if it quantises.
+/// Returns the converter's output for ideal counts with white noise of the given standard
+/// deviation: a whole number from 0 to 4095 if it quantises.
 pub(super) fn converted(
     mut counts: f64,
     noise_counts: f64,

@@ -1,4 +1,4 @@
-//! Neighbouring samples of the skin together, so that those far from an object are skipped at once.
+//! Patches of neighbouring skin samples, so that those far from an object are skipped together.
 
 use super::samples::SkinSample;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -11,37 +11,39 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The samples are culled in this many slabs along the finger times sectors around it (chosen).
+// heuristic: samples are culled in this many slabs along the finger times sectors around it.
 const SLABS: usize = 8;
 const SECTORS: usize = 8;
 
-/// As long as nothing enters this part of the hull's radius around the axis, rays start there
-/// instead of on the axis (chosen: inside the core).
+// Fraction of the hull's radius around the axis: while it is free of the object, rays start there
+// instead of on the axis.
+// heuristic: inside the core.
 const INNER: f64 = 0.5;
 
-/// What is this part of the hull's radius away is not looked at again before the finger has come as
-/// far (chosen: a few ticks of an approach).
+// Margin as a fraction of the hull's radius: parts farther away are not tested again before the
+// finger has moved as far.
+// heuristic: a few ticks of an approach.
 const MARGIN: f64 = 0.1;
 
-/// Less than 1 by more than rounding.
+/// Factor below 1 by more than rounding.
 const HELD: f64 = 0.999;
 
-/// All rays of a skin.
+/// Patches of all rays of a skin.
 #[derive(Clone, Debug)]
 pub(super) struct Patches {
     patches: Vec<Patch>,
     whole: Ball,
     inner: Capsule,
     margin_m: f64,
-    /// Farthest that a ball's centre or the axis lies from the origin of `T`.
+    /// Largest distance of a ball's centre or of the axis from the origin of `T`.
     reach_m: f64,
 }
 
-/// Neighbouring samples and a ball around their rays.
+/// Patch of neighbouring samples with a ball around their rays.
 #[derive(Clone, Debug)]
 struct Patch {
     range: Range<usize>,
-    /// Around rays from the axis, and around rays from `inner` off it.
+    /// Ball around the rays from the axis, and around the rays from `inner` off it.
     from_axis: Ball,
     from_inner: Ball,
 }
@@ -52,19 +54,19 @@ struct Ball {
     radius_m: f64,
 }
 
-/// The patches that were within the margin of an object in some pose: all that can meet it until
-/// the finger has moved by the margin. One trial's memory.
+/// Patches that were within the margin of an object in some pose: all that can meet it until the
+/// finger has moved by the margin. It is the memory of one trial.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vicinity {
     mesh: Option<Arc<Mesh>>,
     x_wt: Isometry3<f64>,
-    /// Each with the parts of the object that were within the margin of it.
+    /// Patches, each with the parts of the object within the margin of it.
     near: Vec<(usize, Nearby)>,
     /// Whether the object was within the margin of the inner capsule.
     is_deep: bool,
 }
 
-/// The patch to which a sample belongs: samples are sorted by it.
+/// Returns the patch of a sample: samples are sorted by it.
 pub(super) fn key(profile: &Profile, sample: &SkinSample) -> usize {
     let p = sample.point();
     let along = (p.x + profile.length_m) / (profile.length_m + profile.radius_m);
@@ -74,7 +76,8 @@ pub(super) fn key(profile: &Profile, sample: &SkinSample) -> usize {
 }
 
 impl Patches {
-    /// Of samples sorted by their [`key`], whose rays end `bulge_m` above the skin.
+    /// Creates the patches of samples sorted by their [`key`], whose rays end `bulge_m` above the
+    /// skin.
     pub fn new(profile: &Profile, samples: &[SkinSample], bulge_m: f64) -> Self {
         let inner = Capsule {
             p0_w: Point3::origin(),
@@ -100,18 +103,19 @@ impl Patches {
         Self { patches, whole, inner, margin_m: MARGIN * profile.radius_m, reach_m }
     }
 
-    /// Memory for [`near`](Self::near).
+    /// Allocates memory for [`near`](Self::near).
     pub fn vicinity(&self) -> Vicinity {
         Vicinity { near: Vec::with_capacity(self.patches.len()), ..Vicinity::default() }
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         size_of_val(self.patches.as_slice())
     }
 
-    /// The ranges of samples whose rays may meet the object in pose `x_wt`, in order, each with the
-    /// parts of it that these may meet; and how far off the axis the rays may start.
+    /// Returns the ranges of samples whose rays may meet the object in pose `x_wt`, in order, each
+    /// with the parts of it that they may meet, and the distance off the axis at which the rays may
+    /// start.
     pub fn near<'a>(
         &'a self,
         bvh: &'a MeshBvh,
@@ -131,7 +135,7 @@ impl Patches {
         (if is_deep { 0.0 } else { self.inner.radius_m }, met)
     }
 
-    /// Finds what is within the margin.
+    /// Finds the patches within the margin.
     fn look(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, vicinity: &mut Vicinity) {
         let margin_m = self.margin_m;
         vicinity.mesh = Some(bvh.mesh().clone());
@@ -152,7 +156,7 @@ impl Patches {
         vicinity.near.extend(near);
     }
 
-    /// Whether the object is within `margin_m` of the inner capsule.
+    /// Returns whether the object is within `margin_m` of the inner capsule.
     fn is_deep(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
         let Capsule { p0_w, p1_w, radius_m } = self.inner;
         let radius_m = radius_m + margin_m;
@@ -161,12 +165,13 @@ impl Patches {
 }
 
 impl Vicinity {
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         self.near.capacity() * size_of::<(usize, Nearby)>()
     }
 
-    /// Whether the finger is still within the margin of the pose in which it was found.
+    /// Returns whether the finger is still within the margin of the pose in which the patches were
+    /// found.
     fn holds(&self, patches: &Patches, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> bool {
         let is_same = self.mesh.as_ref().is_some_and(|mesh| Arc::ptr_eq(mesh, bvh.mesh()));
         let way = x_wt.translation.vector - self.x_wt.translation.vector;
@@ -176,7 +181,8 @@ impl Vicinity {
 }
 
 impl Ball {
-    /// Around the rays of `samples`, from `from_m` off the axis to `bulge_m` above the skin.
+    /// Returns the ball around the rays of `samples`, from `from_m` off the axis to `bulge_m` above
+    /// the skin.
     fn around(samples: &[SkinSample], from_m: f64, bulge_m: f64) -> Self {
         let ends = || {
             samples.iter().flat_map(|sample| {
@@ -190,12 +196,13 @@ impl Ball {
         Self { centre, radius_m }
     }
 
-    /// What of the object may be within `margin_m` of it.
+    /// Returns the parts of the object that may be within `margin_m` of the ball.
     fn nearby(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> Nearby {
         bvh.nearby(&(x_wt * self.centre), self.radius_m + margin_m)
     }
 
-    /// Whether the object, of which `near` is all that may be, is within `margin_m` of it.
+    /// Returns whether the object, of which only the parts in `near` can be close, is within
+    /// `margin_m` of the ball.
     fn meets(&self, bvh: &MeshBvh, near: &Nearby, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
         bvh.touches_near(near, &(x_wt * self.centre), self.radius_m + margin_m)
     }

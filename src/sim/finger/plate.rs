@@ -1,4 +1,4 @@
-//! A finger pressed on a flat plate.
+//! Finger pressed on a flat plate.
 
 use super::effects::skin::{Pressed, Skin, SkinEffect};
 use super::load::{Load, PressError};
@@ -8,41 +8,42 @@ use palpate_explore::robot::finger::shape::Finger;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::mesh::Mesh;
 
-/// Half the side of the plate the finger is pressed on.
+/// Half the side of the plate.
 const PLATE_M: f64 = 0.1;
 
-/// A height is found when its force is met to this part, or to a tenth of a nanometre (chosen).
+// heuristic: a height is accepted at this relative error of its force, or at a tenth of a
+// nanometre.
 const FORCE_PART: f64 = 1e-9;
 const NEAR_M: f64 = 1e-10;
 
-/// Heights that are tried at most, the first of them by halving: far from the force its curve is
-/// no line (chosen).
+// heuristic: largest number of heights tried; the first ones by bisection, because the force far
+// from the target is not linear.
 const TRIES: usize = 60;
 const HALVINGS: usize = 4;
 
-/// Presses between the first touch and the largest force (chosen: the law is linear between
-/// kinks, and force doubles in a fraction of this way).
+// heuristic: presses between the first contact and the largest force; the law is linear between
+// kinks, and force doubles in a fraction of this distance.
 const PRESSES: u32 = 200;
 
-/// Halvings by which the depth of the largest force is found: to a billionth of the finger.
+/// Bisections to find the depth of the largest force: to a billionth of the finger.
 const DEPTH_HALVINGS: u32 = 30;
 
-/// A fingertip over a flat plate.
+/// Fingertip over a flat plate.
 pub struct Plate {
-    /// Its skin.
+    /// Skin of the fingertip.
     pub skin: Skin,
-    /// The skin in its last pose.
+    /// Skin in its last pose.
     pub pressed: Pressed,
     bvh: MeshBvh,
 }
 
 impl Plate {
-    /// The BioTac with this skin; none if the plate cannot be built.
+    /// Creates the BioTac with this skin; `None` if the plate cannot be built.
     pub fn new(skin: &SkinEffect, cavity_pa_m3: f64) -> Option<Self> {
         Self::of(Skin::new(&Profile::biotac(&Finger::default()), skin, cavity_pa_m3))
     }
 
-    /// Over a plate in the plane z = 0.
+    /// Creates a finger over a plate in the plane z = 0.
     fn of(skin: Skin) -> Option<Self> {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
@@ -50,28 +51,29 @@ impl Plate {
         Some(Self { pressed: skin.relaxed(), skin, bvh: MeshBvh::new(mesh) })
     }
 
-    /// Load with the plate across the direction `towards_t` and the origin of `T` `height_m` above
-    /// it.
+    /// Returns the load with the plate across the direction `towards_t` and the origin of `T`
+    /// `height_m` above it.
     fn press(&mut self, towards_t: &Vector3<f64>, height_m: f64) -> Result<Load, PressError> {
         self.skin.press(&self.bvh, &pose(towards_t, height_m), &mut self.pressed)
     }
 
-    /// The height at which the plate touches the skin; 0 if that lies behind the origin of `T`.
+    /// Returns the height at which the plate touches the skin; 0 if that lies behind the origin of
+    /// `T`.
     fn top_m(&self, towards_t: &Vector3<f64>) -> f64 {
         let reach_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
         reach_m.fold(0.0, f64::max)
     }
 
-    /// The height at which the plate takes a normal force.
+    /// Returns the height at which the plate takes a normal force.
     ///
     /// # Errors
-    /// See [`Skin::press`].
+    /// The errors of [`Skin::press`].
     pub fn height_m(
         &mut self,
         towards_t: &Vector3<f64>,
         normal_force_n: f64,
     ) -> Result<f64, PressError> {
-        // Illinois: the secant of a bracket, its older end halved (Dowell & Jarratt 1971).
+        // Illinois method: secant of a bracket, with its older end halved (Dowell & Jarratt 1971).
         let mut low = (0.0, f64::INFINITY);
         let mut high = (self.top_m(towards_t), -normal_force_n);
         let (mut at_m, mut was_deep) = (high.0, None);
@@ -98,10 +100,10 @@ impl Plate {
         Ok(at_m)
     }
 
-    /// Load at a given normal force.
+    /// Returns the load at a given normal force.
     ///
     /// # Errors
-    /// See [`Skin::press`].
+    /// The errors of [`Skin::press`].
     pub fn press_to(
         &mut self,
         towards_t: &Vector3<f64>,
@@ -112,13 +114,13 @@ impl Plate {
     }
 }
 
-/// The direction out of the finger that faces the plate, in `T`.
+/// Returns the outward direction of the finger that faces the plate, in `T`.
 pub fn direction_t(pitch_rad: f64, roll_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
     Vector3::new(sin, cos * roll_rad.sin(), -cos * roll_rad.cos())
 }
 
-/// Pose of `T` over a plate in the plane z = 0 of `W` that `towards_t` faces.
+/// Returns the pose of `T` over a plate in the plane z = 0 of `W` that faces `towards_t`.
 pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
     let turn = Rotation3::rotation_between(towards_t, &-Vector3::z())
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
@@ -126,8 +128,8 @@ pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
     Isometry3::from_parts(origin_w.into(), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
-/// Largest slope of force over depth, in N/m, with a flat plate pressed on the skin across
-/// `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
+/// Returns the largest slope of force over depth, in N/m, with a flat plate pressed on the skin
+/// across `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
 pub fn largest_stiffness_n_m(skin: &Skin, towards_t: &Vector3<f64>, force_n: f64) -> f64 {
     let Some(mut plate) = Plate::of(skin.clone()) else { return 0.0 };
     let top_m = plate.top_m(towards_t);

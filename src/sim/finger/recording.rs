@@ -7,20 +7,20 @@ use serde::Deserialize;
 /// Recordings of one or more sensors.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Recordings {
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub note: String,
-    /// One entry per sensor.
+    /// Recordings, one per sensor.
     pub sensors: Vec<Recording>,
 }
 
-/// One session of one sensor on the plate.
+/// Session of one sensor on the plate.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Recording {
-    /// Its name in the source.
+    /// Name of the sensor in the source.
     pub sensor: String,
-    /// What it reads untouched, in a session of its own.
+    /// Median electrode readings without contact, in a separate session.
     pub no_contact_median_counts: [f64; ELECTRODES],
-    /// Spread of that.
+    /// Standard deviation of the readings without contact.
     pub no_contact_std_counts: [f64; ELECTRODES],
     /// Means over bins of normal force.
     pub near_normal_loads: Vec<Bin>,
@@ -29,7 +29,7 @@ pub struct Recording {
 /// Means over frames whose normal force lies in a range.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Bin {
-    /// The range.
+    /// Range of the normal force.
     pub normal_force_n: [f64; 2],
     /// Mean normal force.
     pub mean_normal_force_n: f64,
@@ -41,14 +41,14 @@ pub struct Bin {
     pub std_counts: [f64; ELECTRODES],
 }
 
-/// Greatest force that a BioTac takes (SynTouch BioTac SP manual).
+/// Largest force that a BioTac withstands (SynTouch BioTac SP manual).
 const FORCE_MAX_N: f64 = 250.0;
 
 impl Recordings {
-    /// Whether every number can be one of a sensor's.
+    /// Checks that every number is plausible for a sensor.
     ///
     /// # Errors
-    /// The first that cannot.
+    /// Returns the first value that is not plausible.
     pub fn check(&self) -> Result<(), Invalid> {
         filled("sensors", self.sensors.len())?;
         for (i, recording) in self.sensors.iter().enumerate() {
@@ -73,12 +73,12 @@ impl Recording {
     }
 }
 
-/// Whether `force_n` can be on a BioTac.
+/// Checks that `force_n` is possible on a BioTac.
 pub(super) fn force(field: &str, force_n: f64) -> Result<(), Invalid> {
     within(field, &[force_n], FORCE_MAX_N)
 }
 
-/// Whether a list has something in it.
+/// Checks that a list is not empty.
 pub(super) fn filled(field: &str, count: usize) -> Result<(), Invalid> {
     match count {
         0 => Err(Invalid::new(format!("{field} is empty")).allowed("at least one entry")),

@@ -1,5 +1,5 @@
-//! Points of the fingertip's outer skin: spread evenly over it, or over the nodes of a lattice of
-//! triangles above the fluid.
+//! Sample points of the fingertip's outer skin: spread evenly over it, or over the nodes of a
+//! triangle lattice above the fluid.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::robot::finger::profile::{Layers, Profile};
@@ -8,15 +8,15 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Golden section of a turn: successive points never line up.
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
-/// Step of the central differences over the skin: along it as a part of the samples' distance,
-/// which near the apex is where the profile bends; around it in radians.
+/// Step of the central differences over the skin: along it as a fraction of the distance between
+/// samples, which near the apex is where the profile bends; around it in radians.
 const STEP: f64 = 0.05;
 const STEP_RAD: f64 = 1e-4;
 
-/// One point of the skin with the ray from the axis through it, in `T`.
+/// Point of the skin with the ray from the axis through it, in `T`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkinSample {
-    /// Where the ray leaves the axis.
+    /// Start of the ray on the axis.
     pub start: Point3<f64>,
     /// Direction of the ray.
     pub direction: UnitVector3<f64>,
@@ -24,29 +24,30 @@ pub struct SkinSample {
     pub layers: Layers,
     /// Outward normal of the skin.
     pub normal: UnitVector3<f64>,
-    /// Area of skin it stands for.
+    /// Area of skin that the sample represents.
     pub area_m2: f64,
-    /// Its node of a shell; none outside of one.
+    /// Node of the shell; `None` without a shell.
     pub node: Option<usize>,
 }
 
 impl SkinSample {
-    /// The point of the skin.
+    /// Returns the point of the skin.
     pub fn point(&self) -> Point3<f64> {
         self.start + self.direction.scale(self.layers.outer_m)
     }
 
-    /// Its area seen along the ray: times a displacement along the ray this is volume.
+    /// Returns the sample's area seen along the ray; times a displacement along the ray, it is a
+    /// volume.
     pub fn section_m2(&self) -> f64 {
         self.area_m2 * self.normal.dot(&self.direction).max(0.0)
     }
 }
 
-/// `count` samples, deterministic.
+/// Returns `count` samples, deterministic.
 ///
 /// Equal steps in x cut equal areas out of a cylinder and out of a sphere (Archimedes), so a
-/// Fibonacci lattice over x and the turn is even over a capsule; the profile then stretches each
-/// area by the local ratio of surfaces.
+/// Fibonacci lattice over x and the turn is even over a capsule; the profile then scales each area
+/// by the local ratio of surfaces.
 pub fn spread(profile: &Profile, count: usize) -> Vec<SkinSample> {
     let (length_m, radius_m) = (profile.length_m, profile.radius_m);
     let cell_m = (length_m + radius_m) / count as f64;
@@ -74,26 +75,26 @@ pub fn spread(profile: &Profile, count: usize) -> Vec<SkinSample> {
         .collect()
 }
 
-/// One node, in the middle of the skin's thickness, in `T`.
+/// Node of the shell, in the middle of the skin's thickness, in `T`.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// Where it rests.
+    /// Position at rest.
     pub point: Point3<f64>,
-    /// Where the ray from the axis through it starts.
+    /// Start of the ray from the axis through the node.
     pub start: Point3<f64>,
     /// Direction of that ray.
     pub direction: UnitVector3<f64>,
     /// Thickness of the fluid under it.
     pub gap_m: f64,
-    /// The area it stands for, along its outward normal, in m².
+    /// Area that the node represents, along its outward normal, in m².
     pub area_m2: Vector3<f64>,
-    /// Whether nail or back end hold it.
+    /// Whether nail or back end clamp the node.
     pub clamped: bool,
-    /// Its mirror image across y = 0.
+    /// Index of its mirror image across y = 0.
     pub mirror: usize,
 }
 
-/// A shell over the half of the fingertip that has fluid under it; never changes.
+/// Lattice of a shell over the half of the fingertip that has fluid under it; constant.
 #[derive(Clone, Debug)]
 pub struct Lattice {
     nodes: Vec<Node>,
@@ -101,11 +102,11 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The shell of this shape with so many cells along and around it, an even number of these; all
-    /// angles meet in the apex.
+    /// Creates the lattice with the given numbers of cells along and around it, an even number
+    /// around; all angles meet in the apex.
     ///
     /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps
-    /// of an arc, and an even number, so that the corner at 45° is a node.
+    /// of an arc. Their number is even, so that the corner at 45° is a node.
     pub fn new(profile: &Profile, [along, around]: [usize; 2]) -> Self {
         let (radius_m, length_m) = (profile.radius_m, profile.length_m);
         let arc = 2 * along.div_ceil(4);
@@ -153,17 +154,17 @@ impl Lattice {
         Self { nodes, triangles }
     }
 
-    /// Its nodes.
+    /// Returns the nodes.
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
-    /// Corners of its triangles, counterclockwise seen from outside.
+    /// Returns the corners of the triangles, counterclockwise seen from outside.
     pub fn triangles(&self) -> &[[usize; 3]] {
         &self.triangles
     }
 
-    /// The skin's point over each node.
+    /// Returns the skin's point over each node.
     pub fn samples(&self, profile: &Profile) -> impl Iterator<Item = SkinSample> {
         self.nodes.iter().enumerate().map(|(k, node)| SkinSample {
             start: node.start,

@@ -1,4 +1,5 @@
-//! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
+//! Conversion of a scene to MJCF, the text that MuJoCo compiles into a model. Numbers are in SI
+//! units, in `W`.
 
 mod robot;
 mod scenery;
@@ -11,41 +12,43 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use text::{CONTACT, TABLE, list, mesh_asset, pose};
 
-/// Time step of a model that is only looked at; chosen, the period of the PA-10's servo.
+// heuristic: time step of a model for viewing, the period of the PA-10's servo.
 const PICTURE_STEP_S: f64 = 0.002;
 
-/// Heights along each side. On the bird, 101 were measured to place a finger's contact within
+/// Samples of the height field along each side. On the bird, 101 placed a finger's contact within
 /// 0.004 mm in the median and 0.03 mm at most; 51 within 0.012 and 0.12 mm.
 const PER_SIDE: usize = 101;
 
-/// Thickness of the ground under the lowest height; chosen.
+// heuristic: thickness of the ground under the lowest height.
 const GROUND_M: f64 = 0.01;
 
-/// What a model is for.
+/// Purpose of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mode {
-    /// To look at: everything in the scene.
+    /// Model for viewing: everything in the scene.
     Picture,
-    /// To step: what moves and nothing else. Shapes would cost time at every step, and contact is
-    /// the skin's matter, not MuJoCo's; only a finger without a skin meets the object, as the
-    /// scene's [`Collision`], and links whatever is in their way if the scene asks for that.
+    /// Model for stepping: only the moving parts. Shapes would cost time at every step, and the
+    /// contact force comes from the skin, not from MuJoCo. Only a finger without a skin collides
+    /// with the object, as the scene's [`Collision`]; links collide with everything if the scene
+    /// asks for it.
     Dynamic {
-        /// Time step; the servos' gains are chosen for 2 ms and less.
+        /// Time step, s; the servo gains are tuned for 2 ms and less.
         step_s: f64,
     },
 }
 
-/// What MuJoCo works out for `[effects.wrench]` alone.
+/// Sensors that MuJoCo computes only for `[effects.wrench]`.
 const SENSOR: &str = r#"  <sensor>
     <force name="force" site="mount"/>
     <torque name="torque" site="mount"/>
   </sensor>
 "#;
 
-/// The scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger on it, the
-/// site `mount`, with a force/torque sensor if the scene has one, and `T` at the site `tip`; in a
-/// picture also the object at its pose on a vertical board, the floor, a camera and lights. None
-/// for a scene without a mesh, and for a stage that turns the finger, of which there is no model.
+/// Returns the scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger, the
+/// site `mount`, with a force/torque sensor if the scene has one, and `T` at the site `tip`. A
+/// picture also has the object at its pose on a vertical board, the floor, a camera and lights.
+/// Returns `None` for a scene without a mesh, and for a stage that turns the finger, which has no
+/// model.
 pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let mesh = environment.mesh()?;
     let chain = environment.chain()?;
@@ -75,8 +78,8 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
         false => String::new(),
     };
     let senses = environment.scene().effects.wrench.is_some();
-    // A diverging state must be seen, not reset in silence. One arm is one island: to look for
-    // others costs a twentieth of a step.
+    // `autoreset` is off so that a diverging state is reported. `island` is off because one arm is
+    // one island, and the search for others costs a twentieth of a step.
     Some(format!(
         r#"<mujoco model="palpate">
 {robot}
@@ -98,9 +101,10 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     ))
 }
 
-/// What collides with a finger without skin: the object as a height field, as the convex hull of
-/// its mesh, which MuJoCo computes, so that every hollow is filled, or as the signed distance field
-/// of its mesh, interpolated in MuJoCo's octree, with the options of the search for contact.
+/// Returns the collision geometry for a finger without skin: the object as a height field, as the
+/// convex hull of its mesh (computed by MuJoCo, so every hollow is filled), or as the signed
+/// distance field of its mesh, interpolated in MuJoCo's octree, with the options of the contact
+/// search.
 fn obstacle(environment: &Environment) -> Option<String> {
     let solver = &environment.scene().solver;
     let (kind, option) = match solver.collision.unwrap_or_default() {
@@ -121,9 +125,10 @@ fn obstacle(environment: &Environment) -> Option<String> {
     ))
 }
 
-/// The object as a height field over the zone: a surface that is explored along one direction is
-/// one, and MuJoCo collides it as it is. It is what the finger can meet from targets in the zone;
-/// places where the approach meets nothing lie as low as the lowest that do.
+/// Returns the object as a height field over the zone. A surface explored along one direction is a
+/// height field, and MuJoCo collides it without change. It has every surface point that the finger
+/// can meet from targets in the zone; places where the approach meets nothing get the lowest
+/// height.
 fn height_field(environment: &Environment) -> Option<String> {
     let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
     let (scene, zone) = (environment.scene(), environment.task().zone()?);
@@ -146,12 +151,12 @@ fn height_field(environment: &Environment) -> Option<String> {
         .collect();
     let lowest = heights.iter().flatten().copied().reduce(f64::min)?;
     let highest = heights.iter().flatten().copied().fold(lowest, f64::max);
-    // MuJoCo stretches heights to 0..1 and refuses a field without any.
+    // MuJoCo stretches heights to 0..1 and refuses a field of constant height.
     let rise_m = (highest - lowest).max(1e-6);
     let values = heights.iter().map(|height| height.map_or(0.0, |y| (y - lowest) / rise_m));
     let half = |[low, high]: [f64; 2]| (high - low) / 2.0;
     let middle = |[low, high]: [f64; 2]| (high + low) / 2.0;
-    // Its rows run against z and its heights along y: turned by −90° about x.
+    // Rows of a field run against z and its heights along y: turned by −90° about x.
     let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2);
     let middle_z = Translation3::new(middle(x_m), lowest, middle(z_m));
     Some(format!(
@@ -165,7 +170,7 @@ fn height_field(environment: &Environment) -> Option<String> {
     ))
 }
 
-/// The table of `[effects.collision]`.
+/// Returns the table of `[effects.collision]`.
 fn table(scene: &Scene) -> String {
     let Some(collision) = &scene.effects.collision else { return String::new() };
     let place = list([0.0, 0.0, collision.table_m]);
@@ -175,7 +180,7 @@ fn table(scene: &Scene) -> String {
     )
 }
 
-/// As MJCF spells it.
+/// Returns MuJoCo's keyword of an integrator.
 fn keyword(integrator: Integrator) -> &'static str {
     match integrator {
         Integrator::ImplicitFast => "implicitfast",

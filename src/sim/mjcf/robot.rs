@@ -1,4 +1,4 @@
-//! The arm or the stage with the finger on it.
+//! MJCF of the arm or stage with the finger.
 
 use super::text::{CONTACT, LINK, TABLE, pose, surface};
 use crate::sim::Scene;
@@ -11,12 +11,12 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 const STAGE: &str = include_str!("../../../models/stage.xml");
 
-/// How the models say that their shapes meet nothing.
+/// Attributes by which the robot models mark shapes that collide with nothing.
 const PASSING: &str = r#"contype="0" conaffinity="0""#;
 
-/// The robot's model without its outermost tags, with its base and its tool put in; the finger's
-/// hull is met by the object if it `collides`, and the links by all there is if the robot `bumps`;
-/// the finger has a pad and a nail if it `is_soft`.
+/// Returns the robot's model without its outermost tags, with its base and tool filled in. The
+/// finger's hull collides with the object if it `collides`; the links collide with everything if
+/// the robot `bumps`; the finger has a pad and a nail if it `is_soft`.
 pub(super) fn robot(
     scene: &Scene,
     (chain, model): (&Chain, Option<&str>),
@@ -41,11 +41,12 @@ pub(super) fn robot(
         .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, (contact, is_soft)))
 }
 
-/// Adapter and finger as one body at the flange, where the force/torque sensor is.
+/// Returns adapter and finger as one body at the flange, where the force/torque sensor is.
 fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, (contact, is_soft): (&str, bool)) -> String {
     let mount_m = chain.tool.translation.vector.norm();
     let heel_m = (mount_m - finger.length_m).max(0.0);
-    // A rod of the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across, m r²/2 along.
+    // Inertia of a rod with the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across,
+    // m r²/2 along.
     let (radius_m, along) = (0.01_f64, 0.5 * tool_kg * 0.01 * 0.01);
     let across = tool_kg / 12.0 * (3.0 * radius_m * radius_m + mount_m * mount_m);
     // MuJoCo refuses a capsule without length.
@@ -79,22 +80,22 @@ fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, (contact, is_soft): (&str,
     )
 }
 
-/// Cells along the finger and around each of its halves; chosen: smooth to look at.
+// heuristic: cells along the finger and around each of its halves, enough to look smooth.
 const ALONG: usize = 20;
 const AROUND: usize = 20;
 
-/// Name, colour (chosen) and the angle from −z at which each half begins.
+/// Name, colour, and angle from −z at which each half begins.
 const HALVES: [(&str, &str, f64); 2] =
     [("pad", ".13 .42 .40 1", -FRAC_PI_2), ("nail", ".86 .82 .74 1", FRAC_PI_2)];
 
-/// What a BioTac looks like, as assets: the pad that senses, and the nail that holds the skin on
+/// Returns the assets that draw a BioTac: the pad that senses, and the nail that holds the skin on
 /// its back.
 pub(super) fn skin_assets(finger: &Finger) -> String {
     let profile = Profile::biotac(finger);
     HALVES.iter().map(|(name, _, begins)| asset(&profile, name, *begins)).collect()
 }
 
-/// The two halves on a body in whose frame `T` is `tip`; they meet nothing.
+/// Returns the two halves on a body in whose frame `T` is `tip`; they collide with nothing.
 fn skin_geoms(tip: &Isometry3<f64>) -> String {
     let geom = |(name, rgba, _): &(&str, &str, f64)| {
         format!(
@@ -105,7 +106,7 @@ fn skin_geoms(tip: &Isometry3<f64>) -> String {
     HALVES.iter().map(geom).collect()
 }
 
-/// Half of the outer skin in `T`: rows from the back end to near the apex, and the apex.
+/// Returns half of the outer skin in `T`: rows from the back end to near the apex, and the apex.
 fn asset(profile: &Profile, name: &str, begins: f64) -> String {
     let whole_m = profile.length_m + profile.radius_m;
     let rows = (0..ALONG).flat_map(|i| {

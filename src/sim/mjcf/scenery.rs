@@ -1,4 +1,4 @@
-//! What stands around: the object on its board, the floor, the camera, the lights.
+//! Scenery of a picture: the object on its board, the floor, the cameras, the lights.
 
 use super::text::{list, mesh_asset, pose};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
@@ -6,29 +6,29 @@ use palpate_explore::robot::arm::Chain;
 use palpate_explore::task::{Task, Zone};
 use palpate_geometry::mesh::Mesh;
 
-/// Thickness of the board that the object is fixed to, and how far it reaches beyond it.
+/// Thickness of the board that carries the object, and its margin around the object.
 const BOARD_M: f64 = 0.02;
 const RIM_M: f64 = 0.1;
 
-/// From the middle of all there is towards a spectator beside the finger, who also sees the
+/// Direction from the middle of the scene to the camera beside the finger, which also shows the
 /// object's front.
 const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
 
-/// Two cameras: `front` sees the object from in front and above, `whole` from beside the finger
-/// all there is.
+/// Returns the scenery with two cameras: `front` shows the object from the front and above, `whole`
+/// shows the whole scene from beside the finger.
 pub(super) fn scenery(mesh: &Mesh, task: &Task, chain: &Chain) -> String {
-    // The board stands behind the object as the finger sees it.
+    // The board is behind the object, seen from the finger.
     let x_wz = task.zone().map_or_else(Isometry3::identity, Zone::x_wz);
     let (low, high) = mesh.transformed(&x_wz.inverse()).bounds();
     let middle_z = nalgebra::center(&low, &high);
     let half = (high - low) / 2.0;
-    // An upright one stands on the floor; every one overlaps the object.
+    // An upright board reaches down to the floor; every board overlaps the object.
     let is_upright = (x_wz.rotation * Vector3::z()).z > 1.0 - 1e-9;
     let floor_z = if is_upright { -x_wz.translation.z } else { f64::INFINITY };
     let (foot_z, top_z) = ((low.z - RIM_M).min(floor_z), high.z + RIM_M);
     let board = Translation3::new(middle_z.x, low.y - BOARD_M / 2.0, (foot_z + top_z) / 2.0);
     let board_half_m = [half.x + RIM_M, BOARD_M / 2.0, (top_z - foot_z) / 2.0];
-    // Around a whole object stands what it stands on, from the floor up, or nothing.
+    // A whole object has a support from its lowest plane to the floor, or none.
     let (board, board_half_m) = match task.ball().map(|ball| ball.lowest_m) {
         None => (Some(board), board_half_m),
         Some(lowest_m) => {
@@ -51,7 +51,7 @@ pub(super) fn scenery(mesh: &Mesh, task: &Task, chain: &Chain) -> String {
     let between = nalgebra::center(&foot, &middle) + Vector3::z() * (0.3 * (foot - middle).norm());
     let size = (foot - middle).norm() + 4.0 * half.norm();
     let whole = between + BESIDE * size;
-    // A free camera, that of a viewer, starts there too: the direction it looks in.
+    // View direction of the viewer's free camera, which starts in the same place.
     let azimuth = (-BESIDE.y).atan2(-BESIDE.x).to_degrees();
     let elevation = (-BESIDE.z).atan2(BESIDE.xy().norm()).to_degrees();
     let asset = mesh_asset(mesh, "object");

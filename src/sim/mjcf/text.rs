@@ -1,41 +1,42 @@
-//! Pieces of MJCF that several parts write.
+//! Shared fragments of MJCF.
 
 use nalgebra::{Isometry3, Point3};
 use palpate_geometry::mesh::Mesh;
 use std::fmt::Display;
 
-/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
-/// arm would: an arm that has to stop at once would be stopped by force (chosen).
+// Attributes of the two geoms that collide.
+// heuristic: no friction, and as compliant as mount and gears of an arm, because a rigid contact
+// would stop the arm with an unrealistic force.
 pub(super) const CONTACT: &str =
     r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
 
-/// The same of the arm's links where they collide: with each other, the table and the object.
+/// Attributes of the arm's links if they collide: with each other, the table and the object.
 pub(super) const LINK: &str =
     r#"contype="2" conaffinity="3" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
 
-/// The same of the table, and of a finger whose skin meets the object: with links.
+/// Attributes of the table, and of a finger with a skin, if they collide with links.
 pub(super) const TABLE: &str =
     r#"contype="2" conaffinity="2" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
 
-/// Numbers with spaces between them.
+/// Returns the numbers separated by spaces.
 pub(super) fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
     let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
     texts.join(" ")
 }
 
-/// A pose as attributes.
+/// Returns a pose as attributes.
 pub(super) fn pose(x: &Isometry3<f64>) -> String {
     let q = x.rotation.quaternion();
     format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
 }
 
-/// `mesh` as an asset called `name`; MuJoCo keeps its numbers in single precision, about its
-/// centre of mass.
+/// Returns `mesh` as an asset called `name`; MuJoCo stores its numbers in single precision, about
+/// its centre of mass.
 pub(super) fn mesh_asset(mesh: &Mesh, name: &str) -> String {
     surface(name, mesh.vertices().iter().copied(), mesh.triangles().iter().copied())
 }
 
-/// A mesh asset of any vertices and triangles.
+/// Returns a mesh asset of any vertices and triangles.
 pub(super) fn surface<Index: Display>(
     name: &str,
     vertices: impl IntoIterator<Item = Point3<f64>>,

@@ -1,4 +1,4 @@
-//! An arm or stage with masses, servos and friction, carrying the finger.
+//! Dynamic backend: an arm or stage with masses, servos and friction that carries the finger.
 
 use super::{Models, Plant};
 use crate::sim::Environment;
@@ -8,17 +8,17 @@ use palpate_explore::robot::arm::Chain;
 use palpate_explore::robot::finger::TipMotion;
 use std::sync::Arc;
 
-/// A state counts as diverged this far beyond a joint's limits, rad or m (the stops stand 0.05 rad
-/// beyond, and give), or this many times faster than its limit; chosen.
+// heuristic: a state has diverged this far beyond a joint's limits, rad or m (the stops are 0.05
+// rad beyond, and are compliant), or this many times faster than its limit.
 const BEYOND: f64 = 0.2;
 const FASTER: f64 = 5.0;
 
-/// A [`Plant`] whose fingertip carries the skin, if the scene has one.
+/// Backend of a [`Plant`] whose fingertip has a skin, if the scene has one.
 pub struct Dynamic {
     chain: Chain,
     capabilities: Capabilities,
     plant: Plant,
-    /// None for a finger without skin, which MuJoCo lets collide.
+    /// Soft finger; `None` for a finger without skin, which collides in MuJoCo.
     finger: Option<SimulatedFinger>,
     wrench: Wrench,
     steps: u32,
@@ -27,10 +27,10 @@ pub struct Dynamic {
 }
 
 impl Dynamic {
-    /// At the chain's home.
+    /// Creates the backend at the chain's home.
     ///
     /// # Errors
-    /// In an environment without an object.
+    /// If the environment has no object.
     pub fn new(environment: &Arc<Environment>, models: &Models) -> Result<Self, Fault> {
         let chain = environment.chain().ok_or_else(|| Fault::lacks("an object"))?;
         let period_s = environment.scene().period_s();
@@ -98,7 +98,7 @@ impl Backend for Dynamic {
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
         self.capabilities.accept(command)?;
-        // What the servos are told: the command within the joints' speeds.
+        // The servos get the command, clamped to the joints' speed limits.
         let within = command.qdot.iter().zip(&self.chain.joints);
         self.reading.applied.qdot.clear();
         self.reading
@@ -107,7 +107,7 @@ impl Backend for Dynamic {
             .extend(within.map(|(&qdot, joint)| qdot.clamp(-joint.qdot_limit, joint.qdot_limit)));
         let step_s = self.plant.step_s();
         for _ in 0..self.steps {
-            // The skin's force is that at the start of the step.
+            // The skin's force at the start of the step is constant during it.
             self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
             if let Some(finger) = &mut self.finger {
                 let motion = TipMotion::moving(self.plant.tip(), &self.plant.tip_twist());

@@ -1,26 +1,27 @@
-//! The velocity servo of a joint: proportional plus integral.
+//! Velocity servo of a joint: a PI controller.
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtIntegrator};
 use palpate_explore::robot::arm::Joints;
 use palpate_explore::robot::arm::chain::MAX_JOINTS;
 
-/// Integral over proportional gain; chosen: with the arm outstretched, where kv over inertia is
-/// smallest, 110 /s at S1, the loop is damped 0.75.
+// Ratio of integral to proportional gain.
+// heuristic: with the arm outstretched, where kv over inertia is smallest, 110 /s at S1, the
+// damping ratio of the loop is 0.75.
 const INTEGRAL_PER_S: f64 = 50.0;
 
-/// `force = kv · (u − qdot)` with `u = qdot_command + INTEGRAL_PER_S · lag` and
-/// `lag = ∫ (qdot_command − qdot) dt`. A step is implicit in the qdot of the first
-/// ([`embed`]) but for explicit integrators; the integral is kept
-/// here, and its mean over the step is what is held through it.
+/// Velocity servo `force = kv · (u − qdot)` with `u = qdot_command + INTEGRAL_PER_S · lag` and `lag
+/// = ∫ (qdot_command − qdot) dt`. A step is implicit in the first qdot ([`embed`]) except for
+/// explicit integrators. The integral is stored here; its mean over the step is constant during the
+/// step.
 ///
-/// The gains kv are chosen and stand in the model: as stiff as leaves kv · 2 ms below twice the
-/// smallest inertia a joint can meet.
+/// The gains kv are part of the model, a heuristic: the largest for which kv · 2 ms stays below
+/// twice the smallest inertia of a joint.
 pub(super) struct JointServo {
-    /// rad or m.
+    /// Integral of the velocity error, rad or m.
     lag: Joints,
-    /// N·m·s/rad or N·s/m.
+    /// Gains, N·m·s/rad or N·s/m.
     kv: Joints,
-    /// N·m or N.
+    /// Largest motor torque or force, N·m or N.
     limit: Joints,
 }
 
@@ -29,7 +30,7 @@ impl JointServo {
         Self { lag: Joints::zeros(), kv, limit }
     }
 
-    /// Starts as if `load` had been held for long.
+    /// Sets the state reached after a long time under `load`.
     pub(super) fn hold(&mut self, load: &[f64]) {
         self.lag = Joints::zeros();
         for (i, load) in load.iter().enumerate().take(MAX_JOINTS) {
@@ -37,8 +38,8 @@ impl JointServo {
         }
     }
 
-    /// The control value u of joint `i` for the next `step_s`. `force` is what its motor gave in
-    /// the last; while that is at its limit the integral grows no further (anti-windup).
+    /// Returns the control value u of joint `i` for the next `step_s`. `force` is the motor's
+    /// output in the last step; at its limit the integral stops growing (anti-windup).
     pub(super) fn control(
         &mut self,
         i: usize,
@@ -57,13 +58,14 @@ impl JointServo {
 }
 
 /// Turns the velocity servos of an implicitly integrated `model`, `force = kv (ctrl − qdot)`, into
-/// motors, `force = kv ctrl`, and adds `kv h` to the joints' inertias, h being the step.
+/// motors, `force = kv ctrl`, and adds `kv h` to the joints' inertias, where h is the time step.
 ///
-/// Given `ctrl = u − qdot` at its start, a step is that of a servo implicit in its velocity:
-/// `(M + kv h) Δqdot = h (kv (u − qdot) + …)`. MuJoCo makes the same step of a servo of its own,
-/// but finds joint friction before, as if `M` alone were moved: at 2 ms a joint of the wrist then
-/// rubs as if it were a fourth as heavy as it is for the step. Here both see the same inertia. How
-/// soft friction is (`dof_invweight0`) stays that of `M`, so that it does not depend on the step.
+/// With `ctrl = u − qdot` at its start, a step equals that of a servo implicit in its velocity: `(M
+/// + kv h) Δqdot = h (kv (u − qdot) + …)`. MuJoCo makes the same step of its own servos, but
+/// computes joint friction before, with the inertia `M` alone: at 2 ms a wrist joint then has the
+/// friction of a joint a fourth as heavy as it is for the step. Here both use the same inertia. The
+/// softness of friction (`dof_invweight0`) stays that of `M`, so that it does not depend on the
+/// step.
 pub(super) fn embed(model: &mut MjModel) {
     let step_s = model.opt().timestep;
     let implicit = [MjtIntegrator::mjINT_IMPLICIT, MjtIntegrator::mjINT_IMPLICITFAST];
@@ -79,7 +81,8 @@ pub(super) fn embed(model: &mut MjModel) {
     }
 }
 
-/// What [`embed`] added to the inertia of joint `i`, kg·m² or kg; none if its servo is MuJoCo's.
+/// Returns the inertia that [`embed`] added to joint `i`, kg·m² or kg; `None` if MuJoCo steps its
+/// servo.
 pub(super) fn embedded(model: &MjModel, i: usize) -> Option<f64> {
     let (gain, bias) = (model.actuator_gainprm()[i][0], model.actuator_biasprm()[i][2]);
     (bias == 0.0).then(|| gain * model.opt().timestep)

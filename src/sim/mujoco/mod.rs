@@ -1,4 +1,4 @@
-//! MuJoCo as a library: compiling models, and the plant that steps one.
+//! MuJoCo bindings: compilation of models, and the plant that steps one.
 
 mod dynamic;
 mod joint_servo;
@@ -18,17 +18,17 @@ use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
 use palpate_input::error::Invalid;
 use std::sync::Once;
 
-/// A model that is not one of a robot with a finger.
+/// Returns the error of a model that lacks a `part` of a robot with a finger.
 fn lacking(part: &str) -> Invalid {
     Invalid::new(format!("the MuJoCo model lacks {part}"))
 }
 
-/// Version of the linked library.
+/// Returns the version of the linked library.
 pub fn version() -> &'static str {
     mujoco_rs::mujoco_version()
 }
 
-/// Compiles a model; servos of an implicit integrator become a [`Plant`]'s own.
+/// Compiles a model; with an implicit integrator, its servos become those of a [`Plant`].
 ///
 /// # Errors
 /// If MuJoCo refuses it.

@@ -1,5 +1,5 @@
-//! What MuJoCo compiles of an environment, once for all trials, and how finely the scene's time
-//! step is divided for the skin's force.
+//! Compiled MuJoCo models of an environment, shared by all trials, and the substeps that the skin's
+//! stiffness requires.
 
 use super::{Plant, compile, lacking};
 use crate::sim::Environment;
@@ -12,21 +12,22 @@ use palpate_input::error::Invalid;
 use std::fmt::{Display, Formatter, Result as Written};
 use std::sync::Arc;
 
-/// Shared by the trials of an experiment.
+/// Compiled models, shared by the trials of an experiment.
 #[derive(Clone, Debug)]
 pub struct Models {
-    /// The arm or stage.
+    /// Model of the arm or stage.
     pub plant: Arc<MjModel>,
-    /// How the scene's time step was divided, and why; none if it was not.
+    /// Division of the scene's time step, with its reason; `None` if it was not divided.
     pub substeps: Option<Substeps>,
 }
 
 impl Models {
-    /// With the scene's time step, or part of it where that is too long for the skin.
+    /// Compiles the models with the scene's time step, or a fraction of it if that is too long for
+    /// the skin.
     ///
     /// # Errors
-    /// If MuJoCo refuses the scene, no step is short enough for its skin, or the object has no
-    /// inside where the scene's collision needs one.
+    /// If MuJoCo refuses the scene, no step is short enough for its skin, or the scene's collision
+    /// needs a closed mesh and the object has none.
     pub fn new(environment: &Environment) -> Result<Self, Invalid> {
         let step_s = environment.scene().solver.step_s;
         let whole = Self::at(environment, step_s)?;
@@ -39,16 +40,16 @@ impl Models {
                 Ok(Self { substeps: Some(Substeps { count, step_s, limit }), ..divided })
             }
             _ => Err(Invalid::new(format!(
-                "solver.step_s = {step_s} is too long, and cannot be divided so finely: {limit}"
+                "solver.step_s = {step_s} is too long, and no allowed substep is short enough: {limit}"
             ))),
         }
     }
 
-    /// With a time step of `step_s`, whatever the skin needs.
+    /// Compiles the models with a time step of `step_s`, without the limit of the skin.
     ///
     /// # Errors
-    /// If MuJoCo refuses the scene, or the object has no inside where the scene's collision needs
-    /// one.
+    /// If MuJoCo refuses the scene, or the scene's collision needs a closed mesh and the object has
+    /// none.
     pub fn at(environment: &Environment, step_s: f64) -> Result<Self, Invalid> {
         check_inside(environment)?;
         let text = mjcf::scene(environment, Mode::Dynamic { step_s });
@@ -57,7 +58,7 @@ impl Models {
     }
 }
 
-/// Without an inside a distance has no sign.
+/// Checks that the mesh is closed if signed distances are needed.
 fn check_inside(environment: &Environment) -> Result<(), Invalid> {
     let Shape::Mesh { report, .. } = environment.shape() else { return Ok(()) };
     let edges = report.border_edges.count + report.non_manifold_edges.count;
@@ -70,39 +71,39 @@ fn check_inside(environment: &Environment) -> Result<(), Invalid> {
     }
 }
 
-/// Shortest step, that of a scene.
+/// Shortest time step allowed in a scene.
 const SHORTEST_S: f64 = 1e-5;
 
-/// A division of the time step, and why.
+/// Division of the time step, with its reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps {
-    /// Steps in one of the scene's.
+    /// Number of substeps in one step of the scene.
     pub count: u32,
-    /// The scene's step.
+    /// Time step of the scene, s.
     pub step_s: f64,
-    /// The longest that is stable.
+    /// Longest stable step.
     pub limit: StepLimit,
 }
 
-/// What limits a step at whose start the skin's force is taken.
+/// Stability limit of a step with a skin force from the start of the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLimit {
     /// Largest force of a touch.
     pub force_n: f64,
     /// Largest stiffness of the skin up to that force.
     pub stiffness_n_m: f64,
-    /// Smallest mass that the fingertip moves with.
+    /// Smallest effective mass of the fingertip.
     pub mass_kg: f64,
-    /// √(mass / stiffness).
+    /// Longest step, √(mass / stiffness).
     pub limit_s: f64,
 }
 
 impl StepLimit {
-    /// Of a model of `environment`; none without a skin.
+    /// Computes the limit of a model of `environment`; `None` without a skin.
     ///
-    /// A force that is explicit in the position of a mass m is stable in steps below `2 √(m / k)`;
-    /// half of that is the limit, because a hollow object presses more skin at once than the
-    /// flat plate on which k is measured.
+    /// A force that is explicit in the position of a mass m is stable in steps below `2 √(m / k)`.
+    /// The limit is half of that, because a hollow object presses more skin at once than the flat
+    /// plate on which k is measured.
     ///
     /// # Errors
     /// If the model is not one of a robot with a finger.
@@ -126,7 +127,7 @@ impl Display for StepLimit {
         let Self { force_n, stiffness_n_m, mass_kg, limit_s } = self;
         write!(
             f,
-            "up to {force_n} N (touch.force_limit_n) the skin is as stiff as {stiffness_n_m:.0} N/m and the \
+            "up to {force_n} N (touch.force_limit_n) the skin's stiffness is {stiffness_n_m:.0} N/m and the \
              fingertip as light as {mass_kg:.3} kg, which needs at most {limit_s:.2e} s"
         )
     }

@@ -1,4 +1,4 @@
-//! A picture of a model, drawn off-screen through EGL: no window and no display is needed.
+//! Rendering of a model to a PNG, off-screen through EGL: no window and no display is needed.
 
 use mujoco_rs::renderer::{MjRenderer, RendererError, png::Compression};
 use mujoco_rs::wrappers::mj_data::MjData;
@@ -7,8 +7,8 @@ use mujoco_rs::wrappers::mj_visualization::MjvCamera;
 use palpate_input::error::Invalid;
 use std::path::Path;
 
-/// Draws `model` at its first keyframe, or at q = 0 without one, as `camera` sees it, and writes
-/// it to `path` as PNG in the size of the model's off-screen buffer.
+/// Renders `model` from `camera` at its first keyframe, or at q = 0 without one, and writes a PNG
+/// of the size of the model's off-screen buffer to `path`.
 ///
 /// # Errors
 /// If the camera is unknown, EGL is missing or the file cannot be written.

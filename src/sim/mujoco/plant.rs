@@ -1,4 +1,4 @@
-//! The arm or stage with its velocity servos, gravity and friction, one step at a time.
+//! Arm or stage with velocity servos, gravity and friction, one step at a time.
 
 use super::joint_servo::{JointServo, embedded};
 use mujoco_rs::wrappers::mj_data::MjData;
@@ -13,27 +13,28 @@ use palpate_explore::robot::arm::chain::MAX_JOINTS;
 use palpate_input::error::Invalid;
 use std::sync::Arc;
 
-/// A compiled model of [`mjcf::scene`](crate::sim::mjcf::scene), shared, and one state of it.
+/// Plant: a compiled model of [`mjcf::scene`](crate::sim::mjcf::scene), shared, with one state of
+/// it.
 ///
-/// It knows nothing of skin: the caller gives the wrench on the fingertip.
+/// It does not model the skin: the caller gives the wrench on the fingertip.
 pub struct Plant {
     data: MjData<Arc<MjModel>>,
     servo: JointServo,
-    /// What the model adds to the joints' inertias in place of its servos' damping; none if they
-    /// damp themselves.
+    /// Inertia that the model adds to the joints in place of its servos' damping; `None` if the
+    /// servos damp themselves.
     gain_kg_m2: Option<Joints>,
-    /// The site of `T` and the body it is on.
+    /// Site of `T` and the body that has it.
     tip: usize,
     finger: usize,
     /// Pose of the sensor in `T`.
     x_tm: Isometry3<f64>,
-    /// Whether a step evaluates the model in between.
+    /// Whether a step evaluates the model at intermediate stages.
     staged: bool,
     contact: Option<IdealContact>,
 }
 
 impl Plant {
-    /// A state of `model` at q = 0; [`reset`](Self::reset) brings it to its start.
+    /// Creates a state of `model` at q = 0; [`reset`](Self::reset) sets its start.
     ///
     /// # Errors
     /// If `model` is not one of a robot with a finger, or memory is short.
@@ -88,7 +89,7 @@ impl Plant {
         })
     }
 
-    /// Puts the arm at rest at `q`, its servos holding its weight, at time 0.
+    /// Puts the arm at rest at `q` and time 0, with servos that hold its weight.
     ///
     /// # Errors
     /// [`Fault::Refused`] if `q` is not one finite number per joint.
@@ -102,18 +103,18 @@ impl Plant {
         self.check()
     }
 
-    /// Brakes for the next step: they hold the arm's weight and damp what moves, as the servos do
-    /// without their integral; that they also rub is left out.
+    /// Brakes for the next step: the brakes hold the arm's weight and damp its motion like the
+    /// servos without their integral. Their friction is not modelled.
     pub fn brake(&mut self) {
         self.servo.hold(self.data.qfrc_bias());
     }
 
-    /// One time step with velocities commanded to the servos (rad/s or m/s) and `wrench` on the
-    /// fingertip, given in `T` about its origin and kept through the step.
+    /// Advances by one time step with the velocities commanded to the servos (rad/s or m/s) and
+    /// `wrench` on the fingertip, in `T` about its origin and constant during the step.
     ///
     /// # Errors
-    /// [`Fault::Refused`] if a number is not finite or missing, [`Fault::Diverged`] with time,
-    /// q and qdot if MuJoCo warns; the state is then meaningless until the next reset.
+    /// [`Fault::Refused`] if a number is not finite or missing; [`Fault::Diverged`] with time, q
+    /// and qdot if MuJoCo warns. The state is then invalid until the next reset.
     pub fn step(&mut self, qdot: &[f64], wrench: &Wrench) -> Result<(), Fault> {
         self.accept(qdot)?;
         let Wrench { force_n, torque_nm } = wrench;
@@ -128,16 +129,16 @@ impl Plant {
             let damped = if self.gain_kg_m2.is_some() { speed } else { 0.0 };
             self.data.ctrl_mut()[i] = control - damped;
         }
-        // MuJoCo takes a wrench about the body's centre of mass. Only what is applied this way
-        // reaches the force/torque sensor.
+        // MuJoCo takes a wrench about the body's centre of mass. Only forces applied this way reach
+        // the force/torque sensor.
         let x_wt = self.tip();
         let force_w = x_wt.rotation * force_n;
         let arm = x_wt.translation.vector - Vector3::from(self.data.xipos()[self.finger]);
         let torque_w = x_wt.rotation * torque_nm + arm.cross(&force_w);
         self.data.xfrc_applied_mut()[self.finger] =
             [force_w.x, force_w.y, force_w.z, torque_w.x, torque_w.y, torque_w.z];
-        // In this order positions and velocities are those after the step; `mj_step` would leave
-        // those before it. `mj_step2` cannot do Runge and Kutta's stages: it takes Euler's instead.
+        // This order gives positions and velocities after the step; `mj_step` would leave those
+        // before it. `mj_step2` cannot do Runge–Kutta stages: it takes an Euler step instead.
         match self.staged {
             true => self.data.step(),
             false => self.data.step2(),
@@ -147,37 +148,38 @@ impl Plant {
         self.check()
     }
 
-    /// Time step.
+    /// Returns the time step, s.
     pub fn step_s(&self) -> f64 {
         self.data.model_opt().timestep
     }
 
-    /// Time since reset.
+    /// Returns the time since the reset, s.
     pub fn time_s(&self) -> f64 {
         self.data.time()
     }
 
-    /// Joint positions, rad or m.
+    /// Returns the joint positions, rad or m.
     pub fn q(&self) -> &[f64] {
         self.data.qpos()
     }
 
-    /// Joint velocities, rad/s or m/s.
+    /// Returns the joint velocities, rad/s or m/s.
     pub fn qdot(&self) -> &[f64] {
         self.data.qvel()
     }
 
-    /// What the motors gave during the last step, N·m or N.
+    /// Returns the motor outputs during the last step, N·m or N.
     pub fn motors(&self) -> &[f64] {
         self.data.actuator_force()
     }
 
-    /// What MuJoCo's contacts did to the finger during the last step, for a finger without skin.
+    /// Returns the force of MuJoCo's contacts on the finger during the last step, for a finger
+    /// without skin.
     pub fn contact(&self) -> Option<IdealContact> {
         self.contact
     }
 
-    /// Pose of `T` in `W`.
+    /// Returns the pose of `T` in `W`.
     pub fn tip(&self) -> Isometry3<f64> {
         let p = Point3::from(self.data.site_xpos()[self.tip]);
         let r = Matrix3::from_row_slice(&self.data.site_xmat()[self.tip]);
@@ -185,14 +187,14 @@ impl Plant {
         Isometry3::from_parts(p.into(), r)
     }
 
-    /// Velocity of `T`: linear (m/s) at its origin, then angular (rad/s), in `W`.
+    /// Returns the velocity of `T`: linear (m/s) at its origin, then angular (rad/s), in `W`.
     pub fn tip_twist(&self) -> Vector6<f64> {
         let site = self.data.try_object_velocity(MjtObjBase::mjOBJ_SITE, self.tip, false);
         let [rx, ry, rz, x, y, z] = site.unwrap_or_default();
         Vector6::new(x, y, z, rx, ry, rz)
     }
 
-    /// The smallest mass with which `T` yields to a push at the present posture, over all
+    /// Returns the smallest effective mass of `T` against a push in the present posture, over all
     /// directions: one over the largest eigenvalue of `J M⁻¹ Jᵀ`.
     pub fn tip_mass_kg(&self) -> f64 {
         let n = self.q().len();
@@ -208,12 +210,13 @@ impl Plant {
         mobility.map_or(0.0, |mobility| 1.0 / mobility.symmetric_eigenvalues().max())
     }
 
-    /// What the force/torque sensor measured during the last step, carried over to `T` about its
-    /// origin: the load of everything beyond it, so the wrench on the fingertip plus the weight
-    /// and inertia of adapter and finger. Zero in a scene without the sensor.
+    /// Returns the reading of the force/torque sensor during the last step, transformed to `T`
+    /// about its origin: the load of everything beyond the sensor, that is, the wrench on the
+    /// fingertip plus the weight and inertia of adapter and finger. It is zero in a scene without
+    /// the sensor.
     pub fn mount(&self) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
-        // MuJoCo gives what the link does to the finger; the sensor feels the opposite.
+        // MuJoCo gives the force of the link on the finger; the sensor reads the opposite.
         let (force_n, torque_nm) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));
         Wrench { force_n, torque_nm }.moved(&self.x_tm)
     }
@@ -223,7 +226,7 @@ impl Plant {
         if fits { Ok(()) } else { Err(Fault::Refused { values: values.into() }) }
     }
 
-    /// MuJoCo warns of a state that is not finite or larger than 1e10.
+    /// Checks for MuJoCo's warning of a state that is not finite or larger than 1e10.
     fn check(&self) -> Result<(), Fault> {
         if self.data.warning().iter().all(|warning| warning.number == 0) {
             return Ok(());
@@ -233,10 +236,11 @@ impl Plant {
     }
 }
 
-/// MuJoCo's own contacts as one, in `T`: centre weighted by force, sum of the forces and its
-/// direction; `None` without force. Those of links with whatever else are left out.
+/// Combines MuJoCo's contacts with the finger into one, in `T`: centre weighted by force, sum of
+/// the forces and its direction; `None` without force. Contacts between links and other bodies are
+/// left out.
 ///
-/// To be asked while `data` holds the forces of the last step; `finger` is the finger's body.
+/// It is valid while `data` has the forces of the last step; `finger` is the finger's body.
 fn contact(
     data: &MjData<Arc<MjModel>>,
     finger: usize,
@@ -245,7 +249,7 @@ fn contact(
     let (mut moment, mut weight_n, mut sum_n) = (Vector3::zeros(), 0.0, Vector3::zeros());
     for (i, contact) in data.contact().iter().enumerate() {
         let force_n = data.try_contact_force(i).map_or(0.0, |[normal, ..]| normal);
-        // From the first geom to the second, which come in the order of their kinds.
+        // The normal points from the first geom to the second, which are ordered by kind.
         let [x, y, z, ..] = contact.frame;
         let of = |geom: i32| data.model().geom_bodyid().get(geom as usize);
         let outward = match contact.geom.map(|geom| of(geom) == Some(&(finger as i32))) {

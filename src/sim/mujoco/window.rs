@@ -1,4 +1,4 @@
-//! A window that shows a model in the posture that something else gives it: MuJoCo's viewer.
+//! Viewer window that shows a model in a posture set from outside, in MuJoCo's viewer.
 
 use super::{compile, lacking};
 use crate::sim::Environment;
@@ -12,21 +12,21 @@ use palpate_input::error::Invalid;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
 
-/// Most marks that are drawn, the latest ones; as many as an experiment has touches at most.
+/// Largest number of marks drawn, the latest ones; as many as an experiment has touches at most.
 const MARKS_MAX: usize = 2000;
 
-/// Radius and colour of a mark; chosen.
+// heuristic: radius and colour of a mark.
 const MARK_M: f64 = 0.002;
 const MARK_RGBA: [f32; 4] = [0.84, 0.37, 0.0, 1.0];
 
-/// An open window. Only the main thread may have one.
+/// Viewer window; only the main thread may have one.
 pub struct Window {
     viewer: MjViewer,
     data: MjData<Arc<MjModel>>,
 }
 
 impl Window {
-    /// Opens it on the picture of `environment`.
+    /// Opens a window with the picture of `environment`.
     ///
     /// # Errors
     /// If the environment has nothing to show, or there is no display with OpenGL.
@@ -46,12 +46,12 @@ impl Window {
         Ok(Self { viewer, data })
     }
 
-    /// Whether its user has not closed it.
+    /// Returns whether the window is still open.
     pub fn is_open(&self) -> bool {
         self.viewer.running()
     }
 
-    /// Draws the model at the joints seen, with a small ball at every mark.
+    /// Draws the model at the joint positions of `seen`, with a small ball at every mark.
     ///
     /// # Errors
     /// If the display fails.
@@ -68,7 +68,7 @@ impl Window {
         for mark in seen.marks_w.iter().rev().take(MARKS_MAX) {
             let (size, place) = (Some([MARK_M; 3]), Some(mark.coords.into()));
             let ball = MjtGeom::mjGEOM_SPHERE;
-            // SAFETY: the ball keeps the ids of material, texture and object that say none.
+            // SAFETY: the ball keeps the default ids (none) of material, texture and object.
             let drawn = unsafe { scene.try_create_geom(ball, size, place, None, Some(MARK_RGBA)) };
             if drawn.is_err() {
                 break;

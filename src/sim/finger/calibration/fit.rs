@@ -1,4 +1,4 @@
-//! Constants and sessions as one problem of least squares, and its fit with how sure it is.
+//! Least-squares fit of constants and sessions, with its uncertainty.
 
 use super::constants::{Constant, Model};
 use super::session::{Bench, Session};
@@ -9,61 +9,61 @@ use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::{FitError, Problem, clustered_covariance, robust};
 use std::cell::RefCell;
 
-/// Besides from where it starts, a fit is tried from skins this many times softer: a stiff skin
-/// and a soft one are two valleys (chosen).
+// Softness factors of the skins from which fits start.
+// heuristic: a stiff skin and a soft one are two local minima.
 const SOFTER: [f64; 2] = [1.0, 10.0];
 
-/// What a fit may change.
+/// Parameters that a fit may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Free {
-    /// Only what belongs to the sessions: a test of the constants.
+    /// Only the parameters of the sessions: a test of the constants.
     Sessions,
-    /// The constants too.
+    /// Constants and sessions.
     Constants,
 }
 
-/// A constant as the recordings give it.
+/// Estimate of a constant from the recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Its key in a scene's `[effects]`.
+    /// Key of the constant in a scene's `[effects]`.
     pub key: &'static str,
-    /// Its value.
+    /// Estimated value.
     pub value: f64,
-    /// One standard deviation up multiplies it by this; electrodes of one session err together.
+    /// Factor of one standard deviation; the errors of electrodes in one session are correlated.
     pub factor: f64,
 }
 
-/// A constant that ran to where it may go no farther, and was put back to its start.
+/// Constant that reached a bound and was reset to its start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refused {
-    /// Its key in a scene's `[effects]`.
+    /// Key of the constant in a scene's `[effects]`.
     pub key: &'static str,
-    /// Where it ran to.
+    /// Bound that it reached.
     pub bound: f64,
-    /// What it keeps.
+    /// Value after the reset.
     pub kept: f64,
 }
 
-/// Constants and sessions.
+/// Fitted constants and sessions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// With the constants found.
+    /// Model with the fitted constants.
     pub model: Model,
-    /// One for each recording.
+    /// Sessions, one for each recording.
     pub sessions: Vec<Session>,
-    /// The constants that are determined.
+    /// Constants that the recordings determine.
     pub estimates: Vec<Estimate>,
-    /// Those that are not.
+    /// Constants that the recordings do not determine.
     pub refused: Vec<Refused>,
 }
 
-/// Fits `free` to the recordings together, from `start`.
+/// Fits `free` to all recordings together, from `start`.
 ///
-/// Errors beyond 1.3 of the expected count with their amount (Huber), so that no electrode decides
-/// alone. Constants at a bound are put back and the rest is fitted again.
+/// Errors beyond 1.3 of the expected count have a linear cost (Huber 1964), so that no electrode
+/// decides alone. Constants at a bound are reset, and the rest is fitted again.
 ///
 /// # Errors
-/// If there is no recording, or no step helps.
+/// If there is no recording, or no step lowers the cost.
 pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, FitError> {
     let mut constants: Vec<&'static Constant> = match free {
         Free::Sessions => Vec::new(),
@@ -99,7 +99,7 @@ pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, 
     }
 }
 
-/// The best of the fits from stiff and from soft skins.
+/// Returns the best of the fits from stiff and from soft skins.
 fn lowest(problem: &Calibration) -> Result<DVector<f64>, FitError> {
     let starts = if problem.free.is_empty() { &SOFTER[..1] } else { &SOFTER[..] };
     let mut best: Option<(f64, DVector<f64>)> = None;
@@ -123,42 +123,44 @@ fn lowest(problem: &Calibration) -> Result<DVector<f64>, FitError> {
     best.map(|(_, state)| state).ok_or(failed)
 }
 
-/// Expected error of a mean count (chosen: two thirds of what the best fit is off on average).
+// heuristic: expected error of a mean count, two thirds of the mean error of the best fit.
 const EXPECTED_COUNTS: f64 = 40.0;
 
-/// From 4 to 8 N the pressure may rise, per newton, by this part of its rise over the first
-/// newton: the sensor's manual says it saturates at about 2 N (chosen).
+// Largest rise of the pressure per newton from 4 to 8 N, relative to its rise over the first
+// newton: the sensor's manual says that it saturates at about 2 N.
+// heuristic: 15 % still counts as saturated.
 const SATURATED: f64 = 0.15;
 
-/// Expected error of that part, for each session (chosen: the manual speaks of another model of
-/// the sensor and gives no curve).
+// Expected error of that fraction, for each session.
+// heuristic: the manual describes another model of the sensor and gives no curve.
 const SATURATION_SD: f64 = 0.015;
 
-/// What is plausible of a session, as standard deviations (chosen): offset about that of untouched
-/// sensors between sessions; gain as the spread of the resistors; a hand that aims at the pulp.
+// heuristic: plausible standard deviations of a session: offset, as that of sensors without contact
+// between sessions; gain, as the spread of the resistors; attitude, for a hand that aims at the
+// pulp.
 const OFFSET_LN: f64 = 0.15;
 const GAIN_LN: f64 = 0.15;
 const PITCH_RAD: f64 = 0.3;
 const ROLL_RAD: f64 = 0.3;
-/// How far the mean roll at a load lies from the session's.
+/// Standard deviation of the mean roll at a load about the session's roll.
 const LOAD_ROLL_RAD: f64 = 0.1;
 
-/// Parameters of a session that are not rolls: offset, gain, pitch.
+/// Number of a session's parameters other than rolls: offset, gain, pitch.
 const SHARED: usize = 3;
 
-/// In place of residuals where a pose has no answer; no step goes there.
+/// Residual of a pose without a solution, so that no step goes there.
 const IMPOSSIBLE: f64 = 1e6;
 
-/// Part of a unit over which slopes are taken: columns are found to rounding, a shell to a
-/// thousandth of its force (chosen).
+// Step of the finite differences, as a fraction of a unit.
+// heuristic: columns are exact to rounding, a shell to a thousandth of its force.
 const COLUMNS_DIFFERENCE: f64 = 1e-4;
 const SHELL_DIFFERENCE: f64 = 2e-2;
 
-/// A step that gains no more than this part of the cost is the last (chosen).
+// heuristic: a step with a smaller relative gain than this is the last.
 const GAINED: f64 = 1e-4;
 
-/// What is fitted: the constants that are free, then each session's offset, gain, pitch and rolls,
-/// all in units of what is plausible, 0 at the start.
+/// Least-squares problem of the fit. Its parameters are the free constants, then each session's
+/// offset, gain, pitch and rolls, all in units of their plausible deviation, 0 at the start.
 struct Calibration<'a> {
     start: &'a Model,
     free: Vec<&'static Constant>,
@@ -167,12 +169,12 @@ struct Calibration<'a> {
 }
 
 impl Calibration<'_> {
-    /// The model and the sessions of a state.
+    /// Returns the model and the sessions of a parameter vector.
     fn decode(&self, state: &DVector<f64>) -> (Model, Vec<Session>) {
         let mut model = self.start.clone();
         for (constant, units) in self.free.iter().zip(state.iter()) {
             let value = constant.value(self.start) * (constant.plausible * units).exp();
-            // The ends of its bounds are exact.
+            // The ends of the bounds are exact.
             let [least, most] = constant.bounds;
             constant.set(&mut model, value.clamp(least, most));
         }
@@ -191,7 +193,8 @@ impl Calibration<'_> {
         (model, sessions)
     }
 
-    /// The electrode of a session that residual `i` is an error of; none if it is of a belief.
+    /// Returns the electrode of residual `i`, counted over all sessions; `None` for a residual of
+    /// the prior.
     fn electrode(&self, i: usize) -> Option<usize> {
         let mut first = 0;
         for (number, recording) in self.recordings.iter().enumerate() {
@@ -204,7 +207,7 @@ impl Calibration<'_> {
         None
     }
 
-    /// Errors of the counts, in units of what is expected.
+    /// Returns the errors of the counts, in units of the expected error.
     fn errors(&self, model: &Model, sessions: &[Session]) -> Option<Vec<f64>> {
         let bench = &mut *self.bench.borrow_mut();
         let mut errors = Vec::new();
@@ -219,7 +222,7 @@ impl Calibration<'_> {
         Some(errors)
     }
 
-    /// By how much each session's pressure fails to saturate.
+    /// Returns the saturation residual of each session's pressure.
     fn unsaturated(&self, model: &Model, sessions: &[Session]) -> Option<Vec<f64>> {
         if self.free.is_empty() {
             return Some(Vec::new());
@@ -232,7 +235,7 @@ impl Calibration<'_> {
         sessions.iter().map(of).collect()
     }
 
-    /// How far a state lies from what was plausible.
+    /// Returns the prior residuals: deviations from the plausible values.
     fn doubts(&self, state: &DVector<f64>, sessions: &[Session]) -> Vec<f64> {
         let mut doubts = state.as_slice()[..self.free.len()].to_vec();
         for session in sessions {

@@ -1,13 +1,13 @@
-//! Constants of skin and electrodes from recordings of fingers pressed on a flat plate.
+//! Calibration of skin and electrodes from recordings of fingers pressed on a flat plate.
 //!
-//! What a session shows is its sensor's and its contact's: all electrodes read more than in the
-//! session without contact, by one factor of conductivity (an untouched sensor shows that alone:
-//! 1.08 and 1.2 in MiaoLi/syntouchcontact's recordings), the sensor answers stronger or weaker
-//! than another, and a hand held the finger at an attitude that nobody wrote down. `session` has
-//! these apart from the `constants`, which all sensors share; `fit` fits both to every load there
-//! is and says how sure it is, and `score` tries constants on a sensor that they were not
-//! fitted to, beside what knows nothing of force. `shear` holds the model against how electrodes
-//! answer tangential force.
+//! A recording depends on its sensor and its contact. All electrodes read more than in the session
+//! without contact, by one factor of conductivity (a sensor without contact has that factor alone:
+//! 1.08 and 1.2 in MiaoLi/syntouchcontact's recordings). The sensitivity differs between sensors,
+//! and the attitude of the finger, which was held by hand, is not recorded. `session` has these
+//! parameters, separate from the `constants`, which all sensors share. `fit` fits both to all loads
+//! and estimates the uncertainty; `score` tests the constants on a held-out sensor, against
+//! baselines that do not use force. `shear` compares the model with the measured response of
+//! electrodes to tangential force.
 
 pub mod constants;
 pub mod fit;

@@ -1,5 +1,4 @@
-//! How constants do on a sensor that they were not fitted to, beside predictions that know nothing
-//! of force.
+//! Accuracy of the constants on a held-out sensor, with baselines that do not use force.
 
 use super::constants::Model;
 use super::fit::{Fit, Free, fit};
@@ -10,39 +9,40 @@ use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::FitError;
 use rayon::prelude::*;
 
-/// A measured change below this is too small to have a sign.
+/// Smallest measured change whose sign counts.
 const SIGNED_COUNTS: f64 = 100.0;
 
-/// Offsets that are tried where only an offset is fitted, as factors of conductivity (chosen).
+// heuristic: range and number of offsets tried in a fit of the offset alone, as factors of
+// conductivity.
 const OFFSETS: (f64, f64, usize) = (0.7, 1.5, 161);
 
-/// Mean absolute errors over some entries, in counts.
+/// Mean absolute errors over a set of entries, in counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
-    /// Electrodes times loads.
+    /// Number of entries: electrodes times loads.
     pub entries: usize,
-    /// Of the model.
+    /// Error of the model.
     pub model_counts: f64,
-    /// Of saying that nothing changes.
+    /// Error of the no-change predictor.
     pub no_change_counts: f64,
-    /// Of saying that nothing changes but the session's offset, the best there is.
+    /// Error of the best predictor with the session's offset as the only change.
     pub offset_counts: f64,
-    /// Of saying that each electrode changes as the other sensors' do on average over their loads;
-    /// none without other sensors.
+    /// Error of the predictor that each electrode changes by the mean over the other sensors'
+    /// loads; `None` without other sensors.
     pub mean_change_counts: Option<f64>,
-    /// Entries measured to change by more than 100 counts.
+    /// Number of entries with a measured change of more than 100 counts.
     pub signed: usize,
-    /// Those of them whose predicted change has the right sign.
+    /// Number of these whose predicted change has the right sign.
     pub right: usize,
 }
 
 impl Score {
-    /// Part of the signs that are right.
+    /// Returns the fraction of signs that are right.
     pub fn right_sign(&self) -> f64 {
         self.right as f64 / self.signed.max(1) as f64
     }
 
-    /// Over all entries of several.
+    /// Returns the score over all entries of several scores.
     pub fn of<'a>(scores: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let entries: usize = scores.clone().map(|score| score.entries).sum();
         let mean = |of: fn(&Self) -> Option<f64>| {
@@ -61,33 +61,33 @@ impl Score {
     }
 }
 
-/// A sensor with constants of others.
+/// Result on a held-out sensor.
 #[derive(Clone, Debug)]
 pub struct HeldOut {
-    /// The sensor.
+    /// Name of the held-out sensor.
     pub sensor: String,
-    /// Those that the constants are fitted to; none for the constants of the start.
+    /// Sensors that the constants are fitted to; empty if the constants are those of the start.
     pub others: Vec<String>,
-    /// Constants from the others, and the session fitted to this sensor.
+    /// Fit: constants from the other sensors, session from this sensor.
     pub fit: Fit,
-    /// By load: mean normal force, score.
+    /// Mean normal force and score, by load.
     pub loads: Vec<(f64, Score)>,
 }
 
 impl HeldOut {
-    /// Over all loads.
+    /// Returns the score over all loads.
     pub fn whole(&self) -> Score {
         Score::of(self.loads.iter().map(|(_, score)| score))
     }
 }
 
-/// Each sensor with constants fitted to all others from `start`; with `free` the sessions only, or
-/// without others, with those of `start`.
+/// Fits the constants to all other sensors from `start`, for each sensor in turn. With `free` the
+/// sessions only, or without other sensors, the constants are those of `start`.
 ///
-/// Offset, gain and attitude of a sensor are its session's and are fitted to itself.
+/// Offset, gain and attitude of a sensor belong to its session and are fitted to the sensor itself.
 ///
 /// # Errors
-/// As [`fit`].
+/// The errors of [`fit`].
 pub fn leave_one_out(
     start: &Model,
     recordings: &[Recording],
@@ -116,8 +116,8 @@ pub fn leave_one_out(
     held.collect()
 }
 
-/// What one standard deviation between sensors multiplies the constant `key` by, from the fits
-/// without one sensor each: the jackknife. None for fewer than two of them.
+/// Returns the factor of one standard deviation of the constant `key` between sensors, from the
+/// leave-one-out fits (jackknife); `None` for fewer than two of them.
 pub fn between(held_out: &[HeldOut], key: &str) -> Option<f64> {
     let found =
         held_out.iter().map(|held| held.fit.estimates.iter().find(|found| found.key == key));
@@ -128,7 +128,7 @@ pub fn between(held_out: &[HeldOut], key: &str) -> Option<f64> {
     (logs.len() > 1).then(|| ((count - 1.0) / count * squares).sqrt().exp())
 }
 
-/// Scores a session by load; none if a pose has no answer.
+/// Scores a session by load; `None` if a pose has no solution.
 pub fn loads(
     model: &Model,
     session: &Session,
@@ -162,12 +162,12 @@ pub fn loads(
     Some(scored.collect())
 }
 
-/// Counts at rest when the fluid conducts `factor` times as well.
+/// Returns the counts at rest if the fluid conducts `factor` times as well.
 fn conducting(rest: f64, factor: f64) -> f64 {
     counts(impedance_ohm(rest) / factor)
 }
 
-/// The factor of conductivity that alone explains most.
+/// Returns the factor of conductivity that best explains the counts alone.
 fn offset(bins: &[Bin], rest: &[f64; ELECTRODES]) -> f64 {
     let (least, most, count) = OFFSETS;
     let error = |factor: f64| -> f64 {
@@ -181,7 +181,7 @@ fn offset(bins: &[Bin], rest: &[f64; ELECTRODES]) -> f64 {
     factors.min_by(|a, b| error(*a).total_cmp(&error(*b))).unwrap_or(1.0)
 }
 
-/// Each electrode's mean change over the loads of all `others`.
+/// Returns each electrode's mean change over the loads of all `others`.
 fn mean_change(others: &[&Recording]) -> Option<[f64; ELECTRODES]> {
     let count: usize = others.iter().map(|other| other.near_normal_loads.len()).sum();
     let change = |i: usize| -> f64 {

@@ -1,4 +1,4 @@
-//! What belongs to one session of one sensor, and the plate on which its presses are repeated.
+//! Session of one sensor, and the plate on which its presses are simulated.
 
 use super::constants::Model;
 use crate::sim::finger::effects::electrodes::{Electrodes, ElectrodesEffect};
@@ -10,34 +10,34 @@ use palpate_explore::robot::finger::frame::ELECTRODES;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Standard deviation of the roll from press to press of a hand at one load (chosen, as fits that
-/// leave it free find 0.01 to 0.27).
+// heuristic: standard deviation of the roll between a hand's presses at one load; fits with this
+// parameter free find 0.01 to 0.27.
 const PRESS_SD_RAD: f64 = 0.1;
 
 /// Abscissae and weights of three-point Gauss–Hermite quadrature over a normal distribution.
 const QUADRATURE: [(f64, f64); 3] =
     [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
 
-/// Offset, gain and attitude: nothing that another session of the sensor shares.
+/// Session parameters: offset, gain and attitude, not shared with other sessions of the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {
-    /// How well the fluid conducts, relative to the session without contact.
+    /// Conductivity of the fluid, relative to the session without contact.
     pub offset: f64,
-    /// What the sensor's electrodes multiply the exponent of their gap with.
+    /// Factor on the exponent of the electrodes' gaps.
     pub gain: f64,
-    /// From the pad towards the tip.
+    /// Pitch, from the pad towards the tip.
     pub pitch_rad: f64,
-    /// From the pad towards +y, at each load: these are different presses.
+    /// Roll, from the pad towards +y, at each load, because these are different presses.
     pub roll_rad: Vec<f64>,
 }
 
 impl Session {
-    /// Mean of the rolls.
+    /// Returns the mean of the rolls.
     pub fn mean_roll_rad(&self) -> f64 {
         self.roll_rad.iter().sum::<f64>() / self.roll_rad.len().max(1) as f64
     }
 
-    /// Counts at each load of `recording`; none if a pose has no answer.
+    /// Returns the counts at each load of `recording`; `None` if a pose has no solution.
     pub fn predict(
         &self,
         model: &Model,
@@ -55,7 +55,7 @@ impl Session {
             .collect()
     }
 
-    /// The electrodes of the recorded sensor.
+    /// Returns the electrodes of the recorded sensor.
     pub(super) fn electrodes(&self, model: &Model, recording: &Recording) -> ElectrodesEffect {
         ElectrodesEffect {
             baseline_counts: recording.no_contact_median_counts,
@@ -64,9 +64,9 @@ impl Session {
         }
     }
 
-    /// Mean counts over the presses of a hand with a normal force about a roll, where `carry`
-    /// changes how much of each gap is closed, given the direction that faces the plate; none if a
-    /// pose has no answer.
+    /// Returns the mean counts over the presses of a hand with a normal force about a roll. `carry`
+    /// changes the closed fraction of each gap, given the direction that faces the plate. Returns
+    /// `None` if a pose has no solution.
     pub(super) fn mean_counts(
         &self,
         [force_n, roll_rad]: [f64; 2],
@@ -86,8 +86,8 @@ impl Session {
         Some(mean)
     }
 
-    /// Rise of pressure per newton from 4 to 8 N, relative to the first newton; none if a pose has
-    /// no answer.
+    /// Returns the rise of pressure per newton from 4 to 8 N, relative to the first newton; `None`
+    /// if a pose has no solution.
     pub fn saturation(&self, model: &Model, bench: &mut Bench) -> Option<f64> {
         bench.wear(model)?;
         let angles_rad = [self.pitch_rad, self.mean_roll_rad()];
@@ -97,20 +97,21 @@ impl Session {
     }
 }
 
-/// Presses remembered, of 4 kB each (chosen: several times the slopes of one step).
+// heuristic: number of cached presses, of 4 kB each; several times the number in the slopes of one
+// step.
 const REMEMBERED: usize = 4000;
 
-/// What a press does.
+/// Response of the finger to a press.
 #[derive(Debug)]
 pub struct Press {
-    /// How far the skin moved inwards at each sample.
+    /// Inward motion of the skin at each sample.
     pub inward_m: Vec<f64>,
     /// Pressure of the fluid above rest.
     pub pressure_pa: f64,
 }
 
-/// A finger over a plate, with one skin at a time, that remembers its presses: most of a fit's
-/// parameters leave them alone.
+/// Finger over a plate, with one skin at a time and a cache of its presses: most parameters of a
+/// fit leave them unchanged.
 #[derive(Default)]
 pub struct Bench {
     worn: Option<(Model, Plate)>,
@@ -118,8 +119,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Puts on the skin of `model`, unless it is worn, and returns its points; none if it cannot be
-    /// built.
+    /// Sets the skin of `model`, unless it is set already, and returns its points; `None` if it
+    /// cannot be built.
     pub fn wear(&mut self, model: &Model) -> Option<&[SkinSample]> {
         let is_worn = |(worn, _): &(Model, Plate)| {
             worn.skin == model.skin && worn.cavity_pa_m3 == model.cavity_pa_m3
@@ -130,7 +131,7 @@ impl Bench {
         Some(self.worn.as_ref()?.1.skin.samples())
     }
 
-    /// Presses with a normal force at pitch and roll; none if that has no answer.
+    /// Presses with a normal force at pitch and roll; `None` if the pose has no solution.
     pub fn press(&mut self, angles_rad: [f64; 2], force_n: f64) -> Option<Rc<Press>> {
         let (model, plate) = self.worn.as_mut()?;
         let skin = &model.skin;

@@ -1,4 +1,4 @@
-//! How the electrodes answer tangential force: what was measured, and what the model says.
+//! Response of the electrodes to tangential force: measurement and model.
 
 use super::constants::Model;
 use super::fit::{Free, fit};
@@ -12,40 +12,40 @@ use palpate_gp::math::least_squares::FitError;
 use palpate_input::error::Invalid;
 use serde::Deserialize;
 
-/// Tangential force to either side over which the model's slopes are taken; chosen: about what a
-/// hand that presses with 3 to 6 N does.
+// heuristic: tangential force to either side over which the model's slopes are computed, about that
+// of a hand that presses with 3 to 6 N.
 const ASIDE_N: f64 = 1.0;
 
-/// So many electrodes with the largest slopes are held against each other one by one (chosen).
+// heuristic: number of electrodes with the largest slopes that are compared one by one.
 const LARGEST: usize = 8;
 
-/// Slopes of one or more sensors.
+/// Measured slopes of one or more sensors.
 #[derive(Clone, Debug, Deserialize)]
 pub struct ShearRecordings {
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub note: String,
-    /// One entry per sensor.
+    /// Slopes, one entry per sensor.
     pub sensors: Vec<ShearRecording>,
 }
 
 /// Least-squares slopes of the counts over the force on the finger, E1 to E19.
 #[derive(Clone, Debug, Deserialize)]
 pub struct ShearRecording {
-    /// The sensor's name in the source.
+    /// Name of the sensor in the source.
     pub sensor: String,
     /// Mean normal force of the frames.
     pub mean_normal_force_n: f64,
-    /// Over the force along +y of `T`.
+    /// Slopes over the force along +y of `T`.
     pub counts_per_n_lateral: [f64; ELECTRODES],
-    /// Over that along +x.
+    /// Slopes over the force along +x of `T`.
     pub counts_per_n_axial: [f64; ELECTRODES],
 }
 
 impl ShearRecordings {
-    /// Whether there are sensors and forces can be theirs.
+    /// Checks that there are sensors and that the forces are plausible.
     ///
     /// # Errors
-    /// The first that cannot.
+    /// Returns the first value that is not plausible.
     pub fn check(&self) -> Result<(), Invalid> {
         filled("sensors", self.sensors.len())?;
         for (i, of) in self.sensors.iter().enumerate() {
@@ -55,17 +55,17 @@ impl ShearRecordings {
     }
 }
 
-/// Slopes of the model against measured ones.
+/// Comparison of the model's slopes with measured ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Agreement {
-    /// Counts per N that were measured.
+    /// Measured slopes, counts per N.
     pub measured: [f64; ELECTRODES],
-    /// Those of the model.
+    /// Slopes of the model, counts per N.
     pub model: [f64; ELECTRODES],
 }
 
 impl Agreement {
-    /// Pearson's correlation over the electrodes.
+    /// Returns Pearson's correlation over the electrodes.
     pub fn correlation(&self) -> f64 {
         let about_mean = |all: &[f64; ELECTRODES]| {
             let mean = all.iter().sum::<f64>() / ELECTRODES as f64;
@@ -75,8 +75,8 @@ impl Agreement {
         dot(&measured, &model) / (dot(&measured, &measured) * dot(&model, &model)).sqrt()
     }
 
-    /// Least and greatest ratio of the model's slope to the measured one, over the eight electrodes
-    /// whose measured slopes are largest.
+    /// Returns the smallest and largest ratio of the model's slope to the measured one, over the
+    /// eight electrodes with the largest measured slopes.
     pub fn ratios(&self) -> [f64; 2] {
         let mut order: Vec<usize> = (0..ELECTRODES).collect();
         order.sort_by(|&a, &b| self.measured[b].abs().total_cmp(&self.measured[a].abs()));
@@ -86,29 +86,30 @@ impl Agreement {
         })
     }
 
-    /// What the model's slopes are best multiplied by (least squares).
+    /// Returns the factor on the model's slopes that fits best (least squares).
     pub fn scale(&self) -> f64 {
         dot(&self.measured, &self.model) / dot(&self.model, &self.model)
     }
 }
 
-/// A sensor under tangential force.
+/// Comparison for a sensor under tangential force.
 #[derive(Clone, Debug)]
 pub struct Sheared {
-    /// The sensor.
+    /// Name of the sensor.
     pub sensor: String,
-    /// Under force along y of `T`.
+    /// Comparison under force along y of `T`.
     pub lateral: Agreement,
-    /// Under force along x.
+    /// Comparison under force along x of `T`.
     pub axial: Agreement,
 }
 
-/// Holds the model against what was measured on a sensor, in the session that fits its
-/// `recording` under normal force. Nothing is fitted to the slopes: the finger does not roll while
+/// Compares the model with the measured slopes of a sensor, in the session that fits its
+/// `recording` under normal force. Nothing is fitted to the slopes: the finger does not roll under
+/// shear.
 /// it is sheared.
 ///
-/// # Errors
-/// As [`fit`].
+/// The errors of [`fit`].
+/// The errors of [`fit`].
 pub fn compare(
     model: &Model,
     friction: &FrictionEffect,
@@ -129,7 +130,8 @@ pub fn compare(
     })
 }
 
-/// Counts per N of tangential force on the finger along `axis_t`; none if a pose has no answer.
+/// Returns the counts per N of tangential force on the finger along `axis_t`; `None` if a pose has
+/// no solution.
 fn slopes(
     model: &Model,
     friction: &FrictionEffect,

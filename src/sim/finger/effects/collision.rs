@@ -1,13 +1,14 @@
-//! Links, tool, object and table in each other's way.
+//! Collisions between links, tool, object and table.
 
 use super::effect::{Effect, Needs};
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[collision]`: in a `dynamic` body MuJoCo lets the links of the arm, the adapter and the
-/// finger collide with each other, with a table, and all but a soft finger with the object as
-/// `solver.collision` says. Without it they pass through each other.
+/// Table `[collision]`: in a `dynamic` body, MuJoCo lets the links of the arm, the adapter and the
+/// finger collide with each other and with a table. All but a soft finger also collide with the
+/// object, with the geometry of `solver.collision`. Without this table they pass through each
+/// other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CollisionEffect {
@@ -16,7 +17,7 @@ pub struct CollisionEffect {
 }
 
 impl Default for CollisionEffect {
-    /// The foot of the arm where that stands by default.
+    /// Returns a table at the height of the arm's default base.
     fn default() -> Self {
         Self { table_m: 0.0 }
     }

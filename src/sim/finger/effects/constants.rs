@@ -1,6 +1,6 @@
-//! The constants of effects, which stand in the file of a sensor and not in a scene.
+//! Constants of effects, which are part of a sensor file and not of a scene.
 //!
-//! In memory an effect holds its constants beside its settings.
+//! In memory an effect has its constants next to its settings.
 
 use palpate_input::config::Rules;
 use serde::de::DeserializeOwned;
@@ -8,21 +8,21 @@ use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 use toml::{Table, Value};
 
-/// The sensors that come with Palpate: names and files.
+/// Sensors included in Palpate: names and files.
 pub const SENSORS: [(&str, &str); 1] = [("biotac", include_str!("../../../../models/biotac.toml"))];
 
-/// The tables of the BioTac's file.
+/// Tables of the BioTac's file.
 pub(super) static BIOTAC: LazyLock<Table> =
     LazyLock::new(|| toml::from_str(SENSORS[0].1).unwrap_or_default());
 
-/// Value of a constant in the BioTac's file, by the dotted name of its table and its key.
+/// Returns a constant of the BioTac's file, by the dotted name of its table and its key.
 pub(super) fn constant<T: DeserializeOwned + Default>(table: &str, key: &str) -> T {
     let table = table.split('.').try_fold(&*BIOTAC, |table, part| table.get(part)?.as_table());
     let value = table.and_then(|table| table.get(key)).cloned();
     value.and_then(|value| value.try_into().ok()).unwrap_or_default()
 }
 
-/// A number, or several, that a range limits.
+/// Number or list of numbers with an allowed range.
 pub(super) trait Constant {
     /// Checks the constant under `key`.
     fn check(&self, key: &str, allowed: RangeInclusive<f64>, rules: &mut Rules);
@@ -40,8 +40,8 @@ impl<const N: usize> Constant for [f64; N] {
     }
 }
 
-/// Makes the type of an effect from its settings, which a scene gives, and its constants, which the
-/// sensor's file gives under the name of a table. `checked by` names the rules of the settings.
+/// Defines the type of an effect from its settings, which a scene gives, and its constants, which
+/// the sensor file gives under the name of a table. `checked by` names the checks of the settings.
 macro_rules! effect {
     (
         $(#[$doc:meta])*
@@ -62,7 +62,7 @@ macro_rules! effect {
         }
 
         impl Default for $Effect {
-            /// Constants are those of `models/biotac.toml`, which names their sources.
+            /// Returns the constants of `models/biotac.toml`, which names their sources.
             fn default() -> Self {
                 use crate::sim::finger::effects::constants::constant;
                 Self {
@@ -87,7 +87,7 @@ macro_rules! effect {
 }
 pub(super) use effect;
 
-/// Splits the tables of effects into settings and those constants that are not the BioTac's.
+/// Splits the tables of effects into settings and the constants that differ from the BioTac's.
 pub(super) fn split(effects: Table) -> (Table, Table) {
     split_by(effects, &BIOTAC)
 }

@@ -1,18 +1,18 @@
-//! Silicone that gives way in time: a skin held as it is pushes less and less, and on the way back
-//! less than on the way in.
+//! Stress relaxation of silicone: at a constant pose the force of the skin decays, and unloading
+//! gives less force than loading.
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
 use crate::sim::finger::load::Load;
 
 effect! {
-    /// Table `[creep]`: the skin as a standard linear solid. The fluid's share goes with it; gaps
-    /// follow the object as ever.
+    /// Table `[creep]`: the skin as a standard linear solid. The fluid's share of the force relaxes
+    /// with it; gaps follow the object without delay.
     CreepEffect in "creep"
     constants {
-        /// By this part a sudden load exceeds what stays of it.
+        /// Instantaneous over relaxed load, minus one.
         part: f64, 0.0..=10.0;
-        /// Time constant with which that goes away.
+        /// Time constant of the relaxation.
         time_constant_s: f64, 1e-3..=1e6;
     }
 }
@@ -24,7 +24,7 @@ impl Effect for CreepEffect {
         Some(|effect, lag, _, dt_s, load| lag.step(effect, dt_s, load));
 }
 
-/// What lags behind the load: one trial's state.
+/// Relaxation state of the load in one trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lag {
     force_n: f64,
@@ -32,7 +32,7 @@ pub struct Lag {
 }
 
 impl Lag {
-    /// Another `dt_s` under an elastic `load`, which becomes f + part (f − lag of f), but never
+    /// Advances by `dt_s` under an elastic `load`, which becomes f + part (f − lag of f), but never
     /// pulls. The lag is exact for a constant load.
     pub fn step(&mut self, effect: &CreepEffect, dt_s: f64, load: &mut Load) {
         let caught_up = -(-dt_s / effect.time_constant_s).exp_m1();

@@ -1,73 +1,73 @@
-//! What an effect is: an optional table of the scene, what follows from its being there, and the
-//! switches that put it in and take it out.
+//! The trait of an effect: an optional table of the scene, its consequences for the simulation, and
+//! the switches that toggle it.
 
 use crate::sim::finger::load::Load;
 use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::Checked;
 use std::fmt::Debug;
 
-/// One optional piece of the finger's physics: its settings, all of which have defaults.
+/// Optional part of the finger's physics: its settings, all with defaults.
 ///
-/// An effect that changes the load is written with [`ON_LOAD`](Self::ON_LOAD) and needs nothing
-/// else. One that acts elsewhere (in a channel of the sensor, in a pose) is asked for there.
+/// An effect that changes the load implements [`ON_LOAD`](Self::ON_LOAD) and nothing else. An
+/// effect on something else (a channel of the sensor, a pose) is called there.
 pub trait Effect: Checked + Clone + Default + 'static {
-    /// What it remembers during one trial; `()` for nothing.
+    /// State during one trial; `()` for none.
     type State: Clone + Debug + Default;
 
-    /// What it means nothing without.
+    /// The effect that this one requires.
     const NEEDS: Needs = Needs::Skin;
 
-    /// Whether it fills a channel of the tactile frame.
+    /// Whether the effect fills a channel of the tactile frame.
     const FILLS_FRAMES: bool = false;
 
-    /// What it does to the load once in each step, the others of its kind above it in the table
-    /// having acted; none if it leaves the load alone.
+    /// Change of the load once in each step, after the effects above it in the table; `None` if the
+    /// load stays unchanged.
     const ON_LOAD: Option<OnLoad<Self>> = None;
 
-    /// What it remembers at the start of a trial.
+    /// Returns the state at the start of a trial.
     fn start(&self) -> Self::State {
         Self::State::default()
     }
 
-    /// Its part of a finger with every effect.
+    /// Returns the settings for a finger with every effect.
     fn complete() -> Self {
         Self::default()
     }
 
-    /// What of it can be switched: all of it, unless it says more.
+    /// Returns the parts that can be toggled independently; by default the whole effect.
     fn switches() -> Vec<Switch<Option<Self>>> {
         vec![Switch::table()]
     }
 }
 
-/// Changes the load at the end of a step, with the memory of the trial, given how the fingertip
-/// moves then and the step's duration in seconds.
+/// Changes the load at the end of a step, given the state of the trial, the motion of the
+/// fingertip, and the step's duration in seconds.
 pub type OnLoad<E> = fn(&E, &mut <E as Effect>::State, &TipMotion, f64, &mut Load);
 
-/// What an effect means nothing without.
+/// Requirement of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
-    /// It stands alone.
+    /// No requirement.
     Nothing,
     /// A skin.
     Skin,
-    /// A tactile frame with something in it.
+    /// A tactile frame with at least one channel.
     Frames,
 }
 
-/// Puts something into a `T`, or takes it out.
+/// Adds a part to a `T`, or removes it.
 type Set<T> = Box<dyn Fn(&mut T, bool)>;
 
-/// A switch in a `T`.
+/// Switch of a part of a `T`.
 pub struct Switch<T> {
-    /// As in the scene's file.
+    /// Name in the scene file.
     pub name: String,
     is_on: Box<dyn Fn(&T) -> bool>,
     set: Set<T>,
 }
 
 impl<T: 'static> Switch<T> {
-    /// Read by `is_on`, moved by `set`.
+    /// Creates a switch with the getter `is_on` and the setter `set`.
     pub fn new(
         name: &str,
         is_on: impl Fn(&T) -> bool + 'static,
@@ -76,17 +76,17 @@ impl<T: 'static> Switch<T> {
         Self { name: name.into(), is_on: Box::new(is_on), set: Box::new(set) }
     }
 
-    /// Whether it is on.
+    /// Returns whether the part is present.
     pub fn is_on(&self, of: &T) -> bool {
         (self.is_on)(of)
     }
 
-    /// Puts in with its defaults what was not there, or takes it out.
+    /// Adds the part with its defaults if it is missing, or removes it.
     pub fn set(&self, of: &mut T, on: bool) {
         (self.set)(of, on);
     }
 
-    /// The same switch of the larger `U` that keeps its `T` under `name`.
+    /// Returns the same switch for a larger `U` that has its `T` under `name`.
     pub fn within<U: 'static>(
         self,
         name: &str,
@@ -108,7 +108,7 @@ impl<T: 'static> Switch<T> {
 }
 
 impl<E: Default + 'static> Switch<Option<E>> {
-    /// The whole of an optional table; its name is that under which it is kept.
+    /// Returns the switch of a whole optional table, named after the table.
     pub fn table() -> Self {
         Self::new("", Option::is_some, |table, on| match on {
             true => drop(table.get_or_insert_default()),

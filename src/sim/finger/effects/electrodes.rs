@@ -1,4 +1,4 @@
-//! The impedance electrodes: where the fluid over one grows thin, its counts fall.
+//! Impedance electrodes: the counts of an electrode fall as the fluid over it becomes thinner.
 
 use super::constants::effect;
 use super::effect::Effect;
@@ -9,35 +9,35 @@ use palpate_explore::robot::finger::electrode_table;
 use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use rand::Rng;
 
-/// The resistor an electrode divides its voltage with (SynTouch BioTac SP manual, §5.1).
+/// Resistor of the voltage divider of an electrode (SynTouch BioTac SP manual, §5.1).
 const LOAD_OHM: f64 = 10e3;
 
-/// A closed gap keeps this part of its fluid: the largest Z/Z0 in MiaoLi/syntouchcontact's
-/// recordings is 40.
+/// Smallest fraction of its fluid that a closed gap keeps: the largest Z/Z0 in
+/// MiaoLi/syntouchcontact's recordings is 40.
 const FILM: f64 = 1.0 / 40.0;
 
-/// Samples farther than this many spreads do not count.
+/// Distance, in spreads, beyond which samples are ignored.
 const REACH: f64 = 3.0;
 
 effect! {
     /// Table `[electrodes]`: 19 impedances through the fluid.
     ElectrodesEffect in "electrodes"
     constants {
-        /// What E1 to E19 read untouched.
+        /// Counts of E1 to E19 without contact.
         baseline_counts: [f64; ELECTRODES], 1.0..=FULL_SCALE_COUNTS - 1.0;
-        /// Standard deviation of the patch of fluid an electrode senses.
+        /// Standard deviation of the patch of fluid that an electrode senses.
         spread_m: f64, 1e-5..=1e-1;
         /// Power p in Z = Z0 (g0/g)^p.
         exponent: f64, 0.1..=10.0;
-        /// White noise, as a factor on the recorded standard deviations; 0 is none.
+        /// Factor of white noise on the recorded standard deviations; 0 for none.
         noise: f64, 0.0..=1e3;
         /// Correlation of that noise between any two electrodes, which share their excitation.
         noise_correlation: f64, 0.0..=1.0;
-        /// Random walk shared by all electrodes, in counts per root second; 0 is none.
+        /// Random walk shared by all electrodes, in counts per root second; 0 for none.
         drift_counts: f64, 0.0..=1e3;
-        /// Whether counts are whole numbers.
+        /// Rounding of counts to whole numbers.
         quantise: bool;
-        /// Whether counts stay within the converter's 0 to 4095.
+        /// Clipping of counts to the converter's range, 0 to 4095.
         clip: bool;
     }
 }
@@ -48,20 +48,20 @@ impl Effect for ElectrodesEffect {
     const FILLS_FRAMES: bool = true;
 }
 
-/// The electrodes over a skin; never change.
+/// Electrodes over a skin; constant.
 #[derive(Clone, Debug)]
 pub struct Electrodes {
     effect: ElectrodesEffect,
     /// Standard deviation of the noise.
     noise_counts: [f64; ELECTRODES],
-    /// Untouched impedances.
+    /// Impedances without contact.
     z0_ohm: [f64; ELECTRODES],
-    /// For each electrode, samples and what moving each inwards by a metre takes off g/g0.
+    /// For each electrode: samples, with the decrease of g/g0 per metre of inward motion.
     weights: [Vec<(usize, f64)>; ELECTRODES],
 }
 
 impl Electrodes {
-    /// Electrodes under `samples`, whose lengths are `scale` times a BioTac's.
+    /// Creates electrodes under `samples`, whose lengths are `scale` times a BioTac's.
     pub fn new(effect: &ElectrodesEffect, samples: &[SkinSample], scale: f64) -> Self {
         let weights = electrode_table::positions_t(scale).map(|electrode| {
             let from = |sample: &SkinSample| {
@@ -92,21 +92,21 @@ impl Electrodes {
         }
     }
 
-    /// Makes electrode `i` that many times as noisy.
+    /// Multiplies the noise of electrode `i` by `factor`.
     pub fn worsen(&mut self, i: usize, factor: f64) {
         self.noise_counts.iter_mut().skip(i).take(1).for_each(|counts| *counts *= factor);
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         size_of_val(self)
             + self.weights.iter().map(|near| size_of_val(near.as_slice())).sum::<usize>()
     }
 
-    /// The part of each gap that is closed by skin that moved inwards by `inward_m`, one each, or
-    /// none at rest; negative where it lifted.
+    /// Returns the fraction of each gap that is closed if the skin moves inwards by `inward_m` at
+    /// each sample; an empty slice means rest. The fraction is negative where the skin lifted.
     pub fn closed(&self, inward_m: &[f64]) -> [f64; ELECTRODES] {
-        // An untouched skin is the usual case and needs no sums.
+        // A skin at rest is the usual case and needs no sums.
         let moved = |weights: &[(usize, f64)]| match inward_m.is_empty() {
             true => 0.0,
             false => {
@@ -117,8 +117,8 @@ impl Electrodes {
         std::array::from_fn(|i| moved(&self.weights[i]))
     }
 
-    /// Ideal counts with that part of each gap closed when the fluid conducts `conductivity` times
-    /// as well as at rest.
+    /// Returns ideal counts with the given fraction of each gap closed, if the fluid conducts
+    /// `conductivity` times as well as at rest.
     pub fn counts_closed(
         &self,
         closed: &[f64; ELECTRODES],
@@ -130,7 +130,7 @@ impl Electrodes {
         })
     }
 
-    /// What the converter makes of ideal counts, with what is common on top.
+    /// Returns the converter's output for ideal counts, with the common noise and drift.
     pub fn convert(&self, i: usize, ideal_counts: f64, common: &Common, rng: &mut impl Rng) -> f64 {
         let effect = &self.effect;
         let mut counts = ideal_counts + common.drift_counts;
@@ -144,7 +144,7 @@ impl Electrodes {
         if effect.clip { counts.clamp(0.0, FULL_SCALE_COUNTS) } else { counts }
     }
 
-    /// What is common to the next frame, `duration_s` after the last one.
+    /// Returns the common noise and drift of the next frame, `duration_s` after the last one.
     pub fn next(&self, common: &Common, duration_s: f64, rng: &mut impl Rng) -> Common {
         let effect = &self.effect;
         let mut next = Common { noise: 0.0, ..*common };
@@ -158,22 +158,23 @@ impl Electrodes {
     }
 }
 
-/// How skin that is carried sideways over the core changes the electrodes' gaps; never changes.
+/// Effect of tangential skin displacement over the core on the electrodes' gaps; constant.
 ///
-/// The skin is a sleeve around the core that the fluid lets slide. Carried by `s`, it comes down
-/// where it faces against `s` and lifts off where it faces along it: over a point with outward
-/// normal n along a ray d, by −(n·s) / (n·d). The fluid's volume stays, so the whole skin over it
-/// lifts by the rest. The nail holds the dry skin; at the apex skin and core touch (FEM mesh of
-/// NVlabs/biotac_sim) and hold each other, and in between the skin follows with 1 − d_x² (chosen).
-/// On a plane the skin slides along itself: where the object is met, its shape decides the gap.
+/// The skin is a sleeve around the core that can slide on the fluid. Displaced by `s`, it comes
+/// down where it faces against `s` and lifts off where it faces along it: over a point with outward
+/// normal n along a ray d, by −(n·s) / (n·d). The fluid's volume is constant, so the whole skin
+/// over it lifts by the rest. The nail clamps the dry skin; at the apex skin and core touch (FEM
+/// mesh of NVlabs/biotac_sim) and are fixed to each other; in between the skin follows with 1 −
+/// d_x², a heuristic. On a plane the skin slides along itself: under the contact, the object's
+/// shape decides the gap.
 #[derive(Clone, Debug)]
 pub struct Shear {
-    /// Part of each electrode's gap that a metre along x, y and z of `T` closes.
+    /// Fraction of each electrode's gap that a metre along x, y and z of `T` closes.
     closes_per_m: [[f64; ELECTRODES]; 3],
 }
 
 impl Shear {
-    /// Of the skin at `samples`, over `electrodes`.
+    /// Computes the effect of the skin at `samples` on `electrodes`.
     pub fn new(electrodes: &Electrodes, samples: &[SkinSample]) -> Self {
         let is_wet = |sample: &&SkinSample| sample.layers.wet;
         let follows = |sample: &SkinSample| 1.0 - sample.direction.x.max(0.0).powi(2);
@@ -194,7 +195,8 @@ impl Shear {
         Self { closes_per_m }
     }
 
-    /// Adds to the `closed` part of each gap what skin carried by `skin_t` closes.
+    /// Adds the fraction closed by a skin displacement of `skin_t` to the `closed` fraction of each
+    /// gap.
     pub fn add(&self, skin_t: &Vector3<f64>, closed: &mut [f64; ELECTRODES]) {
         for (per_m, &carried_m) in self.closes_per_m.iter().zip(skin_t.iter()) {
             for (closed, per_m) in closed.iter_mut().zip(per_m) {
@@ -204,33 +206,35 @@ impl Shear {
     }
 }
 
-/// What all electrodes of a frame have in common.
+/// Noise and drift common to all electrodes of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Common {
-    /// The drift so far.
+    /// Accumulated drift.
     pub drift_counts: f64,
-    /// Their common part of the noise, in standard deviations of each.
+    /// Common part of the noise, in standard deviations of each electrode.
     pub noise: f64,
 }
 
-/// `base` to the power of `exponent`; the default exponent and a gap at rest, both 1, need no work.
+/// Returns `base` to the power of `exponent`, with a shortcut for the default exponent and a gap at
+/// rest, both 1.
 #[inline]
 fn power(base: f64, exponent: f64) -> f64 {
     if exponent == 1.0 || base == 1.0 { base } else { raised(base, exponent) }
 }
 
-/// Apart from [`power`], or the compiler computes it in any case and then chooses.
+/// Separate from [`power`], because the compiler would otherwise always compute it.
 #[inline(never)]
 fn raised(base: f64, exponent: f64) -> f64 {
     base.powf(exponent)
 }
 
-/// Counts over impedance: E = 4095 / (1 + Z / 10 kΩ) (SynTouch BioTac SP manual, §5.1).
+/// Returns the counts of an impedance: E = 4095 / (1 + Z / 10 kΩ) (SynTouch BioTac SP manual,
+/// §5.1).
 pub fn counts(impedance_ohm: f64) -> f64 {
     FULL_SCALE_COUNTS / (1.0 + impedance_ohm / LOAD_OHM)
 }
 
-/// Impedance over counts: the inverse of [`counts`].
+/// Returns the impedance of counts: the inverse of [`counts`].
 pub fn impedance_ohm(counts: f64) -> f64 {
     (FULL_SCALE_COUNTS / counts - 1.0) * LOAD_OHM
 }

@@ -1,4 +1,4 @@
-//! What the pressure sensor makes of the fluid: PDC (static) and PAC (vibration).
+//! Pressure sensor of the fluid: PDC (static) and PAC (vibration).
 
 use super::constants::effect;
 use super::effect::{Effect, Switch};
@@ -11,25 +11,25 @@ use std::f64::consts::TAU;
 /// Pressure per count of PDC (SynTouch BioTac SP manual).
 const PDC_PA: f64 = 36.5;
 
-/// Pressure per count of PAC (same).
+/// Pressure per count of PAC (SynTouch BioTac SP manual).
 const PAC_PA: f64 = 0.37;
 
 effect! {
     /// Table `[fluid]`: the liquid under the skin and the sensor of its pressure.
     FluidEffect in "fluid"
     settings checked by check_vibration {
-        /// PAC; without it the sensor does not send it.
+        /// Vibration channel PAC; without it the sensor does not send PAC.
         #[serde(skip_serializing_if = "Option::is_none")]
         vibration: Option<VibrationEffect> = None,
     }
     constants {
-        /// Pressure per volume the fluid is compressed by, in Pa/m³.
+        /// Fluid stiffness: pressure per compressed volume, in Pa/m³.
         stiffness_pa_m3: f64, 1e6..=1e20;
         /// PDC at rest.
         baseline_counts: f64, 0.0..=FULL_SCALE_COUNTS;
-        /// White noise of PDC; 0 is none.
+        /// White noise of PDC; 0 for none.
         noise_counts: f64, 0.0..=1e3;
-        /// Whether counts are whole numbers from 0 to 4095.
+        /// Rounding of counts to whole numbers from 0 to 4095.
         quantise: bool;
     }
 }
@@ -49,7 +49,8 @@ impl Effect for FluidEffect {
         Self { vibration: Some(VibrationEffect::default()), ..Self::default() }
     }
 
-    /// All of it, and its vibration, which brings the fluid with it.
+    /// Returns the switch of the whole effect, and that of its vibration, which also adds the
+    /// fluid.
     fn switches() -> Vec<Switch<Option<Self>>> {
         let is_on = |fluid: &Option<Self>| fluid.as_ref().is_some_and(|f| f.vibration.is_some());
         let set = |fluid: &mut Option<Self>, on| match (fluid, on) {
@@ -67,24 +68,24 @@ effect! {
     constants {
         /// PAC at rest.
         baseline_counts: f64, 0.0..=FULL_SCALE_COUNTS;
-        /// White noise; 0 is none.
+        /// White noise; 0 for none.
         noise_counts: f64, 0.0..=1e3;
-        /// Slower changes are taken out.
+        /// High-pass cut-off frequency.
         high_pass_hz: f64, 1e-3..=1e4;
-        /// Faster ones too.
+        /// Low-pass cut-off frequency.
         low_pass_hz: f64, 1e-3..=1e5;
     }
 }
 
 impl FluidEffect {
-    /// PDC at a pressure above rest.
+    /// Returns PDC at a pressure above rest.
     pub fn pdc_counts(&self, pressure_pa: f64, rng: &mut impl Rng) -> f64 {
         let counts = self.baseline_counts + pressure_pa / PDC_PA;
         converted(counts, self.noise_counts, self.quantise, rng)
     }
 }
 
-/// The filters of PAC, both of first order: one trial's state.
+/// First-order filters of PAC: state of one trial.
 #[derive(Clone, Debug, Default)]
 pub struct Filter {
     smooth_pa: f64,
@@ -92,7 +93,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// PAC `dt_s` after the last one.
+    /// Returns PAC `dt_s` after the last sample.
     pub fn pac_counts(
         &mut self,
         (fluid, vibration): (&FluidEffect, &VibrationEffect),

@@ -1,8 +1,8 @@
-//! Stick and slip: one elastic bristle between finger and object, dragged along at Coulomb's limit.
+//! Coulomb friction with stick and slip: one elastic bristle between finger and object.
 //!
-//! What yields is the skin: the bristle's stretch is how far the object carries it over the core,
-//! which the electrodes feel ([`Shear`](super::electrodes::Shear)). While it slips, the
-//! object's texture makes the fluid vibrate.
+//! The skin is the compliant part: the bristle's stretch is the displacement of the skin over the
+//! core by the object, which the electrodes sense ([`Shear`](super::electrodes::Shear)). During
+//! slip, the object's texture makes the fluid vibrate.
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
@@ -10,19 +10,19 @@ use crate::sim::finger::load::Load;
 use nalgebra::Vector3;
 use palpate_explore::robot::finger::TipMotion;
 
-/// Slower than this the skin creeps and does not slip (chosen): far below any speed of a touch,
-/// far above what rounding at Coulomb's limit makes of a finger at rest.
+// heuristic: below this speed the skin creeps and does not slip; far below any speed of a touch,
+// far above the rounding error at Coulomb's limit of a finger at rest.
 const SLIP_M_S: f64 = 1e-5;
 
 effect! {
     /// Table `[friction]`: tangential force of the skin, its shear over the core, and slip.
     FrictionEffect in "friction"
     constants {
-        /// Coulomb's coefficient.
+        /// Coulomb friction coefficient.
         coefficient: f64, 0.0..=10.0;
         /// Tangential stiffness of the skin on the core, in N/m.
         stiffness_n_m: f64, 1.0..=1e9;
-        /// Roughness of the object: the power of the pressure's noise, in Pa², per m/s of slip.
+        /// Roughness of the object: noise power of the pressure, in Pa², per m/s of slip.
         roughness_pa2_s_m: f64, 0.0..=1e9;
     }
 }
@@ -35,22 +35,22 @@ impl Effect for FrictionEffect {
 }
 
 impl FrictionEffect {
-    /// Standard deviation of the pressure while the skin slips at a speed.
+    /// Returns the standard deviation of the pressure during slip at a given speed.
     ///
-    /// A surface whose spectrum falls with the square of the wave number (a random walk's) passes
-    /// at v with power in proportion to v in any fixed band.
+    /// A surface whose spectrum falls with the square of the wave number (like a random walk) that
+    /// passes at speed v has power proportional to v in any fixed band.
     pub fn vibration_pa(&self, slip_m_s: f64) -> f64 {
         (self.roughness_pa2_s_m * slip_m_s).sqrt()
     }
 }
 
-/// How far finger and object are sheared against each other: one trial's state.
+/// Shear between finger and object: state of one trial.
 #[derive(Clone, Debug, Default)]
 pub struct Bristle {
     stretch_w: Vector3<f64>,
-    /// How far the object carries the skin over the core, in `T`.
+    /// Displacement of the skin over the core by the object, in `T`.
     pub skin_t: Vector3<f64>,
-    /// Speed at which the skin slipped on the object in the last step; 0 while it sticks.
+    /// Slip speed of the skin on the object in the last step; 0 while it sticks.
     pub slip_m_s: f64,
 }
 
@@ -58,9 +58,9 @@ impl Bristle {
     /// Moves the skin with the velocity of T for `dt_s` and adds the friction to `load`, at the
     /// centre of pressure.
     ///
-    /// The stretch follows the motion in the tangent plane and is shortened to μ N / k: a
-    /// projection onto a convex set, taken before the force is read, so a step never gives back
-    /// more than ½ k z² had stored. Friction against spinning about the normal is left out.
+    /// The stretch follows the motion in the tangent plane and is shortened to μ N / k. This is a
+    /// projection onto a convex set before the force is evaluated, so a step never returns more
+    /// than the ½ k z² that was stored. Friction against spinning about the normal is not modelled.
     pub fn step(
         &mut self,
         effect: &FrictionEffect,

@@ -1,8 +1,8 @@
-//! The optional physics of the finger: a scene simulates what it names and pays for nothing else.
+//! Optional physics of the finger: a scene simulates only the effects that it names.
 //!
-//! An effect is a file here, which implements [`Effect`], and a line in the table below. Key and
-//! rules in the scene's file, presence in [`Effects`], memory during a trial, hook on the load,
-//! switch and row in a study of effects follow from that line.
+//! An effect is a file here, which implements [`Effect`], and a line in the table below. That line
+//! defines its key and checks in the scene file, its field in [`Effects`], its state during a
+//! trial, its hook on the load, its switch, and its row in a study of effects.
 
 pub mod collision;
 pub mod constants;
@@ -25,35 +25,35 @@ use effect::{Effect, Needs, Switch};
 use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::{Checked, Rules};
 
-// What an effect needs stands above it.
+// An effect comes after those that it requires.
 table::effects! {
-    /// A soft skin; without it there is no load and no tactile frame.
+    /// Soft skin; without it there is no load and no tactile frame.
     skin: skin::SkinEffect,
-    /// Liquid under the skin and its pressure; without it the finger is dry and its skin's
-    /// points do not know of each other.
+    /// Liquid under the skin with its pressure; without it the finger is dry and the skin's points
+    /// are independent.
     fluid: fluid::FluidEffect,
-    /// The impedance electrodes.
+    /// Impedance electrodes.
     electrodes: electrodes::ElectrodesEffect,
-    /// Silicone that gives way in time.
+    /// Stress relaxation of the silicone.
     creep: creep::CreepEffect,
-    /// Heat.
+    /// Heat transfer and temperature channels.
     thermal: thermal::ThermalEffect,
-    /// Tangential forces.
+    /// Friction and tangential forces.
     friction: friction::FrictionEffect,
-    /// The force/torque sensor behind the finger.
+    /// Force/torque sensor behind the finger.
     wrench: wrench::WrenchEffect,
-    /// Errors of the finger's and the object's place.
+    /// Registration errors of finger and object.
     registration: registration::RegistrationEffect,
-    /// How this sensor differs from the next.
+    /// Variation between sensors and sessions.
     variation: variation::VariationEffect,
-    /// Skew and latency of the tactile frames, delay of commands.
+    /// Skew and latency of tactile frames, delay of commands.
     timing: timing::TimingEffect,
-    /// Links, tool, object and table collide.
+    /// Collisions of links, tool, object and table.
     collision: collision::CollisionEffect,
 }
 
 impl Effects {
-    /// What a BioTac cannot be without: skin, fluid and electrodes, with their defaults.
+    /// Returns the minimal effects of a BioTac: skin, fluid and electrodes, with their defaults.
     pub fn biotac() -> Self {
         Self {
             skin: Some(skin::SkinEffect::default()),
@@ -63,7 +63,7 @@ impl Effects {
         }
     }
 
-    /// Whether what `needs` asks for is there.
+    /// Returns whether the requirement `needs` is met.
     fn supports(&self, needs: Needs) -> bool {
         match needs {
             Needs::Nothing => true,
@@ -73,7 +73,7 @@ impl Effects {
     }
 }
 
-/// Why `name` may not be there; `filling` says of each effect whether it fills frames.
+/// Returns why `name` is not allowed; `filling` has, for each effect, whether it fills frames.
 fn missing(name: &str, needs: Needs, filling: &[(&str, bool)]) -> String {
     match needs {
         Needs::Frames => {

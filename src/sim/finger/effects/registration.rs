@@ -1,4 +1,5 @@
-//! What is not where it is believed to be: the finger on its mount, the object in the world.
+//! Registration errors: the finger on its mount and the object in the world deviate from their
+//! nominal poses.
 
 use super::effect::Effect;
 use crate::sim::finger::noise::normal;
@@ -10,30 +11,30 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward
-/// kinematics and the truth know nothing of them.
+/// Table `[registration]`: errors that are constant during a trial and drawn anew for each. Forward
+/// kinematics and ground truth do not include them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationEffect {
-    /// Where the finger really is on its mount, in the words of `arm.tool_position_m`; left out,
-    /// where the arm says.
+    /// True position of the finger on its mount, as in `arm.tool_position_m`; default: the arm's
+    /// setting.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finger_position_m: Option<[f64; 3]>,
-    /// The same of its attitude, in the words of `arm.tool_rotation_deg`.
+    /// True attitude of the finger, as in `arm.tool_rotation_deg`; default: the arm's setting.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finger_rotation_deg: Option<[f64; 3]>,
-    /// Standard deviation of the fingertip's place on its mount, along each axis.
+    /// Standard deviation of the fingertip's position on its mount, along each axis.
     pub finger_m: f64,
-    /// The same of its attitude, about each axis.
+    /// Standard deviation of the fingertip's attitude, about each axis.
     pub finger_deg: f64,
-    /// Standard deviation of the object's place, along each axis.
+    /// Standard deviation of the object's position, along each axis.
     pub object_m: f64,
-    /// The same of its attitude, about each axis through the origin of its mesh.
+    /// Standard deviation of the object's attitude, about each axis through its mesh's origin.
     pub object_deg: f64,
 }
 
 impl Default for RegistrationEffect {
-    /// Chosen: a finger that was measured with a calliper, an object put against a mark.
+    // heuristic: a finger measured with a calliper, an object placed against a mark.
     fn default() -> Self {
         Self {
             finger_position_m: None,
@@ -60,8 +61,8 @@ impl Checked for RegistrationEffect {
 }
 
 impl RegistrationEffect {
-    /// Pose of the finger's own `T` in that of kinematics which the arm's settings move by
-    /// `correction` from the end of the mount, before anything is drawn.
+    /// Returns the true pose of the finger's `T` in the `T` of the kinematics, which the arm's
+    /// settings move by `correction` from the end of the mount, before random errors.
     pub fn fixed(&self, correction: Option<Isometry3<f64>>) -> Option<Isometry3<f64>> {
         if self.finger_position_m.is_none() && self.finger_rotation_deg.is_none() {
             return None;
@@ -78,18 +79,18 @@ impl Effect for RegistrationEffect {
     type State = ();
 }
 
-/// The errors of one trial.
+/// Registration errors of one trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Registration {
-    /// Pose of the finger's own `T` in the `T` of the kinematics.
+    /// True pose of the finger's `T` in the `T` of the kinematics.
     pub finger: Isometry3<f64>,
-    /// From where the object is believed to be to where it is, in its own frame; of
-    /// [`motion`](Self::motion) the way back, in `W`.
+    /// Transform from the nominal to the true pose of the object, in its own frame; for
+    /// [`motion`](Self::motion) the inverse, in `W`.
     pub object: Isometry3<f64>,
 }
 
 impl Registration {
-    /// How the finger moves before the object where that is believed to be.
+    /// Returns the motion of the finger relative to an object at its nominal pose.
     pub fn motion(&self, motion: &TipMotion) -> TipMotion {
         let Self { finger, object } = self;
         let aside_w = motion.x_wt.rotation * finger.translation.vector;
@@ -100,7 +101,7 @@ impl Registration {
         }
     }
 
-    /// Drawn by `rng`.
+    /// Draws the errors with `rng`.
     pub fn new(effect: &RegistrationEffect, rng: &mut impl Rng) -> Self {
         let mut drawn = |place_m: f64, angle_deg: f64| {
             let mut vector = |sd| Vector3::from_fn(|_, _| sd * normal(rng));

@@ -1,4 +1,4 @@
-//! The sensor of a scene: a file with the constants that differ from the BioTac's, or the table
+//! Sensor of a scene: a file with the constants that differ from the BioTac's, or the table
 //! `[effects.sensor]` with them.
 
 use super::constants::{BIOTAC, SENSORS};
@@ -8,17 +8,18 @@ use palpate_input::files;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Puts the constants of the scene's sensor into those effects that stand under `effects`, where
-/// the scene itself has others; returns the keys of constants that the scene has in its effects,
-/// where version 0.1 had them.
+/// Copies the constants of the scene's sensor into the effects under `effects`, unless the scene
+/// sets them itself. Returns the keys of constants that the scene sets in its effects, where
+/// version 0.1 had them.
 ///
 /// # Errors
-/// If the sensor's file cannot be read, or holds what is not a constant or not allowed.
+/// If the sensor file cannot be read, or has a key that is not a constant or a value that is not
+/// allowed.
 pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigError> {
     let flex = format!("{effects}.flex");
     if loader.has_value(&flex) {
-        let allowed = "no flex, which was removed: the skins are model = \"columns\" and \
-                       model = \"shell\" of [effects.skin]";
+        let allowed = "no flex, which was removed: use model = \"columns\" or \
+                       model = \"shell\" in [effects.skin]";
         return Err(loader.not_allowed(&flex, "(given)", allowed));
     }
     let key = format!("{effects}.sensor");
@@ -40,7 +41,7 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
     Ok(moved)
 }
 
-/// The constants in the file `name`, or those of a sensor that comes with Palpate.
+/// Returns the constants in the file `name`, or those of an included sensor.
 fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
     if SENSORS.iter().any(|(known, _)| *known == name) {
         return Ok(Table::new());
@@ -57,20 +58,20 @@ fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
     let mut file = Loader::of(path, text)?;
     let Some(table) = file.table_mut("") else { return Ok(Table::new()) };
     let sensor = table.clone();
-    // No effect lacks what it needs where all are there.
+    // With all effects present, none lacks its requirement.
     BIOTAC.keys().for_each(|name| {
         table.entry(name).or_insert_with(|| Value::Table(Table::new()));
     });
     let setting = values(&sensor, "").into_iter().find(|(name, _)| value(&BIOTAC, name).is_none());
     let refused = setting.map(|(key, value)| {
-        let allowed = "a constant of the sensor; settings of effects stand in the scene";
+        let allowed = "a constant of the sensor; settings of effects belong in the scene";
         file.not_allowed(&key, &value.to_string(), allowed)
     });
     file.finish::<Effects>()?;
     refused.map_or(Ok(sensor), Err)
 }
 
-/// The values in the tables of `effects`, by their dotted names.
+/// Returns the values in the tables of `effects`, by their dotted names.
 fn values<'a>(effects: &'a Table, prefix: &str) -> Vec<(String, &'a Value)> {
     let of = |(key, value): (&String, &'a Value)| match value {
         Value::Table(inner) => values(inner, &format!("{prefix}{key}.")),
@@ -79,7 +80,7 @@ fn values<'a>(effects: &'a Table, prefix: &str) -> Vec<(String, &'a Value)> {
     effects.iter().flat_map(of).collect()
 }
 
-/// The value of `effects` with this dotted name.
+/// Returns the value of `effects` with this dotted name.
 fn value<'a>(effects: &'a Table, name: &str) -> Option<&'a Value> {
     match name.split_once('.') {
         Some((table, rest)) => value(effects.get(table)?.as_table()?, rest),
@@ -87,7 +88,7 @@ fn value<'a>(effects: &'a Table, name: &str) -> Option<&'a Value> {
     }
 }
 
-/// Adds what `sensor` has to those tables of `effects` that are there.
+/// Adds the values of `sensor` to the tables of `effects` that exist.
 fn overlay(effects: &mut Table, sensor: &Table) {
     for (key, value) in sensor {
         match (effects.get_mut(key), value) {
@@ -98,7 +99,7 @@ fn overlay(effects: &mut Table, sensor: &Table) {
     }
 }
 
-/// The text of a sensor's file: the constants of `effects` that are not the BioTac's.
+/// Returns the text of a sensor file: the constants of `effects` that differ from the BioTac's.
 ///
 /// # Errors
 /// If a constant is not finite.

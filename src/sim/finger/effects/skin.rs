@@ -1,4 +1,4 @@
-//! The soft skin against the exact mesh: an elastic foundation, or a shell, over the fluid.
+//! Soft skin in contact with the exact mesh: an elastic foundation, or a shell, over the fluid.
 
 use super::constants::effect;
 use super::effect::{Effect, Needs};
@@ -15,47 +15,47 @@ use palpate_input::config::Rules;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A surface met at a flatter angle than this cosine counts as met at this one: a ray that grazes
-/// stands for no more than five times its section (chosen).
+// heuristic: smallest cosine between ray and normal; a grazing ray represents at most five times
+// its section.
 const FLATTEST: f64 = 0.2;
 
-/// Fluid and neighbours push the free skin out by no more than this part of the hull's radius: how
-/// far beyond the skin rays look (chosen; real skins bulge by 0.3 mm of 7).
+// heuristic: largest bulge of the free skin by fluid and neighbours, as a fraction of the hull's
+// radius, to which rays extend; real skins bulge by 0.3 mm of 7.
 const BULGE: f64 = 0.1;
 
-/// How the skin passes load on.
+/// Model of load transfer within the skin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SkinModel {
-    /// Each point is a column of its own; the fluid's pressure is all that they share.
+    /// Elastic foundation: each point is an independent column, coupled only by the fluid's
+    /// pressure.
     #[default]
     Columns,
-    /// A thin shell of silicone carries load to its neighbours.
+    /// Thin shell of silicone that carries load to its neighbours.
     Shell,
 }
 
 effect! {
-    /// Table `[skin]`: a soft skin against the exact mesh.
+    /// Table `[skin]`: a soft skin in contact with the exact mesh.
     SkinEffect in "skin"
     settings checked by check_resolution {
-        /// How the skin passes load on.
+        /// Model of load transfer within the skin.
         model: SkinModel = SkinModel::Columns,
-        /// Points of the skin; of a shell those on the back.
+        /// Number of skin points; for a shell, of those on the back.
         samples: usize = 500,
-        /// A shell's cells along the finger, half of them over the cylinder and half over the tip's
-        /// arc.
+        /// Shell cells along the finger, half over the cylinder and half over the tip's arc.
         along: usize = 24,
-        /// A shell's cells around the finger, from nail to nail; even.
+        /// Shell cells around the finger, from nail to nail; even.
         around: usize = 16,
     }
     constants {
-        /// Modulus of the skin, in Pa: of columns in compression between object and fluid only.
+        /// Modulus of the skin, in Pa; for columns only in compression between object and fluid.
         modulus_pa: f64, 1e3..=1e9;
         /// Poisson's ratio of a shell.
         poisson: f64, 0.0..=0.49;
-        /// Stiffness of the membrane against being flattened, in Pa per metre.
+        /// Membrane stiffness against flattening, in Pa per metre.
         flatten_pa_m: f64, 1e3..=1e12;
-        /// Stiffness of the membrane against being blown up, in Pa per metre.
+        /// Membrane stiffness against inflation, in Pa per metre.
         inflate_pa_m: f64, 1e5..=1e12;
         /// Stiffness of the core and of the ridges inside the skin, once the gap is closed.
         core_pa_m: f64, 1e3..=1e12;
@@ -77,7 +77,7 @@ impl Effect for SkinEffect {
     const NEEDS: Needs = Needs::Nothing;
 }
 
-/// A fingertip's skin; never changes.
+/// Skin of a fingertip; constant.
 #[derive(Clone, Debug)]
 pub struct Skin {
     samples: Vec<SkinSample>,
@@ -88,20 +88,20 @@ pub struct Skin {
     bulge_m: f64,
 }
 
-/// One trial's memory for [`Skin::press`].
+/// Workspace of one trial for [`Skin::press`].
 #[derive(Clone, Debug, Default)]
 pub struct Pressed {
     touches: Vec<SkinContact>,
     vicinity: Vicinity,
     shell: Option<Settled>,
-    /// How far the inner side of the skin moved in at each sample, in metres.
+    /// Inward motion of the skin's inner side at each sample, in metres.
     pub inward_m: Vec<f64>,
-    /// How far the object compresses each sample's column, in metres; 0 where it is not met.
+    /// Compression of each sample's column by the object, in metres; 0 without contact.
     pub indentation_m: Vec<f64>,
 }
 
 impl Pressed {
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
         self.shell.as_ref().map_or(0, Settled::bytes)
@@ -110,14 +110,15 @@ impl Pressed {
             + numbers * size_of::<f64>()
     }
 
-    /// `inward_m`, or nothing while the skin rests.
+    /// Returns `inward_m`, or an empty slice while the skin rests.
     pub fn moved_m(&self) -> &[f64] {
         if self.touches.is_empty() { &[] } else { &self.inward_m }
     }
 }
 
 impl Skin {
-    /// A skin of this shape; `cavity_pa_m3` is the stiffness of the fluid, 0 for a dry finger.
+    /// Creates a skin of this shape; `cavity_pa_m3` is the stiffness of the fluid, 0 for a dry
+    /// finger.
     pub fn new(profile: &Profile, effect: &SkinEffect, cavity_pa_m3: f64) -> Self {
         let mut samples = spread(profile, effect.samples);
         let cells = [effect.along, effect.around];
@@ -154,24 +155,24 @@ impl Skin {
         }
     }
 
-    /// The points of the skin.
+    /// Returns the points of the skin.
     pub fn samples(&self) -> &[SkinSample] {
         &self.samples
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         self.shell.as_ref().map_or(0, Membrane::bytes)
             + self.samples.len() * (size_of::<SkinSample>() + size_of::<f64>())
             + self.patches.bytes()
     }
 
-    /// The law of a column.
+    /// Returns the stiffnesses of a column.
     pub fn column(&self) -> &Column {
         &self.foundation.column
     }
 
-    /// Memory for [`press`](Self::press).
+    /// Allocates a workspace for [`press`](Self::press).
     pub fn relaxed(&self) -> Pressed {
         Pressed {
             touches: Vec::with_capacity(self.samples.len()),
@@ -182,13 +183,13 @@ impl Skin {
         }
     }
 
-    /// Static equilibrium of the skin in pose `x_wt` against the object.
+    /// Computes the static equilibrium of the skin in pose `x_wt` against the object.
     ///
     /// The force is minus the gradient of [`Load::energy_j`] over the pose: each column presses
     /// along the object's normal n with its stress times section / cos(ray, n).
     ///
     /// # Errors
-    /// If a pose is not finite, or the finger's axis is inside the object.
+    /// If the pose is not finite, or the finger's axis is inside the object.
     pub fn press(
         &self,
         bvh: &MeshBvh,
@@ -250,7 +251,7 @@ impl Skin {
         }
     }
 
-    /// Finds the columns' pressure, or how the shell lies.
+    /// Solves for the columns' pressure, or for the shape of the shell.
     fn balance(&self, pressed: &mut Pressed) -> Load {
         let Pressed { touches, shell, inward_m, indentation_m, .. } = pressed;
         let balance = match (&self.shell, shell) {

@@ -1,28 +1,30 @@
-//! What follows from the table of effects: settings, rules, switches, and a trial's memory.
+//! Macro over the table of effects: settings, checks, switches, and state of a trial.
 
-/// From one line for each effect, `name: Type` under its documentation, makes
-/// [`Effects`](crate::sim::finger::Effects) and `EffectStates`, and all that goes through every
-/// effect. Everything is resolved when it is compiled: an effect without a hook leaves no code.
+/// Defines [`Effects`](crate::sim::finger::Effects) and `EffectStates`, with all functions that
+/// iterate over effects, from one line for each effect, `name: Type` under its documentation.
+/// Everything is resolved at compile time: an effect without a hook leaves no code.
 macro_rules! effects {
     ($($(#[$doc:meta])* $name:ident: $Effect:ty,)*) => {
-        /// One optional table each; an absent one has no state and costs no work.
+        /// Optional tables, one for each effect; an absent effect has no state and no cost.
         #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct Effects {
             /// Constants of the sensor: `"biotac"`, a file like `models/biotac.toml`, or a table of
-            /// those that differ. They become the effects' own when a scene is read.
+            /// constants that differ.
+            ///
+            /// Reading a scene copies them into the effects.
             pub sensor: Option<String>,
             $(
                 $(#[$doc])*
                 pub $name: Option<$Effect>,
             )*
-            /// Keys of constants that the scene has in its effects, as in version 0.1.
+            /// Keys of constants that the scene sets in its effects, as in version 0.1.
             #[serde(skip)]
             pub moved_keys: Vec<String>,
         }
 
         impl serde::Serialize for Effects {
-            /// Constants that are not the BioTac's are in the table `sensor`.
+            /// Writes constants that differ from the BioTac's into the table `sensor`.
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 let mut tables = toml::Table::new();
                 $(
@@ -41,18 +43,18 @@ macro_rules! effects {
         }
 
         impl Effects {
-            /// Every effect with its defaults.
+            /// Returns every effect with its defaults.
             pub fn all() -> Self {
                 Self { $($name: Some(<$Effect>::complete()),)* ..Self::default() }
             }
 
-            /// Whether a tactile frame has anything in it.
+            /// Returns whether a tactile frame has any channel.
             pub fn sends_frames(&self) -> bool {
                 let fills = [$(<$Effect>::FILLS_FRAMES && self.$name.is_some(),)*];
                 self.skin.is_some() && fills.contains(&true)
             }
 
-            /// Takes out every effect that means nothing without one that is not there.
+            /// Removes every effect whose requirement is missing.
             pub fn drop_unsupported(&mut self) {
                 $(
                     if !self.supports(<$Effect>::NEEDS) {
@@ -61,7 +63,7 @@ macro_rules! effects {
                 )*
             }
 
-            /// Every switch, in the table's order.
+            /// Returns every switch, in the table's order.
             pub fn switches() -> Vec<Switch<Self>> {
                 let mut all = Vec::new();
                 $(
@@ -89,7 +91,7 @@ macro_rules! effects {
             }
         }
 
-        /// What the effects of one finger remember during one trial.
+        /// States of one finger's effects during one trial.
         #[derive(Clone, Debug)]
         pub struct EffectStates {
             $(
@@ -99,13 +101,12 @@ macro_rules! effects {
         }
 
         impl EffectStates {
-            /// At the start of a trial.
+            /// Creates the states at the start of a trial.
             pub fn new(effects: &Effects) -> Self {
                 Self { $($name: effects.$name.as_ref().map(Effect::start),)* }
             }
 
-            /// Lets every effect that has something to do with it change the load, in the table's
-            /// order.
+            /// Applies the load hook of every effect that has one, in the table's order.
             #[inline]
             pub fn on_load(
                 &mut self,
@@ -123,7 +124,7 @@ macro_rules! effects {
                 )*
             }
 
-            /// Bytes held: what an effect that is off does not hold.
+            /// Returns the bytes held; effects that are off hold none.
             pub fn bytes(&self) -> usize {
                 [$(self.$name.as_ref().map_or(0, size_of_val),)*].iter().sum()
             }

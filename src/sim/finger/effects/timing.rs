@@ -1,4 +1,4 @@
-//! When a BioTac samples which channel, and when its frames arrive.
+//! Sampling times of a BioTac's channels, and arrival times of its frames.
 
 use super::constants::effect;
 use super::effect::{Effect, Needs, Switch};
@@ -6,20 +6,20 @@ use palpate_explore::backend::delay::DELAY_MAX_S;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_input::config::Rules;
 
-/// A delay of commands that is more than a control tick of any body (chosen).
+// heuristic: a command delay longer than a control tick of any body.
 const LONG_DELAY_S: f64 = 0.02;
 
 effect! {
     /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches,
-    /// commands late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a
-    /// command holds from the tick on in which it is given.
+    /// commands act late. Without it, all channels of a frame are sampled at once, every 10 ms, and
+    /// the frame arrives immediately; a command acts from the tick in which it is given.
     TimingEffect in "timing"
     settings checked by check_timing {
-        /// From a command to its effect, rounded to whole control periods.
+        /// Delay from a command to its effect, rounded to whole control periods.
         control_delay_s: f64 = 0.002,
     }
     constants {
-        /// Frames that arrive together, when the last of them is complete.
+        /// Number of frames that arrive together, when the last of them is complete.
         batch_frames: usize;
     }
 }
@@ -34,8 +34,8 @@ impl Effect for TimingEffect {
 
     const NEEDS: Needs = Needs::Frames;
 
-    /// All of it, and a delay of commands alone: with frames as near to those without timing as a
-    /// table can say it, each by itself.
+    /// Returns the switch of the whole effect, and that of the command delay alone, with frames as
+    /// close to those without `[timing]` as its settings allow: one in each batch.
     fn switches() -> Vec<Switch<Option<Self>>> {
         let is_on =
             |timing: &Option<Self>| timing.as_ref().is_some_and(|t| t.control_delay_s > 0.0);
@@ -51,10 +51,10 @@ impl Effect for TimingEffect {
     }
 }
 
-/// What a slot samples.
+/// Channel sampled in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// An electrode; E1 is 0.
+    /// Electrode; E1 is 0.
     Electrode(usize),
     /// Dynamic pressure; the first in a frame is 0.
     Pac(usize),
@@ -66,7 +66,7 @@ pub enum Channel {
     Tdc,
 }
 
-/// The channel of a slot, 0 to 43.
+/// Returns the channel of a slot, 0 to 43.
 pub fn channel(slot: usize) -> Channel {
     match slot / 2 {
         pair if slot % 2 == 1 => Channel::Pac(pair),

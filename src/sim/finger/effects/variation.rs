@@ -1,4 +1,4 @@
-//! How one sensor differs from the next, and today's session from yesterday's.
+//! Variation between sensors of one kind, and between sessions of one sensor.
 
 use super::constants::effect;
 use super::effect::Effect;
@@ -9,32 +9,32 @@ use nalgebra::{UnitQuaternion, Vector3};
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use rand::{Rng, RngExt};
 
-/// What an open electrode reads: as little as a scene may say.
+/// Counts of an open electrode: the smallest allowed in a scene.
 const OPEN_COUNTS: f64 = 1.0;
 
 effect! {
-    /// Table `[variation]`: another sensor of the kind in each trial. Every number is a standard
-    /// deviation about what the scene says, of a logarithm unless it is of an angle; or a
+    /// Table `[variation]`: each trial has another sensor of the same kind. Every number is a
+    /// standard deviation about the scene's value (of the logarithm, except for angles) or a
     /// probability.
     VariationEffect in "variation"
     constants {
-        /// Of each electrode's resistance at rest.
+        /// Spread of each electrode's resistance at rest.
         resistance: f64, 0.0..=1.0;
-        /// Of the fluid's conductivity, common to all electrodes of a session.
+        /// Spread of the fluid's conductivity, common to all electrodes of a session.
         offset: f64, 0.0..=1.0;
-        /// Of what the electrodes make of their gaps, common to all.
+        /// Spread of the electrodes' sensitivity to their gaps, common to all.
         gain: f64, 0.0..=1.0;
-        /// Of the rate at which the electrodes drift.
+        /// Spread of the electrodes' drift rate.
         drift: f64, 0.0..=2.0;
-        /// Of the fingertip on its mount, in degrees about each axis.
+        /// Spread of the fingertip's attitude on its mount, in degrees about each axis.
         attitude_deg: f64, 0.0..=45.0;
-        /// Of the silicone's stiffness, in `[skin]`.
+        /// Spread of the silicone's stiffness, in `[skin]`.
         stiffness: f64, 0.0..=1.0;
         /// Probability that an electrode of the sensor is open.
         dead: f64, 0.0..=1.0;
-        /// Probability that one is noisy.
+        /// Probability that an electrode of the sensor is noisy.
         noisy: f64, 0.0..=1.0;
-        /// How many times as noisy that is.
+        /// Noise of a noisy electrode relative to the others.
         noisy_factor: f64, 1.0..=1e3;
     }
 }
@@ -44,9 +44,9 @@ impl Effect for VariationEffect {
 }
 
 impl VariationEffect {
-    /// The sensor of one trial.
+    /// Draws the sensor of one trial.
     pub fn sensor(&self, mut rng: impl Rng) -> Sensor {
-        // Every number is drawn, also where its spread is nothing: one leaves the others alone.
+        // Every number is drawn, also if its spread is 0, so that the others do not change with it.
         let mut factor = |spread: f64| (spread * normal(&mut rng)).exp();
         let resistance = std::array::from_fn(|_| factor(self.resistance));
         let [conductivity, gain, drift, stiffness] =
@@ -69,29 +69,29 @@ impl VariationEffect {
     }
 }
 
-/// How a sensor differs from what the scene says, as factors.
+/// Sensor constants of one trial, as factors on the scene's values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
-    /// On each electrode's resistance at rest.
+    /// Factor on each electrode's resistance at rest.
     pub resistance: [f64; ELECTRODES],
-    /// On the fluid's conductivity.
+    /// Factor on the fluid's conductivity.
     pub conductivity: f64,
-    /// On the power of the gap.
+    /// Factor on the exponent of the gap.
     pub gain: f64,
-    /// On the rate of drift.
+    /// Factor on the drift rate.
     pub drift: f64,
-    /// On the silicone's stiffness.
+    /// Factor on the silicone's stiffness.
     pub stiffness: f64,
-    /// The fingertip's own attitude in that of its mount.
+    /// Attitude of the fingertip relative to its mount.
     pub attitude: UnitQuaternion<f64>,
-    /// An open electrode.
+    /// Index of an open electrode.
     pub dead: Option<usize>,
-    /// A noisy one, with its factor.
+    /// Index of a noisy electrode, with its noise factor.
     pub noisy: Option<(usize, f64)>,
 }
 
 impl Sensor {
-    /// Its skin where the scene has `nominal`: the core is as stiff as there.
+    /// Returns the sensor's skin, if the scene has `nominal`; the core's stiffness is unchanged.
     pub fn skin(&self, nominal: &SkinEffect) -> SkinEffect {
         SkinEffect {
             modulus_pa: self.stiffness * nominal.modulus_pa,
@@ -101,7 +101,7 @@ impl Sensor {
         }
     }
 
-    /// The same of its electrodes.
+    /// Returns the sensor's electrodes, if the scene has `nominal`.
     pub fn electrodes(&self, nominal: &ElectrodesEffect) -> ElectrodesEffect {
         let baseline = |i: usize| match self.dead {
             Some(dead) if dead == i => OPEN_COUNTS,

@@ -1,4 +1,4 @@
-//! The force/torque sensor at the finger's mount: bias, drift, noise and resolution.
+//! Force/torque sensor at the finger's mount: bias, drift, noise and resolution.
 
 use super::constants::effect;
 use super::effect::Effect;
@@ -8,29 +8,29 @@ use palpate_explore::backend::Wrench;
 use rand_chacha::ChaCha8Rng;
 
 effect! {
-    /// Table `[wrench]`: what a force/torque sensor makes of the load on it, in its own frame: z
-    /// along the finger, distal. Without it a body has no such sensor.
+    /// Table `[wrench]`: a force/torque sensor at the mount, with its own frame: z along the
+    /// finger, distal. Without it a body has no such sensor.
     WrenchEffect in "wrench"
     constants {
-        /// Standard deviation of each reading: forces along x, y, z.
+        /// Noise (standard deviation) of each force reading along x, y, z.
         noise_n: [f64; 3], 0.0..=100.0;
-        /// The same of torques about x, y, z.
+        /// Noise (standard deviation) of each torque reading about x, y, z.
         noise_nm: [f64; 3], 0.0..=10.0;
-        /// Step between values that can be told apart; 0 for none.
+        /// Resolution of the forces; 0 for a continuous reading.
         resolution_n: [f64; 3], 0.0..=100.0;
-        /// The same of torques.
+        /// Resolution of the torques; 0 for a continuous reading.
         resolution_nm: [f64; 3], 0.0..=10.0;
-        /// Standard deviation of what it reads unloaded at the start of a trial.
+        /// Standard deviation of the force reading without load at the start of a trial.
         bias_n: f64, 0.0..=1e3;
-        /// The same of torques.
+        /// Standard deviation of the torque reading without load at the start of a trial.
         bias_nm: f64, 0.0..=100.0;
-        /// The bias walks at random by this standard deviation per square root of a second.
+        /// Random walk of the force bias: standard deviation per square root of a second.
         drift_n_sqrt_s: [f64; 3], 0.0..=10.0;
     }
 }
 
 impl WrenchEffect {
-    /// Largest standard deviation of a force.
+    /// Returns the largest standard deviation of a force.
     pub fn noise_max_n(&self) -> f64 {
         self.noise_n.iter().fold(0.0, |most, &noise| noise.max(most))
     }
@@ -40,7 +40,7 @@ impl Effect for WrenchEffect {
     type State = ();
 }
 
-/// The sensor during one trial.
+/// State of the sensor during one trial.
 #[derive(Clone, Debug)]
 pub struct Gauge {
     rng: ChaCha8Rng,
@@ -48,7 +48,7 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// At the start of a trial; `rng` is the only randomness.
+    /// Creates the sensor at the start of a trial; `rng` is the only randomness.
     pub fn new(effect: &WrenchEffect, mut rng: ChaCha8Rng) -> Self {
         let bias = Vector6::from_fn(|i, _| {
             normal(&mut rng) * if i < 3 { effect.bias_n } else { effect.bias_nm }
@@ -56,7 +56,7 @@ impl Gauge {
         Self { rng, bias }
     }
 
-    /// What it says `dt_s` after the last reading of a load.
+    /// Returns the reading of a load, `dt_s` after the last one.
     pub fn read(&mut self, effect: &WrenchEffect, load: &Wrench, dt_s: f64) -> Wrench {
         let noise = effect.noise_n.iter().chain(&effect.noise_nm);
         let steps = effect.resolution_n.iter().chain(&effect.resolution_nm);

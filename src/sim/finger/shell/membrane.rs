@@ -1,8 +1,8 @@
-//! The shell of the skin in balance with the fluid under it, the core and an object.
+//! Shell of the skin in balance with the fluid under it, the core and an object.
 //!
-//! Sought is where the energy of sheet, fluid (½ K V²), core and skin under the object is least.
-//! This is that energy; `settle` finds its least. [`Membrane::balance`] is that under the rays by
-//! which the skin meets an object.
+//! The shell rests where the energy of sheet, fluid (½ K V²), core and skin under the object is
+//! smallest. This module has that energy; `settle` minimises it. [`Membrane::balance`] minimises it
+//! with the rays by which the skin meets an object.
 
 use super::sheet::{Material, Sheet, Strained};
 use super::softness::Softness;
@@ -12,30 +12,30 @@ use crate::sim::finger::samples::{Lattice, Node, SkinSample};
 use nalgebra::Vector3;
 use palpate_gp::math::simd::Quad;
 
-/// The shell goes on as it went by no more than so many times its last way (chosen).
+// heuristic: largest extrapolation of the shell's last motion, as a multiple of it.
 const FARTHEST: f64 = 2.0;
 
-/// An object before a node of the shell: a plane, for all that the node knows.
+/// Contact of an object with a node of the shell, approximated by a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
-    /// The node.
+    /// Index of the node.
     pub node: usize,
-    /// The plane's normal, towards the finger, in `T`.
+    /// Normal of the plane, towards the finger, in `T`.
     pub normal_t: Vector3<f64>,
-    /// How far the skin at rest lies behind it; negative before it.
+    /// Overlap of the skin at rest with the object behind the plane; negative without overlap.
     pub overlap_m: f64,
 }
 
-/// The shell; never changes.
+/// Shell of the skin; constant.
 #[derive(Clone, Debug)]
 pub struct Membrane {
     pub(super) sheet: Sheet,
     pub(super) nodes: Vec<Node>,
-    /// Nodes that can move, and each node's place among them.
+    /// Nodes that can move, and the index of each node among them.
     pub(super) free: Vec<usize>,
     pub(super) place: Vec<Option<usize>>,
     pub(super) softness: Softness,
-    /// Of each node: the skin's through its thickness and the core's, in N/m.
+    /// Stiffness of each node, in N/m: the skin through its thickness, and the core.
     pub(super) skin_n_m: Vec<f64>,
     pub(super) core_n_m: Vec<f64>,
     pub(super) cavity_pa_m3: f64,
@@ -43,18 +43,18 @@ pub struct Membrane {
     half_m: f64,
 }
 
-/// A way to lie.
+/// Displacement of all nodes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pose {
     pub moved_m: Vec<Vector3<f64>>,
     pub strained: Strained,
 }
 
-/// Where the shell is; one trial's memory.
+/// State of the shell and workspace of one trial.
 #[derive(Clone, Debug)]
 pub struct Settled {
     pub(super) here: Pose,
-    /// Memory for the next.
+    /// Memory for the next pose.
     pub(super) there: Pose,
     pub(super) at_rest: bool,
     pub(super) course: Course,
@@ -66,13 +66,13 @@ pub struct Settled {
     pub(super) reaction_m: Vec<f32>,
     pub(super) last_m: Vec<f32>,
     pub(super) halves: Vec<f32>,
-    /// A₀⁻¹ v, K / (1 + K vᵀ A₀⁻¹ v), and how many corrections were made since rest.
+    /// A₀⁻¹ v, K / (1 + K vᵀ A₀⁻¹ v), and the number of corrections since rest.
     pub(super) fluid_m_pa: Vec<f32>,
     pub(super) fluid_pa_m3: f64,
     pub(super) fluid_age: usize,
 }
 
-/// A spring of the contact problem.
+/// Spring of the contact problem.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
     pub place: usize,
@@ -82,8 +82,8 @@ pub(super) struct Link {
 }
 
 impl Membrane {
-    /// Of the skin's silicone; `core_pa_m` is the stiffness of the core and `cavity_pa_m3` that of
-    /// the fluid, 0 without it.
+    /// Creates the shell of the skin's silicone; `core_pa_m` is the stiffness of the core and
+    /// `cavity_pa_m3` that of the fluid, 0 without fluid.
     pub fn new(lattice: &Lattice, material: &Material, core_pa_m: f64, cavity_pa_m3: f64) -> Self {
         let nodes = lattice.nodes().to_vec();
         let held: Vec<bool> = nodes.iter().map(|node| node.clamped).collect();
@@ -108,7 +108,7 @@ impl Membrane {
         }
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let numbers = self.skin_n_m.len() + self.core_n_m.len() + self.free.len();
         self.sheet.bytes()
@@ -118,7 +118,7 @@ impl Membrane {
             + size_of_val(self.place.as_slice())
     }
 
-    /// Untouched.
+    /// Creates the state without contact.
     pub fn relaxed(&self) -> Settled {
         let (size, count) = (3 * self.free.len(), self.nodes.len());
         let pose =
@@ -142,7 +142,7 @@ impl Membrane {
         }
     }
 
-    /// Lets go of everything.
+    /// Resets the state to rest.
     pub fn rest(&self, state: &mut Settled) {
         if !state.at_rest {
             state.here.moved_m.fill(Vector3::zeros());
@@ -152,7 +152,7 @@ impl Membrane {
         }
     }
 
-    /// Force with which the object pushes, along the push's normal.
+    /// Returns the force of the object along the push's normal.
     pub fn push_n(&self, push: &Push, state: &Settled) -> f64 {
         self.pushed_n(push, &state.here)
     }
@@ -162,12 +162,12 @@ impl Membrane {
         self.skin_n_m[push.node] * (push.overlap_m - yielded_m).max(0.0)
     }
 
-    /// How far a node moved towards the core.
+    /// Returns the displacement of a node towards the core.
     pub(super) fn sunk_m(&self, node: usize, pose: &Pose) -> f64 {
         -self.nodes[node].direction.dot(&pose.moved_m[node])
     }
 
-    /// Energy of sheet, fluid, core, and skin under the pushes.
+    /// Returns the energy of sheet, fluid, core, and skin under the pushes.
     pub fn energy_j(&self, pushes: &[Push], state: &Settled) -> f64 {
         self.held_j(pushes, &state.here)
     }
@@ -186,11 +186,11 @@ impl Membrane {
         smooth_j + pushed.sum::<f64>() + on_core.sum::<f64>()
     }
 
-    /// Finds every touch's response, and how far the skin moved in at each sample. Where there is
-    /// no shell, on the back, `column` stands on its own.
+    /// Computes the response of every contact, and the inward motion of the skin at each sample. On
+    /// the back, which has no shell, each `column` is independent.
     ///
-    /// A node is met as a ball as thick as the skin, by the plane in which its ray met the object:
-    /// pressed flat, the skin turns until its outside faces the object.
+    /// A node is a ball as thick as the skin, in contact with the plane in which its ray met the
+    /// object: pressed flat, the skin turns until its outside faces the object.
     pub(in crate::sim::finger) fn balance(
         &self,
         touches: &mut [SkinContact],
@@ -227,7 +227,7 @@ impl Membrane {
                 stress_pa: force_n * touch.cosine / touch.section_m2,
                 ..Response::default()
             };
-            // Where the ball is nearest to the plane.
+            // Point of the ball nearest to the plane.
             let moved_m = &here.moved_m[push.node];
             let centre_t = self.nodes[push.node].point + moved_m;
             let above_m = self.half_m - push.overlap_m + push.normal_t.dot(moved_m);
@@ -245,12 +245,12 @@ impl Membrane {
 }
 
 impl Settled {
-    /// How far each node moved, in `T`.
+    /// Returns the displacement of each node, in `T`.
     pub fn moved_m(&self) -> &[Vector3<f64>] {
         &self.here.moved_m
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let vectors = self.here.moved_m.capacity() + self.there.moved_m.capacity();
         let singles =
@@ -267,20 +267,20 @@ impl Settled {
     }
 }
 
-/// The last ways of shell and object, to guess where the shell goes next.
+/// Last displacements of shell and object, to extrapolate the shell's next position.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Course {
-    /// How far each node went in the last press.
+    /// Displacement of each node in the last press.
     pub went_m: Vec<Vector3<f64>>,
-    /// Of each node: overlap with the object, NaN without one, the one before, and by how much it
-    /// grew.
+    /// Overlap of each node with the object (NaN without one), the overlap before, and its
+    /// increase.
     overlap_m: Vec<f64>,
     before_m: Vec<f64>,
     grew_m: Vec<f64>,
 }
 
 impl Course {
-    /// Of so many nodes, at rest.
+    /// Creates the history of `nodes` nodes, at rest.
     pub fn new(nodes: usize) -> Self {
         let unknown = || vec![f64::NAN; nodes];
         Self {
@@ -291,13 +291,13 @@ impl Course {
         }
     }
 
-    /// Forgets them.
+    /// Clears the history.
     pub fn forget(&mut self) {
         self.overlap_m.fill(f64::NAN);
         self.grew_m.fill(f64::NAN);
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let numbers =
             [&self.overlap_m, &self.before_m, &self.grew_m].map(|numbers| numbers.capacity());
@@ -305,8 +305,8 @@ impl Course {
             + numbers.iter().sum::<usize>() * size_of::<f64>()
     }
 
-    /// How many times its last way the object went now, given each node's overlap with it; takes
-    /// note of them.
+    /// Returns the ratio of the object's present displacement to its last one, from each node's
+    /// overlap with it, and stores the overlaps.
     pub fn times(&mut self, overlaps: impl Iterator<Item = (usize, f64)>) -> f64 {
         let (mut along_m2, mut last_m2) = (0.0, 0.0);
         std::mem::swap(&mut self.overlap_m, &mut self.before_m);

@@ -1,8 +1,8 @@
-//! The skin as a thin shell over the fluid: it carries load to its neighbours.
+//! Thin-shell model of the skin over the fluid: it carries load to its neighbours.
 //!
-//! `sheet` is the silicone and `softness` how it gives way at rest, `membrane` is its energy with
-//! fluid, core and object, under the rays by which the skin meets an object; `settle` finds the
-//! least of it, with `springs` for the places that may touch.
+//! `sheet` models the silicone, and `softness` its compliance at rest. `membrane` has its energy
+//! with fluid, core and object, under the rays by which the skin meets an object. `settle`
+//! minimises that energy, with `springs` for the places that may touch.
 
 pub mod membrane;
 mod settle;

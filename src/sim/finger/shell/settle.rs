@@ -1,48 +1,50 @@
-//! How the shell is brought into balance.
+//! Solver for the equilibrium of the shell.
 //!
-//! The springs of core and contact are convex and pushed one by one in `springs`; sheet and fluid
-//! are smooth. So each correction δ is the least of
+//! The springs of core and contact are convex and solved one by one in `springs`; sheet and fluid
+//! are smooth. So each correction δ minimises
 //!
 //! ½ δᵀ A δ + ∇Eᵀ δ + springs(u + δ),  A = stiffness of the sheet at rest + K v vᵀ
 //!
-//! with the gradients of energy and volume, ∇E and v, as they are, and A factorised once. As A is
-//! positive, δ leads downhill; it is shortened until the energy itself has fallen. So the energy
-//! falls with every correction, whatever the press, and the shell cannot diverge. The first guess
-//! is that shell and object go on as they went; it is taken if the energy is lower there.
+//! with the current gradients of energy and volume, ∇E and v, and A factorised once. As A is
+//! positive, δ is a descent direction; it is shortened until the energy itself has fallen. So the
+//! energy falls with every correction, whatever the press, and the shell cannot diverge. The first
+//! guess is that shell and object repeat their last motion; it is used if it lowers the energy.
 
 use super::membrane::{Link, Membrane, Push, Settled};
 use nalgebra::Vector3;
 use palpate_gp::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest};
 
-/// The shell is settled once a correction promises less than this part of the energy: force and
+/// Convergence threshold: predicted gain of a correction, relative to the energy. Force and
 /// pressure are then within 0.5 % (measured, 1.5 mm deep on a plane at three pitches, ticks of 10
 /// and 40 µm).
 const SETTLED: f64 = 1e-4;
 
-/// Corrections in one call; what is missing then is made up for by the next (chosen: a press of
-/// 2 mm from rest takes 20 to 40).
+// heuristic: largest number of corrections in one call; the next call makes up for missing ones. A
+// press of 2 mm from rest takes 20 to 40.
 const CORRECTIONS: usize = 60;
 
-/// The fluid's share in A is made anew after so many corrections: it grows old as the skin turns,
-/// and the pressure with it (chosen: 0.2 % of the pressure for a tenth of the time).
+// The fluid's share in A is updated after this many corrections, because it becomes outdated as the
+// skin turns, and the pressure with it.
+// heuristic: 0.2 % of the pressure for a tenth of the time.
 const FLUID_AGES: usize = 8;
 
-/// A correction must bring this part of what it promises (Armijo's rule; the usual value).
+/// Fraction of the predicted gain that a correction must reach (Armijo's rule; the usual value).
 const BROUGHT: f64 = 1e-4;
 
-/// A correction is shortened by at most and at least these factors at a time, this often (chosen).
+// heuristic: smallest and largest factor of one step shortening, and the number of shortenings.
 const SHORTER: [f64; 2] = [0.1, 0.6];
 const SHORTENINGS: usize = 30;
 
-/// Places this near to what they may touch take part in a correction (chosen: more than neighbours
-/// bulge in one tick; who comes in from farther away is there in the next correction).
+// Places this close to a possible contact take part in a correction.
+// heuristic: more than neighbours bulge in one tick; places from farther away are included in the
+// next correction.
 const NEAR_M: f64 = 5e-5;
 
-/// Corrections that creep are taken together up to so many of them (chosen).
+// heuristic: largest extrapolation factor of slowly converging corrections.
 const TOGETHER: f64 = 50.0;
 
 impl Membrane {
-    /// Brings the shell into balance with `pushes`, from where it was.
+    /// Brings the shell into equilibrium with `pushes`, from its present state.
     pub fn settle(&self, pushes: &[Push], state: &mut Settled) {
         let mut energy_j = self.go_on(pushes, state);
         for correction in 0..CORRECTIONS {
@@ -69,7 +71,8 @@ impl Membrane {
         }
     }
 
-    /// Goes on as shell and object went last, if that lowers the energy; the energy.
+    /// Extrapolates the last motion of shell and object, if that lowers the energy; returns the
+    /// energy.
     fn go_on(&self, pushes: &[Push], state: &mut Settled) -> f64 {
         state.at_rest = false;
         let overlaps = pushes.iter().map(|push| (push.node, push.overlap_m));
@@ -95,7 +98,7 @@ impl Membrane {
         energy_j
     }
 
-    /// A₀⁻¹ v for the volume's gradient as it is.
+    /// Computes A₀⁻¹ v for the present gradient of the volume.
     fn feel_fluid(&self, state: &mut Settled) {
         if self.cavity_pa_m3 <= 0.0 {
             return;
@@ -110,7 +113,7 @@ impl Membrane {
         state.fluid_pa_m3 = self.cavity_pa_m3 / (1.0 + self.cavity_pa_m3 * softness_m3_pa);
     }
 
-    /// The springs that may push, and the forces that are not in balance.
+    /// Collects the springs that may push, and the residual forces.
     fn link(&self, pushes: &[Push], state: &mut Settled) {
         let Settled { here, links, springs, residual_n, .. } = state;
         links.clear();
@@ -143,7 +146,7 @@ impl Membrane {
         }
     }
 
-    /// Finds the correction; how much energy it promises to free.
+    /// Computes the correction; returns its predicted energy gain.
     fn correct(&self, state: &mut Settled) -> f64 {
         let Settled {
             links,
@@ -205,9 +208,9 @@ impl Membrane {
         promised_j
     }
 
-    /// Corrections that creep on the same way are taken together: the least of their combination
-    /// (Anderson 1965, with one correction before the last), if it leads downhill. `there` is where
-    /// the last one started. How much energy it promises to free.
+    /// Combines slowly converging corrections in the same direction: minimises over their
+    /// combination (Anderson 1965, with one correction before the last), if it is a descent
+    /// direction. `there` is the start of the last one. Returns the predicted energy gain.
     fn hurry(&self, promised_j: f64, state: &mut Settled) -> f64 {
         let Settled { here, there, correction_m, last_m, residual_n, .. } = state;
         let (mut along, mut apart) = (0.0, 0.0);
@@ -237,8 +240,8 @@ impl Membrane {
         promised_j
     }
 
-    /// Moves along the correction as far as the energy falls, to what it then is; none if it does
-    /// not.
+    /// Moves along the correction as far as the energy falls, and returns the new energy; `None` if
+    /// it does not fall.
     fn go(
         &self,
         pushes: &[Push],
@@ -261,7 +264,7 @@ impl Membrane {
                 std::mem::swap(here, there);
                 return Some(there_j);
             }
-            // Least of the parabola through what is known; not a number is none of it.
+            // Minimum of the parabola through the known values; NaN fails the comparison.
             let least = promised_j * part / (2.0 * (promised_j * part - freed_j));
             let [shortest, longest] = SHORTER;
             part *= if least.is_nan() { shortest } else { least.clamp(shortest, longest) };
@@ -270,7 +273,7 @@ impl Membrane {
     }
 }
 
-/// A vector in single precision, in double.
+/// Converts a vector from single to double precision.
 #[inline(always)]
 fn widened(values: &[f32]) -> Quad {
     [f64::from(values[0]), f64::from(values[1]), f64::from(values[2]), 0.0]

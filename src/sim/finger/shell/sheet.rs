@@ -1,26 +1,28 @@
-//! A thin elastic sheet of triangles that lets go of its shape.
+//! Thin elastic sheet of triangles with large displacements: membrane energy, bending energy,
+//! volume.
 //!
-//! *Membrane*: constant strain, St. Venant–Kirchhoff, plane stress. With the square q = l² − L² by
-//! which each edge e grew, eᵀ ε e = q/2 for all three edges gives the strain ε, so the energy is
-//! ½ qᵀ C q with one constant matrix for each triangle.
+//! *Membrane*: constant strain, St. Venant–Kirchhoff, plane stress. With the growth of the squared
+//! length of each edge e, q = l² − L², eᵀ ε e = q/2 for all three edges gives the strain ε, so the
+//! energy is ½ qᵀ C q with one constant matrix for each triangle.
 //!
 //! *Bending*: constant curvature. With the change θ of slope across each edge, half of it on either
 //! side, the tensor is Λ = Σ θ/2 l n nᵀ / A over the edges of length l and normal n in the
-//! triangle's plane (Grinspun et al., Computing discrete shape operators on general meshes, 2006;
-//! exact where neighbours make parallelograms), so the energy ½ D A ((1 − ν) Λ:Λ + ν tr²Λ) is
-//! ½ θᵀ Q θ. Slopes are read along the normals at rest, which turns of the sheet by an angle φ
-//! change by κ φ²/2 instead of not at all.
+//! triangle's plane (Grinspun et al. 2006, Computing discrete shape operators on general meshes;
+//! exact where neighbours make parallelograms), so the energy ½ D A ((1 − ν) Λ:Λ + ν tr²Λ) is ½ θᵀ
+//! Q θ. Slopes are measured along the normals at rest; a rotation of the sheet by an angle φ
+//! changes them by κ φ²/2 instead of not at all.
 //!
 //! *Volume* under the sheet: exact, of its triangles against the origin. A corner's gradient is a
 //! sixth of the sum of p × q over the edges pq across from it.
 //!
-//! What a processor goes through are edges: each knows the edges with which it shares a triangle.
+//! The data structure for the processor is a list of edges: each has the indices of the edges with
+//! which it shares a triangle.
 
 use nalgebra::{Matrix3, Vector3};
 use palpate_gp::math::simd::{Quad, cross, dot_quad, quad, scaled, sum, widest};
 use std::collections::HashMap;
 
-/// What a sheet is made of.
+/// Material and thickness of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Young's modulus.
@@ -31,53 +33,54 @@ pub struct Material {
     pub thickness_m: f64,
 }
 
-/// An edge with what lies across it.
+/// Edge with the corners across from it.
 #[derive(Clone, Debug)]
 struct Edge {
-    /// Ends, then the corners across; with one triangle only the third comes twice.
+    /// Ends, then the corners across; with one triangle only, the third is repeated.
     corners: [usize; 4],
-    /// What makes a sixth of this edge's p × q the gradient of the volume at the corners across.
+    /// Factors that turn a sixth of this edge's p × q into the gradient of the volume at the
+    /// corners across.
     turns: [f64; 2],
     rest_m2: f64,
     rest_slope: f64,
-    /// How much each corner's motion along `normal` adds to the slope.
+    /// Derivative of the slope by each corner's motion along `normal`.
     slopes_m: Quad,
     normal: Quad,
-    /// The edges with which it shares a triangle; where there is one triangle only, itself with
-    /// zeros in `laws`.
+    /// Edges with which it shares a triangle; if there is only one triangle, itself with zeros in
+    /// `laws`.
     near: [usize; 4],
-    /// Of itself and of `near`: entries of C and Q, in J/m⁴ and J.
+    /// Entries of C and Q for itself and for `near`, in J/m⁴ and J.
     laws: [[f64; 2]; 5],
 }
 
-/// The sheet; never changes.
+/// Sheet of triangles; constant.
 #[derive(Clone, Debug)]
 pub struct Sheet {
     rest: Vec<Quad>,
     edges: Vec<Edge>,
-    /// Volume under it at rest.
+    /// Volume under the sheet at rest.
     volume_m3: f64,
 }
 
-/// A state of the sheet, and memory to find it.
+/// State of the sheet, with the workspace to compute it.
 #[derive(Clone, Debug, Default)]
 pub struct Strained {
     /// Elastic energy.
     pub energy_j: f64,
-    /// Its gradient at each node, in N.
+    /// Gradient of the energy at each node, in N.
     pub gradient_n: Vec<Quad>,
-    /// Volume by which it is smaller inside than at rest.
+    /// Displaced volume: the volume at rest minus the present one.
     pub displaced_m3: f64,
-    /// The gradient of that at each node, in m².
+    /// Gradient of the displaced volume at each node, in m².
     pub volume_m2: Vec<Quad>,
     points: Vec<Quad>,
-    /// Of each edge: the square by which it grew, in m², and the change of slope.
+    /// Growth of each edge's squared length, in m², and change of slope.
     grown: Vec<[f64; 2]>,
 }
 
 impl Sheet {
-    /// Through `points`, whose triangles are counterclockwise seen from outside. Where both ends of
-    /// a border's edge are `held`, the slope is held too.
+    /// Creates the sheet through `points`, whose triangles are counterclockwise seen from outside.
+    /// If both ends of a border edge are `held`, its slope is clamped too.
     pub fn new(
         points: Vec<Vector3<f64>>,
         triangles: &[[usize; 3]],
@@ -99,7 +102,7 @@ impl Sheet {
             }
             edge.rest_slope = edge.slope(&sheet.rest);
         }
-        // By the same sums as later, so that it displaces nothing at rest.
+        // Computed by the same sums as later, so that the displaced volume at rest is exactly 0.
         sheet.volume_m3 = -sheet.relaxed().displaced_m3;
         sheet
     }
@@ -150,14 +153,14 @@ impl Sheet {
         }
     }
 
-    /// Memory for [`strain`](Self::strain), at rest.
+    /// Allocates a state for [`strain`](Self::strain), at rest.
     pub fn relaxed(&self) -> Strained {
         let mut strained = Strained::default();
         self.strain(&vec![Vector3::zeros(); self.rest.len()], &mut strained);
         strained
     }
 
-    /// Its state with each node moved by `moved_m`.
+    /// Computes the state with each node displaced by `moved_m`.
     pub fn strain(&self, moved_m: &[Vector3<f64>], state: &mut Strained) {
         widest(
             #[inline(always)]
@@ -184,7 +187,7 @@ impl Sheet {
         }
         let mut doubled_j = [0.0; 2];
         for (edge, own) in edges.iter().zip(&*grown) {
-            // Tension and moment: derivatives of the energy by what grew.
+            // Tension and moment: derivatives of the energy by the growth.
             let mut pull = [edge.laws[0][0] * own[0], edge.laws[0][1] * own[1]];
             for k in 0..4 {
                 let (law, other) = (edge.laws[k + 1], grown[edge.near[k]]);
@@ -212,8 +215,8 @@ impl Sheet {
         state.displaced_m3 = tripled_m3 / 3.0 + volume_m3;
     }
 
-    /// Hands out the blocks of the elastic energy's second derivative at rest, in N/m, by pairs of
-    /// nodes; blocks of one pair add up.
+    /// Passes the blocks of the elastic energy's second derivative at rest, in N/m, to `add` by
+    /// pairs of nodes; blocks of one pair add up.
     pub fn stiffness(&self, mut add: impl FnMut([usize; 2], Matrix3<f64>)) {
         let vector = |v: &Quad| Vector3::new(v[0], v[1], v[2]);
         for (id, e) in self.edges.iter().enumerate() {
@@ -233,14 +236,14 @@ impl Sheet {
         }
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         size_of_val(self.rest.as_slice()) + size_of_val(self.edges.as_slice())
     }
 }
 
 impl Edge {
-    /// With nothing across it yet.
+    /// Creates an edge without neighbours.
     fn between([low, high]: [usize; 2], rest_m2: f64, across: usize, id: usize) -> Self {
         Self {
             corners: [low, high, across, across],
@@ -270,20 +273,20 @@ impl Edge {
 }
 
 impl Strained {
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let quads = self.gradient_n.capacity() + self.volume_m2.capacity() + self.points.capacity();
         quads * size_of::<Quad>() + self.grown.capacity() * size_of::<[f64; 2]>()
     }
 }
 
-/// C and Q of a triangle with these sides.
+/// Returns C and Q of a triangle with these sides.
 fn stiffness(sides: &[Vector3<f64>; 3], material: &Material) -> (Matrix3<f64>, Matrix3<f64>) {
     let Material { young_pa, poisson, thickness_m } = *material;
     let area_m2 = sides[0].cross(&sides[1]).norm() / 2.0;
     let x = sides[0].normalize();
     let y = sides[0].cross(&sides[1]).normalize().cross(&x);
-    // Rows: what ε_xx, ε_yy, ε_xy do to each edge.
+    // Rows: effect of ε_xx, ε_yy, ε_xy on each edge.
     let strains = Matrix3::from_rows(&sides.map(|side| {
         let (u, v) = (side.dot(&x), side.dot(&y));
         nalgebra::RowVector3::new(u * u, v * v, 2.0 * u * v)
@@ -291,7 +294,7 @@ fn stiffness(sides: &[Vector3<f64>; 3], material: &Material) -> (Matrix3<f64>, M
     let plane_pa = young_pa / (1.0 - poisson * poisson);
     let hooke_pa = plane_pa
         * Matrix3::new(1.0, poisson, 0.0, poisson, 1.0, 0.0, 0.0, 0.0, 2.0 * (1.0 - poisson));
-    // A triangle without area holds nothing.
+    // A triangle without area has no stiffness.
     let inverse = strains.try_inverse().unwrap_or_default();
     let membrane = inverse.transpose() * hooke_pa * inverse * (area_m2 * thickness_m / 4.0);
     let rigidity_nm = plane_pa * thickness_m.powi(3) / 12.0;

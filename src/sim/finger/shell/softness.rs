@@ -1,8 +1,8 @@
-//! How the sheet gives way at rest.
+//! Compliance of the sheet at rest: the inverse of its stiffness matrix.
 //!
-//! A shell that is the same left and right moves symmetrically under the symmetric part of forces
-//! and antisymmetrically under the rest: its stiffness falls into two matrices of half the size and
-//! half the band, and a solution costs half.
+//! A shell that is mirror-symmetric moves symmetrically under the symmetric part of forces and
+//! antisymmetrically under the rest. Its stiffness separates into two matrices of half the size and
+//! half the bandwidth, and a solution costs half.
 
 use super::sheet::Sheet;
 use nalgebra::Matrix3;
@@ -10,16 +10,16 @@ use palpate_gp::math::banded::{Banded, Factor};
 use palpate_gp::math::simd::Quad;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// The inverse of the sheet's stiffness at rest for the nodes that can move; never changes.
+/// Inverse of the sheet's stiffness at rest for the nodes that can move; constant.
 #[derive(Clone, Debug)]
 pub struct Softness {
-    /// Of symmetric and of antisymmetric motions.
+    /// Factors of symmetric and antisymmetric motions.
     halves: [Factor; 2],
-    /// Unknowns of the symmetric ones, which come before the others.
+    /// Number of symmetric unknowns, which precede the antisymmetric ones.
     symmetric: usize,
-    /// Of each node's three directions: its unknowns, and its shares in them.
+    /// Unknowns of each node's three directions, with their shares.
     parts: Vec<[Part; 2]>,
-    /// The inverse at nodes p and q ≤ p, in m/N, by rows of p.
+    /// Inverse at nodes p and q ≤ p, in m/N, by rows of p.
     blocks: Vec<[[f32; 3]; 3]>,
 }
 
@@ -30,8 +30,8 @@ struct Part {
 }
 
 impl Softness {
-    /// Of `sheet`, whose node k is at `place[k]` among those that can move; the one at place i has
-    /// its mirror image across y = 0 at place `mirror[i]`.
+    /// Computes the compliance of `sheet`. Node k has the index `place[k]` among those that can
+    /// move; index i has its mirror image across y = 0 at index `mirror[i]`.
     pub fn new(sheet: &Sheet, place: &[Option<usize>], mirror: &[usize]) -> Self {
         let (parts, symmetric) = parts(mirror);
         let size = parts.len();
@@ -63,7 +63,8 @@ impl Softness {
         own
     }
 
-    /// What `forces_n` displace by, in place; `halves` is memory of the same length.
+    /// Replaces `forces_n` by the displacements under them; `halves` is a workspace of the same
+    /// length.
     pub fn solve(&self, forces_n: &mut [f32], halves: &mut [f32]) {
         halves.fill(0.0);
         for (force_n, parts) in forces_n.iter().zip(&self.parts) {
@@ -78,7 +79,8 @@ impl Softness {
         }
     }
 
-    /// How far one place moves along its normal under a newton along that of the other, in m/N.
+    /// Returns the displacement of one node along its normal per newton along the normal of
+    /// another, in m/N.
     #[inline]
     pub fn between(&self, own: (usize, &Quad), other: (usize, &Quad)) -> f64 {
         let ((p, normal_p), (q, normal_q)) =
@@ -91,7 +93,7 @@ impl Softness {
         normal_p[0] * row(0) + normal_p[1] * row(1) + normal_p[2] * row(2)
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         self.halves.iter().map(Factor::bytes).sum::<usize>()
             + size_of_val(self.parts.as_slice())
@@ -99,8 +101,8 @@ impl Softness {
     }
 }
 
-/// The unknowns of all directions, and how many of them are symmetric. Motion across y is symmetric
-/// if its images are opposite.
+/// Returns the unknowns of all directions, and how many of them are symmetric. Motion across y is
+/// symmetric if its mirror images are opposite.
 fn parts(mirror: &[usize]) -> (Vec<[Part; 2]>, usize) {
     let mut parts = vec![[Part::default(); 2]; 3 * mirror.len()];
     let mut count = 0;
@@ -127,8 +129,8 @@ fn parts(mirror: &[usize]) -> (Vec<[Part; 2]>, usize) {
     (parts, count)
 }
 
-/// The entries of the stiffness between `unknowns`, counted from the first of them; those of one
-/// place add up.
+/// Passes the entries of the stiffness between `unknowns`, counted from the first of them; those of
+/// one place add up.
 fn each(
     sheet: &Sheet,
     place: &[Option<usize>],

@@ -1,20 +1,20 @@
-//! Springs that push and never pull, on a body that answers linearly.
+//! Unilateral springs (push only) on a body with a linear response.
 //!
-//! Spring i of stiffness kᵢ is shorter than its rest by xᵢ = bᵢ − Σⱼ Wᵢⱼ fⱼ under all forces f ≥ 0,
-//! and pushes with fᵢ = kᵢ max(xᵢ, 0). W is symmetric and positive, so there is one answer. It is
-//! looked for among the loaded springs, which are those of the last guess that push and those
-//! beside them that are shortened; where that goes in a circle, one spring after the other.
+//! Spring i of stiffness kᵢ is compressed by xᵢ = bᵢ − Σⱼ Wᵢⱼ fⱼ under all forces f ≥ 0, and pushes
+//! with fᵢ = kᵢ max(xᵢ, 0). W is symmetric and positive, so there is one solution. An active-set
+//! method finds it: the loaded springs are those of the last guess that push, and the others that
+//! are compressed. If this cycles, a sweep over single springs replaces it.
 
 use palpate_gp::math::simd::{dot, widest};
 
-/// Guesses of what is loaded (chosen; two or three are usual).
+// heuristic: largest number of active-set guesses; two or three are usual.
 const GUESSES: usize = 12;
 
-/// Sweeps over the springs one by one, if the guesses go in a circle (chosen: they need not end,
-/// what they bring is on the way down).
+// Sweeps over single springs, if the guesses cycle.
+// heuristic: they may stop before convergence, because every sweep lowers the energy.
 const SWEEPS: usize = 100;
 
-/// The springs and memory to solve for them.
+/// Springs, with the workspace to solve for their forces.
 #[derive(Clone, Debug, Default)]
 pub struct Springs {
     /// k, in N/m.
@@ -23,7 +23,7 @@ pub struct Springs {
     pub free_m: Vec<f64>,
     /// W by rows, in m/N.
     pub softness_m_n: Vec<f64>,
-    /// f: before [`solve`](Self::solve) a guess of what is loaded, then the answer, in N.
+    /// f, in N: before [`solve`](Self::solve) a guess of the loaded springs, then the solution.
     pub force_n: Vec<f64>,
     loaded: Vec<usize>,
     factor: Vec<f64>,
@@ -31,7 +31,7 @@ pub struct Springs {
 }
 
 impl Springs {
-    /// Forgets all springs.
+    /// Removes all springs.
     pub fn clear(&mut self) {
         for values in
             [&mut self.stiffness_n_m, &mut self.free_m, &mut self.softness_m_n, &mut self.force_n]
@@ -44,7 +44,7 @@ impl Springs {
         self.stiffness_n_m.len()
     }
 
-    /// Bytes held.
+    /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let values = [
             &self.stiffness_n_m,
@@ -58,14 +58,14 @@ impl Springs {
         numbers * size_of::<f64>() + self.loaded.capacity() * size_of::<usize>()
     }
 
-    /// How much spring `i` is shortened by everything but the forces.
+    /// Returns the compression of spring `i` by everything but its own stiffness.
     fn shortened_m(&self, i: usize) -> f64 {
         let row = &self.softness_m_n[i * self.len()..(i + 1) * self.len()];
         let yielded = self.loaded.iter().map(|&j| row[j] * self.force_n[j]);
         self.free_m[i] - yielded.sum::<f64>()
     }
 
-    /// Finds the forces.
+    /// Solves for the forces.
     pub fn solve(&mut self) {
         let count = self.len();
         self.loaded.clear();
@@ -81,7 +81,7 @@ impl Springs {
             for i in 0..count {
                 let was = self.loaded.get(next) == Some(&i);
                 next += usize::from(was);
-                // What does not push yet will if it is shortened under these forces.
+                // An unloaded spring becomes loaded if it is compressed under these forces.
                 let is = if was { self.force_n[i] > 0.0 } else { self.shortened_m(i) > 0.0 };
                 settled &= is == was;
                 self.pushes.push(f64::from(u8::from(is)));
@@ -95,13 +95,13 @@ impl Springs {
         self.sweep();
     }
 
-    /// The forces with which the loaded springs are in balance, pulling allowed.
+    /// Solves for the forces that balance the loaded springs, with pulling allowed.
     #[inline(always)]
     fn push_loaded(&mut self) {
         let (count, size) = (self.len(), self.loaded.len());
         self.factor.clear();
         self.pushes.clear();
-        // Cholesky's factor and its forward solution, row by row.
+        // Cholesky factor and forward solution, row by row.
         for (row, &i) in self.loaded.iter().enumerate() {
             let mut push = self.free_m[i];
             for (column, &j) in self.loaded[..=row].iter().enumerate() {
@@ -113,7 +113,7 @@ impl Springs {
                     entry /= self.factor[other + column];
                     push -= entry * self.pushes[column];
                 } else {
-                    // With 1/k > 0 on it the diagonal stays positive but for rounding.
+                    // With 1/k > 0 on it the diagonal stays positive except for rounding.
                     let least = self.stiffness_n_m[i].recip();
                     entry = (entry + least).max(1e-3 * least).sqrt();
                     push /= entry;
@@ -133,7 +133,7 @@ impl Springs {
         }
     }
 
-    /// Projected Gauss–Seidel: each sweep lowers the energy.
+    /// Does one projected Gauss–Seidel sweep; each sweep lowers the energy.
     fn sweep(&mut self) {
         let count = self.len();
         self.loaded.clear();
