@@ -122,7 +122,7 @@ def test_an_own_planner_goes_around_an_object(mug, run, isolate):
     ("planner", "words"),
     [
         (around.Flat, "3 coordinates, a target around an object 6"),
-        (around.Beyond, "not in the ball"),
+        (around.Beyond, "outside the ball"),
         (around.Zoned, "asks for a zone"),
         (around.Mistaken, "`variance` is of the exploration of a zone"),
     ],

@@ -45,8 +45,8 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     ("planner", "words"),
     [
         (own.Raises, "ValueError: no idea"),
-        (own.NotANumber, "not in the zone"),
-        (own.Outside, "not in the zone"),
+        (own.NotANumber, "outside the zone"),
+        (own.Outside, "outside the zone"),
         (own.Many, "5 coordinates"),
         (own.Words, "could not convert"),
         (own.Unmade, "not today"),

@@ -77,10 +77,10 @@ fn what_goes_over_a_zone_refuses_a_whole_object() {
     assert!(shown.contains("ball: 9") && shown.contains("% of the surface"), "{shown}");
     assert!(!shown.contains("zone") && !shown.contains("refuses"), "{shown}");
     let mjcf = ["show", "scene.toml", "--mjcf", "it.xml"];
-    fails(folder.path(), &mjcf, &["no model in MuJoCo", "[arm]"]);
+    fails(folder.path(), &mjcf, &["no MuJoCo model", "[arm]"]);
     succeeds(folder.path(), &["show", "scene.toml", "--png", "reach.png"]);
     assert!(folder.path().join("reach.png").is_file());
-    fails(folder.path(), &["show", "scene.toml", "--watch"], &["touches without moving"]);
+    fails(folder.path(), &["show", "scene.toml", "--watch"], &["does not move"]);
 }
 
 /// A robot that goes around objects registers itself at one side of a body.

@@ -45,7 +45,7 @@ fn commands_answer_to_their_old_names() {
             &["align", "scan/cloud.ply", "mesh.obj", "--position=0,0,0"],
             &["register MESH --cloud CLOUD"],
         ),
-        (&["watch", "scene.toml"], &["show SCENE --watch", "touches without moving"]),
+        (&["watch", "scene.toml"], &["show SCENE --watch", "does not move"]),
         (&["fidelity", "scene.toml", "--touches", "x"], &["invalid value 'x'"]),
     ];
     for (old, says) in renamed {
@@ -54,7 +54,7 @@ fn commands_answer_to_their_old_names() {
         assert!(says.iter().all(|words| output.contains(words)), "{old:?}: {output}");
     }
     for gone in ["stress", "bench", "cost"] {
-        fails(folder.path(), &[gone], &["is gone", "make "]);
+        fails(folder.path(), &[gone], &["was removed", "make "]);
     }
     fails(folder.path(), &["merge"], &["palpate report FOLDER --merge SHARDS"]);
     fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);

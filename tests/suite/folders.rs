@@ -122,7 +122,7 @@ fn every_beginning_that_a_crash_leaves_is_begun_anew() {
     }
     // With rows it is not taken: another run's rows are lost by --fresh only.
     let refused = run(folder.path(), &other, &[]);
-    assert!(said(&refused).contains("holds another experiment"), "{}", said(&refused));
+    assert!(said(&refused).contains("contains another experiment"), "{}", said(&refused));
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn what_others_put_into_a_folder_is_not_touched() {
         let out_name = out.to_str().unwrap();
         for fresh in [&[][..], &["--fresh"]] {
             let arguments = [&["run", "small.toml", "--out", out_name], fresh].concat();
-            fails(folder.path(), &arguments, &["this folder holds something else", "--out"]);
+            fails(folder.path(), &arguments, &["this folder contains other files", "--out"]);
         }
         assert_eq!(fs::read_dir(&out).unwrap().count(), files.len(), "{i}");
         for (name, text) in *files {

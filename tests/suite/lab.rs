@@ -215,16 +215,16 @@ fn a_run_that_was_halted_goes_on() {
     let first = network.run("random", 6, &out).arg("--record").output().unwrap();
     let said = String::from_utf8_lossy(&first.stderr).into_owned();
     assert_eq!(first.status.code(), Some(2), "{said}");
-    assert!(said.contains("emergency stop") && said.contains("touches of it are kept"), "{said}");
+    assert!(said.contains("emergency stop") && said.contains("touches are stored"), "{said}");
     let lines = |text: &str| text.lines().filter(|line| line.contains("\"touch\"")).count();
     let journal = fs::read_to_string(out.join("touches.jsonl")).unwrap();
     let kept = lines(&journal);
     assert!((1..6).contains(&kept), "{journal}");
-    assert!(said.contains(&format!("{kept} touches of it are kept")), "{said}");
+    assert!(said.contains(&format!("{kept} touches are stored")), "{said}");
     sleep(Duration::from_millis(1500));
     let unseen = network.run("random", 6, &out).output().unwrap();
     let said = String::from_utf8_lossy(&unseen.stderr).into_owned();
-    assert!(said.contains("halted by a fault") && said.contains("--clear-fault"), "{said}");
+    assert!(said.contains("a fault halted the run") && said.contains("--clear-fault"), "{said}");
     let mut second = network.run("random", 6, &out);
     let second = second.args(["--clear-fault", "--record"]).output().unwrap();
     assert!(second.status.success(), "{}", String::from_utf8_lossy(&second.stderr));
@@ -238,7 +238,7 @@ fn a_run_that_was_halted_goes_on() {
     let told = String::from_utf8_lossy(&replay.stdout).into_owned();
     assert!(replay.status.success(), "{told}{}", String::from_utf8_lossy(&replay.stderr));
     assert!(
-        told.contains("random-0000-part-2.mcap") && told.contains("6 touches the same"),
+        told.contains("random-0000-part-2.mcap") && told.contains("6 touches identical"),
         "{told}"
     );
     twin.end();

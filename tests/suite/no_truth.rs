@@ -98,12 +98,12 @@ fn a_run_without_truth_is_told() {
         report::write_tables(&run, &analysis, folder.path()).unwrap();
         report::write(&run, &analysis, folder.path()).unwrap();
         let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
-        assert!(page.contains("nobody knows this surface"));
+        assert!(page.contains("no ground truth"));
         let visible = page.split("<script").next().unwrap();
         assert!(!visible.contains("NaN") && !visible.contains("mean R (Eq. 5) is"), "{visible}");
         assert_eq!(page.contains("At verification touches"), !with.is_empty());
         let text = report::tables::summary::text(&run);
-        assert!(text.contains("nobody knows this surface"), "{text}");
+        assert!(text.contains("no ground truth"), "{text}");
         assert_eq!(text.contains("verification rmse"), !with.is_empty(), "{text}");
         let csv = fs::read_to_string(folder.path().join("summary.csv")).unwrap();
         assert!(csv.lines().count() > 1 && !csv.contains("NaN"));

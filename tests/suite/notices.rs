@@ -87,7 +87,7 @@ fn a_datum_far_from_the_surface_and_an_r_that_says_nothing_are_told() {
         assert!(words.contains("the zone is 120.0 mm wide"), "{words}");
     }
     assert!(summary(&folder, "random", "8", "r_mean") > 0.999);
-    assert!(text.contains("R cannot tell a belief from a constant height"), "{text}");
+    assert!(text.contains("R does not distinguish the belief from a constant height"), "{text}");
     assert!(text.contains("random, sobol"), "{text}");
 }
 
@@ -98,7 +98,7 @@ fn a_forgotten_unit_is_told_with_the_one_that_fits() {
     let notes = said(&output);
     assert!(notes.contains("1667 times larger than the zone"), "{notes}");
     assert!(notes.contains("in \"mm\" it would measure 0.2000 m"), "{notes}");
-    assert!(notes.contains("can touch only 0 of 1681 test places"), "{notes}");
+    assert!(notes.contains("can reach only 0 of 1681 test points"), "{notes}");
     let bird =
         folder("bird.toml", &[("[zone]", "[zone]"), ("[object]", "[object]\nunit = \"mm\"")]);
     let notes = said(&palpate(bird.path(), &["show", "scene.toml"]));
@@ -113,10 +113,10 @@ fn few_places_and_few_contacts_are_told_before_and_after() {
     let (text, notes) = (table(&output), said(&output));
     let page = fs::read_to_string(folder.path().join("runs/it/report.html")).unwrap();
     for words in [&text, &notes, &page] {
-        assert!(words.contains("of 441 test places have a surface"), "{words}");
+        assert!(words.contains("of 441 test points lie on the object"), "{words}");
     }
     for words in [&text, &page] {
-        assert!(words.contains("touches met the object or could be read"), "{words}");
+        assert!(words.contains("touches made a usable contact"), "{words}");
     }
 }
 

@@ -105,7 +105,7 @@ fn a_planner_that_is_not_there_is_an_error() {
     let experiment = simulation(8).experiment().clone();
     let bare = Simulation::new(experiment).unwrap();
     let error = runner::jobs(&bare, &[]).err().unwrap().to_string();
-    assert!(error.starts_with("planner `mine:Random` is not built into this program"), "{error}");
+    assert!(error.starts_with("planner `mine:Random` is not available in this program"), "{error}");
     assert!(bare.planner("random").is_some());
 }
 

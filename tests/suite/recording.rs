@@ -594,7 +594,7 @@ fn the_program_records_and_replays() {
     for name in ["random-0000", "random-0001", "active-0000", "active-0001"] {
         let file = format!("run/recordings/{name}.mcap");
         let said = succeeds(path, &["replay", &file]);
-        assert!(said.contains("3 touches the same"), "{said}");
+        assert!(said.contains("3 touches identical"), "{said}");
     }
     let file = "run/recordings/active-0001.mcap";
     let json = succeeds(path, &["replay", file, "--json"]);
@@ -604,7 +604,7 @@ fn the_program_records_and_replays() {
     let other = ended(&mut command(path, &changed), "replay");
     assert_eq!(other.status.code(), Some(1), "{}", said(&other));
     let words = String::from_utf8(other.stdout).unwrap();
-    assert!(words.contains("differs in touch 1 at tick "), "{words}");
+    assert!(words.contains("touch 1 differs at tick "), "{words}");
     fails(path, &["replay", "small.toml"], &["small.toml", "not a recording"]);
     fails(path, &["replay", "none.mcap"], &["none.mcap"]);
     let cast = ["run", "small.toml", "--set", "scene.body=\"cast\"", "--record", "--out", "cast"];
@@ -651,8 +651,8 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     }
     let file = path.to_str().unwrap();
     let said = succeeds(folder.path(), &["replay", file]);
-    assert_eq!(said.matches("touches the same").count(), 3, "{said}");
-    assert!(said.contains("5 touches the same, decisions and belief, 4 of them made before"));
+    assert_eq!(said.matches("touches identical").count(), 3, "{said}");
+    assert!(said.contains("5 touches identical in decisions and belief, 4 of them from earlier"));
     let json = succeeds(folder.path(), &["replay", file, "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["parts"][1]["made_before"], 4);
@@ -664,5 +664,5 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     bytes.truncate(bytes.len() / 2);
     fs::write(&parts[2], bytes).unwrap();
     let cut = succeeds(folder.path(), &["replay", file]);
-    assert!(cut.contains("ends before its trial"), "{cut}");
+    assert!(cut.contains("ends before the trial"), "{cut}");
 }

@@ -168,7 +168,7 @@ fn trials_and_planners_added_later_give_the_bytes_of_a_run_at_once() {
     let summary = fs::read_to_string(out.join("summary.csv")).unwrap();
     assert!(!summary.contains("active") && summary.contains("\nrandom,35,5,"), "{summary}");
     let again = output(&out, &all);
-    assert!(again.contains("\n0 trials in ") && again.contains("15 were there"), "{again}");
+    assert!(again.contains("\n0 trials in ") && again.contains("15 already done"), "{again}");
     assert!(fs::read(trials(&out)).unwrap() == grown);
 }
 

@@ -68,12 +68,12 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     let (code, told) = merge("missing", &["1", "3"]);
     assert!(code == Some(2) && told.contains("4 of 14 trials are missing"), "{told}");
     let (code, told) = merge("twice", &["1", "2", "3", "whole"]);
-    assert!(code == Some(2) && told.contains("stands in"), "{told}");
+    assert!(code == Some(2) && told.contains("is in both"), "{told}");
     run(&at("foreign"), &["--shard", "1/3", "--set", "gp.noise_sd_m=0.01"]);
     let (code, told) = merge("of-two", &["2", "foreign"]);
-    assert!(code == Some(2) && told.contains("another experiment"), "{told}");
+    assert!(code == Some(2) && told.contains("not the experiment of"), "{told}");
     let (code, told) = merge("merged", &["1", "2", "3"]);
-    assert!(code == Some(2) && told.contains("has rows already"), "{told}");
+    assert!(code == Some(2) && told.contains("already has rows"), "{told}");
     assert!(["missing", "twice", "of-two"].iter().all(|name| !at(name).exists()));
     let (code, told) = run(&at("no"), &["--shard", "4/3"]);
     assert!(code == Some(2) && told.contains("from 1 to N"), "{told}");

@@ -257,7 +257,7 @@ fn what_cannot_be_asked_for_is_refused() {
     };
     let active = "planners = [\"active\"]";
     refused("planners = [\"active\", \"slope\"]", "around = {}", "planners[1]");
-    refused("planners = [\"silhouette\"]", "around = {}", "goes around an object");
+    refused("planners = [\"silhouette\"]", "around = {}", "a planner for whole objects");
     refused(active, "around = {}\nzone = { x_m = [0, 1] }", "scene.zone");
     refused(active, "", "[around] for a whole object");
     refused(active, "around = { radius_m = -1 }", "scene.around.radius_m");
