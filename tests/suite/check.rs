@@ -161,7 +161,7 @@ fn a_check_says_by_its_exit_code() {
     let told = fs::read_to_string(junit).unwrap();
     assert!(told.contains("<failure") || told.contains("<error"), "{told}");
     let (code, said) = check(&["--set", "seed=5"]);
-    assert!(code == Some(2) && said.contains("`seed` is 2016 there and 5"), "{said}");
+    assert!(code == Some(2) && said.contains("`seed` is 2016 in the baseline and 5"), "{said}");
     let text = fs::read_to_string(&file).unwrap();
     fs::write(&file, text.replacen("\"trial\":1", "\"trial\":x", 1)).unwrap();
     let (code, said) = check(&[]);
