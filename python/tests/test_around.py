@@ -121,7 +121,7 @@ def test_an_own_planner_goes_around_an_object(mug, run, isolate):
 @pytest.mark.parametrize(
     ("planner", "words"),
     [
-        (around.Flat, "3 coordinates, a target around an object 6"),
+        (around.Flat, "3 coordinates, a target around an object needs 6"),
         (around.Beyond, "outside the ball"),
         (around.Zoned, "asks for a zone"),
         (around.Mistaken, "`variance` is of the exploration of a zone"),
