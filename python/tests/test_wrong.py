@@ -41,7 +41,7 @@ def test_a_setting_that_is_wrong():
     ("planner", "words"),
     [
         (Widest(), "pass the class Widest"),
-        (3, "3 is no planner"),
+        (3, "3 is not a planner"),
         ("no_such_module:Widest", "No module named 'no_such_module'"),
     ],
 )
