@@ -1,4 +1,4 @@
-"""Whole objects, touched from any side."""
+"""Tests of whole objects."""
 
 import pickle
 import warnings
@@ -63,7 +63,7 @@ def test_a_belief_is_a_field_and_a_closed_surface(run):
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
     mean_m, deviation_m = belief.field(vertices_m)
-    # It is the zero set, but where that leaves the box about the contacts and is cut off.
+    # The vertices lie on the zero set, except where it is clipped to the box around the contacts.
     assert np.quantile(np.abs(mean_m), 0.9) < 1e-5 and (deviation_m > 0).all()
     ball = belief.ball
     beyond_m = ball.centre_m + ball.radius_m * np.eye(3).reshape(1, 3, 3)

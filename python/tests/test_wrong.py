@@ -1,4 +1,4 @@
-"""What is asked wrongly is refused at once, in words that say what is allowed."""
+"""Tests of invalid arguments: errors are immediate and list the allowed values."""
 
 import pytest
 
