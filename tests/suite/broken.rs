@@ -1,16 +1,16 @@
-//! Broken input through the real program: a clear error, exit code 2, never a panic.
+//! Tests of invalid input to the real program: a clear error, exit code 2, and no panic.
 
 use std::fs;
 use std::process::Output;
 
 use crate::common::program::{EXPERIMENT, SCENE, folder, palpate};
 
-/// Cases that were not refused as they should.
+/// Cases that were not rejected as required.
 #[derive(Default)]
 struct Accepted(Vec<String>);
 
 impl Accepted {
-    /// Insists on exit code 2 and a message that begins with `error:` and holds all of `says`.
+    /// Requires exit code 2 and a message that starts with `error:` and contains all of `says`.
     fn refuse(&mut self, case: &str, output: &Output, says: &[&str]) {
         let message = String::from_utf8_lossy(&output.stderr);
         let is_error = output.status.code() == Some(2) && message.starts_with("error: ");
@@ -38,7 +38,7 @@ fn the_unbroken_folder_runs() {
 
 #[test]
 fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
-    // What is replaced, by what, and what the message must hold.
+    // Original text, replacement, and required parts of the message.
     let cases: &[(&str, &str, &[&str])] = &[
         ("trials = 1", "trials = 0", &["small.toml:4", "trials", "0", "1 to 1000000"]),
         ("trials = 1", "trials = -1", &["small.toml:4", "trials", "-1"]),
