@@ -1,11 +1,11 @@
-//! Messages say in the user's words what is wrong, where, and what is allowed: no type of the
-//! program's language, no number of hundreds of digits.
+//! Tests of error messages: they give the problem, its place and the allowed values in the user's
+//! terms, without types of the programming language and without very long numbers.
 
 use std::fs;
 
 use crate::common::program::{EXPERIMENT, SCENE, fails, folder};
 
-/// Words of the language and of its parsers.
+/// Words of the programming language and of its parsers.
 const LEAKS: [&str; 14] = [
     "expected u32",
     "u64",

@@ -1,4 +1,4 @@
-//! Parts of a run, put together.
+//! Tests of shards and their merging.
 
 use crate::common::counting::peak_bytes;
 use crate::common::program::palpate;
@@ -10,7 +10,7 @@ use std::path::Path;
 const SETS: [&str; 4] =
     ["trials=7", "touches=8", "initial_touches=3", "planners=[\"active\",\"random\"]"];
 
-/// Runs the toy with `more` in `out`; how it ended and what it said.
+/// Runs the toy with `more` in `out`; returns exit code and output.
 fn run(out: &Path, more: &[&str]) -> (Option<i32>, String) {
     let mut arguments =
         vec!["--quiet", "run", "toy", "--no-report", "--out", out.to_str().unwrap()];
@@ -34,7 +34,8 @@ fn a_shard_is_every_nth_trial() {
     }
 }
 
-/// The bytes of a run in one process; and what is no whole is refused, and nothing written.
+/// Merged shards have the bytes of a run in one process; incomplete sets are rejected without
+/// writing.
 #[test]
 fn shards_are_merged_to_the_bytes_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -42,7 +43,7 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     let text = |name: &str| at(name).to_str().unwrap().to_owned();
     assert_eq!(run(&at("whole"), &[]).0, Some(0));
     for shard in ["1", "2", "3"] {
-        // The second is stopped after its first trial and begun again.
+        // The second run is stopped after its first trial and restarted.
         if shard == "2" {
             run(&at(shard), &["--shard", "2/3", "--set", "trials=2"]);
             assert!(
@@ -79,7 +80,7 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     assert!(code == Some(2) && told.contains("from 1 to N"), "{told}");
 }
 
-/// What is kept of a row is which trial it is and where it stands.
+/// Only the trial and the position of each row are kept in memory.
 #[test]
 fn rows_are_merged_without_being_kept() {
     let folder = tempfile::tempdir().unwrap();
