@@ -60,7 +60,7 @@ pub(super) struct Args {
 }
 
 impl Args {
-    /// Name of the planner asked for; empty if none is.
+    /// Name of the requested planner; empty if none is given.
     fn planner(&self) -> &str {
         self.planner.as_deref().unwrap_or_default()
     }

@@ -16,7 +16,7 @@ Examples:
   palpate list                 everything that has a name
   palpate list planners")]
 pub(super) struct Args {
-    /// What to list [default: all].
+    /// Kind to list [default: all].
     kind: Option<Kind>,
 }
 

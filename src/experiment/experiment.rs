@@ -131,7 +131,7 @@ impl Experiment {
     /// does.
     ///
     /// # Errors
-    /// The same as for [`load`](Self::load).
+    /// See [`load`](Self::load).
     pub fn parse(path: &Path, text: String, sets: &[String]) -> Result<Self, ConfigError> {
         Self::finish(Loader::of(path, text)?, sets)
     }

@@ -10,18 +10,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReportSettings {
-    /// Touch counts after which beliefs are drawn [default: a third, two thirds and all of the
-    /// planned touches].
+    /// Touch counts after which beliefs are drawn (default: a third, two thirds and all of the
+    /// planned touches).
     pub touch_counts: Vec<u32>,
     /// Trial whose beliefs are drawn.
     pub trial: u32,
-    /// Planners whose beliefs are drawn [default: all].
+    /// Planners whose beliefs are drawn (default: all).
     pub planners: Vec<String>,
-    /// Reference planners of the comparisons [default: `random` and `active` if they ran, otherwise
-    /// every planner].
+    /// Reference planners of the comparisons (default: `random` and `active` if they ran, otherwise
+    /// every planner).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub baselines: Vec<String>,
-    /// Number of touches of a baseline whose error is the goal of the others [default: all].
+    /// Number of touches of a baseline whose error is the goal of the others (default: all).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub goal_touches: Option<u32>,
     /// Published claims, shown on the page beside the results after the same number of touches.

@@ -48,7 +48,7 @@ impl Simulation {
     /// slow step when it starts.
     ///
     /// # Errors
-    /// The same as for [`new`](Self::new).
+    /// See [`new`](Self::new).
     pub fn new_telling(mut experiment: Experiment, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
         real_robot::check(&experiment, false)?;
         if experiment.backend.kind != BackendKind::Simulated {

@@ -104,7 +104,7 @@ impl Experiment {
     /// Reads one combination of the file at `path`; appends its label to the experiment's name.
     ///
     /// # Errors
-    /// The same as for [`load`](Self::load).
+    /// See [`load`](Self::load).
     pub fn load_cell(path: &Path, cell: &Cell, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
         loader.take(SWEEP);

@@ -116,7 +116,7 @@ impl Samples {
         self.indices.chunks_exact(self.count.max(1)).map(statistic).collect()
     }
 
-    /// Interval of the median of [`count`](Self::count) values; see [`median_interval`].
+    /// Interval of the median of `count` values; see [`median_interval`].
     pub(super) fn median_interval(&self, values: &[f64]) -> Option<[f64; 2]> {
         let (ranked, mut counts) = (Ranked::new(values), Vec::new());
         let medians = self.each(|sample| ranked.median(sample, &mut counts).unwrap_or(f64::NAN));

@@ -21,8 +21,8 @@ pub struct ScanTruth {
     /// Minimum number of contacts within `within_m` of a test point that has a height.
     #[serde(default = "neighbours")]
     pub neighbours: usize,
-    /// Search radius around a test point, in the zone's plane [default: three times the median
-    /// nearest-neighbour distance].
+    /// Search radius around a test point, in the zone's plane (default: three times the median
+    /// nearest-neighbour distance).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within_m: Option<f64>,
 }

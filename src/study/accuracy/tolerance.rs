@@ -60,8 +60,8 @@ impl Tolerance {
 pub enum Criterion {
     /// 95 % of the touches stay within a tolerance.
     Touches(Tolerance),
-    /// The comparison of planners changes by less than this margin, m [default: the change that
-    /// could reverse it].
+    /// The comparison of planners changes by less than this margin, m (default: the change that
+    /// could reverse it).
     Verdict(Option<f64>),
 }
 

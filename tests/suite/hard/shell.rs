@@ -228,5 +228,5 @@ fn pushed_into(solid: palpate::geometry::solids::Triangles) -> Outcome {
 }
 
 /// Presses after which a shell is at rest.
-// heuristic: found by increasing the number.
+// heuristic: a generous number.
 const SETTLING: usize = 20;
