@@ -243,7 +243,7 @@ fn damaged_run_folders_are_refused_and_lose_nothing() {
     accepted.refuse("a whole last line that is no row", &run(&[]), &["trials.jsonl:2"]);
     fs::write(&trials, &rows).unwrap();
     fs::write(&trials, [rows.as_slice(), rows.as_slice()].concat()).unwrap();
-    accepted.refuse("the same trial twice", &run(&[]), &["trials.jsonl:2", "twice"]);
+    accepted.refuse("the same trial twice", &run(&[]), &["trials.jsonl:2", "duplicate"]);
     assert!(run(&["--set", "touches=2", "--out", "runs/shorter"]).status.success());
     fs::copy(folder.path().join("runs/shorter/trials.jsonl"), &trials).unwrap();
     accepted.refuse("a trial of another run", &run(&[]), &["trials.jsonl:1", "2 touches of 3"]);

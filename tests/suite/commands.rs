@@ -60,9 +60,7 @@ fn commands_answer_to_their_old_names() {
     fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);
     // The help lists each command once, in its group.
     let help = succeeds(folder.path(), &["--help"]);
-    for (group, name) in
-        [("Explore:", "  export "), ("Laboratory:", "  twin "), ("More:", "  list ")]
-    {
+    for (group, name) in [("Explore:", "  export "), ("Robot:", "  twin "), ("More:", "  list ")] {
         assert!(help.find(group) < help.find(name), "{help}");
         assert_eq!(help.matches(&format!("\n{name}")).count(), 1, "{help}");
     }
@@ -154,10 +152,10 @@ fn an_exported_belief_replaces_its_own_files_only() {
     succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
     let export = ["export", "runs/small", "--planner", "random", "--out", "it.ply"];
     fs::write(folder.path().join("it.svg"), "mine").unwrap();
-    fails(folder.path(), &export, &["it.svg is there", "--force"]);
+    fails(folder.path(), &export, &["it.svg exists", "--force"]);
     assert!(!folder.path().join("it.ply").exists());
     succeeds(folder.path(), &[&export[..], &["--force"]].concat());
     succeeds(folder.path(), &export);
     let onto_mesh = ["export", "runs/small", "--planner", "random", "--out", "mesh.obj"];
-    fails(folder.path(), &onto_mesh, &["mesh.obj is there", "--force"]);
+    fails(folder.path(), &onto_mesh, &["mesh.obj exists", "--force"]);
 }

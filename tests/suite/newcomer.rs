@@ -174,7 +174,7 @@ fn what_cannot_be_made_an_experiment_is_refused_and_nothing_replaced() {
     fails(folder.path(), &["new", "none.obj"], &["none.obj"]);
     fails(folder.path(), &["new", "egg.ply", "--side", "inside"], &["inside", "front"]);
     fs::write(folder.path().join("egg.toml"), "mine").unwrap();
-    fails(folder.path(), &["new", "egg.ply"], &["egg.toml is there", "--force"]);
+    fails(folder.path(), &["new", "egg.ply"], &["egg.toml exists", "--force"]);
     assert_eq!(fs::read_to_string(folder.path().join("egg.toml")).unwrap(), "mine");
     assert!(!folder.path().join("egg-scene.toml").exists());
     succeeds(folder.path(), &["new", "egg.ply", "--out", "deep/er"]);
