@@ -35,7 +35,7 @@ Examples:
 
 Variants of the scene touch the same targets without sensor noise, so that only the model differs. A
 level is a coarser or finer simulation, compared with the reference, the finest level, and with the
-object's true surface. Each effect is switched alone and compared with the scene as it is; touches are
+object's true surface. Each effect is switched alone and compared with the unchanged scene; touches are
 timed in interleaved pairs.
 
 A tolerance holds for 95 % of the touches. Its unit is mm or um (contact point), N (force) or counts

@@ -23,8 +23,8 @@ Examples:
 
 Reads the mesh and writes an experiment, NAME.toml, and its scene, NAME-scene.toml. Both run unchanged. \
 Every guess is printed and is a setting of the scene that you can change. Units: glTF files are in metres with y up by \
-specification. Other formats do not say: the first of mm, m and cm that gives a size that a finger can explore is used; \
-if none does, the mesh is scaled to 0.15 m. Up: y for OBJ, z for STL and PLY.")]
+specification. Other formats have no unit: the first of mm, m and cm that gives a size that a finger can explore is used; if none \
+does, the mesh is scaled to 0.15 m. Up: y for OBJ, z for STL and PLY.")]
 pub(super) struct Args {
     /// Mesh file.
     mesh: PathBuf,
