@@ -189,7 +189,7 @@ fn whose(run: &Run, args: &Args, touches: u32) -> String {
     )
 }
 
-/// Returns the number of touches to export after.
+/// Returns the touch count after which the belief is exported.
 ///
 /// # Errors
 /// If the run lacks the planner, the trial or the touch count.

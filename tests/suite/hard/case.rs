@@ -127,7 +127,7 @@ impl Case {
     }
 }
 
-/// Stable if `condition` is true, otherwise wrong with `what`.
+/// Returns `Stable` if `condition` is true, otherwise `Wrong` with `what`.
 pub fn require(condition: bool, what: impl FnOnce() -> String) -> Outcome {
     if condition { Outcome::Stable } else { Outcome::Wrong(what()) }
 }
