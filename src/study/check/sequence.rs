@@ -63,7 +63,7 @@ impl Sequence {
     }
 
     /// Number of values for an interval with half width `half`; `None` if the spread is unknown or
-    /// the number exceeds [`MOST`].
+    /// the number exceeds 100 000.
     pub fn wanted(&self, half: f64, alpha: f64) -> Option<usize> {
         let sd = self.sd?;
         (2..MOST).find(|&n| sd * width(n, alpha) <= half * (n as f64).sqrt())
