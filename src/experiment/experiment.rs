@@ -78,7 +78,7 @@ pub struct Experiment {
 /// Key of the table that defines several experiments in one file.
 pub(super) const SWEEP: &str = "sweep";
 
-/// Tables that a file of their own may contain.
+/// Tables that may be in a separate file.
 const INCLUDED: [&str; 4] = ["scene", "backend", "gp", "space"];
 
 /// Default reference planners, those of the paper.

@@ -54,7 +54,7 @@ pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
     notices
 }
 
-/// Notice about a ground truth that is a scan, which has errors of its own.
+/// Notice about a ground truth that is a scan, which itself has errors.
 pub fn of_scan(contacts: usize, rmse_m: Option<f64>) -> String {
     let off = match rmse_m {
         Some(rmse_m) => format!(

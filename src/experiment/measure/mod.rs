@@ -135,7 +135,7 @@ pub const COVERAGE: Measure = measure(Neither, "coverage", "share in the 95 % ba
     .from(Source::Metrics(|it| it.coverage))
     .drawn(Scale::UpToOne);
 
-/// Chamfer distance between the believed and the true surface of a whole object.
+/// Chamfer distance between the estimated and the true surface of a whole object.
 pub const CHAMFER: Measure = measure(Less, "chamfer_m", "Chamfer distance", MM)
     .from(Source::Shape(|it| it.chamfer_m))
     .aggregated(Aggregate::Both)

@@ -200,8 +200,8 @@ impl Rules {
         .collect()
     }
 
-    /// Whether each measure's difference is significant: the first alone, the others after Holm
-    /// 1979.
+    /// Whether each measure's difference is significant: the first alone, the others with
+    /// Holm's correction (Holm 1979).
     fn sure(&self, sequences: &[Sequence]) -> Vec<bool> {
         let mut order: Vec<usize> = (1..sequences.len()).collect();
         order.sort_by(|&a, &b| sequences[a].p.total_cmp(&sequences[b].p));
