@@ -1,15 +1,15 @@
-# `make demo` and `make test` are all a fresh machine needs: they set up, build and run.
-# Needs cargo, a C compiler, python3 with pip, and make.
+# `make demo` and `make test` work on a new machine: they set up, build and run.
+# They need cargo, a C compiler, python3 with pip, and make.
 
 DEPS := .deps
 MUJOCO := 3.17.0
 LIBRARY := $(DEPS)/lib/libmujoco.so
 MUJOCO_LICENCES := $(DEPS)/lib/licences
 CMAKE := $(DEPS)/bin/cmake
-# Which file of the package does not depend on the Python that fetches it.
+# Selects the package file independently of the Python version that fetches it.
 PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementation cp --abi cp312
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
-# What a program says it was built from; built by cargo alone it says "unknown".
+# Commit that the program reports; "unknown" in a build by cargo alone.
 export PALPATE_COMMIT := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
 PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
@@ -23,8 +23,8 @@ demo: setup
 	cargo build --release --locked
 	$(PALPATE) run experiments/demo.toml
 
-# What docs/paper.md is written from: the paper's experiments, the same with the soft finger and the
-# arm, and other planners beside its own.
+# Experiments behind docs/paper.md: those of the paper, the same with the soft finger and the arm, and
+# other planners beside the paper's.
 PLANNERS := $(wildcard experiments/paper/planners-*.toml)
 SOFT := $(wildcard experiments/paper/*-finger-*.toml experiments/paper/*-pa10-*.toml)
 RIGID := $(filter-out $(SOFT) $(PLANNERS),$(wildcard experiments/paper/*.toml))
@@ -43,7 +43,7 @@ paper-planners: setup
 	cargo build --release --locked
 	for experiment in $(PLANNERS); do $(PALPATE) run $$experiment || exit; done
 
-# With ROS 2, so that an arm behind topics is tested where there is none.
+# Includes ROS 2, to test the topics of an arm without an arm.
 test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
@@ -51,12 +51,12 @@ test: setup
 	$(MAKE) test-faults
 	$(MAKE) test-ros2 TOUCHES=6 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop'
 
-# How far the tip still moves after each failure between explorer and arm: the table of docs/safety.md.
-# In real time, so with the machine for itself.
+# Distance that the tip moves after each failure between explorer and arm: the table of docs/safety.md.
+# It runs in real time and needs an idle machine.
 test-faults: setup
 	cargo test --locked -p palpate --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults
 
-# Planners are what experiments/baselines says: whoever changes one writes why (palpate check --bless).
+# Regression test of planners against experiments/baselines; palpate check --bless REASON accepts a change.
 CHECKED := toy container bird
 
 check-planners: setup
@@ -65,16 +65,16 @@ check-planners: setup
 			--baseline experiments/baselines/$$experiment.jsonl || exit; \
 	done
 
-# Fixed work costs the instructions of experiments/baselines/cost.toml; skipped where there is no valgrind.
+# Compares instruction counts with experiments/baselines/cost.toml; skipped without valgrind.
 check-cost: setup
 	tests/cost.py
 
 # All hard cases at all severities, periods and time steps, ten minutes of processor time: writes
-# docs/hard-cases.md, and fails if an outcome is unexplained.
+# docs/hard-cases.md and fails on an unexplained outcome.
 hard-cases: setup
 	PALPATE_HARD_CASES=1 cargo test --locked -p palpate --test suite hard::all_outcomes
 
-# Shards by GNU parallel and by a Slurm of one node, each skipped where it is not there.
+# Shards with GNU parallel and with Slurm on one node; each is skipped if not installed.
 test-clusters: setup
 	cargo build --locked --features ros2
 	tests/clusters/test.sh target/debug/palpate
@@ -82,12 +82,12 @@ test-clusters: setup
 install-clusters:
 	apt-get install --yes --no-install-recommends parallel slurm-wlm munge
 
-# An explorer and a twin of the arm over ROS 2, and a peer of another implementation, in a network
-# namespace of their own: nothing leaves it.
+# An explorer, a simulated robot over ROS 2, and a peer with another implementation, in their own network
+# namespace, isolated from the network.
 TOUCHES := 20
 OVER_TOPICS := lab:: lab_faults::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
-NO_NAMESPACE := this machine allows no network namespace (unshare --map-root-user --net)
+NO_NAMESPACE := no permission for a network namespace (unshare --map-root-user --net)
 LAB_TESTS = cargo test --locked -p palpate --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
 
 test-ros2: setup $(DEPS)/ros2/bin/python
@@ -101,7 +101,7 @@ $(DEPS)/ros2/bin/python: tests/ros2/peer.txt
 	$(DEPS)/ros2/bin/python -m pip install --quiet --only-binary=:all: -r tests/ros2/peer.txt
 	touch $@
 
-# The same over ROS 1, with Debian's master and rospy; `make install-ros1` fetches them.
+# The same tests over ROS 1, with Debian's master and rospy; `make install-ros1` installs them.
 ROS1 := libssl-dev pkg-config python3-rosmaster python3-rospy python3-std-srvs \
 	$(foreach part,std sensor geometry trajectory diagnostic,python3-$(part)-msgs)
 
@@ -115,11 +115,11 @@ test-ros1: setup
 install-ros1:
 	apt-get install --yes --no-install-recommends $(ROS1)
 
-# The report page in a browser; fails where there is no Chromium.
+# Tests the report page in a browser; fails without Chromium.
 page-test: setup
 	PALPATE_PAGE_TEST=1 cargo test --locked -p palpate --test suite page
 
-# A recording in a reader that is not ours; skipped where Python's packages cannot be fetched.
+# Reads a recording with an independent reader; skipped if the Python packages cannot be fetched.
 READER := $(DEPS)/mcap/bin/python
 RECORDED := target/test-mcap
 
@@ -127,14 +127,14 @@ test-mcap: setup
 	cargo build --release --locked
 	$(PALPATE) run container_finger --set trials=1 --set touches=7 --set planners='["active"]' --record --fresh --no-report --out $(RECORDED)
 	@if $(MAKE) --no-print-directory $(READER); then $(READER) tests/mcap_reads.py $(RECORDED)/recordings/active-0000.mcap; \
-	else echo "test-mcap: skipped, the packages of tests/mcap.txt cannot be fetched"; fi
+	else echo "test-mcap is skipped: the packages of tests/mcap.txt cannot be fetched"; fi
 
 $(READER): tests/mcap.txt
 	python3 -m venv $(DEPS)/mcap
 	$(READER) -m pip install --quiet --only-binary=:all: -r tests/mcap.txt
 	touch $@
 
-# Valid files and settings, altered at random: no panic, no hang, no silence. Takes about an hour.
+# Fuzz tests: randomly altered files and settings cause errors, but no panic and no hang. Takes about an hour.
 FUZZ := 100000
 
 fuzz: setup
@@ -142,7 +142,7 @@ fuzz: setup
 	PALPATE_FUZZ=$(FUZZ) cargo test --locked -p palpate --test suite folders::kills
 	PALPATE_FUZZ=$(FUZZ) cargo test --locked -p palpate --test suite recording::
 
-# docs/reference.md, from the code; a test holds it to what the code says.
+# Generates docs/reference.md from the code; a test checks that it is up to date.
 reference: setup
 	PALPATE_WRITE_REFERENCE=1 cargo test --locked -p palpate --test suite reference::
 
@@ -152,7 +152,7 @@ lint: setup
 	cargo clippy --locked --lib --bins --tests --no-default-features --features ros2 -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
 
-# What draws windows and pictures, whose packages take long to check.
+# Code for windows and rendering, whose packages take long to check.
 lint-windows: setup
 	cargo clippy --locked --lib --bins --features render,viewer -- -D warnings
 
@@ -164,23 +164,23 @@ bench: setup
 	cargo bench --locked --bench dynamic
 	cargo bench --locked --bench contact
 
-# How far the electrodes' point of contact lies from the exact one.
+# Error of contacts located by the electrodes.
 contacts: setup
 	cargo bench --locked --bench contacts
 
-# The force at which contact is told, and how often it is told of nothing.
+# Force at which contact is detected, and rate of false detections.
 detection: setup
 	cargo bench --locked --bench detection
 
-# How the cost grows with the number of touches; draws docs/growth.svg.
+# Cost over the number of touches; draws docs/growth.svg.
 growth: setup
 	cargo bench --locked --bench growth
 
-# The same around a whole object; draws docs/growth-around.svg.
+# Cost over the number of touches around a whole object; draws docs/growth-around.svg.
 growth-around: setup
 	cargo bench --locked --bench around
 
-# Palpate beside scikit-learn and egobox, in an environment of its own.
+# Compares Palpate with scikit-learn and egobox, in a separate environment.
 bench-peers: setup $(DEPS)/peers/bin/python
 	cargo build --release --locked
 	$(DEPS)/peers/bin/python benches/peers.py
@@ -190,16 +190,16 @@ $(DEPS)/peers/bin/python: benches/peers.txt
 	$(DEPS)/peers/bin/python -m pip install --quiet --only-binary=:all: -r benches/peers.txt
 	touch $@
 
-# A wheel that needs no Rust: program, extension and what ships with them, in target/wheels.
+# Wheel without a Rust dependency: program, extension and shipped files, in target/wheels.
 PYTHON := $(DEPS)/python/bin/python
 PYTHON_HOME := python/palpate/home
-# MuJoCo's library is the one of its own package, so nothing is to be put into the wheel.
+# The wheel uses MuJoCo's library from the package mujoco and bundles no library.
 MATURIN = $(DEPS)/python/bin/maturin build --quiet --locked --auditwheel skip -m python/Cargo.toml
 
 wheel: setup $(PYTHON) $(PYTHON_HOME)
 	$(MATURIN) --release --out target/wheels
 
-# Into the environment that tests it, built as tests are: what is installed is otherwise the same.
+# Installs a development build into the test environment; otherwise equal to the release wheel.
 install-python: setup $(PYTHON) $(PYTHON_HOME)
 	rm -rf target/wheels-dev
 	$(MATURIN) --profile dev --out target/wheels-dev
@@ -209,16 +209,16 @@ test-python: install-python
 	cargo clippy --locked --package palpate-python -- -D warnings
 	cd python && $(abspath $(PYTHON)) -m mypy
 	cd python/tests && $(abspath $(PYTHON)) -m mypy.stubtest --ignore-disjoint-bases palpate._palpate
-	# Not beside the sources, which are not what is installed.
+	# Runs outside the source folder, so that the installed package is tested.
 	cd python/tests && $(abspath $(DEPS)/python/bin/pytest)
 
-# The guides and the reference of Python as a site, target/docs-site; a link to nothing ends it. All anew, since
-# a page that has not changed is not warned of again.
+# Builds the guides and the Python reference as a site in target/docs-site; a broken link is an error. It always
+# rebuilds all pages, because Sphinx does not repeat warnings for unchanged pages.
 docs: install-python
 	rm -rf target/docs-site
 	$(DEPS)/python/bin/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -c docs -d target/docs-tree . target/docs-site
 
-# Notebooks with what they show, to be committed.
+# Runs the notebooks and stores their outputs, to be committed.
 notebooks: install-python
 	$(PYTHON) python/notebooks/run.py
 
@@ -227,7 +227,7 @@ $(PYTHON): python/requirements.txt
 	$(PYTHON) -m pip install --quiet --only-binary=:all: -r python/requirements.txt
 	touch $@
 
-# What the package brings along; all of it is read at run time.
+# Data files of the package, read at run time.
 $(PYTHON_HOME): FORCE
 	rm -rf $@ && mkdir -p $@
 	cp -r experiments scenes models $@
@@ -237,7 +237,7 @@ $(PYTHON_HOME): FORCE
 
 FORCE:
 
-# An archive that runs where it is unpacked: program, library, what ships with them, licences.
+# Archive that runs after unpacking: program, library, shipped files, licences.
 dist: setup $(MUJOCO_LICENCES)
 	cargo build --release --locked
 	rm -rf target/dist && mkdir -p target/dist/$(DIST)/licences
@@ -255,7 +255,7 @@ tools:
 	@command -v cc >/dev/null || { echo "a C compiler is missing: install gcc (Debian: apt-get install gcc)" >&2; exit 1; }
 	@command -v python3 >/dev/null || { echo "python3 is missing (Debian: apt-get install python3 python3-pip)" >&2; exit 1; }
 
-# The physics engine's shared library with its licences, out of its Python package.
+# Shared library of the physics engine with its licences, from its Python package.
 $(LIBRARY) $(MUJOCO_LICENCES) &: .cargo/mujoco.txt | tools
 	@python3 -m pip --version >/dev/null || { echo "pip is missing (Debian: apt-get install python3-pip)" >&2; exit 1; }
 	rm -rf $(DEPS)/mujoco && mkdir -p $(DEPS)/mujoco $(MUJOCO_LICENCES)
@@ -266,7 +266,7 @@ $(LIBRARY) $(MUJOCO_LICENCES) &: .cargo/mujoco.txt | tools
 	rm -rf $(DEPS)/mujoco
 	ln -sf libmujoco.so.$(MUJOCO) $@
 
-# cmake builds NLopt, which tests hold DIRECT against: the machine's own, or the one of the Python package.
+# cmake builds NLopt, which tests compare DIRECT with: the installed cmake, or that of the Python package.
 $(CMAKE): .cargo/cmake.txt | tools
 	mkdir -p $(DEPS)/bin
 	@if command -v cmake >/dev/null; then \

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Holds the instructions of fixed work against a committed table.
+"""Compares the instruction counts of fixed work with a stored table.
 
     tests/cost.py [TABLE] [--write] [--program PALPATE]
 
-Builds the development build whole, counts one trial of each planner of each experiment in TABLE
+Builds the development build, counts the instructions of one trial of each planner of each experiment in TABLE
 (experiments/baselines/cost.toml) with valgrind, subtracts the set-up, and compares with the table within its
-tolerance. --write counts again and writes the table. --program counts a program that is already built.
+tolerance. --write stores the new counts in the table. --program counts an existing program.
 
-Counts of another compiler, target, optimisation or vector width are not comparable: then, and where there is no
-valgrind, it prints that it is skipped and why, and passes.
+Counts of another compiler, target, optimisation or vector width are not comparable. In that case, and without
+valgrind, it prints the reason, skips the comparison and passes.
 
-Exit codes: 0 within the tolerance, cheaper or skipped, 1 more or missing, 2 could not.
+Exit codes: 0 within the tolerance, smaller or skipped, 1 larger or missing, 2 error.
 """
 
 import argparse
@@ -25,25 +25,25 @@ import tempfile
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Parts that are compiled apart take other numbers of instructions.
+# Separately compiled parts have other instruction counts.
 BUILD = ["cargo", "build", "--quiet", "--locked", "--features", "ros2"]
 WHOLE = {"CARGO_INCREMENTAL": "0"}
-SKIPPED = "cost: skipped, there is no valgrind (Debian: apt-get install valgrind)"
+SKIPPED = "cost: skipped, no valgrind (Debian: apt-get install valgrind)"
 HEAD = """\
-# What one trial of each planner costs, in instructions, its set-up taken off. `make check-cost` holds
-# the program against it; `tests/cost.py --write` counts again.
+# Instructions of one trial of each planner, set-up subtracted. `make check-cost` compares the program
+# with this table; `tests/cost.py --write` counts again.
 """
 
 
 class Bad(Exception):
-    """A table or a program that is of no use."""
+    """Error of an invalid table or program."""
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", nargs="?", type=pathlib.Path, default=ROOT / "experiments/baselines/cost.toml")
-    parser.add_argument("--write", action="store_true", help="write the counts into the table")
-    parser.add_argument("--program", type=pathlib.Path, help="a program that is already built")
+    parser.add_argument("--write", action="store_true", help="store the counts in the table")
+    parser.add_argument("--program", type=pathlib.Path, help="an existing program")
     arguments = parser.parse_args()
     try:
         return run(arguments)
@@ -59,7 +59,7 @@ def run(arguments):
         print(SKIPPED)
         return 0
     if not arguments.write and by != table["by"]:
-        print(f"cost: skipped, counted of {table['by']}, here it is {by}")
+        print(f"cost: skipped, the table is for {table['by']}, this is {by}")
         return 0
     program = arguments.program
     if program is None:
@@ -71,13 +71,13 @@ def run(arguments):
             work["instructions"] = now
         table["by"] = by
         arguments.table.write_text(text(table))
-        print(f"counts of {len(counts)} experiments in {arguments.table}")
+        print(f"wrote counts of {len(counts)} experiments to {arguments.table}")
         return 0
     return compare(table, counts)
 
 
 def read(path):
-    """The table, with every key it may have."""
+    """Reads the table with all its keys."""
     try:
         table = tomllib.loads(path.read_text())
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -95,7 +95,7 @@ def read(path):
 
 
 def check_keys(path, table, needed, optional):
-    """Insists on the keys and their types."""
+    """Checks the keys and their types."""
     if not isinstance(table, dict):
         raise Bad(f"{path}: {table!r} is not a table")
     for key in needed:
@@ -110,7 +110,7 @@ def check_keys(path, table, needed, optional):
 
 
 def text(table):
-    """The table as its file."""
+    """Returns the table as text."""
     lines = [HEAD + f"tolerance = {table['tolerance']}", f"by = {json.dumps(table['by'])}"]
     for work in table["work"]:
         lines += ["", "[[work]]", f"experiment = {json.dumps(work['experiment'])}"]
@@ -123,7 +123,7 @@ def text(table):
 
 
 def counted_by():
-    """Compiler, target, optimisation, vectors and valgrind; None where there is no valgrind."""
+    """Returns compiler, target, optimisation, vector width and valgrind version; None without valgrind."""
     try:
         valgrind = succeed(["valgrind", "--version"]).strip()
     except (Bad, OSError):
@@ -136,7 +136,7 @@ def counted_by():
 
 
 def vectors():
-    """How wide the vectors are that loops run on; valgrind knows none above 256 bits."""
+    """Returns the vector width of loops; valgrind supports at most 256 bits."""
     if platform.machine() == "x86_64":
         for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("flags") and {"avx2", "fma"} <= set(line.split()):
@@ -145,7 +145,7 @@ def vectors():
 
 
 def counted(program, work):
-    """Instructions of one trial of each planner, without those of the set-up."""
+    """Returns the instructions of one trial of each planner, without the set-up."""
     with tempfile.TemporaryDirectory() as folder:
         planners = planners_of(work)
 
@@ -160,7 +160,7 @@ def counted(program, work):
             succeed(cachegrind + trial(planner, run), cwd=ROOT)
             return total(out.read_text())
 
-        # A run that is already there takes what every run takes beside its trials.
+        # A run without new trials costs the set-up.
         succeed(trial(planners[0], "set-up"), cwd=ROOT)
         runs = [(planners[0], "set-up"), *((planner, planner) for planner in planners)]
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -169,7 +169,7 @@ def counted(program, work):
 
 
 def planners_of(work):
-    """The planners of an experiment with its settings."""
+    """Returns the planners of an experiment with its settings."""
     for item in reversed(work["set"]):
         if item.startswith("planners="):
             return tomllib.loads(item)["planners"]
@@ -180,15 +180,15 @@ def planners_of(work):
 
 
 def total(text):
-    """The sum of a file that cachegrind wrote."""
+    """Returns the total of a file written by cachegrind."""
     for line in text.splitlines():
         if line.startswith("summary:"):
             return int(line.split()[1])
-    raise Bad("cachegrind wrote no sum")
+    raise Bad("cachegrind wrote no total")
 
 
 def compare(table, counts):
-    """Prints a line for each planner; returns the exit code."""
+    """Prints a line per planner; returns the exit code."""
     lines = [("trial", "before", "now", "change", "verdict")]
     verdicts = set()
     for work, now in zip(table["work"], counts):
@@ -199,7 +199,7 @@ def compare(table, counts):
             millions = [f"{1e-6 * it:.1f}" if it else "–" for it in (before.get(planner), now.get(planner))]
             lines.append((f"{pathlib.Path(work['experiment']).stem}, {planner}", *millions, change, verdict))
     widths = [max(map(len, column)) for column in zip(*lines)]
-    print("instructions of a trial, in millions")
+    print("instructions per trial, millions")
     for first, *others in lines:
         print(first.ljust(widths[0]), *(it.rjust(width) for it, width in zip(others, widths[1:])), sep="  ")
     worst = next(verdict for verdict in ("MISSING", "WORSE", "new", "ok", "better") if verdict in verdicts)
@@ -208,7 +208,7 @@ def compare(table, counts):
 
 
 def judge(before, now, tolerance):
-    """The verdict on two counts, and their change in words."""
+    """Returns the verdict on two counts and the formatted change."""
     if not before or not now:
         return ("new" if now else "MISSING"), "–"
     change = now / before - 1
@@ -217,7 +217,7 @@ def judge(before, now, tolerance):
 
 
 def succeed(command, **options):
-    """Runs a command to its end and returns its output."""
+    """Runs a command and returns its output."""
     ended = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, **options)
     if ended.returncode:
         raise Bad(f"{command[0]}: {ended.stderr.strip()} (exit code {ended.returncode})")

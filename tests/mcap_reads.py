@@ -1,5 +1,5 @@
-"""Reads a recording with Python's mcap and its decoder of ROS 2 messages: no schema is unknown, every message decodes,
-and the ticks are those of the joint states."""
+"""Reads a recording with Python's mcap and its ROS 2 decoder: every schema is known, every message decodes,
+and the ticks match the joint states."""
 
 import collections
 import json

@@ -1,14 +1,14 @@
-"""What a peer of another implementation does, whichever ROS it speaks: written from the table of topics alone.
+"""Independent peer for ROS 1 and ROS 2, written from the table of topics alone.
 
-    peer.py touch ADDRESS [hand|fingers]   drives a stage along -y until the finger feels something, and back
-    peer.py listen ADDRESS SECONDS         counts what an explorer sends, and checks it
-    peer.py arm ADDRESS SECONDS            is an arm that stands still and answers services (ROS 2 only)
+    peer.py touch ADDRESS [hand|fingers]   moves a stage along -y until the finger detects contact, and back
+    peer.py listen ADDRESS SECONDS         counts and checks the messages of an explorer
+    peer.py arm ADDRESS SECONDS            simulates an arm at rest that answers services (ROS 2 only)
     peer.py echo ADDRESS SECONDS           answers every command with a joint state of the same stamp
 
-Prints one JSON object, and exits with 1 if something is not as the table says. The address is a domain of ROS 2 or a
-master of ROS 1. A `link` opens topics and sends: `inbox(name)` has what came since it was last looked at, `drive(names,
-velocities)` commands, `engage()` tells the arm to listen, `seconds(stamp)` and `validity_ns(point)` read times, `echo(span)`
-answers and counts, `arm(span)` is an arm.
+Prints one JSON object; exits with 1 if a message differs from the table. The address is a ROS 2 domain or a ROS 1
+master. A `link` opens topics and sends messages: `inbox(name)` returns the messages since its last use, `drive(names,
+velocities)` sends a command, `engage()` enables the arm, `seconds(stamp)` and `validity_ns(point)` read times,
+`echo(span)` answers and counts commands, `arm(span)` simulates an arm.
 """
 import json
 import math
@@ -19,7 +19,7 @@ VALID_NS = 30_000_000
 
 
 def touch(link, tactile):
-    """One touch with a stage of three slides X, Y, Z: down at 15 mm/s until the pressure rises, and back."""
+    """Makes one touch with a stage of three slides X, Y, Z: down at 15 mm/s until the pressure rises, and back."""
     is_hand = tactile == "hand"
     joints, wrench, status = map(link.inbox, ("/joint_states", "/ft_sensor/wrench", "/pa10/status"))
     frames = link.inbox("/biotac_pub" if is_hand else "/biotac_pub as BiotacAll")
@@ -33,16 +33,16 @@ def touch(link, tactile):
             if list(message.name) != ["X", "Y", "Z"] or len(message.position) != 3 or len(message.velocity) != 3:
                 problems.add(f"joint names {message.name}")
             if abs(link.seconds(message.header.stamp) - time.time()) > 0.5:
-                problems.add("the stamp of a joint state is not now")
+                problems.add("the stamp of a joint state is not the current time")
             y.append(message.position[1])
         for message in wrench.take():
             counts["wrench"] += 1
             if not all(map(math.isfinite, (message.wrench.force.x, message.wrench.torque.z))):
-                problems.add("a force that is no number")
+                problems.add("a force is not a number")
         for message in status.take():
             counts["status"] += 1
             if message.status[0].name != "pa10" or not message.status[0].values:
-                problems.add("a status of something else")
+                problems.add("a status of another device")
         for message in frames.take():
             counts["frames"] += 1
             data = message.bt_data[0] if is_hand else message.tactiles[0]
@@ -51,7 +51,7 @@ def touch(link, tactile):
             if len(electrodes) != 19 or not all(0 < value < 4096 for value in electrodes):
                 problems.add(f"electrodes {electrodes}")
         at = time.time() - begun
-        # Stand still for a second, go down, and back as soon as the pressure has risen.
+        # Rest for a second, move down, and move back as soon as the pressure has risen.
         speed = 0.0
         if at < 1.0:
             rest = pressures[-20:]
@@ -67,9 +67,9 @@ def touch(link, tactile):
         link.drive(["X", "Y", "Z"], [0.0, speed, 0.0])
         time.sleep(0.004)
     if felt is None or not moved:
-        problems.add("nothing was felt")
+        problems.add("no contact was detected")
     if min(counts.values()) < 20:
-        problems.add("a topic is silent")
+        problems.add("a topic has no messages")
     print(json.dumps({"felt_y_m": felt, "counts": counts, "problems": sorted(problems)}))
     return not problems
 
@@ -87,14 +87,14 @@ def listen(link, span):
             if len(message.points) != 1 or len(set(message.joint_names)) != len(point.velocities):
                 problems.add(f"names {message.joint_names}")
             if not all(math.isfinite(value) for value in point.velocities) or point.positions:
-                problems.add("velocities that are no numbers")
+                problems.add("velocities are not numbers")
             if link.validity_ns(point) != VALID_NS:
-                problems.add("a validity that is not that of the table")
+                problems.add("a validity differs from the table")
         time.sleep(0.001)
     if count < 100 * span / 2 or fastest == 0.0:
-        problems.add("too little was sent")
+        problems.add("too few messages were sent")
     if ages and sorted(ages)[len(ages) // 2] > 0.1:
-        problems.add("stamps are not of now")
+        problems.add("stamps are not the current time")
     print(json.dumps({"commands": count, "fastest_rad_s": fastest, "problems": sorted(problems)}))
     return not problems
 

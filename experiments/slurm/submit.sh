@@ -4,8 +4,8 @@
 #     experiments/slurm/submit.sh EXPERIMENT SHARDS [OUT] [SBATCH OPTIONS…]
 #     experiments/slurm/submit.sh bird 8 runs/bird --partition=long --cpus-per-task=16
 #
-# PALPATE names the program (target/release/palpate). A task that was killed goes on where it stopped when
-# the same line is submitted again; shards that are whole end at once.
+# PALPATE is the path of the program (target/release/palpate). Submit the same line again to continue killed
+# tasks; finished shards end at once.
 set -euo pipefail
 experiment=${1:?experiment}
 shards=${2:?number of shards}

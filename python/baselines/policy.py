@@ -1,29 +1,30 @@
-"""A planner that was trained: it touches where a small network's score is highest.
+"""Trained planner: touches the place with the highest score of a small network.
 
     palpate run toy --planner policy:Trained
 
-The network is a few convolutions along the zone, the same at every place, so that it knows nothing of where in the
-zone it is but the distance to an end. It is read and run with numpy alone.
+The network consists of a few convolutions along the zone, with the same weights at every place. Its only information
+about position is the distance to an end of the zone. It runs with numpy alone.
 """
 
 from pathlib import Path
 
 import numpy as np
 
-#: Places along the zone that are scored; chosen.
+#: Scored places along the zone.
+# heuristic: fine enough for the toy's bumps.
 PLACES = 81
 
-#: What train.py writes.
+#: Weights file written by train.py.
 FILE = Path(__file__).with_name("toy.npz")
 
 
 def features(mean, sd):
-    """What the network sees, shape (..., 2, places), of heights in units of half the zone's widest side."""
+    """Returns the network's input, shape (..., 2, places), with heights in units of half the zone's widest side."""
     return np.stack([mean, 0.5 * np.log10(np.maximum(sd, 1e-6)) + 1.0], axis=-2).astype(np.float32)
 
 
 class Trained:
-    """For zones with one coordinate."""
+    """Planner for zones with one coordinate."""
 
     def __init__(self, zone):
         self.places = zone.grid(PLACES)
@@ -37,7 +38,7 @@ class Trained:
         return self.places[np.argmax(self.scores(features(mean / self.unit_m, sd / self.unit_m)))]
 
     def scores(self, seen):
-        """Of each place, from features of shape (2, places)."""
+        """Returns the score of each place from features of shape (2, places)."""
         for i, (weight, bias) in enumerate(self.layers):
             seen = np.maximum(seen, 0.0) if i else seen
             half = weight.shape[2] // 2

@@ -19,12 +19,12 @@ from torch import nn
 
 from policy import FILE, PLACES, features
 
-# All chosen. The experiment's trials begin with 3 touches and have seed 2016.
+# heuristic: hyperparameters set by hand. The experiment's trials begin with 3 touches and have seed 2016.
 SEED, ENVS, INITIAL, TOUCHES, STEPS = 1, 64, 3, 30, 800_000
 
 
 class Explorations(VecEnv):
-    """Palpate's environments as Stable-Baselines3 steps them: actions are the numbers of places."""
+    """Palpate's environments for Stable-Baselines3; actions are indices of places."""
 
     def __init__(self):
         self.envs = gymnasium.make_vec(
@@ -45,7 +45,7 @@ class Explorations(VecEnv):
         seen, reward, over, _, info = self.envs.step(self.targets)
         infos = [{} for _ in range(ENVS)]
         if over.any():
-            # All have as many touches; the next step begins them anew.
+            # All episodes have the same length; the next step restarts them.
             assert over.all(), info
             self.log_rmse.append(np.log(info["rmse_m"]).mean())
             said = f"{len(self.log_rmse) * ENVS} episodes, {time.time() - self.begun:.0f} s: "
@@ -73,7 +73,7 @@ class Explorations(VecEnv):
 
 
 class Heads(nn.Module):
-    """Scores of places for the actor, and what all places say together for the critic."""
+    """Scores of places for the actor, and a summary over all places for the critic."""
 
     latent_dim_pi, latent_dim_vf = PLACES, 64
 
@@ -96,7 +96,7 @@ class Heads(nn.Module):
 
 
 class Policy(ActorCriticPolicy):
-    """Whose actions are drawn by the scores as they are."""
+    """Policy that draws actions from the scores directly."""
 
     def _build_mlp_extractor(self):
         self.mlp_extractor = Heads()

@@ -1,4 +1,4 @@
-"""Runs notebooks and keeps what they show: `python run.py` all beside it, or those that are named."""
+"""Runs notebooks and stores their outputs: `python run.py` for all in this folder, or for the named ones."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ HERE = Path(__file__).parent
 
 
 def executed(file: Path) -> nbformat.NotebookNode:
-    """The notebook with what its cells show; what raises, raises."""
+    """Returns the notebook with the outputs of its cells; exceptions of cells are raised."""
     notebook = nbformat.read(file, as_version=4)
-    # Sockets of this machine, not ports.
+    # Uses Unix sockets instead of ports.
     kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
-    # Not with the time of each cell, which would differ with every run.
+    # Does not record cell times, which differ between runs.
     NotebookClient(notebook, km=kernel, timeout=300, record_timing=False).execute()
     notebook.metadata.language_info = {"name": "python"}
     return notebook

@@ -1,7 +1,7 @@
 """Palpate: a testbed for active touch.
 
-A robot finger explores an object it cannot see; a Gaussian process keeps a belief of its surface; a planner
-picks the next place to touch. Everything is in SI units, and names end with the unit.
+A robot finger explores an object it cannot see; a Gaussian process estimates the surface; a planner chooses the
+next touch. All quantities are in SI units, and names end with the unit.
 
     >>> import palpate
     >>> run = palpate.Experiment.load("toy").run(["active", "random"], trials=10)
@@ -46,7 +46,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # With the first use, since scikit-learn takes longer to import than all else here.
+    # Imported on first use, because scikit-learn takes longer to import than all other modules.
     if name == "GaussianProcess":
         from ._gaussian_process import GaussianProcess
 

@@ -1,4 +1,4 @@
-"""What is needed of scikit-learn where it is not installed."""
+"""Replacements for scikit-learn's functions if it is not installed."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy.typing as npt
 
 
 class Estimator:
-    """Parameters by the names of the constructor, and the score of a regressor."""
+    """Base class with get_params, set_params and the score of a regressor."""
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The parameters."""
+        """Returns the parameters of the constructor."""
         names = list(inspect.signature(type(self)).parameters)
         return {name: getattr(self, name) for name in names}
 
     def set_params(self, **params: Any) -> Any:
-        """Changes some; returns itself.
+        """Sets parameters and returns the estimator.
 
         Raises:
-            ValueError: of one that is none.
+            ValueError: if a parameter does not exist.
         """
         known = self.get_params()
         for name, value in params.items():
@@ -31,23 +31,23 @@ class Estimator:
         return self
 
     def score(self, X: npt.ArrayLike, y: npt.ArrayLike) -> float:
-        """1 - (residual sum of squares) / (total sum of squares)."""
+        """Returns R² = 1 - (residual sum of squares) / (total sum of squares)."""
         heights = np.asarray(y, dtype=float)
         residual = np.sum((heights - self.predict(X)) ** 2)  # type: ignore[attr-defined]
         return float(1.0 - residual / np.sum((heights - heights.mean()) ** 2))
 
 
 def check_is_fitted(estimator: Any, attribute: str) -> None:
-    """Raises ValueError of one that is not."""
+    """Raises ValueError if the estimator is not fitted."""
     if not hasattr(estimator, attribute):
         raise ValueError(f"this {type(estimator).__name__} is not fitted yet: call fit first")
 
 
 def validate_data(estimator: Any, X: npt.ArrayLike, y: Any = None, **how: Any) -> Any:
-    """Arrays of the shapes that belong together.
+    """Returns X, or X and y, as arrays of consistent shapes.
 
     Raises:
-        ValueError: if they are not, or not finite.
+        ValueError: if shapes do not match, or a value is not finite.
     """
     places = np.asarray(X, dtype=float)
     if places.ndim != 2 or places.size == 0:

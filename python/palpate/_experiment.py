@@ -1,4 +1,4 @@
-"""What is run, from its file to its trials."""
+"""Experiments: loading, settings and runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Experiment"]
 
 
 class Experiment:
-    """Planners and trials on one scene."""
+    """An experiment: planners and trials on one scene."""
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self._path = path
@@ -28,60 +28,60 @@ class Experiment:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], **settings: Any) -> Experiment:
-        """Reads an experiment file, or one that comes with the package by its name (`"toy"`).
+        """Loads an experiment file, or an experiment of the package by its name (`"toy"`).
 
         Args:
-            path: the file, or the name.
-            settings: any setting of `docs/reference.md`, as the program's `--set` takes them: `touches=30`,
+            path: path of the file, or name.
+            settings: any setting of `docs/reference.md`, in the form of the program's `--set`: `touches=30`,
                 `gp__noise=[0.01, 1]` or `**{"gp.noise": [0.01, 1]}`.
 
         Raises:
-            ConfigError: with file, line, key, value and what is allowed.
+            ConfigError: if a setting is invalid; with file, line, key, value and allowed values.
         """
         return cls(found(path, "experiments"), settings)
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the experiment."""
         return self._core.name
 
     @property
     def question(self) -> str:
-        """What it asks."""
+        """Question that the experiment answers."""
         return self._core.question
 
     @property
     def planners(self) -> list[str]:
-        """Names of the planners that it compares."""
+        """Names of the compared planners."""
         return self._core.planners
 
     @property
     def trials(self) -> int:
-        """Trials of each planner."""
+        """Trials per planner."""
         return self._core.trials
 
     @property
     def touches(self) -> int:
-        """Touches of a trial, the initial ones among them."""
+        """Touches per trial, initial ones included."""
         return self._core.touches
 
     @property
     def initial_touches(self) -> int:
-        """Random touches that a trial begins with, the same for every planner."""
+        """Initial random touches of a trial, the same for every planner."""
         return self._core.initial_touches
 
     @property
     def seed(self) -> int:
-        """Root of all randomness."""
+        """Seed of all random numbers."""
         return self._core.seed
 
     @property
     def zone(self) -> Zone:
-        """What is explored; an AttributeError around an object."""
+        """Explored zone; AttributeError around an object."""
         return self._core.zone
 
     def to_toml(self) -> str:
-        """Every setting, defaults written out."""
+        """Returns all settings, including defaults, as TOML."""
         return self._core.to_toml()
 
     def run(
@@ -96,40 +96,40 @@ class Experiment:
         limit_s: float | None = LIMIT_S,
         isolate: bool = False,
     ) -> Run:
-        """Runs the trials that are not there yet.
+        """Runs the missing trials.
 
-        A planner of your own is a class with `plan(belief) -> target`; it runs in the same trials as the
-        built-in ones, under the name `MODULE:CLASS`. What its constructor names of `zone`, `rng` (a seeded
-        numpy generator) and `seed` it is given, around an object no zone. If it raises, returns what is no target in the zone or does
-        not return in time, its trial fails with the reason, and the run goes on.
+        Your own planner is a class with `plan(belief) -> target`. It runs in the same trials as the built-in planners,
+        under the name `MODULE:CLASS`. Its constructor may have the parameters `zone` (not around an object), `rng`
+        (a seeded numpy generator) and `seed`. If it raises an exception, returns an invalid target or exceeds the time
+        limit, its trial fails with the reason, and the run continues.
 
         Args:
-            planners: names of built-in planners (`palpate.PLANNERS`), classes, or `"MODULE:CLASS"`; the
-                experiment's own if left out.
-            trials: of each planner; the experiment's own number if left out.
-            out: folder to keep the run in, and to go on with what is there; kept in memory if left out.
-            fresh: throw away what is there.
-            threads: 0 means all cores; results do not depend on it.
-            progress: say on standard error how far it is.
-            limit_s: seconds that a planner of your own may take for a target; None means for ever, and saves
-                the hand-over to a thread that could be left behind.
-            isolate: run each planner of your own in a process of its own, which can be killed.
+            planners: names of built-in planners (`palpate.PLANNERS`), classes, or `"MODULE:CLASS"`; default: the
+                experiment's planners.
+            trials: trials per planner; default: the experiment's number.
+            out: folder of the run, whose existing trials are kept; by default the run is kept in memory.
+            fresh: delete the existing trials.
+            threads: number of threads, 0 for all cores; results do not depend on it.
+            progress: print progress to stderr.
+            limit_s: time limit for a target of your own planners, seconds; None means no limit, which also avoids the
+                overhead of a thread.
+            isolate: run each of your own planners in its own process, which can be killed.
 
         Raises:
-            PlannerError: of a planner that is none; what else it does wrong fails its trials.
+            PlannerError: if a planner is invalid; its later errors fail its trials instead.
             TypeError: if `planners` is not a list.
             ValueError: if `limit_s` or `threads` is negative.
-            KeyboardInterrupt: after Ctrl-C, when the trials in hand are done; with `out` they are kept, and
-                the same call goes on.
+            KeyboardInterrupt: after Ctrl-C, when the running trials have finished; with `out` they are kept, and the
+                same call continues.
             SimulationError: if the scene cannot be simulated.
-            RunFolderError: if the folder holds something else.
+            RunFolderError: if the folder contains other files.
         """
         if isinstance(planners, (str, type)):
-            raise TypeError(f"planners = {planners!r}: allowed is a list of them, [{planners!r}]")
+            raise TypeError(f"planners = {planners!r}: allowed is a list, [{planners!r}]")
         if threads < 0:
-            raise ValueError(f"threads = {threads}: allowed is 0, all cores, or more")
+            raise ValueError(f"threads = {threads}: allowed is 0 (all cores) or more")
         if limit_s is not None and not 0 < limit_s < float("inf"):
-            raise ValueError(f"limit_s = {limit_s}: allowed is above 0, or None for ever")
+            raise ValueError(f"limit_s = {limit_s}: allowed is above 0, or None for no limit")
         own: dict[str, Factory] = {}
         names = []
         for planner in self.planners if planners is None else planners:

@@ -1,4 +1,4 @@
-"""Gaussian-process regression by scikit-learn's conventions, with or without scikit-learn."""
+"""Gaussian-process regression with the interface of scikit-learn, which is optional."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ else:
         from sklearn.base import BaseEstimator, RegressorMixin
 
         class _Base(RegressorMixin, BaseEstimator):
-            """An estimator of scikit-learn's."""
+            """Base class for scikit-learn."""
 
     except ImportError:
         from ._estimator import Estimator as _Base
@@ -32,23 +32,23 @@ _Array = npt.NDArray[np.float64]
 
 
 class GaussianProcess(_Base):
-    """Exact Gaussian-process regression; hyperparameters by maximum likelihood within ranges.
+    """Exact Gaussian-process regression with maximum-likelihood hyperparameters within ranges.
 
-    A fit scans the whole range of hyperparameters (of more than three inputs at 125 places of a Sobol sequence)
-    and climbs from its hills, so that it needs no restarts and has no randomness.
+    A fit scans the whole range of hyperparameters (for more than three inputs at 125 points of a Sobol sequence)
+    and optimises from the local maxima. It needs no restarts and is deterministic.
 
     Args:
-        kernel: "squared_exponential", "matern_52" or "matern_32", with a length scale for each input.
-        mean: "zero", "data" (the average of y), or "constant" (the likeliest).
+        kernel: "squared_exponential", "matern_52" or "matern_32", with a length scale per input.
+        mean: "zero", "data" (the average of y), or "constant" (fitted).
         length_scale: range (low, high) of each length scale, as a fraction of that input's span.
         noise: range of the noise's standard deviation, as a fraction of the signal's.
         signal: range of the signal's standard deviation, as a fraction of the root mean square of y.
 
     Attributes:
-        length_scales_: shape (d,), in the units of X.
-        signal_sd_, noise_sd_, mean_: in the unit of y.
-        log_marginal_likelihood_value_: of the fit.
-        n_features_in_: d.
+        length_scales_: length scales, shape (d,), in the units of X.
+        signal_sd_, noise_sd_, mean_: hyperparameters in the unit of y.
+        log_marginal_likelihood_value_: log marginal likelihood of the fit.
+        n_features_in_: number of inputs d.
     """
 
     def __init__(
@@ -66,10 +66,10 @@ class GaussianProcess(_Base):
         self.signal = signal
 
     def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> GaussianProcess:
-        """Finds the likeliest process of observations y (n,) at places X (n, d).
+        """Fits the process of maximum likelihood to observations y (n,) at places X (n, d).
 
         Raises:
-            ValueError: of another shape, of what is not finite, of a range that is none.
+            ValueError: if a shape or range is invalid, or a value is not finite.
         """
         if y is None:
             raise ValueError("fit requires y to be passed, but the target y is None")
@@ -101,7 +101,7 @@ class GaussianProcess(_Base):
     def predict(
         self, X: npt.ArrayLike, return_std: bool = False
     ) -> _Array | tuple[_Array, _Array]:
-        """Mean (n,) at places X (n, d); with `return_std` also the standard deviation, without noise."""
+        """Returns the mean (n,) at places X (n, d); with `return_std` also the standard deviation without noise."""
         places = self._checked(X)[0]
         if not return_std:
             return self._fitted.mean(places)

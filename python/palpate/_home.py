@@ -1,4 +1,4 @@
-"""The experiments, scenes and models that come with the package."""
+"""Experiments, scenes and models of the package."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 
 from .errors import ConfigError
 
-#: The folder they lie in.
+#: Folder of the shipped files.
 HOME = Path(__file__).parent / "home"
 
 
 def found(name: str | os.PathLike[str], folder: str) -> Path:
-    """The file that is meant by `name`: a path, or the name of one in `folder`, here or in the package.
+    """Returns the file for `name`: a path, or the name of a file in `folder`, here or in the package.
 
     Raises:
-        ConfigError: of a name that neither has.
+        ConfigError: if there is no such file.
     """
     path = Path(name)
     is_plain = not path.suffix and path.name == str(path)

@@ -1,6 +1,6 @@
-"""Planners in processes of their own: what they do to their process is one failed trial.
+"""Planners in their own processes: a crash of a process fails one trial.
 
-The belief stays here. A planner over there asks it through a pipe, so that it sees what one on a thread sees.
+The belief stays in the main process. A planner queries it through a pipe and gets the same answers as on a thread.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from typing import Any
 from ._planners import Factory, make, source_of, target_of, told
 from .errors import PlannerError
 
-#: Seconds that a process may take to start and to make a planner, at least; chosen.
+#: Minimum time limit for a process to start and create a planner, seconds.
+# heuristic: leaves time for slow imports.
 START_S = 60.0
 
 
 class Isolated:
-    """The planners of one name in one run, each in a process that an earlier trial may have used."""
+    """Planners of one name in a run, each in a process that a finished trial may have used."""
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
         self.factory = factory
@@ -36,7 +37,7 @@ class Isolated:
         return Session(self, zone, seed)
 
     def take(self) -> Child:
-        """A process that has nothing to do."""
+        """Returns an idle process."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
@@ -46,12 +47,12 @@ class Isolated:
         return child
 
     def give_back(self, child: Child) -> None:
-        """Of a trial that is over."""
+        """Returns the process of a finished trial to the pool."""
         with self._lock:
             self._idle.append(child)
 
     def stop(self) -> None:
-        """Ends all of them at once."""
+        """Kills all processes."""
         self.is_stopped = True
         with self._lock:
             for child in self._all:
@@ -63,7 +64,7 @@ class Isolated:
 
 
 class Session:
-    """A planner of one trial."""
+    """Planner of one trial."""
 
     def __init__(self, home: Isolated, zone: Any, seed: int) -> None:
         self._home = home
@@ -71,10 +72,10 @@ class Session:
         self._child: Child | None = None
 
     def plan(self, belief: Any) -> list[float]:
-        """The next target.
+        """Returns the next target.
 
         Raises:
-            PlannerError: with the reason why there is none.
+            PlannerError: if there is no target; with the reason.
         """
         if self._begin is not None:
             self._child = self._home.take()
@@ -87,7 +88,7 @@ class Session:
         return target
 
     def close(self) -> None:
-        """The trial is over."""
+        """Ends the trial."""
         if self._child is not None:
             self._home.give_back(self._child)
             self._child = None
@@ -95,7 +96,7 @@ class Session:
     def _ask(self, request: tuple[Any, ...], belief: Any, limit_s: float | None) -> Any:
         child = self._child
         if child is None:
-            raise PlannerError("its process has ended")
+            raise PlannerError("the planner's process has ended")
         try:
             kind, reply = child.ask(request, belief, limit_s)
         except Exception as error:
@@ -105,7 +106,7 @@ class Session:
             if self._home.is_stopped:
                 raise PlannerError("the run was stopped") from None
             if isinstance(error, _Late):
-                raise PlannerError(f"it did not return within {limit_s:g} s") from None
+                raise PlannerError(f"the planner did not return within {limit_s:g} s") from None
             if died is not None:
                 raise PlannerError(died) from None
             raise PlannerError(f"{type(error).__name__}: {error}") from error
@@ -125,11 +126,11 @@ class Child:
         theirs.close()
 
     def ask(self, request: tuple[Any, ...], belief: Any, limit_s: float | None) -> tuple[str, Any]:
-        """What it answers; until then it may ask the belief.
+        """Sends a request and returns the reply; meanwhile answers queries of the belief.
 
         Raises:
-            _Late: if it does not answer in time.
-            EOFError, OSError: if it has ended.
+            _Late: if there is no reply in time.
+            EOFError, OSError: if the process has ended.
         """
         due_s = None if limit_s is None else time.monotonic() + limit_s
         self._pipe.send(request)
@@ -143,20 +144,20 @@ class Child:
             self._pipe.send(_answer(belief, *rest))
 
     def kill(self) -> None:
-        """Ends it at once."""
+        """Kills the process."""
         self._process.kill()
 
     def end(self) -> str:
-        """How it ended, in words."""
+        """Describes how the process ended."""
         self._process.join(1.0)
         code = self._process.exitcode
         if code is not None and code < 0:
-            return f"its process was ended by {signal.Signals(-code).name}"
-        return f"its process ended with exit code {code}"
+            return f"the planner's process was ended by {signal.Signals(-code).name}"
+        return f"the planner's process ended with exit code {code}"
 
 
 class _Late(Exception):
-    """No answer in time."""
+    """No reply in time."""
 
 
 def _answer(belief: Any, name: str, call: tuple[tuple[Any, ...], dict[str, Any]] | None) -> Any:
@@ -170,7 +171,7 @@ def _answer(belief: Any, name: str, call: tuple[tuple[Any, ...], dict[str, Any]]
 
 
 class _Belief:
-    """The belief, seen through a pipe."""
+    """Proxy of the belief through a pipe."""
 
     def __init__(self, pipe: Connection[Any, Any]) -> None:
         self._pipe = pipe
@@ -185,7 +186,7 @@ class _Belief:
         def method(*arguments: Any, **named: Any) -> Any:
             return self._asked(name, (arguments, named))[1]
 
-        self.__dict__[name] = method  # asked for once
+        self.__dict__[name] = method  # queried only once
         return method
 
     def _asked(self, name: str, call: Any) -> tuple[str, Any]:
@@ -197,7 +198,7 @@ class _Belief:
 
 
 def _serve(pipe: Connection[Any, Any]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     belief = _Belief(pipe)
     planner: Any = None
     while True:
@@ -206,7 +207,7 @@ def _serve(pipe: Connection[Any, Any]) -> None:
         except EOFError:
             return
         except Exception as error:
-            pipe.send(("failed", f"it cannot be made in a process of its own: {error}"))
+            pipe.send(("failed", f"the planner cannot be created in its own process: {error}"))
             continue
         try:
             if kind == "make":

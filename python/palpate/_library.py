@@ -1,4 +1,4 @@
-"""Loads MuJoCo's shared library out of its package, so that the extension finds it loaded."""
+"""Loads MuJoCo's shared library from its package before the extension needs it."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import ctypes
 import importlib.util
 from pathlib import Path
 
-#: The version that the extension is linked with, and its name as the linker knows it.
+#: File name of the library version that the extension is linked with.
 NAME = "libmujoco.so.3.17.0"
 
 
 def load() -> None:
-    """Loads it for all extensions of this process.
+    """Loads the library for all extensions of this process.
 
     Raises:
-        ImportError: if the package `mujoco` is not there, or is another version.
+        ImportError: if the package `mujoco` is missing or has another version.
     """
-    # The package itself is not imported: that takes longer than all else here.
+    # The package itself is not imported, because that takes longer than all other imports.
     found = importlib.util.find_spec("mujoco")
     folders = found.submodule_search_locations if found else None
     for folder in folders or []:

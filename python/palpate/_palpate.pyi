@@ -1,4 +1,4 @@
-"""The extension. What is public is passed on by `palpate`."""
+"""Compiled extension; `palpate` exports its public names."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ __all__ = [
 _Array = npt.NDArray[np.float64]
 
 class _Hyperparameters(TypedDict):
-    """What a fit found."""
+    """Hyperparameters of a fit."""
 
     signal_sd_m: float
     length_scales_m: list[float]
@@ -39,11 +39,11 @@ class _Hyperparameters(TypedDict):
 
 @final
 class Zone:
-    """The rectangle, or the interval, that is explored: targets are its places (x) or (x, z), metres."""
+    """Explored rectangle or interval; targets are its places (x) or (x, z), metres."""
 
     @property
     def dimension(self) -> int:
-        """How many coordinates d a target has: 1 or 2."""
+        """Number d of coordinates of a target: 1 or 2."""
     @property
     def lower(self) -> _Array:
         """Smallest coordinates of a target, shape (d,), metres."""
@@ -52,20 +52,19 @@ class Zone:
         """Largest coordinates of a target, shape (d,), metres."""
     @property
     def datum_y_m(self) -> float:
-        """Where heights are measured from, in the zone's frame, metres."""
+        """Zero of the heights in the zone's frame, metres."""
     def contains(self, target: Sequence[float] | _Array) -> bool:
-        """Whether a target, shape (d,), lies in it."""
+        """Whether a target, shape (d,), lies in the zone."""
     def grid(self, per_side: int) -> _Array:
         """Places on an even grid, shape (per_side ** d, d), metres."""
     def to_world(self, places: npt.ArrayLike, heights_m: npt.ArrayLike) -> _Array:
-        """Points (..., 3) in the world of places (..., d) and heights (...) above the datum, metres."""
+        """Points (..., 3) in the world frame of places (..., d) and heights (...) above the datum, metres."""
 
 @final
 class Ball:
-    """The ball in which a whole object is explored.
+    """Ball that contains the explored object.
 
-    A target is six numbers: the point aimed at (x, y, z), metres, and the unit vector along which the finger
-    goes.
+    A target is six numbers: the aimed point (x, y, z), metres, and the unit vector of the finger's motion.
     """
 
     def __new__(
@@ -73,138 +72,138 @@ class Ball:
     ) -> Ball: ...
     @property
     def centre_m(self) -> _Array:
-        """Its centre in the world, shape (3,), metres."""
+        """Centre in the world frame, shape (3,), metres."""
     @property
     def radius_m(self) -> float:
-        """Its radius, metres."""
+        """Radius, metres."""
     @property
     def lowest_m(self) -> float | None:
-        """Lowest z in the world to which the finger may come, metres; None where nothing is below."""
+        """Lowest allowed z of the finger in the world frame, metres; None if unbounded."""
     def contains(self, target: Sequence[float] | _Array) -> bool:
-        """Whether a target, shape (6,), aims at a point of it."""
+        """Whether a target, shape (6,), aims at a point in the ball."""
     def aim(
         self, outward: Sequence[float] | _Array, at: Sequence[float] | _Array | None = None
     ) -> _Array:
-        """The target, shape (6,), that aims at a point, the centre if left out, from the side `outward`.
+        """Returns the target, shape (6,), that aims at a point (default: the centre) from the side `outward`.
 
         Args:
-            outward: a vector of any length in the world, from the point towards the finger.
-            at: the point in the world, shape (3,), metres.
+            outward: vector of any length in the world frame, from the point towards the finger.
+            at: point in the world frame, shape (3,), metres.
         """
 
 @final
 class Belief:
-    """What is known after some touches: a Gaussian process.
+    """Belief after some touches: a Gaussian process.
 
-    Over a zone it is one of the surface's height. Around an object it is one of a field over space whose zero
-    set is the surface, negative inside; then d is 3, what is of zones only is an AttributeError, and over a zone
-    what is of objects only.
+    Over a zone it models the surface's height. Around an object it models a field that is zero on the surface and
+    negative inside; then d is 3. Attributes for zones raise AttributeError around an object, and attributes for
+    objects raise it over a zone.
 
-    It never changes. Points have shape (..., d), metres, (n,) too where d is 1; what is told of them has
-    shape (...). Before the first fit every number is NaN.
+    It is immutable. Points have shape (..., d), metres, or (n,) if d is 1; results have shape (...). Before the
+    first fit all numbers are NaN.
     """
 
     @property
     def zone(self) -> Zone:
-        """What is explored."""
+        """Explored zone."""
     def mean(self, points: npt.ArrayLike) -> _Array:
         """Mean height above the datum, metres."""
     def variance(self, points: npt.ArrayLike) -> _Array:
-        """Variance of the height, without the noise of a touch, square metres."""
+        """Variance of the height without touch noise, square metres."""
     def variance_gradient(self, points: npt.ArrayLike) -> _Array:
         """Gradient of `variance`, shape (..., d), metres."""
     def explorable_variance(self, points: npt.ArrayLike) -> _Array:
-        """What a touch asked for there could still remove of the variance, square metres.
+        """Variance that a touch with this target can still reduce, square metres.
 
-        As `variance`, given also that targets which missed, or were met elsewhere, are no news. The planner
-        `active` asks for the place where it is largest.
+        It is `variance`, conditioned also on targets without contact or with contact elsewhere. The planner `active`
+        selects its maximum.
         """
     def explorable_variance_gradient(self, points: npt.ArrayLike) -> _Array:
         """Gradient of `explorable_variance`, shape (..., d), metres."""
     def has_surface(self, points: npt.ArrayLike) -> _Array:
-        """Whether there probably is a surface at each point: 1 or 0."""
+        """Whether a surface is likely at each point: 1 or 0."""
     @property
     def targets(self) -> _Array:
-        """Every target asked for so far, shape (n, d), metres; around an object (n, 6)."""
+        """All targets so far, shape (n, d), metres; (n, 6) around an object."""
     @property
     def places(self) -> _Array:
-        """Places of the contacts the belief holds, shape (m, d), metres: not the targets. With
-        `gp.inducing_touches` those that are kept."""
+        """Places of the contacts in the belief (not of the targets), shape (m, d), metres. With
+        `gp.inducing_touches` only the selected contacts."""
     @property
     def heights_m(self) -> _Array:
         """Heights of these contacts above the datum, shape (m,), metres."""
     @property
     def hyperparameters(self) -> _Hyperparameters | None:
-        """What the last fit found; None before it."""
+        """Hyperparameters of the last fit; None before the first fit."""
     @property
     def ball(self) -> Ball:
-        """Around an object: the ball in which it is."""
+        """Ball that contains the object (whole objects only)."""
     def reaches(self, target: Sequence[float] | _Array) -> bool:
-        """Around an object: whether the finger can be brought to what a target, shape (6,), aims at."""
+        """Whether the finger can reach the point that a target, shape (6,), aims at (whole objects only)."""
     @property
     def contacts(self) -> _Array:
-        """Around an object: points of contact in the world, shape (m, 3), metres."""
+        """Contact points in the world frame, shape (m, 3), metres (whole objects only)."""
     def field(self, points: npt.ArrayLike) -> tuple[_Array, _Array]:
-        """Around an object: mean and standard deviation of the field, metres.
+        """Mean and standard deviation of the field, metres (whole objects only).
 
-        It is negative inside, and near the surface about the distance from it.
+        The mean is negative inside; near the surface it approximates the signed distance.
         """
     def mesh(self, cells: int = 64) -> tuple[_Array, npt.NDArray[np.uint32], _Array]:
-        """Around an object: the believed surface, closed; empty where none is believed.
+        """Closed mean surface (whole objects only); empty if the belief contains no surface.
 
-        It is the zero set of the field, cut off where it leaves the box about the contacts.
+        It is the zero set of the field, clipped to the box around the contacts.
 
         Args:
-            cells: of the grid that it is found on, along its longest side, 8 to 256.
+            cells: cells of the grid along the longest side, 8 to 256.
 
         Returns:
-            Vertices (n, 3), metres, triangles (m, 3), counter-clockwise from outside, and how far the surface
-            may lie from each vertex along its normal, one standard deviation, shape (n,), metres.
+            Vertices (n, 3), metres; triangles (m, 3), counter-clockwise from outside; and the standard deviation of the
+            surface along the normal at each vertex, shape (n,), metres.
         """
 
 @final
 class Touch:
-    """What a touch ended with."""
+    """Result of a touch."""
 
     @property
     def target(self) -> list[float]:
-        """Where the finger was sent, metres."""
+        """Target of the touch, metres."""
     @property
     def outcome(self) -> str:
-        """"contact", "miss" (the finger met nothing), or "overload" (broken off)."""
+        """"contact", "miss" (no contact), or "overload" (aborted: too much force, or contact not located)."""
     @property
     def p_wc(self) -> _Array | None:
-        """The point of contact in the world, shape (3,), metres; None without one."""
+        """Contact point in the world frame, shape (3,), metres; None without contact."""
     @property
     def normal_w(self) -> _Array | None:
-        """Unit normal in the world, from the surface towards the finger, shape (3,); None without contact."""
+        """Unit normal in the world frame, from the surface towards the finger, shape (3,); None without contact."""
     @property
     def place(self) -> list[float] | None:
-        """Place of the contact in the zone, shape (d,), metres: not the target; None without contact, and
+        """Place of the contact in the zone (not of the target), shape (d,), metres; None without contact, and
         around an object."""
     @property
     def height_m(self) -> float | None:
-        """Its height above the datum, metres; None without contact, and around an object."""
+        """Height of the contact above the datum, metres; None without contact, and around an object."""
     @property
     def time_s(self) -> float | None:
-        """Time of the body since its start, seconds; None where a touch is no motion."""
+        """Time of the body since its start, seconds; None without motion."""
 
 @final
 class Scene:
-    """An object in its zone, or as a whole, with the finger that touches it: from a scene's file, or of a mesh."""
+    """An object in its zone, or a whole object, with the finger that touches it; from a scene's file or a mesh."""
 
     @staticmethod
     def load(path: str | os.PathLike[str], *, seed: int = 0, **settings: Any) -> Scene:
-        """Reads a scene's file, or one that comes with the package by its name (`"bird"`).
+        """Loads a scene's file, or a scene of the package by its name (`"bird"`).
 
         Args:
-            path: the file, or the name.
-            seed: all the randomness of the sensors.
-            settings: any setting of a scene, as `finger__radius_m=0.001`.
+            path: path of the file, or name.
+            seed: seed of the sensor noise.
+            settings: any setting of a scene, as in `finger__radius_m=0.001`.
 
         Raises:
-            ConfigError: with file, line, key, value and what is allowed.
-            SimulationError: if it cannot be built.
+            ConfigError: if a setting is invalid; with file, line, key, value and allowed values.
+            SimulationError: if the scene cannot be built.
         """
     @staticmethod
     def of_mesh(
@@ -217,14 +216,14 @@ class Scene:
         seed: int = 0,
         **settings: Any,
     ) -> Scene:
-        """A mesh in the world, touched along -y.
+        """Creates a scene from a mesh in the world frame, touched along -y.
 
         Args:
-            vertices_m: shape (n, 3), metres.
-            triangles: shape (m, 3), indices of vertices.
-            x_m, z_m: the zone (low, high), metres.
+            vertices_m: vertices, shape (n, 3), metres.
+            triangles: vertex indices, shape (m, 3).
+            x_m, z_m: zone (low, high), metres.
             body: "cast", "kinematic" or "dynamic".
-            seed, settings: as of `load`.
+            seed, settings: as for `load`.
 
         Raises:
             SimulationError: if the mesh is unusable, or has no surface in the zone.
@@ -241,51 +240,50 @@ class Scene:
     ) -> Scene: ...
     @property
     def zone(self) -> Zone:
-        """What can be touched of one side; an AttributeError around an object."""
+        """Explored zone of one side; AttributeError around an object."""
     @property
     def ball(self) -> Ball:
-        """Around an object: the ball in which it is; an AttributeError over a zone."""
+        """Ball that contains the object (whole objects only); AttributeError over a zone."""
     @property
     def notices(self) -> list[str]:
-        """What of the scene may not be meant, in words."""
+        """Warnings about likely configuration mistakes."""
     def touch(self, target: Sequence[float] | _Array) -> Touch:
-        """Touches at a target, shape (d,), metres; around an object six numbers, as of `Ball`.
+        """Makes a touch at a target, shape (d,), metres; around an object six numbers, as in `Ball`.
 
         Raises:
-            ValueError: if it is not in the zone, or the finger cannot be brought there.
-            SimulationError: if the body cannot.
+            ValueError: if the target is outside the zone or the ball, or unreachable.
+            SimulationError: if the body has a fault.
         """
     def true_height(self, points: npt.ArrayLike) -> _Array:
-        """True height above the datum, metres, of places (..., d); NaN where there is no surface."""
+        """True height above the datum, metres, at places (..., d); NaN outside the object."""
     def mesh(self) -> tuple[_Array, npt.NDArray[np.uint32]] | None:
-        """The object in the world: vertices (n, 3), metres, and triangles (m, 3); None for a function."""
+        """Object in the world frame: vertices (n, 3), metres, and triangles (m, 3); None for an analytic surface."""
 
 @final
 class Exploration:
-    """A scene that is explored touch by touch.
+    """Interactive exploration of a scene, touch by touch.
 
-    Each touch is taken into a belief, which is fitted and can be held against the truth. Touches are those of
-    the scene, whose body goes on from where it is.
+    Each touch updates a belief, which is fitted and can be compared with the ground truth. Touches use the scene's
+    body, which continues from its current state.
     """
 
     def __new__(cls, scene: Scene) -> Exploration: ...
     def touch(self, target: Sequence[float] | _Array) -> Touch:
-        """Touches at a target, and fits the belief.
+        """Makes a touch at a target and fits the belief.
 
         Raises:
-            ValueError, SimulationError: as of `Scene.touch`.
-            PalpateError: if there is no fit.
+            ValueError, SimulationError: as for `Scene.touch`.
+            PalpateError: if the fit fails.
         """
     @property
     def belief(self) -> Belief:
-        """What is known now."""
+        """Belief after the touches so far."""
     @property
     def metrics(self) -> dict[str, float] | None:
-        """How near the belief is to the truth, found when asked for; None before the first touch.
+        """Errors of the belief, computed on access; None before the first touch.
 
-        The names are those of rows: over a zone `rmse_m`, `centred_r` and others, around an object
-        `chamfer_m`, `f_1`, `f_3`, `volume_error`, `iou`, `coverage` and others; what does not apply is left
-        out.
+        Names are those of rows: `rmse_m`, `centred_r` and others over a zone; `chamfer_m`, `f_1`, `f_3`,
+        `volume_error`, `iou`, `coverage` and others around an object. Missing values are left out.
         """
 
 @final

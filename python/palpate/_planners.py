@@ -1,7 +1,7 @@
-"""Planners written in Python: found by name, run beside a clock, and kept from harming the run.
+"""Python planners: lookup by name, time limit, and isolation from the run.
 
-A planner runs on a thread of its own, one for each trial, so that one that does not return can be left
-behind; or, isolated, in a process of its own, which can be ended (`_isolated`).
+A planner runs on its own thread, one per trial, which is abandoned if it exceeds the time limit; or, isolated, in its
+own process, which can be killed (`_isolated`).
 """
 
 from __future__ import annotations
@@ -25,35 +25,36 @@ import numpy as np
 from . import _palpate
 from .errors import PlannerError
 
-#: Seconds that a planner may take for one target, unless another limit is asked for; chosen.
+#: Default time limit for a target, seconds.
+# heuristic: far longer than the built-in planners need.
 LIMIT_S = 60.0
 
-#: What makes a planner: its class, or any callable that is known by a module and a name.
+#: Factory of a planner: its class, or any callable with a module and a name.
 Factory = Callable[..., Any]
 
 
 def name_of(factory: Factory) -> str:
-    """`MODULE:NAME`, as tables and rows know it.
+    """Returns `MODULE:NAME`, the name in tables and rows.
 
     Raises:
-        PlannerError: of what has no name, as a partial or an object.
+        PlannerError: if it has no name, as a partial or an object.
     """
     module = getattr(factory, "__module__", None)
     name = getattr(factory, "__qualname__", None)
     if not callable(factory) or module is None or name is None:
         meant = f"; pass the class {type(factory).__name__}, not an object of it" if _plans(factory) else ""
         raise PlannerError(
-            f"{factory!r} is no planner: allowed are names, classes with plan(belief), and functions "
-            f"that return an object with it{meant}"
+            f"{factory!r} is not a planner: allowed are names, classes with plan(belief), and functions "
+            f"that return an object with plan(belief){meant}"
         )
     return f"{module}:{name.replace('.<locals>', '')}"
 
 
 def by_name(name: str) -> Factory:
-    """The class or function `MODULE:NAME`; the working folder is looked in too, as `python -m` does.
+    """Returns the class or function `MODULE:NAME`; also searches the working folder, as `python -m` does.
 
     Raises:
-        PlannerError: if there is none.
+        PlannerError: if there is no such planner.
     """
     module_name, _, path = name.partition(":")
     if "" not in sys.path and os.getcwd() not in sys.path:
@@ -65,17 +66,17 @@ def by_name(name: str) -> Factory:
     except Exception as error:
         raise PlannerError(f"planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):
-        raise PlannerError(f"planner {name}: it is {found!r}, and no class")
+        raise PlannerError(f"planner {name}: {found!r} is not a class")
     factory: Factory = found
     return factory
 
 
 def source_of(factory: Factory) -> str:
-    """The source that decides what a planner computes, so that a run can tell an edited planner.
+    """Returns the source code that decides a planner's plans, so that a run detects an edited planner.
 
-    It is that of the planner's module and of the modules in its folder that it uses, directly or through one
-    another; what is installed does not count. A planner of a script or a notebook (`__main__`) is known by its own
-    definition and those of its bases there. One without any source is another one each time.
+    It consists of the planner's module and of the modules in its folder that it imports, directly or indirectly;
+    installed packages do not count. For a planner of a script or notebook (`__main__`) it is the planner's definition
+    and those of its bases there. A planner without source code is unique each time.
     """
     module = sys.modules.get(factory.__module__)
     if module is None or module.__name__ == "__main__" or not getattr(module, "__file__", None):
@@ -101,7 +102,7 @@ def source_of(factory: Factory) -> str:
 
 
 def _imported(module: str, text: str) -> list[str]:
-    """The modules that the source of a module may import, by their full names."""
+    """Returns the full names of the modules that a module's source may import."""
     found = []
     try:
         tree = ast.parse(text)
@@ -120,7 +121,7 @@ def _imported(module: str, text: str) -> list[str]:
 
 
 def _file_of(module: str) -> Path | None:
-    """Where a module's source lies; None of one without, or that is not there."""
+    """Returns the path of a module's source; None if there is none."""
     try:
         known = sys.modules.get(module)
         origin = known.__file__ if known is not None else importlib.util.find_spec(module).origin  # type: ignore[union-attr]
@@ -139,8 +140,8 @@ def _plans(planner: Any) -> bool:
 
 
 def make(factory: Factory, zone: Any, seed: int) -> Any:
-    """A planner for one trial: what its constructor names of `zone`, `rng` and `seed` it is given; around an
-    object there is no zone."""
+    """Creates a planner for one trial with the parameters of its constructor: `zone` (not around an object), `rng`
+    and `seed`."""
     offered = {"zone": zone, "rng": np.random.default_rng(seed), "seed": seed}
     try:
         parameters = inspect.signature(factory).parameters
@@ -148,7 +149,7 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
         parameters = {}  # type: ignore[assignment]
     wanted = parameters.get("zone")
     if zone is None and wanted is not None and wanted.default is inspect.Parameter.empty:
-        raise PlannerError(f"{factory!r} asks for a zone, and around an object there is none: belief.ball is there")
+        raise PlannerError(f"{factory!r} has a parameter zone, but a whole object has none: use belief.ball")
     if zone is None:
         del offered["zone"]
     planner = factory(**{name: value for name, value in offered.items() if name in parameters})
@@ -158,12 +159,12 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
 
 
 def target_of(planned: Any) -> list[float]:
-    """What a planner returned, as numbers; a single one where the zone has one coordinate."""
+    """Returns a planner's result as a list of numbers."""
     return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
 
 
 def told(error: BaseException) -> str:
-    """An exception with where it was raised, without the lines of this package."""
+    """Returns an exception with its traceback, without the lines of this package."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if os.path.dirname(frame.filename) != os.path.dirname(__file__)]
     head = "".join(traceback.format_exception_only(error)).strip()
@@ -173,7 +174,7 @@ def told(error: BaseException) -> str:
 
 
 class Workers:
-    """The planners of one name in one run, as the extension starts them."""
+    """Planners of one name in a run, started by the extension."""
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
         self.source = source_of(factory)
@@ -189,39 +190,39 @@ class Workers:
         return worker
 
     def stop(self) -> None:
-        """Waits for no planner any more."""
+        """Stops waiting for all planners."""
         for worker in list(self._live):
             worker.interrupt()
 
     def forget(self, worker: Worker) -> None:
-        """Of one that has ended."""
+        """Forgets a finished worker."""
         self._live.discard(worker)
 
 
 class Trusted:
-    """A planner of one trial that is called where the trial runs: nobody looks at the clock."""
+    """Planner of one trial that is called on the trial's thread without a time limit."""
 
     def __init__(self, factory: Factory, zone: Any, seed: int) -> None:
         self._make = (factory, zone, seed)
         self._planner: Any = None
 
     def plan(self, belief: Any) -> list[float]:
-        """As of a worker."""
+        """Returns the next target, as a worker does."""
         try:
             if self._planner is None:
                 self._planner = make(*self._make)
             return target_of(self._planner.plan(belief))
         except PlannerError:
             raise
-        except BaseException as error:  # also of sys.exit in a planner
+        except BaseException as error:  # includes sys.exit in a planner
             raise PlannerError(told(error)) from None
 
     def close(self) -> None:
-        """The trial is over."""
+        """Ends the trial."""
 
 
 class Worker:
-    """A planner of one trial on a thread of its own, which the extension asks over a desk."""
+    """Planner of one trial on its own thread; the extension communicates with it through a desk."""
 
     def __init__(self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float) -> None:
         self._home = home
@@ -231,16 +232,16 @@ class Worker:
         self._thread.start()
 
     def interrupt(self) -> None:
-        """Lets whoever waits for a target go."""
+        """Ends the wait for a target."""
         self.desk.fail("the run was stopped")
         self.abandon()
 
     def close(self) -> None:
-        """The trial is over."""
+        """Ends the trial."""
         self._home.forget(self)
 
     def abandon(self) -> None:
-        """Asks the thread to end. One that waits outside Python ends when it comes back."""
+        """Requests the thread to end; a thread that waits outside Python ends when it returns to Python."""
         ident = ctypes.c_ulong(self._thread.ident or 0)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, ctypes.py_object(SystemExit))
 
@@ -251,8 +252,8 @@ def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.Desk) -> None:
         planner: Any = make(factory, zone, seed) if belief is not None else None
         while belief is not None:
             desk.answer(target_of(planner.plan(belief)))
-            # Not kept while the next touch is made.
+            # Released while the next touch is made.
             del belief
             belief = desk.next()
-    except BaseException as error:  # also of sys.exit in a planner
+    except BaseException as error:  # includes sys.exit in a planner
         desk.fail(str(error) if isinstance(error, PlannerError) else told(error))

@@ -1,4 +1,4 @@
-"""How far a run is, on standard error."""
+"""Progress of a run on stderr."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 
 
 class Progress:
-    """Told now and then how many trials are done; a line that is written over."""
+    """Callback with the number of finished trials; it rewrites one line."""
 
     def __init__(self, name: str, is_shown: bool) -> None:
         self._name = name

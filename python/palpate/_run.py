@@ -1,4 +1,4 @@
-"""What came of an experiment, as frames."""
+"""Results of an experiment as data frames."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ __all__ = ["Run"]
 
 
 class Run:
-    """The trials of an experiment: from `Experiment.run`, or read from a folder.
+    """Trials of an experiment: from `Experiment.run`, or read from a folder.
 
-    Units are in the names of columns (`rmse_m`, `time_s`); what does not apply is NaN or None.
+    Units are in the names of columns (`rmse_m`, `time_s`); missing values are NaN or None.
     """
 
     def __init__(self, core: _palpate.Run) -> None:
@@ -31,60 +31,60 @@ class Run:
         """Reads a folder that `Experiment.run` or the program wrote.
 
         Raises:
-            RunFolderError: if it is none, or damaged.
+            RunFolderError: if it is not a run's folder, or damaged.
         """
         return cls(_palpate.Run.open(os.fspath(folder)))
 
     @property
     def name(self) -> str:
-        """Of the experiment."""
+        """Name of the experiment."""
         return self._core.name
 
     @property
     def planners(self) -> list[str]:
-        """The planners compared, in their order."""
+        """Compared planners, in order."""
         return self._core.planners
 
     @property
     def zone(self) -> Zone:
-        """What was explored; an AttributeError of a run around an object, which has a `ball`."""
+        """Explored zone; AttributeError for a whole object, which has a `ball`."""
         return self._core.zone
 
     @property
     def ball(self) -> Ball:
-        """Where the object is that was explored as a whole; an AttributeError of a run over a zone."""
+        """Ball around the explored object; AttributeError for a zone."""
         return self._core.ball
 
     def trials(self) -> pd.DataFrame:
-        """A line for each trial: trial, planner, touches, failure (None, or why it ended early)."""
+        """Returns a row per trial: trial, planner, touches, failure (None, or the reason of an early end)."""
         return _frame(self._core.trials())
 
     def touches(self) -> pd.DataFrame:
-        """A line for each touch: target, contact, what the fit found, and every measure after it."""
+        """Returns a row per touch: target, contact, hyperparameters, and every measure after it."""
         return _frame(self._core.touches())
 
     def summary(self) -> pd.DataFrame:
-        """A line for each planner and number of touches: the columns of `summary.csv`."""
+        """Returns a row per planner and number of touches: the columns of `summary.csv`."""
         return _frame(self._core.summary())
 
     def belief(self, trial: int, planner: str, touch: int) -> Belief:
-        """The belief of a trial after so many touches.
+        """Returns the belief of a trial after `touch` touches.
 
         Raises:
-            PalpateError: if the trial is not there, or had no fit then.
+            PalpateError: if there is no such trial, or it has no fit after that touch.
         """
         return self._core.belief(trial, planner, touch)
 
     def truth(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """The test places (n, d) and the true heights there (n,), metres; NaN where is no surface.
+        """Returns the test points (n, d) and the true heights there (n,), metres; NaN outside the object.
 
         Raises:
-            AttributeError: of a run around an object, whose truth is a mesh: `Scene.mesh`.
+            AttributeError: for a whole object, whose ground truth is a mesh: `Scene.mesh`.
         """
         return self._core.truth()
 
     def rows(self) -> bytes:
-        """The trials as JSON, a line each: the bytes of the program's `trials.jsonl`."""
+        """Returns the trials as JSON lines: the bytes of the program's `trials.jsonl`."""
         return self._core.rows()
 
     def __str__(self) -> str:
@@ -95,7 +95,7 @@ class Run:
 
 
 def _frame(columns: dict[str, object]) -> pd.DataFrame:
-    # Imported when it is needed: it takes longer than all else here.
+    # Imported on first use, because it takes longer than all other imports.
     import pandas as pd
 
     return pd.DataFrame(columns)

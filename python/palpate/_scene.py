@@ -1,4 +1,4 @@
-"""Scenes, from files and from meshes."""
+"""Scenes from files and meshes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["read_mesh", "write_mesh"]
 
 
 def load(path: str | os.PathLike[str], seed: int, /, **settings: Any) -> _palpate.Scene:
-    """As `Scene.load`."""
+    """Implements `Scene.load`."""
     return _palpate.Scene._load(os.fspath(found(path, "scenes")), assignments(settings), seed)
 
 
@@ -32,7 +32,7 @@ def of_mesh(
     /,
     **settings: Any,
 ) -> _palpate.Scene:
-    """As `Scene.of_mesh`."""
+    """Implements `Scene.of_mesh`."""
     zone = toml({"x_m": x_m, "z_m": z_m})
     text = f'body = {toml(body)}\nzone = {zone}\nobject = {{ mesh = "mesh" }}\n'
     with tempfile.TemporaryDirectory() as folder:
@@ -50,13 +50,13 @@ def of_mesh(
 def read_mesh(
     path: str | os.PathLike[str], metres_per_unit: float = 1.0
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
-    """Reads OBJ, glTF, GLB, STL or PLY and repairs it.
+    """Reads an OBJ, glTF, GLB, STL or PLY file and repairs the mesh.
 
     Returns:
         Vertices (n, 3), metres, and triangles (m, 3), counter-clockwise from outside.
 
     Raises:
-        SimulationError: if it is unusable.
+        SimulationError: if the mesh is unusable.
     """
     return _palpate.read_mesh(os.fspath(path), metres_per_unit)[0]
 
@@ -64,7 +64,7 @@ def read_mesh(
 def write_mesh(
     path: str | os.PathLike[str], vertices_m: npt.ArrayLike, triangles: npt.ArrayLike
 ) -> None:
-    """Writes a mesh as binary STL, in metres, which `palpate new` takes."""
+    """Writes a mesh as binary STL in metres, for `palpate new`."""
     corners = np.asarray(vertices_m, dtype=float)[np.asarray(triangles, dtype=np.int64)]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(across, axis=1, keepdims=True)

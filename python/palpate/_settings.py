@@ -1,4 +1,4 @@
-"""Settings as Python writes them, to what `--set` takes."""
+"""Conversion of Python settings to the form of `--set`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 
 
 def assignments(settings: Mapping[str, Any]) -> list[str]:
-    """`key=value` of each, in TOML; `__` in a key stands for the dot between tables.
+    """Returns `key=value` in TOML for each setting; `__` in a key replaces the dot between tables.
 
     Raises:
-        TypeError: of a value that TOML does not have.
+        TypeError: if TOML has no such value.
     """
     return [f"{key.replace('__', '.')}={toml(value)}" for key, value in settings.items()]
 
 
 def toml(value: Any) -> str:
-    """A value as TOML writes it."""
-    if hasattr(value, "tolist"):  # of numpy
+    """Returns a value as TOML."""
+    if hasattr(value, "tolist"):  # numpy
         value = value.tolist()
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -36,4 +36,4 @@ def toml(value: Any) -> str:
         return "{" + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items()) + "}"
     if isinstance(value, Sequence):
         return "[" + ", ".join(toml(item) for item in value) + "]"
-    raise TypeError(f"a setting cannot be {type(value).__name__}: {value!r}")
+    raise TypeError(f"a setting cannot be of type {type(value).__name__}: {value!r}")

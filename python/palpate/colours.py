@@ -1,7 +1,7 @@
-"""The colours of Palpate's figures, for figures of your own.
+"""Colours of Palpate's figures, for your own figures.
 
-The categorical ones are those of Okabe and Ito, which differ for every kind of colour vision. A touch, the truth
-and a planner have the colour that they have in reports.
+The categorical colours are those of Okabe and Ito 2008, which are distinct for all kinds of colour vision. Touches,
+ground truth and planners have the same colours as in reports.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ __all__ = [
 
 #: Text and axes.
 INK = "#222222"
-#: Text that steps back.
+#: Secondary text.
 FAINT_INK = "#666666"
-#: Lines behind the data.
+#: Grid lines.
 GRID = "#e4e4e4"
-#: Paper.
+#: Background.
 PAPER = "#ffffff"
 #: The true surface.
 TRUTH = "#009e73"
-#: Touches that every planner starts with.
+#: Initial touches, the same for every planner.
 INITIAL = "#0046c8"
-#: Touches that a planner chose.
+#: Touches of a planner.
 LATER = "#d00000"
-#: How much of its colour a band has.
+#: Opacity of a band.
 BAND_OPACITY = 0.22
 
 #: Standard deviations, small to large: viridis.
@@ -55,7 +55,7 @@ DEVIATION = (
     "#aadc32",
     "#fde725",
 )
-#: Heights, low to high: slate to cream, on which touches stand out.
+#: Heights, low to high: slate to cream, on which touches are visible.
 HEIGHT = ("#68869e", "#96b2b8", "#c4d3c4", "#e6e4c1", "#fceebe")
 #: Errors, too low to too high: ColorBrewer's PuOr.
 ERROR = ("#542788", "#998ec3", "#d8daeb", "#f7f7f7", "#fee0b6", "#f1a340", "#b35806")
@@ -74,7 +74,7 @@ _SPARE = (
 
 
 def planner(name: str, planners: Sequence[str] = ()) -> str:
-    """The colour of a planner among those that it is drawn with (`run.planners`), as in the report."""
+    """Returns the colour of a planner among the drawn ones (`run.planners`), as in the report."""
     if name in _OWN:
         return _OWN[name]
     others = [other for other in planners if other not in _OWN]
@@ -82,15 +82,15 @@ def planner(name: str, planners: Sequence[str] = ()) -> str:
 
 
 def map_of(colours: Sequence[str]) -> Any:
-    """A colour map of matplotlib's through `DEVIATION`, `HEIGHT` or `ERROR`."""
-    # Here only is matplotlib needed.
+    """Returns a matplotlib colour map of `DEVIATION`, `HEIGHT` or `ERROR`."""
+    # matplotlib is needed only here.
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("palpate", list(colours))
 
 
 def style() -> dict[str, Any]:
-    """Settings of matplotlib: `matplotlib.rcParams.update(palpate.colours.style())`."""
+    """Returns matplotlib settings: `matplotlib.rcParams.update(palpate.colours.style())`."""
     return {
         "axes.axisbelow": True,
         "axes.edgecolor": FAINT_INK,

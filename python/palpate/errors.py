@@ -1,4 +1,4 @@
-"""What can go wrong, with what a program needs to know of it as attributes."""
+"""Exceptions of Palpate, with details as attributes."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ __all__ = [
 
 
 class PalpateError(Exception):
-    """Anything that Palpate could not do."""
+    """Base class of Palpate's errors."""
 
 
 class ConfigError(PalpateError, ValueError):
-    """A setting that is wrong, with its place.
+    """An invalid setting, with its place.
 
-    Attributes are None where they do not apply.
+    Attributes that do not apply are None.
 
     Attributes:
-        file: the file it stands in.
-        line: its line there, from 1.
-        key: its dotted name.
-        value: what stands there.
-        allowed: what may stand there, in words.
+        file: file that contains the setting.
+        line: line in the file, from 1.
+        key: dotted name of the setting.
+        value: its value.
+        allowed: description of the allowed values.
     """
 
     def __init__(
@@ -47,14 +47,14 @@ class ConfigError(PalpateError, ValueError):
 
 
 class SimulationError(PalpateError, ValueError):
-    """A scene that cannot be built or simulated."""
+    """A scene cannot be built or simulated."""
 
 
 class RunFolderError(PalpateError, OSError):
-    """A run's folder that cannot be read or written.
+    """A run's folder cannot be read or written.
 
     Attributes:
-        path: the folder or the file in it.
+        path: path of the folder, or of the file in it.
     """
 
     def __init__(self, message: str, *, path: str | None = None) -> None:
@@ -63,4 +63,4 @@ class RunFolderError(PalpateError, OSError):
 
 
 class PlannerError(PalpateError):
-    """A planner that cannot be found or made, or that returned no target."""
+    """A planner was not found, could not be created, or returned no target."""

@@ -1,44 +1,43 @@
-"""Exploration as an environment of Gymnasium: `Palpate/Touch-v0`.
+"""Gymnasium environment for exploration: `Palpate/Touch-v0`.
 
     >>> import gymnasium, palpate.gym
     >>> env = gymnasium.make("Palpate/Touch-v0", scene="bird")
     >>> envs = gymnasium.make_vec("Palpate/Touch-v0", num_envs=16, scene="suite")
 
-An episode begins with random touches and ends after a fixed number of them. Many are stepped side by side on
-threads that need no Python (`make_vec`).
+An episode starts with random touches and ends after a fixed number of touches. `make_vec` steps many episodes in
+parallel on threads outside Python.
 
-Over a zone:
+Zone:
 
-Action: where to touch, shape (d,), -1 to 1 along each side of the zone.
+Action: place of the touch, shape (d,), from -1 to 1 along each side of the zone.
 
-Observation, a dict of arrays in which heights are in units of half the zone's widest side:
+Observation: a dict of arrays; the unit of heights is half of the zone's widest side.
 
-* "touches": shape (touches, 2 d + 2), a row for each touch made, zeros for those to come: target (d) and place of
-  contact (d), both -1 to 1 along the zone's sides, height of contact, and 1 if there was a contact;
-* "count": how many were made;
+* "touches": shape (touches, 2 d + 2), a row per touch, zeros for touches not yet made: target (d) and place of
+  contact (d), both from -1 to 1 along the zone's sides, height of contact, and 1 for a contact;
+* "count": number of touches made;
 * "belief": shape (2, grid, ..., grid), mean and standard deviation of the height on an even grid, the last axis
-  along x; left out with `grid=0`.
+  along x; absent with `grid=0`.
 
-Info: "rmse_m", "centred_r", "max_error_m" of the belief against the truth, left out where no belief is fitted, and
-"failure", why an episode ended early, or None.
+Info: "rmse_m", "centred_r" and "max_error_m" of the belief, absent if no belief is fitted, and "failure", the reason
+of an early end, or None.
 
-Around an object (a scene with `[around]`), in units of the ball's radius, from its centre:
+Whole object (a scene with `[around]`); the unit is the ball's radius, the origin its centre:
 
-Action: shape (6,), -1 to 1: a vector of any length to the side from which the finger comes, and the point that it
-aims at, drawn back into the ball. Both are vectors of space: unlike angles they have no seam and no pole, so that
-what is near in the action is near in the world; zeros for the point are the plain aim at the centre. It is one
-number more than is needed, for along the way the point changes nothing. An aim that the finger cannot be brought to
-is a touch that met nothing.
+Action: shape (6,), from -1 to 1: a vector of any length towards the finger's side, and the aimed point, clipped to the
+ball. Both are vectors in space, which unlike angles have no discontinuity and no pole: close actions are close in
+the world. Zeros for the point aim at the centre. One value is redundant: moving the point along the approach changes
+nothing. An unreachable aim counts as a touch without contact.
 
-Observation: "touches" with rows of 13: side (3), point aimed at (3), contact (3), its normal (3), and 1 if there was
-one; "count"; "belief": shape (2, grid, grid, grid), mean and standard deviation of the field on the cube about the
-ball, negative inside, the last axis along x, the first along z.
+Observation: "touches" with rows of 13: side (3), aimed point (3), contact (3), its normal (3), and 1 for a contact;
+"count"; "belief": shape (2, grid, grid, grid), mean and standard deviation of the field on the cube around the ball,
+negative inside, the last axis along x, the first along z.
 
 Info: "chamfer_m", "f_1", "iou" and "failure".
 
-Reward: "error", by how much the logarithm of the belief's error fell, over a zone its RMSE, around an object its
-Chamfer distance, the ball's radius where no surface is believed; "information", by how much the mean logarithm of its
-standard deviation fell on the grid; "none", 0, which with `grid=0` fits no belief at all.
+Reward: "error", the decrease of the log error (RMSE over a zone; Chamfer distance around an object, where a missing
+surface counts as the ball's radius); "information", the decrease of the mean log standard deviation on the grid;
+"none", 0, which with `grid=0` fits no belief.
 """
 
 from __future__ import annotations
@@ -62,12 +61,12 @@ __all__ = ["TouchEnv", "TouchVectorEnv"]
 
 _Observation = dict[str, Any]
 
-#: A scene by name or path, "suite" for those of the suite, "suite/around" for the same objects as wholes, or several.
+#: A scene by name or path, "suite" for all scenes of the suite, "suite/around" for its whole objects, or a list.
 Scenes = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 
 class _Explorations:
-    """The extension's environments with their spaces."""
+    """Environments of the extension with their spaces."""
 
     def __init__(
         self,
@@ -102,7 +101,7 @@ class _Explorations:
         self.measures = self.core.measures if grid or reward != "none" else []
 
     def seen(self, told: dict[str, Any]) -> _Observation:
-        """The observations of all."""
+        """Returns the observations of all environments."""
         shapes = {name: space.shape or () for name, space in self.observation.spaces.items()}
         return {name: told[name].reshape(-1, *shape) for name, shape in shapes.items()}
 
@@ -111,11 +110,11 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
     """One exploration.
 
     Args:
-        scene: as `palpate.Scene.load` takes it; "suite", "suite/around" or a list for a random one in each episode.
-        touches: of an episode, the initial ones among them.
-        initial_touches: random touches it begins with.
-        grid: places along each side of the zone, or of the cube about the ball, that the belief is told on; 0 for
-            none. Around an object 8 are 512 places and cheap, 16 are 4096.
+        scene: as for `palpate.Scene.load`; "suite", "suite/around" or a list selects a random scene per episode.
+        touches: touches per episode, initial ones included.
+        initial_touches: random touches at the start.
+        grid: points along each side of the zone, or of the cube around the ball, on which the belief is observed; 0 for
+            no belief. Around an object 8 gives 512 points and is cheap, 16 gives 4096.
         reward: "error", "information" or "none".
         settings: any setting of a scene.
     """
@@ -141,7 +140,7 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[_Observation, dict[str, Any]]:
-        """Begins an episode: its initial touches are made."""
+        """Starts an episode with its initial touches."""
         super().reset(seed=seed)
         told = self._all.core.reset([int(self.np_random.integers(2**63))])
         return self._seen(told), self._info(told)
@@ -149,7 +148,7 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
     def step(
         self, action: npt.NDArray[np.float32]
     ) -> tuple[_Observation, float, bool, bool, dict[str, Any]]:
-        """Touches; an episode terminates with its last touch."""
+        """Makes a touch; an episode terminates with its last touch."""
         told = self._all.core.step(np.asarray(action, dtype=np.float32)[None])
         return self._seen(told), float(told["reward"][0]), bool(told["over"][0]), False, self._info(told)
 
@@ -165,11 +164,11 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
 
 
 class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[np.float32], npt.NDArray[Any]]):
-    """Many explorations, as `TouchEnv`; one that is over begins anew with the next step.
+    """Parallel explorations, like `TouchEnv`; a finished one restarts with the next step.
 
     Args:
-        num_envs: how many.
-        threads: 0 means all cores; what happens does not depend on it.
+        num_envs: number of environments.
+        threads: number of threads, 0 for all cores; results do not depend on it.
     """
 
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -203,7 +202,7 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[np.float32], npt.NDArra
         seed: int | list[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[_Observation, dict[str, Any]]:
-        """Begins all; a list of seeds is one for each."""
+        """Resets all environments; a list has one seed per environment."""
         if isinstance(seed, list):
             each = [np.random.default_rng(one) for one in seed]
             seeds = [int(one.integers(2**63)) for one in each]
@@ -216,7 +215,7 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[np.float32], npt.NDArra
     def step(
         self, actions: npt.NDArray[np.float32]
     ) -> tuple[_Observation, npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], dict[str, Any]]:
-        """Touches with all of them, actions of shape (num_envs, d)."""
+        """Makes a touch in each environment; actions have shape (num_envs, d)."""
         told = self._all.core.step(np.ascontiguousarray(actions, dtype=np.float32))
         never = np.zeros(self.num_envs, dtype=bool)
         return self._all.seen(told), told["reward"], told["over"], never, self._info(told)

@@ -1,4 +1,4 @@
-//! The ball: what is explored around an object.
+//! Exploration region of a whole object: a ball around it.
 
 use nalgebra::Vector3;
 use numpy::PyArray1;
@@ -6,8 +6,8 @@ use palpate::task::{self, Aim, Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// The ball in which a whole object is explored. A target is six numbers: the point aimed at
-/// (x, y, z), metres, and the unit vector along which the finger goes.
+/// Ball that contains the explored object. A target is six numbers: the aimed point (x, y, z),
+/// metres, and the unit vector of the finger's motion.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Ball(pub(crate) task::Ball);
 
@@ -19,31 +19,31 @@ impl Ball {
         Self(task::Ball { centre_w: centre_m.into(), radius_m, lowest_m })
     }
 
-    /// Its centre in the world, shape (3,), metres.
+    /// Centre in the world frame, shape (3,), metres.
     #[getter]
     fn centre_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.0.centre_w.coords.as_slice())
     }
 
-    /// Its radius, metres.
+    /// Radius, metres.
     #[getter]
     fn radius_m(&self) -> f64 {
         self.0.radius_m
     }
 
-    /// Lowest z in the world to which the finger may come, metres; None where nothing is below.
+    /// Lowest allowed z of the finger in the world frame, metres; None if unbounded.
     #[getter]
     fn lowest_m(&self) -> Option<f64> {
         self.0.lowest_m
     }
 
-    /// Whether a target, shape (6,), aims at a point of it.
+    /// Whether a target, shape (6,), aims at a point in the ball.
     fn contains(&self, target: Vec<f64>) -> bool {
         Target::from_numbers(&target).is_some_and(|target| Region::from(self.0).contains(&target))
     }
 
-    /// The target, shape (6,), that aims at a point in the world, the centre if left out, from the
-    /// side of the vector `outward`, of any length.
+    /// Returns the target, shape (6,), that aims at a point in the world frame (default: the
+    /// centre) from the side of the vector `outward`, of any length.
     #[pyo3(signature = (outward, at = None))]
     fn aim<'py>(
         &self,
@@ -56,13 +56,13 @@ impl Ball {
         let is_vector = outward_w.norm().is_finite() && outward_w.norm() > 1e-12;
         if !is_vector || !p_w.iter().all(|x_m| x_m.is_finite()) {
             return Err(PyValueError::new_err(format!(
-                "outward = {outward:?}, at = {at:?}: allowed are finite numbers, and a direction"
+                "outward = {outward:?}, at = {at:?}: allowed are finite numbers and a non-zero outward vector"
             )));
         }
         Ok(PyArray1::from_vec(py, Target::from(Aim::against(p_w, &outward_w)).numbers()))
     }
 
-    /// For pickles.
+    /// Supports pickling.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, Parts) {
         let task::Ball { centre_w, radius_m, lowest_m } = slf.get().0;
         (slf.get_type().into_any(), (centre_w.into(), radius_m, lowest_m))
@@ -74,5 +74,5 @@ impl Ball {
     }
 }
 
-/// What it is made of.
+/// Constructor arguments of a ball.
 type Parts = ([f64; 3], f64, Option<f64>);

@@ -1,4 +1,4 @@
-//! The belief as a planner or a reader of a run sees it.
+//! Belief that planners and users of a run get.
 
 use crate::ball::Ball;
 use crate::errors;
@@ -15,19 +15,19 @@ use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// What is known after some touches: a Gaussian process, of the surface's height over a zone, or
-/// around an object of a field over space whose zero set is the surface, negative inside.
+/// Belief after some touches: a Gaussian process of the surface's height over a zone, or of an
+/// implicit surface around an object (a field that is zero on the surface and negative inside).
 ///
-/// It never changes. Points have shape (..., d), metres, (n,) too where d is 1; what is told of
-/// them has shape (...). Before the first fit every number is NaN. Around an object d is 3, and
-/// what is of zones only is an AttributeError, as over a zone what is of objects only.
+/// It is immutable. Points have shape (..., d), metres, or (n,) if d is 1; results have shape
+/// (...). Before the first fit all numbers are NaN. Around an object d is 3; attributes for zones
+/// raise AttributeError there, and attributes for objects raise it over a zone.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Belief(pub(crate) Known);
 
-/// Vertices (n, 3), triangles (m, 3) and deviations (n,).
+/// Vertices (n, 3), triangles (m, 3) and standard deviations (n,).
 type Solid<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f64>>);
 
-/// Means and deviations, in the shape of the points.
+/// Means and standard deviations, in the shape of the points.
 type Field<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
 
 impl Belief {
@@ -84,7 +84,7 @@ fn variances(posterior: &Posterior, places: &[Vec<f64>]) -> Vec<f64> {
 
 #[pymethods]
 impl Belief {
-    /// The zone.
+    /// Explored zone.
     #[getter]
     fn zone(&self) -> PyResult<Zone> {
         Ok(Zone(self.over_zone("zone")?.zone().clone()))
@@ -99,7 +99,7 @@ impl Belief {
         self.told(points, (belief, belief.surface()), means)
     }
 
-    /// Variance of the height, without the noise of a touch, square metres.
+    /// Variance of the height without touch noise, square metres.
     fn variance<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("variance")?;
         self.told(points, (belief, belief.surface()), variances)
@@ -114,9 +114,9 @@ impl Belief {
         self.gradients(points, (belief, belief.surface()))
     }
 
-    /// What a touch asked for there could still remove of the variance, square metres: as
-    /// `variance`, given also that targets which missed, or were met elsewhere, are no news. The
-    /// planner `active` asks for the place where it is largest.
+    /// Variance that a touch with this target can still reduce, square metres: `variance`,
+    /// conditioned also on targets without contact or with contact elsewhere. The planner `active`
+    /// selects its maximum.
     fn explorable_variance<'py>(
         &self,
         points: &Bound<'py, PyAny>,
@@ -134,7 +134,7 @@ impl Belief {
         self.gradients(points, (belief, belief.explorable()))
     }
 
-    /// Whether there probably is a surface at each point: 1 or 0.
+    /// Whether a surface is likely at each point: 1 or 0.
     fn has_surface<'py>(
         &self,
         points: &Bound<'py, PyAny>,
@@ -147,7 +147,7 @@ impl Belief {
         places.told(points.py(), values)
     }
 
-    /// Every target asked for so far, shape (n, d), metres; around an object (n, 6).
+    /// All targets so far, shape (n, d), metres; (n, 6) around an object.
     #[getter]
     fn targets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let targets: Vec<Vec<f64>> = self.0.targets().iter().map(Target::numbers).collect();
@@ -155,8 +155,8 @@ impl Belief {
         rows(py, &targets, width)
     }
 
-    /// Places of the contacts the belief holds, shape (m, d), metres: not the targets. With
-    /// `gp.inducing_touches` those that are kept.
+    /// Places of the contacts in the belief (not of the targets), shape (m, d), metres. With
+    /// `gp.inducing_touches` only the selected contacts.
     #[getter]
     fn places<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("places")?;
@@ -172,7 +172,8 @@ impl Belief {
         Ok(PyArray1::from_slice(py, heights_m.unwrap_or_default()))
     }
 
-    /// What the last fit found: signal_sd_m, length_scales_m, noise_sd_m, mean_m; None before it.
+    /// Hyperparameters of the last fit: signal_sd_m, length_scales_m, noise_sd_m, mean_m; None
+    /// before the first fit.
     #[getter]
     fn hyperparameters<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(posterior) = self.0.posterior() else { return Ok(None) };
@@ -185,13 +186,14 @@ impl Belief {
         Ok(Some(told))
     }
 
-    /// Around an object: the ball in which it is.
+    /// Ball that contains the object (whole objects only).
     #[getter]
     fn ball(&self) -> PyResult<Ball> {
         Ok(Ball(self.around("ball")?.scope().ball))
     }
 
-    /// Around an object: whether the finger can be brought to what a target, shape (6,), aims at.
+    /// Whether the finger can reach the point that a target, shape (6,), aims at (whole objects
+    /// only).
     fn reaches(&self, target: Vec<f64>) -> PyResult<bool> {
         let scope = self.around("reaches")?.scope();
         let target = Target::from_numbers(&target);
@@ -199,7 +201,7 @@ impl Belief {
         Ok(aim.is_some_and(|aim| scope.ball.contains(aim) && scope.reaches(aim)))
     }
 
-    /// Around an object: points of contact in the world, shape (m, 3), metres.
+    /// Contact points in the world frame, shape (m, 3), metres (whole objects only).
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let contacts = self.around("contacts")?.contacts();
@@ -207,8 +209,8 @@ impl Belief {
         rows(py, &contacts, 3)
     }
 
-    /// Around an object: mean of the field, negative inside and near the surface about the distance
-    /// from it, and its standard deviation, metres.
+    /// Mean and standard deviation of the field, metres (whole objects only). The mean is negative
+    /// inside; near the surface it approximates the signed distance.
     fn field<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Field<'py>> {
         let surface = self.around("field")?.surface();
         let places = Places::of(points, 3)?;
@@ -224,10 +226,10 @@ impl Belief {
         Ok((places.told(points.py(), means_m)?, places.told(points.py(), sds_m)?))
     }
 
-    /// Around an object: the believed surface, from a grid of `cells` along its longest side:
-    /// vertices (n, 3), metres, triangles (m, 3), counter-clockwise from outside, and how far the
-    /// surface may lie from each vertex along its normal, shape (n,), metres. All are empty where
-    /// no surface is believed.
+    /// Mean surface from a grid of `cells` along its longest side (whole objects only): vertices
+    /// (n, 3), metres; triangles (m, 3), counter-clockwise from outside; and the standard deviation
+    /// of the surface along the normal at each vertex, shape (n,), metres. All are empty if the
+    /// belief contains no surface.
     #[pyo3(signature = (cells = 64))]
     fn mesh<'py>(&self, py: Python<'py>, cells: u32) -> PyResult<Solid<'py>> {
         let surface = self.around("mesh")?.surface();
@@ -249,5 +251,5 @@ impl Belief {
     }
 }
 
-/// Cells that a believed surface may be made of, as `gp.cells`.
+/// Allowed cells of a mesh, as for `gp.cells`.
 const CELLS: [u32; 2] = [8, 256];

@@ -1,4 +1,4 @@
-//! Rows and curves as columns: what frames are made of.
+//! Rows and curves as columns of data frames.
 
 use numpy::PyArray1;
 use palpate::experiment::measure::in_files;
@@ -9,7 +9,7 @@ use palpate::explore::planner::Stall;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Names of a target's numbers, in a zone and around an object.
+/// Column names of a target's numbers, for a zone and for a whole object.
 const PLACE: [&str; 2] = ["target_x_m", "target_z_m"];
 const AIM: [&str; 6] = ["target_x_m", "target_y_m", "target_z_m", "ahead_x", "ahead_y", "ahead_z"];
 
@@ -39,7 +39,7 @@ fn words<'a>(
     told.set_item(name, values.collect::<Vec<_>>())
 }
 
-/// A line for each trial.
+/// Returns a record per trial.
 pub(crate) fn trials<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let told = PyDict::new(py);
     let rows = || run.rows.iter();
@@ -50,7 +50,7 @@ pub(crate) fn trials<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyD
     Ok(told)
 }
 
-/// A line for each touch: the row's part of it, and every measure after it.
+/// Returns a record per touch: its part of the row, and every measure after it.
 pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let told = PyDict::new(py);
     let all: Vec<(&TrialRow, usize, &TouchRow)> = (run.rows.iter())
@@ -83,7 +83,7 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     Ok(told)
 }
 
-/// A line for each planner and number of touches, the columns of `summary.csv`.
+/// Returns a record per planner and number of touches, with the columns of `summary.csv`.
 pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let told = PyDict::new(py);
     let records = py.detach(|| curve_table(&run.experiment, &run.rows, |_| true));

@@ -1,5 +1,5 @@
-//! Where a trial hands its belief to the thread of a planner, and waits for the target: neither holds
-//! the interpreter while it waits.
+//! Channel between a trial and a planner's thread: the trial sends its belief and waits for the
+//! target. Neither side holds the interpreter lock while waiting.
 
 use crate::belief::Belief;
 use crate::known::Known;
@@ -9,21 +9,22 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Planners that take no longer are not slept for: to be woken takes as long. Chosen.
+/// Time of busy waiting before a trial sleeps.
+// heuristic: waking up takes about as long.
 const SOON: Duration = Duration::from_micros(50);
 
 type Reply = Result<Vec<f64>, String>;
 
-/// The planner's side of the desk.
+/// Planner's end of the channel.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct Desk {
     requests: Mutex<Receiver<Known>>,
     replies: Sender<Reply>,
-    /// Taken when the trial sits down.
+    /// Trial's end, until the trial takes it.
     other: Mutex<Option<Trial>>,
 }
 
-/// The trial's side.
+/// Trial's end of the channel.
 pub(crate) struct Trial {
     requests: Sender<Known>,
     replies: Receiver<Reply>,
@@ -41,7 +42,7 @@ impl Desk {
         Ok(Self { requests: Mutex::new(theirs), replies, other: Mutex::new(Some(trial)) })
     }
 
-    /// Waits for the next belief; None once the trial is over.
+    /// Waits for the next belief; returns None after the trial.
     fn next(&self, py: Python<'_>) -> Option<Belief> {
         py.detach(|| {
             let requests = self.requests.lock().unwrap_or_else(PoisonError::into_inner);
@@ -49,40 +50,40 @@ impl Desk {
         })
     }
 
-    /// Hands over a target.
+    /// Sends a target.
     fn answer(&self, target: Vec<f64>) {
-        // A trial that waits no more needs none.
+        // Ignored if the trial no longer waits.
         let _ = self.replies.send(Ok(target));
     }
 
-    /// Says why there is no target.
+    /// Sends the reason why there is no target.
     fn fail(&self, reason: String) {
         let _ = self.replies.send(Err(reason));
     }
 }
 
 impl Desk {
-    /// The trial's side, once.
+    /// Takes the trial's end; returns `None` the second time.
     pub(crate) fn trial(&self) -> Option<Trial> {
         self.other.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
-/// Why there is no target.
+/// Reasons for a missing target.
 pub(crate) enum NoTarget {
-    /// The planner, or who stopped the run, says why.
+    /// The planner failed, or the run was stopped, for this reason.
     Said(String),
-    /// It did not return in time.
+    /// The planner exceeded the time limit.
     Late(Duration),
 }
 
 impl Trial {
-    /// The target of a belief.
+    /// Sends a belief and waits for the target.
     ///
     /// # Errors
-    /// If there is none.
+    /// If there is no target.
     pub(crate) fn ask(&self, belief: Known) -> Result<Vec<f64>, NoTarget> {
-        let gone = || NoTarget::Said("its thread has ended".into());
+        let gone = || NoTarget::Said("the planner's thread has ended".into());
         self.requests.send(belief).map_err(|_| gone())?;
         let begun = Instant::now();
         while begun.elapsed() < SOON {

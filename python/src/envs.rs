@@ -1,4 +1,4 @@
-//! Many explorations side by side, stepped by actions: what the Gymnasium environments are made of.
+//! Parallel explorations that are stepped by actions, the core of the Gymnasium environments.
 
 use crate::errors;
 use crate::exploration::{Exploration, How, Reward, World};
@@ -13,7 +13,7 @@ use rayon::iter::{
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Explorations of one or of several objects.
+/// Explorations of one or several objects.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct Envs {
     worlds: Arc<[Arc<World>]>,
@@ -24,8 +24,9 @@ pub(crate) struct Envs {
 
 #[pymethods]
 impl Envs {
-    /// `scenes` are files with their `--set` assignments; `touches` and `initial` are counts of an
-    /// episode; `grid` is what the belief is told on, places along each side, 0 for no belief.
+    /// `scenes` are files with their `--set` assignments; `touches` and `initial` are counts per
+    /// episode; `grid` is the number of points along each side on which the belief is observed, 0
+    /// for no belief.
     #[new]
     #[pyo3(signature = (scenes, count, touches, initial, grid, reward, threads))]
     #[allow(clippy::too_many_arguments)]
@@ -53,7 +54,7 @@ impl Envs {
         let action = worlds.first().map_or(0, |world| world.action());
         if worlds.iter().any(|world| world.action() != action) || action == 0 {
             return Err(PyValueError::new_err(
-                "scenes: allowed are one or more, all of curves, all of surfaces or all around objects",
+                "scenes: allowed are one or more, all curves, all surfaces or all whole objects",
             ));
         }
         if initial < 1 || initial > touches {
@@ -69,7 +70,7 @@ impl Envs {
         Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
     }
 
-    /// Numbers of an action, numbers told of a touch, and axes of the belief's grid.
+    /// Sizes of an action, of a touch's row, and number of axes of the belief's grid.
     #[getter]
     fn sizes(&self) -> (usize, usize, usize) {
         let world = &self.worlds[0];
@@ -82,7 +83,7 @@ impl Envs {
         self.worlds[0].measured().to_vec()
     }
 
-    /// Begins all anew, each with the randomness of its seed.
+    /// Resets all explorations, each with its seed.
     fn reset<'py>(&self, py: Python<'py>, seeds: Vec<u64>) -> PyResult<Bound<'py, PyDict>> {
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
@@ -96,8 +97,9 @@ impl Envs {
         self.told(py)
     }
 
-    /// Touches with each at its action, shape (count, d), fractions -1 to 1 of the zone's sides, or
-    /// side and offset around an object; one whose episode was over begins anew instead.
+    /// Makes a touch in each exploration: actions have shape (count, d) and are fractions from -1
+    /// to 1 of the zone's sides, or side and offset around an object. A finished exploration is
+    /// reset instead.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -131,7 +133,7 @@ impl Envs {
         Ok(())
     }
 
-    /// What is seen now, with reward and measures of the last touch.
+    /// Returns the observations, with reward and measures of the last touch.
     fn told<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
         let count = each.len();

@@ -1,4 +1,4 @@
-//! Palpate's errors as exceptions of `palpate.errors`, with what they carry as attributes.
+//! Conversion of Palpate's errors to exceptions of `palpate.errors` with attributes.
 
 use palpate::config::{ConfigError, Origin};
 use palpate::experiment::store::RunError;
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 
-/// An exception of `palpate.errors` with attributes; those that are none stay `None`.
+/// Creates an exception of `palpate.errors`; missing attributes are `None`.
 fn exception(class: &str, message: &str, fields: &[(&str, Option<String>)]) -> PyErr {
     Python::attach(|py| {
         let made = || -> PyResult<PyErr> {
@@ -26,7 +26,7 @@ fn shown(path: &Path) -> Option<String> {
     Some(path.display().to_string())
 }
 
-/// Of settings: file, line, key, value, and what is allowed.
+/// Converts a settings error; attributes are file, line, key, value and the allowed values.
 pub(crate) fn config(error: ConfigError) -> PyErr {
     let message = error.to_string();
     let (file, line) = match error.origin.as_deref() {
@@ -39,12 +39,12 @@ pub(crate) fn config(error: ConfigError) -> PyErr {
     exception("ConfigError", &message, &fields)
 }
 
-/// Of a scene that cannot be built or simulated.
+/// Converts an error of a scene that cannot be built or simulated.
 pub(crate) fn scene(error: impl std::fmt::Display) -> PyErr {
     exception("SimulationError", &error.to_string(), &[])
 }
 
-/// Of a run: of its settings, of its folder, or of anything else.
+/// Converts an error of a run: of its settings, its folder, or its other inputs.
 pub(crate) fn run(error: RunError) -> PyErr {
     let message = error.to_string();
     match error {
@@ -56,29 +56,29 @@ pub(crate) fn run(error: RunError) -> PyErr {
     }
 }
 
-/// Anything else that was asked for and is not there.
+/// Converts any other error.
 pub(crate) fn other(error: impl std::fmt::Display) -> PyErr {
     exception("PalpateError", &error.to_string(), &[])
 }
 
-/// Of what is asked around an object and is of zones only; `there` is what there is.
+/// Error of an attribute for zones that is used around an object; `there` lists the alternatives.
 pub(crate) fn not_around(name: &str, there: &str) -> PyErr {
     PyAttributeError::new_err(format!(
-        "`{name}` is of the exploration of a zone, and this is around an object: there is {there}"
+        "`{name}` exists only for a zone; this explores a whole object: use {there}"
     ))
 }
 
-/// The other way round.
+/// Error of an attribute for objects that is used over a zone; `there` lists the alternatives.
 pub(crate) fn not_over_zone(name: &str, there: &str) -> PyErr {
     PyAttributeError::new_err(format!(
-        "`{name}` is of the exploration around an object, and this is over a zone: there is {there}"
+        "`{name}` exists only for a whole object; this explores a zone: use {there}"
     ))
 }
 
-/// A number must be in its range.
+/// Checks that a number is in its range.
 ///
 /// # Errors
-/// `ValueError`.
+/// `ValueError` if it is not.
 pub(crate) fn within(name: &str, value: u32, [least, most]: [u32; 2]) -> PyResult<()> {
     match (least..=most).contains(&value) {
         true => Ok(()),

@@ -1,4 +1,4 @@
-//! An experiment, and its run with the interpreter let go.
+//! An experiment, and its run with the interpreter lock released.
 
 use crate::errors;
 use crate::planner::PythonFactory;
@@ -15,10 +15,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// How often a run looks for Ctrl-C and tells how far it is; chosen.
+/// Interval between two checks of Ctrl-C and two progress reports of a run.
+// heuristic: short enough to feel immediate.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What is run: planners × trials on one scene.
+/// An experiment: planners × trials on one scene.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct Experiment(experiment::Experiment);
 
@@ -74,9 +75,10 @@ impl Experiment {
         resolved(&self.0)
     }
 
-    /// Runs what is not there yet. `own` are names with what starts such a planner; `how` is the
-    /// folder, whether to begin it anew, and the number of threads; `(look, stop)` are called now
-    /// and then with how many trials are done and how many there are, and when the run is stopped.
+    /// Runs the missing trials. `own` pairs names of Python planners with their factories; `how`
+    /// has the folder, whether to start again, and the number of threads. `(look, stop)` are
+    /// callbacks: `look` gets the number of finished and of all trials at intervals, `stop` is
+    /// called when the run is stopped.
     fn run(
         &self,
         py: Python<'_>,
@@ -97,7 +99,7 @@ impl Experiment {
         simulation.simulator().check_reach().map_err(errors::scene)?;
         if simulation.is_real() {
             return Err(errors::scene(
-                "backend.kind: a real arm is driven by the program (palpate run), with someone beside it; \
+                "backend.kind: only the program (palpate run) moves a real arm, with an operator present; \
                  allowed here is \"simulated\"",
             ));
         }
@@ -108,13 +110,13 @@ impl Experiment {
             Some(folder) => told.kept(py, &simulation, (folder, fresh), threads),
             None => told.in_memory(py, &simulation, threads),
         };
-        // What makes planners of Python lets go of it before the interpreter goes on.
+        // Releases the Python planners before the interpreter continues.
         drop(simulation);
         run
     }
 }
 
-/// A run with the one who waits for it.
+/// A run with its callbacks.
 struct Told {
     look: Py<PyAny>,
     stop: Py<PyAny>,
@@ -165,11 +167,11 @@ impl Told {
         }))
     }
 
-    /// What `work` returns, done on a thread of its own without the interpreter, while this one
-    /// looks for Ctrl-C; after it the trials in hand are given time to end.
+    /// Runs `work` on its own thread without the interpreter lock and returns its result. This
+    /// thread checks for Ctrl-C; after it, running trials are finished.
     ///
     /// # Errors
-    /// `KeyboardInterrupt`, or what `look` raises.
+    /// `KeyboardInterrupt`, or the exception that `look` raises.
     fn watched<T: Send>(
         &self,
         py: Python<'_>,

@@ -1,4 +1,4 @@
-//! One exploration: an episode of touches, what is seen of it, and what it is worth.
+//! One exploration: an episode of touches with observations and rewards.
 
 use crate::errors;
 use crate::known::{self, AIM, Known, Measured, True};
@@ -17,27 +17,28 @@ use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Measures of the belief against the truth, by their names: over a zone, and around an object.
+/// Names of the measures of the belief, over a zone and around an object.
 pub(crate) const OVER_ZONE: [&str; 3] = ["rmse_m", "centred_r", "max_error_m"];
 pub(crate) const AROUND: [&str; 3] = ["chamfer_m", "f_1", "iou"];
 
-/// Test places along each side of the zone, as where nobody says how many; chosen.
+/// Default number of test points along each side of the zone.
+// heuristic: the default of experiments.
 pub(crate) const TRUTH_PER_SIDE: usize = 31;
 
-/// Cells along the longest side of a believed surface that is measured after every touch; chosen,
-/// half of what runs take.
+/// Cells along the longest side of a mean surface that is measured after every touch.
+// heuristic: half of the cells in runs.
 const CELLS: u32 = 32;
 
-/// An object in its zone or its ball, with the truth.
+/// An object in its zone or ball, with the ground truth.
 pub(crate) struct World {
     simulator: Simulator,
     truth: True,
-    /// What the belief is told on.
+    /// Points on which the belief is observed.
     grid: Vec<Vec<f64>>,
 }
 
 impl World {
-    /// Of a scene's file; `grid` places along each side.
+    /// Loads a scene's file; `grid` is the number of points along each side.
     ///
     /// # Errors
     /// `ConfigError`, `SimulationError`.
@@ -71,27 +72,27 @@ impl World {
         self.task().ball().is_some()
     }
 
-    /// Axes of the grid.
+    /// Number of axes of the grid.
     pub(crate) fn axes(&self) -> usize {
         self.task().zone().map_or(3, Zone::dimension)
     }
 
-    /// Numbers of an action.
+    /// Size of an action.
     pub(crate) fn action(&self) -> usize {
         self.task().zone().map_or(AIM, Zone::dimension)
     }
 
-    /// Numbers that are told of a touch.
+    /// Size of a touch's row.
     pub(crate) fn row(&self) -> usize {
         self.task().zone().map_or(AIM + 7, |zone| 2 * zone.dimension() + 2)
     }
 
-    /// The names of its measures.
+    /// Names of the measures.
     pub(crate) fn measured(&self) -> [&'static str; 3] {
         if self.is_around() { AROUND } else { OVER_ZONE }
     }
 
-    /// What lengths are told in units of.
+    /// Unit of lengths in observations.
     fn unit_m(&self) -> f64 {
         match self.task().region() {
             Region::Zone(zone) => 0.5 * zone.widest_m(),
@@ -99,8 +100,9 @@ impl World {
         }
     }
 
-    /// What an action means: a place of the zone; around an object the side from which the finger
-    /// comes, and what it aims at as an offset from the centre, drawn back into the ball.
+    /// Converts an action to a target: a place of the zone; around an object the side from which
+    /// the finger approaches, and the aimed point as an offset from the centre, clipped to the
+    /// ball.
     fn target(&self, action: &[f32]) -> Target {
         let clamped = action.iter().map(|at| f64::from(at.clamp(-1.0, 1.0)));
         match self.task().region() {
@@ -117,7 +119,7 @@ impl World {
         }
     }
 
-    /// What is told of a touch: its target, where it met and 1, or zeros.
+    /// Row of a touch: its target, contact and 1, or zeros without contact.
     fn told(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
         let mut row = match (self.task().region(), target) {
             (Region::Zone(zone), Target::Place(place)) => self.told_over_zone(zone, place, met),
@@ -148,7 +150,7 @@ impl World {
     }
 }
 
-/// Points on an even grid over the cube about a ball, x fastest, then y, then z.
+/// Points on an even grid over the cube around a ball, x fastest, then y, then z.
 fn cube(ball: &Ball, per_side: usize) -> Vec<Vec<f64>> {
     let step = 2.0 / (per_side.max(2) - 1) as f64;
     let at = |i: usize| if per_side > 1 { step * i as f64 - 1.0 } else { 0.0 };
@@ -160,32 +162,31 @@ fn cube(ball: &Ball, per_side: usize) -> Vec<Vec<f64>> {
     .collect()
 }
 
-/// What an episode is.
+/// Settings of an episode.
 #[derive(Clone, Copy)]
 pub(crate) struct How {
-    /// Touches, the initial ones among them.
+    /// Touches, initial ones included.
     pub(crate) touches: usize,
-    /// Random touches it begins with.
+    /// Initial random touches.
     pub(crate) initial: usize,
-    /// What a touch is worth.
+    /// Reward of a touch.
     pub(crate) reward: Reward,
-    /// Whether there is a belief.
+    /// Whether the belief is observed.
     pub(crate) believes: bool,
 }
 
-/// What a touch is worth.
+/// Kinds of reward of a touch.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Reward {
-    /// By how much the logarithm of the error fell: over a zone of the RMSE, around an object of the
-    /// Chamfer distance.
+    /// Decrease of the log error: RMSE over a zone, Chamfer distance around an object.
     Error,
-    /// By how much the mean logarithm of the belief's standard deviation fell, on the grid.
+    /// Decrease of the mean log standard deviation of the belief on the grid.
     Information,
-    /// Nothing.
+    /// No reward: 0.
     None,
 }
 
-/// An exploration in hand.
+/// A running exploration.
 pub(crate) struct Exploration {
     how: How,
     world: Arc<World>,
@@ -193,27 +194,27 @@ pub(crate) struct Exploration {
     known: Known,
     random: ChaCha8Rng,
     score: f64,
-    /// Touches made.
+    /// Number of touches made.
     pub(crate) count: usize,
-    /// Of each touch, as `World::told`.
+    /// Rows of the touches, from `World::told`.
     pub(crate) told: Vec<f32>,
-    /// Means, then standard deviations on the grid, in the same unit as heights.
+    /// Means, then standard deviations on the grid, in the unit of heights.
     pub(crate) believed: Vec<f32>,
-    /// As [`OVER_ZONE`] or [`AROUND`], NaN without a belief.
+    /// Values of [`OVER_ZONE`] or [`AROUND`]; NaN without a belief.
     pub(crate) measures: [f64; 3],
-    /// Of the last touch.
+    /// Reward of the last touch.
     pub(crate) reward: f64,
-    /// Whether it has ended.
+    /// Whether the episode has ended.
     pub(crate) is_over: bool,
-    /// Why it ended before its last touch.
+    /// Reason of an early end.
     pub(crate) failure: Option<String>,
 }
 
 impl Exploration {
-    /// Not yet begun.
+    /// Creates an exploration that has not started.
     ///
     /// # Errors
-    /// If the body cannot be brought to its start.
+    /// If the body cannot be moved to its start.
     pub(crate) fn new(world: &Arc<World>, how: How) -> Result<Self, Fault> {
         Ok(Self {
             how,
@@ -232,12 +233,12 @@ impl Exploration {
         })
     }
 
-    /// All the randomness of what follows.
+    /// Seeds all random numbers that follow.
     pub(crate) fn seed(&mut self, seed: u64) {
         self.random = seed::stream(seed, 0, "exploration");
     }
 
-    /// Begins an episode on one of `worlds`: its initial touches are made.
+    /// Starts an episode on one of `worlds` with its initial touches.
     pub(crate) fn begin(&mut self, worlds: &[Arc<World>]) {
         let world = &worlds[self.random.random_range(0..worlds.len())];
         let probe = world.simulator.probe(self.random.random());
@@ -257,7 +258,7 @@ impl Exploration {
         self.reward = 0.0;
     }
 
-    /// Touches at an action.
+    /// Makes a touch at an action.
     pub(crate) fn touch(&mut self, action: &[f32]) {
         let target = self.world.target(action);
         let before = self.score;
@@ -276,7 +277,7 @@ impl Exploration {
         }
     }
 
-    /// An aim that the finger cannot be brought to is a touch that met nothing.
+    /// Makes a touch; an unreachable aim counts as a touch without contact.
     fn touch_at(&mut self, target: &Target) -> Result<(), Fault> {
         let task = self.world.task();
         let mut met = None;
@@ -298,7 +299,8 @@ impl Exploration {
         Ok(())
     }
 
-    /// Fits the belief and tells it and its score; ends the episode if it is over.
+    /// Fits the belief and computes its observation and score; ends the episode after the last
+    /// touch or a failure.
     fn conclude(&mut self, made: Result<(), Fault>) {
         let fitted = made.map_err(|fault| fault.to_string()).and_then(|()| self.fit());
         self.failure = fitted.err();
@@ -317,7 +319,7 @@ impl Exploration {
                 self.measures = [metrics.rmse_m, metrics.centred_r, metrics.max_error_m];
             }
             Some(Measured::Around(metrics)) => {
-                // Where no surface is believed, the true one is as far away as can be.
+                // Without a surface the Chamfer distance counts as the ball's radius.
                 let chamfer_m = metrics.chamfer_m.unwrap_or(unit_m);
                 self.measures = [chamfer_m, metrics.f_1, metrics.iou.unwrap_or(f64::NAN)];
             }
@@ -342,7 +344,7 @@ impl Exploration {
     }
 }
 
-/// Means and variances on the grid: of heights, or of the field.
+/// Means and variances of the height or the field on the grid.
 fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
     match known {
         Known::HeightField(belief) => {

@@ -1,4 +1,4 @@
-//! An exploration in the hands of whoever asks: touch by touch, with the belief after each.
+//! Interactive exploration: touch by touch, with the belief after each.
 
 use crate::belief::Belief;
 use crate::known::{self, Known, Measured, True};
@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
 
-/// A scene that is explored touch by touch: each is taken into a belief, which is fitted and can be
-/// held against the truth.
+/// Interactive exploration of a scene: each touch updates a belief, which is fitted and can be
+/// compared with the ground truth.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Exploration {
     scene: Py<Scene>,
@@ -18,8 +18,7 @@ pub(crate) struct Exploration {
     truth: True,
 }
 
-/// Cells along the longest side of a believed surface that is measured, as where nobody says how
-/// many.
+/// Default cells along the longest side of a measured surface.
 const CELLS: u32 = 64;
 
 #[pymethods]
@@ -33,7 +32,7 @@ impl Exploration {
         Self { known: Mutex::new(known), truth, scene }
     }
 
-    /// Touches at a target, and fits the belief.
+    /// Makes a touch at a target and fits the belief.
     fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
         let (touch, told) = self.scene.get().touched(py, target.clone())?;
         let fitted = py.detach(|| {
@@ -47,13 +46,13 @@ impl Exploration {
         Ok(touch)
     }
 
-    /// The belief after the touches so far.
+    /// Belief after the touches so far.
     #[getter]
     fn belief(&self) -> Belief {
         Belief(self.known.lock().unwrap_or_else(PoisonError::into_inner).clone())
     }
 
-    /// How near the belief is to the truth, by the names of rows; None before the first touch.
+    /// Errors of the belief, named as in rows; None before the first touch.
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let measured = py.detach(|| {

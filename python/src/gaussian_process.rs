@@ -1,4 +1,4 @@
-//! The Gaussian process alone: a fit, and what it predicts.
+//! Gaussian-process regression: fit and prediction.
 
 use crate::errors;
 use crate::places::{rows, seen_at};
@@ -16,14 +16,15 @@ pub(crate) struct Fitted {
     fit: Fit,
 }
 
-/// How to make one again: by what, of what.
+/// Function and arguments that recreate the object.
 type Reduced<'py> =
     (Bound<'py, PyAny>, (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<f64>>, String, String));
 
 #[pymethods]
 impl Fitted {
-    /// The likeliest process of the ranges. `lengths` are the ranges (low, high) of each length
-    /// scale, `noise` of the noise's standard deviation in units of the signal's, `signal` of that.
+    /// Fits the process of maximum likelihood within ranges (low, high): `lengths` of each length
+    /// scale, `signal` of the signal's standard deviation, `noise` of the noise's standard
+    /// deviation relative to the signal's.
     #[new]
     #[pyo3(signature = (places, heights, name, mean, lengths, noise, signal))]
     #[allow(clippy::too_many_arguments)]
@@ -65,7 +66,7 @@ impl Fitted {
         })
     }
 
-    /// For pickles: the same observations, and the fit as JSON.
+    /// Recreates the process from its observations and the fit as JSON, for pickling.
     #[staticmethod]
     fn _of(
         places: PyReadonlyArray2<'_, f64>,
@@ -161,7 +162,7 @@ fn observed(
     observations
 }
 
-/// The rows.
+/// Rows of the array.
 fn each(places: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
     places.as_array().rows().into_iter().map(|place| place.to_vec()).collect()
 }

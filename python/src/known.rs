@@ -1,4 +1,4 @@
-//! What is known of one side of an object or of a whole one, and the truth that it is held against.
+//! Beliefs over a zone or around an object, and their ground truth.
 
 use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::measure::shape::{ShapeMetrics, TrueShape};
@@ -9,39 +9,39 @@ use palpate::sim::Environment;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
 
-/// Returns an empty belief over what `environment` explores, with default settings.
+/// Returns an empty belief for `environment` with default settings.
 pub(crate) fn nothing(environment: &Environment) -> Known {
     let scene = environment.scene();
     let finger = (&scene.finger, scene.effects.skin.is_some());
     Known::new(environment.task(), finger, &GpSettings::default(), &SpaceSettings::default())
 }
 
-/// How many numbers a target of `known` has.
+/// Number of values of a target of `known`.
 pub(crate) fn target_numbers(known: &Known) -> usize {
     known.height_field().map_or(AIM, |field| field.zone().dimension())
 }
 
-/// Numbers of a target around an object.
+/// Number of values of a target around an object.
 pub(crate) const AIM: usize = 6;
 
-/// What beliefs are held against.
+/// Ground truth that beliefs are compared with.
 pub(crate) enum True {
     /// Heights over a zone.
     Zone(Truth),
-    /// The surface of a whole object; none of an object without a mesh.
+    /// Surface of a whole object; `None` without a mesh.
     Around(Option<TrueShape>),
 }
 
-/// How near a belief is to the truth.
+/// Errors of a belief.
 pub(crate) enum Measured {
-    /// Over a zone.
+    /// Errors over a zone.
     Zone(Metrics),
-    /// Around an object.
+    /// Errors around an object.
     Around(ShapeMetrics),
 }
 
 impl True {
-    /// Of an environment, over a zone on `per_side` places along each side.
+    /// Ground truth of an environment; over a zone on `per_side` points along each side.
     pub(crate) fn of(environment: &Environment, per_side: usize) -> Self {
         match environment.task().ball() {
             Some(_) => Self::Around(TrueShape::of(environment)),
@@ -49,8 +49,8 @@ impl True {
         }
     }
 
-    /// How near `known` is, a surface in space made of `cells` along its longest side; none before
-    /// the first fit, or without a truth.
+    /// Errors of `known`; a closed surface is meshed with `cells` along its longest side. `None`
+    /// before the first fit, or without ground truth.
     pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<Measured> {
         match (self, known) {
             (Self::Zone(truth), Known::HeightField(belief)) => {

@@ -1,7 +1,7 @@
-//! Palpate as a Python extension: what the package `palpate` is made of.
+//! Palpate as a Python extension, the core of the package `palpate`.
 //!
-//! It hands over arrays and plain values. What is said in Python's own words (frames, progress,
-//! conventions of scikit-learn and Gymnasium) stands in the package's Python files.
+//! It returns arrays and plain values. Data frames, progress, and the conventions of scikit-learn
+//! and Gymnasium are in the package's Python files.
 
 mod ball;
 mod belief;

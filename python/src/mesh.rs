@@ -13,18 +13,18 @@ use std::path::PathBuf;
 /// Vertices (n, 3), metres, and triangles (m, 3).
 pub(crate) type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
 
-/// A mesh as arrays.
+/// Converts a mesh to arrays.
 ///
 /// # Errors
-/// If there is no memory.
+/// If memory is exhausted.
 pub(crate) fn arrays<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Arrays<'py>> {
     triangles_of(py, mesh.vertices(), mesh.triangles())
 }
 
-/// Vertices and triangles as arrays.
+/// Converts vertices and triangles to arrays.
 ///
 /// # Errors
-/// If there is no memory.
+/// If memory is exhausted.
 pub(crate) fn triangles_of<'py>(
     py: Python<'py>,
     vertices: &[Point3<f64>],
@@ -40,10 +40,10 @@ pub(crate) fn triangles_of<'py>(
     ))
 }
 
-/// A mesh of arrays, repaired.
+/// Creates a repaired mesh from arrays.
 ///
 /// # Errors
-/// `ValueError` of another shape, `SimulationError` if it is unusable.
+/// `ValueError` for other shapes, `SimulationError` if the mesh is unusable.
 pub(crate) fn mesh_of(
     vertices: &PyReadonlyArray2<'_, f64>,
     triangles: &PyReadonlyArray2<'_, i64>,
@@ -57,15 +57,15 @@ pub(crate) fn mesh_of(
     }
     let vertices: Vec<Point3<f64>> =
         vertices.rows().into_iter().map(|row| Point3::new(row[0], row[1], row[2])).collect();
-    // An index that is none of a vertex is refused below, so is a negative one.
+    // An invalid or negative index is rejected below.
     let index = |i: i64| u32::try_from(i).unwrap_or(u32::MAX);
     let triangles: Vec<[u32; 3]> =
         triangles.rows().into_iter().map(|row| [row[0], row[1], row[2]].map(index)).collect();
     Mesh::new(&vertices, &triangles).map_err(errors::scene)
 }
 
-/// Reads a mesh file and repairs it: vertices (n, 3), metres, triangles (m, 3), and what was found,
-/// in words.
+/// Reads a mesh file and repairs it; returns vertices (n, 3), metres, triangles (m, 3), and a
+/// report of the repairs.
 #[pyfunction]
 #[pyo3(signature = (path, metres_per_unit = 1.0))]
 pub(crate) fn read_mesh<'py>(

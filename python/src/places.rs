@@ -1,22 +1,22 @@
-//! Places as arrays: of shape (…, d) in a zone of d coordinates, (n,) too where d is 1.
+//! Places as arrays of shape (…, d) in a zone of d coordinates, or (n,) if d is 1.
 
 use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods};
 use palpate::gp::Observations;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Places with the shape of what is told of each.
+/// Places with the shape of the results.
 pub(crate) struct Places {
-    /// The places.
+    /// List of the places.
     pub(crate) each: Vec<Vec<f64>>,
     shape: Vec<usize>,
 }
 
 impl Places {
-    /// Of an array of places of `dimension` coordinates.
+    /// Reads an array of places of `dimension` coordinates.
     ///
     /// # Errors
-    /// `ValueError` of another shape.
+    /// `ValueError` for other shapes.
     pub(crate) fn of(points: &Bound<'_, PyAny>, dimension: usize) -> PyResult<Self> {
         let array: PyArrayLikeDyn<f64, AllowTypeChange> = points.extract()?;
         let array = array.as_array();
@@ -34,10 +34,10 @@ impl Places {
         Ok(Self { each: flat.chunks_exact(dimension).map(<[f64]>::to_vec).collect(), shape })
     }
 
-    /// A number for each place, in their shape.
+    /// Returns a number per place, in the shape of the places.
     ///
     /// # Errors
-    /// If there is no memory.
+    /// If memory is exhausted.
     pub(crate) fn told<'py>(
         &self,
         py: Python<'py>,
@@ -46,10 +46,10 @@ impl Places {
         values.into_pyarray(py).reshape(self.shape.as_slice())
     }
 
-    /// The same of vectors.
+    /// Returns a vector per place, in the shape of the places.
     ///
     /// # Errors
-    /// If there is no memory.
+    /// If memory is exhausted.
     pub(crate) fn told_vectors<'py>(
         &self,
         py: Python<'py>,
@@ -61,15 +61,15 @@ impl Places {
     }
 }
 
-/// Where something was observed.
+/// Places of the observations.
 pub(crate) fn seen_at(seen: &Observations) -> Vec<Vec<f64>> {
     (0..seen.len()).map(|i| seen.place(i).collect()).collect()
 }
 
-/// Rows of `width` numbers as an array of shape (n, width).
+/// Returns rows of `width` numbers as an array of shape (n, width).
 ///
 /// # Errors
-/// If there is no memory.
+/// If memory is exhausted.
 pub(crate) fn rows<'py>(
     py: Python<'py>,
     rows: &[Vec<f64>],

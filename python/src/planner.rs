@@ -1,4 +1,4 @@
-//! A planner written in Python, as an experiment runs it.
+//! Python planners in experiments.
 
 use crate::belief::Belief;
 use crate::desk::{Desk, NoTarget, Trial};
@@ -10,14 +10,15 @@ use pyo3::prelude::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Makes a planner of Python for each trial.
+/// Factory of a Python planner for each trial.
 pub(crate) struct PythonFactory {
-    /// `MODULE:CLASS`.
+    /// Name, `MODULE:CLASS`.
     pub(crate) name: String,
-    /// Called with zone, None around an object, and seed. Its result has `close()`, and `desk` with `abandon()`, or
-    /// `plan(belief) -> sequence of float`; what that raises is the reason why there is no target.
+    /// Called with the zone (None around an object) and the seed. The result has `close()`, and
+    /// either `desk` with `abandon()` or `plan(belief) -> sequence of float`, whose exception is
+    /// the reason for a missing target.
     pub(crate) start: Py<PyAny>,
-    /// The source that decides its plans.
+    /// Source code that decides its plans.
     pub(crate) source: String,
 }
 
@@ -37,7 +38,8 @@ impl PlannerFactory for PythonFactory {
 }
 
 impl PythonFactory {
-    /// Makes the planners of `name` by `start`, which says the source as `source`.
+    /// Creates the factory of planner `name` from `start`, whose attribute `source` is the source
+    /// code.
     ///
     /// # Errors
     /// If `start` has no source.
@@ -47,7 +49,7 @@ impl PythonFactory {
     }
 }
 
-/// A planner of one trial, begun when it is first asked.
+/// Planner of one trial, created at its first plan.
 struct PythonPlanner {
     start: Py<PyAny>,
     seed: u64,
@@ -56,7 +58,7 @@ struct PythonPlanner {
 
 struct Begun {
     planner: Py<PyAny>,
-    /// Where it is asked, if it sits on a thread of its own.
+    /// Channel to the planner, if it has its own thread.
     desk: Option<Trial>,
 }
 
@@ -77,15 +79,15 @@ impl PythonPlanner {
             let zone = belief.height_field().map(|field| field.zone());
             self.begun = Some(self.begin(zone));
         }
-        let Some(begun) = &self.begun else { return Err("it was not begun".into()) };
+        let Some(begun) = &self.begun else { return Err("the planner was not started".into()) };
         let Begun { planner, desk } = begun.as_ref().map_err(Clone::clone)?;
         if let Some(desk) = desk {
             return desk.ask(belief.clone()).map_err(|no_target| match no_target {
                 NoTarget::Said(reason) => reason,
                 NoTarget::Late(limit) => {
-                    // That it could not be left behind changes nothing.
+                    // A failure here has no consequence.
                     Python::attach(|py| planner.call_method0(py, "abandon").is_ok());
-                    format!("it did not return within {} s", limit.as_secs_f64())
+                    format!("the planner did not return within {} s", limit.as_secs_f64())
                 }
             });
         }
@@ -104,10 +106,11 @@ impl Planner for PythonPlanner {
         if found != wanted {
             let is_zone = belief.height_field().is_some();
             let of = if is_zone { "of this zone" } else { "around an object" };
-            let reason = format!("it has {found} coordinates, a target {of} {wanted}");
+            let reason =
+                format!("the target has {found} coordinates, a target {of} needs {wanted}");
             return Err(PlanError { reason });
         }
-        let target = Target::from_numbers(&target).ok_or("its target has no direction")?;
+        let target = Target::from_numbers(&target).ok_or("the target has no direction")?;
         Ok(Plan::at(target))
     }
 }
@@ -115,15 +118,15 @@ impl Planner for PythonPlanner {
 impl Drop for PythonPlanner {
     fn drop(&mut self) {
         if let Some(Ok(Begun { planner, desk })) = self.begun.take() {
-            // So that its thread ends.
+            // Ends the planner's thread.
             drop(desk);
-            // That it could not be ended changes nothing.
+            // A failure here has no consequence.
             Python::try_attach(|py| planner.call_method0(py, "close").is_ok());
         }
     }
 }
 
-/// What an exception says.
+/// Message of an exception.
 fn reason(py: Python<'_>, error: &PyErr) -> String {
     error.value(py).to_string()
 }

@@ -1,4 +1,4 @@
-//! The command `palpate`: the same program, with planners of Python.
+//! Command `palpate` of the Python package, with Python planners.
 
 use crate::planner::PythonFactory;
 use palpate::cli::Host;
@@ -6,14 +6,14 @@ use palpate::experiment::trial::entrant;
 use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
 
-/// Commit that the package was built from.
+/// Commit of the build.
 pub(crate) const COMMIT: &str = match option_env!("PALPATE_COMMIT") {
     Some(commit) => commit,
     None => "unknown",
 };
 
-/// Runs the program on arguments, of which the first is its name; returns its exit code. `bring`
-/// gives what starts the planner of a name `MODULE:CLASS`.
+/// Runs the program on `arguments`, the first of which is its name; returns its exit code. `bring`
+/// returns the factory of a planner named `MODULE:CLASS`.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> u8 {
     let brought = |name: &str| {
@@ -30,7 +30,7 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
     })
 }
 
-/// The names of the built-in planners.
+/// Names of the built-in planners.
 #[pyfunction]
 pub(crate) fn planners() -> Vec<&'static str> {
     entrant::listed().map(|(name, _)| name).collect()

@@ -1,4 +1,4 @@
-//! A run read back, or just made.
+//! A run, in memory or read from a folder.
 
 use crate::ball::Ball;
 use crate::belief::Belief;
@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
-/// The rows of a run, with what was run and the truth.
+/// Rows of a run, with its experiment and ground truth.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct Run(pub(crate) store::Run);
 
@@ -63,11 +63,11 @@ impl Run {
         let Some(around) = &self.0.experiment.scene.around else {
             return Err(errors::not_over_zone("ball", "zone, truth()"));
         };
-        let ball = around.ball().ok_or_else(|| errors::other("[around] is not written out"))?;
+        let ball = around.ball().ok_or_else(|| errors::other("[around] is incomplete"))?;
         Ok(Ball(ball))
     }
 
-    /// Places (n, d) and heights (n,) of the true surface, NaN where there is none.
+    /// Places (n, d) and heights (n,) of the true surface; NaN outside the object.
     fn truth<'py>(&self, py: Python<'py>) -> PyResult<Surface<'py>> {
         let zone = self.over_zone("truth")?;
         let truth = &self.0.truth;
@@ -76,7 +76,7 @@ impl Run {
         Ok((places, PyArray1::from_iter(py, heights_m)))
     }
 
-    /// The rows as they stand in `trials.jsonl`.
+    /// Rows as bytes of `trials.jsonl`.
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let mut bytes = Vec::new();
         for row in &self.0.rows {

@@ -1,4 +1,4 @@
-//! A scene, touched where one says.
+//! A scene for interactive touches.
 
 use crate::ball::Ball;
 use crate::errors;
@@ -20,12 +20,12 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// An object in its zone, or as a whole, with the finger that touches it: from a scene's file, or
-/// of a mesh.
+/// An object in its zone, or a whole object, with the finger that touches it; from a scene's file
+/// or a mesh.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Scene {
     simulator: Simulator,
-    /// Made with the first touch.
+    /// Created with the first touch.
     probe: Mutex<Option<Box<dyn probe::Probe>>>,
     seed: u64,
 }
@@ -53,17 +53,17 @@ impl Scene {
         task.zone().ok_or_else(|| errors::not_around(name, "ball, mesh()"))
     }
 
-    /// Touches at a target; with the way and what was swept.
+    /// Makes a touch at a target; also returns the approach and the swept volume.
     ///
     /// # Errors
-    /// `ValueError` if it is none, `SimulationError` if the body cannot.
+    /// `ValueError` for an invalid target, `SimulationError` for a fault of the body.
     pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, Told)> {
         let task = self.environment().task();
         let known = task::Target::from_numbers(&target).filter(|at| task.contains(at));
         let Some(approach) = known.and_then(|at| task.approach(&at)) else {
             let words = match task.ball() {
-                None => "is not in the zone",
-                Some(_) => "is not six numbers that aim into the ball, to where the finger can go",
+                None => "is outside the zone",
+                Some(_) => "is not a reachable aim of six numbers into the ball",
             };
             return Err(PyValueError::new_err(format!("{target:?} {words}")));
         };
@@ -90,20 +90,20 @@ impl Scene {
     }
 }
 
-/// What a belief is told of a touch.
+/// Information about a touch for a belief.
 pub(crate) struct Told {
-    /// The way.
+    /// Approach of the finger.
     pub(crate) approach: Approach,
-    /// How it ended.
+    /// Outcome of the touch.
     pub(crate) touch: probe::Touch,
-    /// What it found free, if that is known.
+    /// Swept free volume, if known.
     pub(crate) swept: Option<probe::Swept>,
 }
 
 #[pymethods]
 impl Scene {
-    /// Reads a scene's file, or one that comes with the package by its name ("bird"); `seed` is all
-    /// the randomness of the sensors, `settings` are any of a scene, as finger__radius_m=0.001.
+    /// Loads a scene's file, or a scene of the package by its name ("bird"). `seed` seeds the
+    /// sensor noise; `settings` are settings of a scene, as in finger__radius_m=0.001.
     #[staticmethod]
     #[pyo3(signature = (path, *, seed = 0, **settings))]
     fn load<'py>(
@@ -115,8 +115,8 @@ impl Scene {
         py.import("palpate._scene")?.call_method("load", (path, seed), settings.as_ref())
     }
 
-    /// A mesh in the world, touched along -y: vertices (n, 3), metres, triangles (m, 3), their
-    /// indices; the zone, metres; which body touches; the rest as of `load`.
+    /// Creates a scene from a mesh in the world frame, touched along -y: vertices (n, 3), metres;
+    /// triangles (m, 3), vertex indices; the zone, metres; the body; other arguments as in `load`.
     #[staticmethod]
     #[pyo3(signature = (vertices_m, triangles, *, x_m, z_m, body = "cast", seed = 0, **settings))]
     fn of_mesh<'py>(
@@ -139,7 +139,7 @@ impl Scene {
         Self::around(py, seed, || Environment::build(scene).map_err(errors::scene))
     }
 
-    /// A scene's file whose object is not read: the mesh takes its place.
+    /// Loads a scene's file with the mesh in place of its object.
     #[staticmethod]
     fn _of_mesh(
         py: Python<'_>,
@@ -159,32 +159,31 @@ impl Scene {
         })
     }
 
-    /// What can be touched of one side.
+    /// Explored zone of one side of the object.
     #[getter]
     fn zone(&self) -> PyResult<Zone> {
         Ok(Zone(self.over_zone("zone")?.clone()))
     }
 
-    /// Around an object: the ball in which it is.
+    /// Ball that contains the object (whole objects only).
     #[getter]
     fn ball(&self) -> PyResult<Ball> {
         let ball = self.environment().task().ball().copied();
         ball.map(Ball).ok_or_else(|| errors::not_over_zone("ball", "zone"))
     }
 
-    /// What of the scene may not be meant, in words.
+    /// Warnings about likely configuration mistakes.
     #[getter]
     fn notices(&self) -> Vec<String> {
         self.simulator.notices().iter().map(ToString::to_string).collect()
     }
 
-    /// Touches at a target, shape (d,), metres; around an object six numbers, as of `Ball`.
+    /// Makes a touch at a target, shape (d,), metres; around an object six numbers, as in `Ball`.
     fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
         Ok(self.touched(py, target)?.0)
     }
 
-    /// True height above the datum, metres, of places of shape (..., d); NaN where there is no
-    /// surface.
+    /// True height above the datum, metres, at places of shape (..., d); NaN outside the object.
     fn true_height<'py>(
         &self,
         points: &Bound<'py, PyAny>,
@@ -196,8 +195,8 @@ impl Scene {
         places.told(points.py(), heights_m)
     }
 
-    /// The object in the world: vertices (n, 3), metres, and triangles (m, 3), their indices,
-    /// counter-clockwise from outside; None for a function.
+    /// Object in the world frame: vertices (n, 3), metres, and triangles (m, 3), vertex indices,
+    /// counter-clockwise from outside; None for an analytic surface.
     fn mesh<'py>(&self, py: Python<'py>) -> PyResult<Option<Arrays<'py>>> {
         self.environment().mesh().map(|mesh| arrays(py, mesh)).transpose()
     }
@@ -212,47 +211,48 @@ impl Scene {
     }
 }
 
-/// What a touch ended with.
+/// Result of a touch.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Touch {
-    /// Where the finger was sent, metres.
+    /// Target of the touch, metres.
     #[pyo3(get)]
     target: Vec<f64>,
-    /// "contact", "miss" (the finger met nothing), or "overload" (broken off).
+    /// "contact", "miss" (no contact), or "overload" (aborted: too much force, or contact not
+    /// located).
     #[pyo3(get)]
     outcome: &'static str,
     contact: Option<probe::Contact>,
     place: Option<(Vec<f64>, f64)>,
-    /// Time of the body since its start, seconds; None where a touch is no motion.
+    /// Time of the body since its start, seconds; None without motion.
     #[pyo3(get)]
     time_s: Option<f64>,
 }
 
 #[pymethods]
 impl Touch {
-    /// The point of contact in the world, shape (3,), metres; None without one.
+    /// Contact point in the world frame, shape (3,), metres; None without contact.
     #[getter]
     fn p_wc<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         let contact = self.contact.as_ref()?;
         Some(PyArray1::from_slice(py, contact.p_wc.coords.as_slice()))
     }
 
-    /// Unit normal in the world, from the surface towards the finger, shape (3,); None without
-    /// contact.
+    /// Unit normal in the world frame, from the surface towards the finger, shape (3,); None
+    /// without contact.
     #[getter]
     fn normal_w<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         let contact = self.contact.as_ref()?;
         Some(PyArray1::from_slice(py, contact.normal_w.as_slice()))
     }
 
-    /// Place of the contact in the zone, shape (d,), metres: not the target; None without contact,
-    /// and around an object.
+    /// Place of the contact in the zone (not of the target), shape (d,), metres; None without
+    /// contact, and around an object.
     #[getter]
     fn place(&self) -> Option<Vec<f64>> {
         Some(self.place.as_ref()?.0.clone())
     }
 
-    /// Its height above the datum, metres; None without contact, and around an object.
+    /// Height of the contact above the datum, metres; None without contact, and around an object.
     #[getter]
     fn height_m(&self) -> Option<f64> {
         Some(self.place.as_ref()?.1)

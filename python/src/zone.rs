@@ -1,4 +1,4 @@
-//! The zone: what is explored.
+//! Exploration region of one side of an object: a zone.
 
 use crate::errors;
 use crate::places::{Places, rows};
@@ -6,13 +6,13 @@ use numpy::{PyArray1, PyArrayDyn};
 use palpate::task;
 use pyo3::prelude::*;
 
-/// The rectangle, or the interval, that is explored: targets are its places (x) or (x, z), metres.
+/// Explored rectangle or interval; targets are its places (x) or (x, z), metres.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Zone(pub(crate) task::Zone);
 
 #[pymethods]
 impl Zone {
-    /// How many coordinates a target has: 1 or 2.
+    /// Number of coordinates of a target: 1 or 2.
     #[getter]
     fn dimension(&self) -> usize {
         self.0.dimension()
@@ -30,13 +30,13 @@ impl Zone {
         PyArray1::from_vec(py, self.0.sides().map(|[_, high]| high).collect())
     }
 
-    /// Where heights are measured from, in the zone's frame, metres.
+    /// Zero of the heights in the zone's frame, metres.
     #[getter]
     fn datum_y_m(&self) -> f64 {
         self.0.datum_y_m()
     }
 
-    /// Whether a target, shape (d,), lies in it.
+    /// Whether a target, shape (d,), lies in the zone.
     fn contains(&self, target: Vec<f64>) -> bool {
         target.len() == self.0.dimension() && self.0.contains(&target)
     }
@@ -46,8 +46,8 @@ impl Zone {
         rows(py, &self.0.grid(per_side.max(1)), self.0.dimension())
     }
 
-    /// Points in the world of places, shape (..., d), and their heights above the datum, as many:
-    /// shape (..., 3), metres.
+    /// Points in the world frame, shape (..., 3), of places (..., d) and heights (...) above the
+    /// datum, metres.
     fn to_world<'py>(
         &self,
         py: Python<'py>,
@@ -62,7 +62,7 @@ impl Zone {
         places.told_vectors(py, &points, 3)
     }
 
-    /// For pickles: the zone as JSON.
+    /// Recreates a zone from JSON, for pickling.
     #[staticmethod]
     fn _of(text: &str) -> PyResult<Self> {
         serde_json::from_str(text).map(Self).map_err(errors::other)

@@ -1,10 +1,10 @@
-"""Planners around objects as a user writes them, and ones that fail."""
+"""Example planners for whole objects, valid and failing."""
 
 import numpy as np
 
 
 class Away:
-    """From the side of the believed surface of which it is least sure."""
+    """Touches the side of the mean surface with the largest standard deviation."""
 
     def plan(self, belief):
         vertices_m, _, sd_m = belief.mesh(cells=24)

@@ -1,4 +1,4 @@
-"""The program of the package, as a command."""
+"""Fixture that runs the package's program as a command."""
 
 import os
 import subprocess

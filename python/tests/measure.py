@@ -1,4 +1,4 @@
-"""What docs/python.md says of time and memory, measured: python tests/measure.py, on a machine with nothing else to do."""
+"""Measures the times and memory in docs/python.md: python tests/measure.py, on an idle machine."""
 
 import resource
 import subprocess
@@ -12,7 +12,7 @@ import palpate.gym
 
 
 class Scatter:
-    """Random touches: no time of its own."""
+    """Random touches, whose own time is negligible."""
 
     def __init__(self, zone, rng):
         self.zone, self.rng = zone, rng
@@ -67,7 +67,7 @@ def stepping():
                 for action in actions:
                     envs.step(action)
 
-            touched = 2 * 64 * touches  # the initial ones among them
+            touched = 2 * 64 * touches  # initial ones included
             asked = 2 * 64 * (touches - 5)
             took_s = best_of(3, go)
             print(

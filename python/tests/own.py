@@ -1,4 +1,4 @@
-"""Planners as a user writes them, and ones that fail."""
+"""Example planners for zones, valid and failing."""
 
 import os
 import signal
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Middle:
-    """Of a few random places the one of which the belief is least sure."""
+    """Touches the one of a few random places with the largest variance."""
 
     def __init__(self, zone, rng):
         self.zone, self.rng = zone, rng
@@ -79,4 +79,4 @@ class Killed:
 
 
 class Nothing:
-    """No planner."""
+    """Has no method plan."""

@@ -1,4 +1,4 @@
-"""Whole objects, touched from any side."""
+"""Tests of whole objects."""
 
 import pickle
 import warnings
@@ -63,7 +63,7 @@ def test_a_belief_is_a_field_and_a_closed_surface(run):
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
     mean_m, deviation_m = belief.field(vertices_m)
-    # It is the zero set, but where that leaves the box about the contacts and is cut off.
+    # The vertices lie on the zero set, except where it is clipped to the box around the contacts.
     assert np.quantile(np.abs(mean_m), 0.9) < 1e-5 and (deviation_m > 0).all()
     ball = belief.ball
     beyond_m = ball.centre_m + ball.radius_m * np.eye(3).reshape(1, 3, 3)
@@ -80,22 +80,22 @@ def test_a_belief_is_a_field_and_a_closed_surface(run):
 def test_what_is_of_zones_is_refused_around_an_object_and_the_other_way_round(run):
     belief = run.belief(0, "random", 10)
     for name in ("zone", "places", "heights_m"):
-        with pytest.raises(AttributeError, match=f"`{name}` is of the exploration of a zone"):
+        with pytest.raises(AttributeError, match=f"`{name}` exists only for a zone"):
             getattr(belief, name)
     for name in ("mean", "variance", "explorable_variance", "variance_gradient", "has_surface"):
-        with pytest.raises(AttributeError, match="around an object"):
+        with pytest.raises(AttributeError, match="a whole object"):
             getattr(belief, name)([[0.0, 0.0]])
     for ask in (lambda: run.zone, run.truth, lambda: palpate.Scene.load(MUG).zone):
-        with pytest.raises(AttributeError, match="around an object"):
+        with pytest.raises(AttributeError, match="a whole object"):
             ask()
     over_zone = palpate.Experiment.load("toy", touches=6).run(["random"], trials=1)
-    with pytest.raises(AttributeError, match="over a zone"):
+    with pytest.raises(AttributeError, match="explores a zone"):
         over_zone.ball.radius_m
     belief = over_zone.belief(0, "random", 6)
     for ask in (lambda: belief.ball, belief.mesh, lambda: belief.field([[0, 0, 0]]), lambda: belief.contacts):
-        with pytest.raises(AttributeError, match="over a zone"):
+        with pytest.raises(AttributeError, match="explores a zone"):
             ask()
-    with pytest.raises(AttributeError, match="over a zone"):
+    with pytest.raises(AttributeError, match="explores a zone"):
         palpate.Scene.load("toy").ball.radius_m
 
 
@@ -121,10 +121,10 @@ def test_an_own_planner_goes_around_an_object(mug, run, isolate):
 @pytest.mark.parametrize(
     ("planner", "words"),
     [
-        (around.Flat, "3 coordinates, a target around an object 6"),
-        (around.Beyond, "not in the ball"),
-        (around.Zoned, "asks for a zone"),
-        (around.Mistaken, "`variance` is of the exploration of a zone"),
+        (around.Flat, "3 coordinates, a target around an object needs 6"),
+        (around.Beyond, "outside the ball"),
+        (around.Zoned, "has a parameter zone"),
+        (around.Mistaken, "`variance` exists only for a zone"),
     ],
 )
 def test_a_planner_that_fails_is_a_row_with_the_reason(mug, planner, words):
@@ -198,5 +198,5 @@ def test_the_touch_is_where_the_action_says():
     low.reset(seed=0)
     seen, _, over, _, info = low.step(np.array([0, 0, -1, 0, 0, 0], dtype=np.float32))
     assert seen["count"] == 6 and (seen["touches"][5][6:] == 0).all() and info["failure"] is None
-    with pytest.raises(ValueError, match="all around objects"):
+    with pytest.raises(ValueError, match="all whole objects"):
         palpate.gym.TouchEnv([MUG, "bird"])

@@ -1,4 +1,4 @@
-"""Figures from Python have the colours of the report."""
+"""Tests that figures from Python have the report's colours."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the guides show runs as it stands there."""
+"""Tests that the examples in the guides run unchanged."""
 
 import re
 import subprocess

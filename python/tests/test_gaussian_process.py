@@ -1,4 +1,4 @@
-"""The Gaussian process alone, beside scikit-learn's."""
+"""Comparison of the Gaussian process with scikit-learn's."""
 
 import subprocess
 import sys
@@ -36,7 +36,7 @@ def test_it_is_scikit_learns_posterior(dimension):
     assert means == pytest.approx(their_means, abs=1e-8)
     assert sds**2 + ours.noise_sd_**2 == pytest.approx(their_sds**2, rel=1e-6)
     assert ours.log_marginal_likelihood_value_ == pytest.approx(theirs.log_marginal_likelihood(), abs=1e-6)
-    # Searched in the same ranges: a length scale without end is likelier still where an input hardly matters.
+    # The search ranges are equal: an unbounded length scale would be likelier for an almost irrelevant input.
     low, high = ours.length_scale
     within = [(low * span, high * span) for span in np.ptp(places, axis=0)]
     kernel.set_params(k1__k2__length_scale_bounds=within)

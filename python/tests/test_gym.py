@@ -1,4 +1,4 @@
-"""The environments keep to Gymnasium's rules, and say what the object is like."""
+"""Tests of the Gymnasium environments."""
 
 import warnings
 
@@ -20,7 +20,7 @@ def test_the_environment_keeps_to_the_rules(settings):
     env = gymnasium.make(ID, touches=8, **settings)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # Places beyond any zone, and heights, are of the object.
+        # Contacts beyond the zone and heights are unbounded.
         warnings.filterwarnings("ignore", message=".*(infinity|-infinity).*")
         check_env(env.unwrapped)
 

@@ -1,4 +1,4 @@
-"""Notebooks run, and stand with what they show."""
+"""Tests that notebooks run and contain their outputs."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Planners written in Python: they are run beside the built-in ones, and harm nobody."""
+"""Tests of Python planners: they run beside the built-in ones, and their failures are isolated."""
 
 import functools
 import os
@@ -45,8 +45,8 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     ("planner", "words"),
     [
         (own.Raises, "ValueError: no idea"),
-        (own.NotANumber, "not in the zone"),
-        (own.Outside, "not in the zone"),
+        (own.NotANumber, "outside the zone"),
+        (own.Outside, "outside the zone"),
         (own.Many, "5 coordinates"),
         (own.Words, "could not convert"),
         (own.Unmade, "not today"),
@@ -114,7 +114,7 @@ def test_the_program_runs_planners_of_python(tmp_path, program):
 
 
 class Least:
-    """`active` as scipy finds it: the largest variance, by DIRECT and then L-BFGS-B."""
+    """Reimplements `active` with scipy: the largest variance, by DIRECT and then L-BFGS-B."""
 
     def __init__(self, zone):
         self.bounds = optimize.Bounds(zone.lower, zone.upper)
@@ -161,7 +161,7 @@ def test_an_edited_planner_does_not_keep_its_rows(tmp_path):
     first = rows.read_bytes()
     assert run().returncode == 0
     assert rows.read_bytes() == first
-    # A module that the planner uses counts, one that lies beside it does not.
+    # A module that the planner imports counts; another module in its folder does not.
     (tmp_path / "other.py").write_text("SHARE = 1\n")
     assert run().returncode == 0
     helper.write_text("from constant import SHARE\n")
@@ -177,6 +177,6 @@ def test_an_edited_planner_does_not_keep_its_rows(tmp_path):
 def test_the_source_of_a_planner_is_that_of_its_module():
     assert source_of(own.Middle) == source_of(own.Raises)
     assert source_of(own.Middle).startswith("# own.py\n")
-    # Without a source none is the same as another.
+    # A planner without source is unique.
     built = type("Built", (), {"plan": lambda self, belief: 0.0, "__module__": "__main__"})
     assert source_of(built) != source_of(built)

@@ -1,4 +1,4 @@
-"""Runs and what is read of them."""
+"""Tests of runs and their data frames."""
 
 import os
 import signal

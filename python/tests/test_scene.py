@@ -1,4 +1,4 @@
-"""Scenes touched by hand, and meshes as arrays."""
+"""Tests of interactive scenes and of meshes as arrays."""
 
 import numpy as np
 import palpate
@@ -10,7 +10,7 @@ RADIUS_M = 0.05
 
 
 def sphere(rings=60):
-    """A sphere as a mesh."""
+    """Returns the mesh of a sphere."""
     polar = np.linspace(0, np.pi, rings + 1)[1:-1]
     around = np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False)
     grid = np.stack(np.meshgrid(polar, around, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -63,7 +63,7 @@ def test_what_is_wrong_is_said():
         palpate.Scene.load("bird", finger__radius_m=-1.0)
     scene = palpate.Scene.load("toy")
     assert scene.mesh() is None
-    with pytest.raises(ValueError, match="not in the zone"):
+    with pytest.raises(ValueError, match="outside the zone"):
         scene.touch([99.0])
     vertices_m, triangles = sphere(4)
     with pytest.raises(SimulationError):

@@ -1,4 +1,4 @@
-"""What is asked wrongly is refused at once, in words that say what is allowed."""
+"""Tests of invalid arguments: errors are immediate and list the allowed values."""
 
 import pytest
 
@@ -41,7 +41,7 @@ def test_a_setting_that_is_wrong():
     ("planner", "words"),
     [
         (Widest(), "pass the class Widest"),
-        (3, "3 is no planner"),
+        (3, "3 is not a planner"),
         ("no_such_module:Widest", "No module named 'no_such_module'"),
     ],
 )

@@ -35,51 +35,51 @@ Examples:
 
 Variants of the scene touch the same targets without sensor noise, so that only the model differs. A
 level is a coarser or finer simulation, compared with the reference, the finest level, and with the
-object's true surface. An effect is switched alone and compared with the scene as it is; touches are
+object's true surface. Each effect is switched alone and compared with the unchanged scene; touches are
 timed in interleaved pairs.
 
-A tolerance holds for 95 % of the touches: in mm or um of the point of contact, N of force, or counts of
-the electrodes. An effect is needed if, switched alone, it takes more of them beyond the tolerance, not
-needed if it does not, by the 95 % interval of that share; at least 72 touches are needed to decide. With
---tolerance verdict it is needed if it changes the comparison of active with random by more than the
-margin: the one given (verdict:0.1mm), or the end of the scene's own interval that is nearest to zero.
+A tolerance holds for 95 % of the touches. Its unit is mm or um (contact point), N (force) or counts
+(electrodes). An effect is needed if switching it alone puts more than 5 % of the touches beyond the
+tolerance. The 95 % interval of that share decides; it needs at least 72 touches. With --tolerance
+verdict an effect is needed if it changes the comparison of active with random by more than the margin:
+the one given (verdict:0.1mm), or the bound nearest to zero of the scene's own interval.
 
-The cheapest scene is compared again on held-out targets or trials; exit code 1 if it does not stay within
-the tolerance there. Ctrl-C keeps the variants that are done.")]
+The cheapest scene is tested on held-out targets or trials; exit code 1 if it exceeds the tolerance
+there. Ctrl-C keeps the finished variants.")]
 pub(super) struct Args {
     /// Scene (TOML) with an object.
     scene: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Compare effects with the scene as it is, or levels with the reference or the truth
+    /// Origin of the errors: the unchanged scene for effects, the reference or the truth for levels
     /// [default: both; with --tolerance verdict scene].
     #[arg(long, value_name = "ORIGIN")]
     against: Option<Origin>,
-    /// Touches of each variant [default: 24 of a level, 120 of an effect].
+    /// Touches per variant [default: 24 of a level, 120 of an effect].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=1000))]
     touches: Option<u16>,
     /// Seed of the targets.
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u16,
-    /// Pairs of touches that are timed with each effect.
+    /// Pairs of touches timed with each effect.
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     pairs: u16,
-    /// Trials of each planner with each effect, 0 for none
-    /// [default: 10, with a tolerance of touches 0, with --tolerance verdict 40].
+    /// Trials of each planner with each effect; 0 runs none [default: 10; 0 with a tolerance of
+    /// touches, 40 with --tolerance verdict].
     #[arg(long, value_name = "N")]
     trials: Option<u16>,
-    /// Touches of a trial.
+    /// Touches per trial.
     #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=500))]
     trial_touches: u16,
     /// Write the cheapest scene within this error, or with the same verdict on planners.
     #[arg(long, value_name = "0.2mm|0.1N|20counts|verdict")]
     tolerance: Option<Criterion>,
-    /// Held-out targets or trials that the cheapest scene is tried on
-    /// [default: 200 targets for effects, else as many as are compared].
+    /// Held-out targets or trials that test the cheapest scene [default: 200 targets for effects,
+    /// else as many as are compared].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     fresh: Option<u16>,
-    /// Switch effects in the scene with every effect that its body can have.
+    /// Start from the scene with every effect that its body supports.
     #[arg(long)]
     full: bool,
     /// Folder for the results [default: runs/accuracy-SCENE].
@@ -89,20 +89,22 @@ pub(super) struct Args {
     force: Force,
 }
 
-/// Touches of each level, where not given: the finest takes seconds for each.
+/// Default touches per level.
+// heuristic: the finest level takes seconds per touch.
 const LEVEL_TOUCHES: u16 = 24;
 
-/// Touches with each effect, where not given: one of them beyond the tolerance is few enough.
+/// Default touches per effect.
+// heuristic: one touch beyond the tolerance still passes.
 const EFFECT_TOUCHES: u16 = 120;
 
-/// Held-out targets of the scene without effects, where not given.
-// heuristic: 5 of them beyond the tolerance are still few enough.
+/// Default held-out targets of the scene without unneeded effects.
+// heuristic: 5 touches beyond the tolerance still pass.
 const FRESH: u16 = 200;
 
-/// The source of every interval.
+/// Explains what the printed intervals cover.
 const ONE_BUILD: &str = "\
-intervals: 95 %, over touches, trials and timings of this one build; another build of the program may
-place its code so that times differ by some percent more";
+intervals: 95 %, over touches, trials and timings of this build; code placement in another build can change
+times by some percent";
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
@@ -119,7 +121,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
             scene.body.moves(),
             "{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\""
         );
-        bail!("--against: a verdict is that of the scene; allowed is --against scene");
+        bail!("--against: --tolerance verdict compares with the scene; use --against scene");
     }
     let origin =
         args.against.unwrap_or(if has_effects { Origin::Scene } else { Origin::Reference });
@@ -147,7 +149,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         let words = ["does NOT shrink", "shrinks"];
         if let Some(is_converging) = compared.is_converging() {
             let words = words[usize::from(is_converging)];
-            print(&format!("towards the reference the error of the force {words} at every step"))?;
+            print(&format!("the force error {words} at every level towards the reference"))?;
         }
         for order in &orders {
             print(&format!(
@@ -164,7 +166,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         let within =
             compared.criterion.map_or(String::new(), |it| format!(", within {}", words(it)));
         print(&format!(
-            "effects{within}; one that is switched on is needed where the real finger has it:"
+            "effects{within}; keep an effect that the real finger has if it is needed:"
         ))?;
         print(&format!("{}{ONE_BUILD}", table(&compared)))?;
         effects = Some(compared);
@@ -200,8 +202,8 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     };
     let within = format!("{} from {}", words(criterion), origin.name());
     let Some(cheapest) = cheapest else {
-        ensure!(origin == Origin::Scene, "no level is within {within}: no scene is written");
-        print(&format!("nothing that the scene has can be left out within {within}"))?;
+        ensure!(origin == Origin::Scene, "no level is within {within}; no scene written");
+        print(&format!("no effect of the scene can be removed within {within}"))?;
         return Ok(Ending::Done);
     };
     let described = described(&cheapest, criterion, origin);
@@ -230,7 +232,7 @@ fn effort(args: &Args, touches: u16, is_of_effects: bool) -> Effort {
     }
 }
 
-/// Measures variants, of which the first is the reference, until Ctrl-C.
+/// Measures variants until Ctrl-C; the first variant is the reference.
 fn compare(
     variants: Vec<(Variant, Scene)>,
     effort: Effort,
@@ -255,11 +257,13 @@ fn compare(
 fn words(criterion: Criterion) -> String {
     match criterion {
         Criterion::Touches(it) => format!("{it} of the {}", it.quantity.name()),
-        Criterion::Verdict(m) => format!("{:.3} mm of active less random", 1e3 * m.unwrap_or(0.0)),
+        Criterion::Verdict(m) => {
+            format!("{:.3} mm of the difference active - random", 1e3 * m.unwrap_or(0.0))
+        }
     }
 }
 
-/// Prints the cheapest level within a tolerance of touches, or how near the levels come to it.
+/// Prints the cheapest level within a tolerance of touches, or the smallest error of any level.
 fn print_cheapest_level(
     levels: Option<&Comparison>,
     criterion: Criterion,
@@ -270,22 +274,25 @@ fn print_cheapest_level(
     if let Some((level, _)) = levels.cheapest(&tolerance, origin) {
         let time = duration(level.wall_s.unwrap_or(f64::NAN));
         print(&format!(
-            "cheapest level within {tolerance} of {of}: {}, {time} a touch",
+            "cheapest level within {tolerance} of {of}: {}, {time} per touch",
             level.name
         ))?;
     } else if let Some(least) = levels.error_min(&tolerance, origin) {
         let least = tolerance.shown(least);
-        print(&format!("no level within {tolerance} of {of}: 95 % within {least} at best"))?;
+        print(&format!(
+            "no level within {tolerance} of {of}: the best level has 95 % within {least}"
+        ))?;
     }
     Ok(())
 }
 
-/// The errors of the cheapest scene where it was selected and on held-out touches or trials.
+/// Describes the errors of the cheapest scene on the touches or trials that selected it and on
+/// held-out ones.
 fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> String {
     let errors = |variant: &Variant| match criterion {
         Criterion::Touches(tolerance) => {
             let p95 = variant.p95(tolerance.quantity, origin);
-            let p95 = p95.map_or("nothing is comparable".into(), |p95| tolerance.shown(p95));
+            let p95 = p95.map_or("no comparable value".into(), |p95| tolerance.shown(p95));
             format!("95 % of {} touches are within {p95}", variant.touches)
                 + &variant.beyond.map_or(String::new(), |share| format!(", {}", beyond(&share)))
         }
@@ -293,15 +300,15 @@ fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> Strin
             let [verdict, change] = [variant.verdict_m, variant.verdict_change_m];
             let trials = change.map_or(0, |change| change.trials);
             let [verdict, change] = [verdict, change].map(paired);
-            format!("active less random is {verdict} mm in {trials} trials, a change of {change}")
+            format!("active - random is {verdict} mm in {trials} trials, a change of {change}")
         }
     };
     let Cheapest { selected, held_out, is_confirmed, .. } = cheapest;
-    let stays = if *is_confirmed { "it stays" } else { "it is NOT shown to stay" };
+    let stays = if *is_confirmed { "confirmed" } else { "NOT confirmed" };
     let interval = held_out.time_ratio_interval.map(|[low, high]| [1.0 / high, 1.0 / low]);
     let speedup = held_out.time_ratio.map_or(f64::NAN, |ratio| 1.0 / ratio);
     format!(
-        "where it was selected, {}\nheld out, {}: {stays} within the tolerance\n{} times as fast as the \
+        "on the selection set, {}\nheld out, {}: {stays} within the tolerance\n{} times as fast as the \
          reference\n{ONE_BUILD}",
         errors(selected),
         errors(held_out),
@@ -309,23 +316,23 @@ fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> Strin
     )
 }
 
-/// The head of a column and its cell of a variant.
+/// Column header and the function that formats its cell.
 type Column = (&'static str, fn(&Variant) -> String);
 
-/// The columns of both tables; those without a value are left out.
+/// Columns of both tables; columns without a value are omitted.
 const COLUMNS: [Column; 17] = [
     ("variant", |it| it.name.clone()),
-    ("off truth mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
+    ("error to truth mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
     ("95 %", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.p95), 3)),
     ("max", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.max), 3)),
-    ("off reference mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
+    ("error to reference mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
     ("95 %", |it| cell(it.contact_m.map(|spread| 1e3 * spread.p95), 3)),
     ("force N", |it| mean(it.force_n, 1.0, 4)),
     ("electrodes counts", |it| mean(it.electrode_counts, 1.0, 2)),
     ("surface RMSE mm", |it| cell(it.surface_rmse_m.map(|m| 1e3 * m), 3)),
-    ("a touch", |it| it.wall_s.map_or(NONE.into(), duration)),
-    ("x real time", |it| cell(it.real_time_factor(), 1)),
-    ("time", |it| {
+    ("time per touch", |it| it.wall_s.map_or(NONE.into(), duration)),
+    ("real-time factor", |it| cell(it.real_time_factor(), 1)),
+    ("time change", |it| {
         it.time_ratio.map_or(NONE.into(), |ratio| {
             with_interval(ratio, it.time_ratio_interval, &|it| {
                 format!("{:+.1} %", 100.0 * (it - 1.0))
@@ -336,7 +343,7 @@ const COLUMNS: [Column; 17] = [
     ("active - random RMSE mm", |it| paired(it.verdict_m)),
     ("change", |it| paired(it.verdict_change_m)),
     ("beyond the tolerance", |it| it.beyond.as_ref().map_or(NONE.into(), beyond)),
-    ("so it is", |it| it.relevance.map_or(NONE, |relevance| relevance.words()).into()),
+    ("relevance", |it| it.relevance.map_or(NONE, |relevance| relevance.words()).into()),
 ];
 
 fn table(comparison: &Comparison) -> String {

@@ -1,4 +1,4 @@
-//! `palpate register MESH --cloud CLOUD`: where an object stands, from a cloud of contacts.
+//! `palpate register MESH --cloud CLOUD`: registers a contact cloud to a mesh (ICP).
 
 use super::known_body::numbers;
 use super::patience::with_patience;
@@ -12,27 +12,27 @@ use palpate_geometry::import::import;
 use palpate_gp::math::pose::pose;
 use std::path::{Path, PathBuf};
 
-/// A cloud of contacts, and what is known of the mesh that is laid onto it.
+/// Options of the registration of a contact cloud to a mesh.
 #[derive(clap::Args)]
 pub(super) struct Cloud {
-    /// Lay these points of contact, cloud.csv or cloud.ply of palpate export, onto the mesh FILE.
-    /// It begins at the pose that --at (of the mesh's origin, in the cloud's frame) and --rotation
-    /// give, which must be near.
+    /// Register this contact cloud (cloud.csv or cloud.ply of palpate export) to the mesh FILE by
+    /// ICP. The initial pose is --at (the mesh's origin in the cloud's frame) and --rotation; it
+    /// must be near the true pose.
     #[arg(long, value_name = "CLOUD", conflicts_with_all = ["ball", "plate", "touches", "seed", "clear_fault", "set"])]
     pub(super) cloud: Option<PathBuf>,
-    /// Unit of the mesh file's numbers.
+    /// Unit of the mesh file.
     #[arg(long, value_name = "UNIT", default_value_t, requires = "cloud")]
     unit: Unit,
-    /// Factor on top of the unit.
+    /// Scale factor, applied after the unit.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "cloud")]
     scale: f64,
-    /// How the mesh is turned at first, about the fixed axes x, then y, then z, in degrees.
+    /// Initial rotation of the mesh about the fixed axes x, then y, then z, degrees.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, allow_hyphen_values = true, default_value = "0,0,0", requires = "cloud")]
     rotation: [f64; 3],
 }
 
-/// Lays the points of `cloud` onto `mesh`, whose origin stands near `position_m` in their frame,
-/// and writes the pose to `out`.
+/// Registers the points of `cloud` to `mesh` from the initial position `position_m` of the mesh's
+/// origin in the cloud's frame, and writes the pose to `out`.
 pub(super) fn align(
     (mesh, cloud): (&Path, &Path),
     position_m: [f64; 3],
@@ -48,7 +48,7 @@ pub(super) fn align(
     let mesh = MeshBvh::new(mesh.0);
     let aligned = icp::align(&mesh, &points, &pose(position_m, args.rotation))?;
     let text = format!(
-        "# Palpate {}: laid onto the mesh. [object] goes into the scene.\n\n{}",
+        "# Palpate {}: pose registered by ICP. Copy [object] into the scene.\n\n{}",
         env!("CARGO_PKG_VERSION"),
         aligned.tables()
     );

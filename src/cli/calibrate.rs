@@ -17,8 +17,7 @@ use clap::ValueEnum;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// Fit the finger's constants to recordings of it on a flat plate, and score them on sensors that
-/// they were not fitted to.
+/// Fit the finger's constants to recordings on a flat plate, and score them on held-out sensors.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -28,31 +27,30 @@ Examples:
   palpate calibrate tests/data/biotac_flat_plate.json --shear tests/data/biotac_shear.json
   palpate calibrate tests/data/biotac_flat_plate.json --model shell")]
 pub struct Args {
-    /// The recordings, as in tests/data/biotac_flat_plate.json.
+    /// Recordings; the format is that of tests/data/biotac_flat_plate.json.
     recordings: PathBuf,
-    /// Keep the constants and find only what belongs to each session (offset, gain, attitude): a
-    /// test of the constants.
+    /// Keep the constants and fit only the offset, gain and attitude of each session, to test the
+    /// constants.
     #[arg(long)]
     attitude_only: bool,
-    /// Hold a skin under tangential force against this file of slopes instead, as in
-    /// tests/data/biotac_shear.json, with the constants of a scene without settings.
+    /// Compare the skin under tangential force with the slopes in this file, in the format of
+    /// tests/data/biotac_shear.json; uses the default constants.
     #[arg(long, value_name = "FILE", conflicts_with = "attitude_only")]
     shear: Option<PathBuf>,
-    /// How the skin passes load on.
+    /// Skin model.
     #[arg(long, value_enum, default_value_t)]
     model: Skin,
-    /// Write the constants fitted to all sensors into this file, which a scene names by
-    /// effects.sensor.
+    /// Write the constants fitted to all sensors to this file; a scene names it in effects.sensor.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["attitude_only", "shear"])]
     out: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Default, clap::ValueEnum)]
 enum Skin {
-    /// Each point is a column of its own.
+    /// Independent columns under each skin point.
     #[default]
     Columns,
-    /// A thin shell carries load to its neighbours; takes minutes.
+    /// Thin shell that carries load to its neighbours; takes minutes.
     Shell,
 }
 
@@ -95,7 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
         }
         let text = format!(
             "# Constants of the sensor for model = \"{}\" of [effects.skin], fitted by palpate calibrate \
-             to {name}.\n# What is not here is as in models/biotac.toml.\n{}",
+             to {name}.\n# Other constants are those of models/biotac.toml.\n{}",
             args.model.to_possible_value().map_or(String::new(), |model| model.get_name().into()),
             sensor::text(&fit.model.effects())?
         );
@@ -120,7 +118,7 @@ fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
     })
 }
 
-/// What a sensor's electrodes answer to tangential force.
+/// Table of the electrodes' responses to tangential force, measured and modelled.
 fn sheared(found: &Sheared, stiffness_n_m: f64) -> String {
     let Sheared { sensor, lateral, axial } = found;
     let mut rows = vec![["  counts per N", "lateral", "model", "axial", "model"].map(String::from)];
@@ -133,24 +131,24 @@ fn sheared(found: &Sheared, stiffness_n_m: f64) -> String {
     let told = [("lateral", lateral), ("axial", axial)].map(|(name, of)| {
         let [least, most] = of.ratios();
         format!(
-            "  {name}: correlation {:.2}; the eight largest slopes times {least:.2} to {most:.2}; \
-             best with {:.0} N/m",
+            "  {name}: correlation {:.2}; ratios of the eight largest slopes {least:.2} to {most:.2}; \
+             best stiffness {:.0} N/m",
             of.correlation(),
             stiffness_n_m / of.scale()
         )
     });
-    format!("sensor {sensor} with a skin of {stiffness_n_m} N/m\n{table}{}\n", told.join("\n"))
+    format!("sensor {sensor}, skin stiffness {stiffness_n_m} N/m\n{table}{}\n", told.join("\n"))
 }
 
 fn told(held: &HeldOut) -> String {
     let from = match held.others.is_empty() {
-        true => "the constants of a scene without settings".into(),
+        true => "the default constants".into(),
         false => format!("constants fitted to {}", names(held.others.iter())),
     };
     let mut text = format!("sensor {} with {from}\n", held.sensor);
     text += &estimates(&held.fit, &[]);
     for session in &held.fit.sessions {
-        text += &format!("  its own: {}\n", held_at(session));
+        text += &format!("  session: {}\n", held_at(session));
     }
     let mut rows = Vec::new();
     for (force_n, score) in &held.loads {
@@ -160,7 +158,7 @@ fn told(held: &HeldOut) -> String {
     text + &table(rows)
 }
 
-/// The constants of a fit; `held_out` are those without one sensor each.
+/// Lists the constants of a fit; `held_out` are fits without one sensor each.
 fn estimates(fit: &Fit, held_out: &[HeldOut]) -> String {
     let mut text = String::new();
     for found in &fit.estimates {
@@ -172,7 +170,7 @@ fn estimates(fit: &Fit, held_out: &[HeldOut]) -> String {
     }
     for lost in &fit.refused {
         text += &format!(
-            "  {:22} refused: it ran to its bound {:e}, the recordings do not determine it; it stays {:e}\n",
+            "  {:22} refused: the fit ran to its bound {:e}, the recordings do not determine it; {:e} is kept\n",
             lost.key, lost.bound, lost.kept
         );
     }

@@ -21,35 +21,35 @@ Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl --bless 'length scales are fitted in logarithms'
   palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
 
-Runs the first four trials of every planner. Rows that are the bytes of the baseline's are identical, and that is \
-all. Otherwise new and old are paired by trial, which share seeds, on the mean of the logarithm of the error over the \
-touches; trials are added by tens until an interval that holds at any time says better, ok (its upper end is below \
-the tolerance) or worse, or --max-trials are spent: undecided. Other measures stand beside it, corrected after Holm, and \
-can only be worse. No time is judged.
+Runs the first four trials of every planner. If their rows equal the baseline's byte for byte, the planner is identical \
+and the test ends. Otherwise new and old trials with the same seeds are paired on the mean log error over the touches. \
+Trials are added in tens until a confidence sequence decides: better, ok (the upper bound is below the tolerance) or \
+worse. After --max-trials the result is undecided. Other measures are Holm-corrected and can only be worse. Run time is \
+not tested.
 
-Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 could not.")]
+Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 error.")]
 pub(super) struct Args {
     /// An experiment (.toml), or the name of one in experiments/.
     experiment: PathBuf,
-    /// What planners were: a file that --bless writes.
+    /// Baseline file, written by --bless.
     #[arg(long, value_name = "FILE")]
     baseline: PathBuf,
-    /// Most trials of each planner.
+    /// Maximum number of trials per planner.
     #[arg(long, default_value_t = 50, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     max_trials: u32,
-    /// Share of an error that may be lost.
+    /// Largest relative increase in error that still passes.
     #[arg(long, default_value_t = 0.05, value_name = "SHARE", value_parser = tolerance)]
     tolerance: f64,
-    /// Write the baseline as it is now, and why.
+    /// Write the current results to the baseline, with this reason.
     #[arg(long, value_name = "WHY")]
     bless: Option<String>,
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Write the table as Markdown.
+    /// Write the results table as Markdown.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Draw the changes with their intervals.
+    /// Draw the changes with their intervals as SVG.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Change one setting; may be repeated.
@@ -64,7 +64,7 @@ pub(super) struct Args {
 
 fn tolerance(text: &str) -> Result<f64, String> {
     let share = text.parse().ok().filter(|share| (1e-4..=10.0).contains(share));
-    share.ok_or("allowed is a share of 0.0001 to 10, as in 0.05".into())
+    share.ok_or("allowed is 0.0001 to 10, as in 0.05".into())
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
@@ -86,7 +86,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     bound_threads(args.threads)?;
     let simulation = simulation(experiment, talk)?;
     if simulation.is_real() {
-        bail!("backend.kind: a check runs on the simulated body; allowed is \"simulated\"");
+        bail!("backend.kind: a check runs in simulation; allowed is \"simulated\"");
     }
     let stop = stop_on_interrupt("trials")?;
     let rules = Rules { tolerance: args.tolerance, ..Rules::default() };
@@ -133,7 +133,8 @@ fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> 
     Ok(())
 }
 
-/// Makes every trial and writes what they are; of a baseline that is there it is said who differs.
+/// Runs all trials and writes them as the baseline; the header lists planners that differ from an
+/// existing baseline.
 fn bless(
     args: &Args,
     simulation: &Simulation,

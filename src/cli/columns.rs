@@ -1,13 +1,13 @@
-//! Tables on the terminal.
+//! Tables for the terminal.
 
 pub(super) use crate::report::table::aligned as aligned_rows;
 
-/// Cells in aligned columns: the first to the left, the others to the right.
+/// Formats cells in aligned columns: the first column left-aligned, the others right-aligned.
 pub(super) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
     aligned_rows(lines)
 }
 
-/// `lines`, the first of them the head, without the columns that have no value in any line.
+/// Removes the columns that have no value in any line; the first line is the header.
 pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
     for column in (0..lines.first().map_or(0, Vec::len)).rev() {
         if lines.len() > 1 && lines.iter().skip(1).all(|line| line[column] == NONE) {
@@ -17,15 +17,15 @@ pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
     lines
 }
 
-/// A cell without a value.
+/// Text of a cell without a value.
 pub(super) const NONE: &str = "-";
 
-/// A number, or a dash where there is none.
+/// Formats a number; a dash if there is none.
 pub(super) fn cell(value: Option<f64>, decimals: usize) -> String {
     value.map_or(NONE.into(), |value| format!("{value:.decimals$}"))
 }
 
-/// A duration in the unit that suits it.
+/// Formats a duration in us, ms or s.
 pub(super) fn duration(s: f64) -> String {
     match s {
         s if s < 1e-3 => format!("{:.1} us", 1e6 * s),

@@ -15,21 +15,21 @@ Examples:
   palpate compare runs/bird runs/bird-before --against random --svg profiles.svg
   palpate compare runs/six/*/ --against active --out runs/six
 
-Each trial's error over its touches, exp(mean log RMSE), in units of that of one planner in the same trial: its \
-interquartile and geometric means with a bootstrap that draws within each object, how many objects a planner is better and \
-worse on, how much of the way from random to the oracle it comes, what it took, and the probability that a trial is better \
-than one of that planner. Runs of the same experiment are told apart by their folders.")]
+The unit of error is a trial's exp(mean log RMSE over its touches), divided by that of one planner in the same trial. \
+The tables give its interquartile and geometric means (bootstrap within each object), the number of objects on which a \
+planner is better or worse, the share of the gap from random to the oracle that it closes, its cost, and the probability \
+that a trial beats that planner's. The folder's name distinguishes runs of the same experiment.")]
 pub(super) struct Args {
     /// Run folders.
     #[arg(required = true)]
     runs: Vec<PathBuf>,
-    /// The planner that others are held against.
+    /// Reference planner; errors are divided by its errors.
     #[arg(long, default_value = "random", value_name = "PLANNER")]
     against: String,
-    /// Draw the performance profiles.
+    /// Draw the performance profiles as SVG.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Write the page suite.html and the numbers suite.csv into a folder.
+    /// Write the page suite.html and the table suite.csv to this folder.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -58,12 +58,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
 
 const PAGE: &str = "suite.html";
 
-/// The tables of a comparison for a terminal, object by object and over all.
+/// Formats the tables of a comparison for a terminal, per object and overall.
 pub(super) fn text(compared: &Compared) -> String {
     format!("{}\n{}", each(compared).text(), overall(compared).text())
 }
 
-/// Writes a comparison into a folder, as a page and as a table; returns the page's path.
+/// Writes a comparison to a folder as a page and a CSV table; returns the page's path.
 pub(super) fn write(
     folder: &Path,
     (name, question): (&str, &str),

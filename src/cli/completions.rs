@@ -10,7 +10,7 @@ Examples:
   palpate completions zsh > ~/.zfunc/_palpate
   palpate completions fish > ~/.config/fish/completions/palpate.fish")]
 pub(super) struct Args {
-    /// The shell.
+    /// Shell to complete commands in.
     shell: Shell,
 }
 

@@ -24,34 +24,33 @@ Examples:
   palpate export runs/mug --planner active --grid 128 --out mug.ply
   palpate export scenes/container.toml --grid 41x51 --out runs/container-scan
 
-Of a run: beside FILE.ply or FILE.obj stand FILE.svg, FILE.png and FILE.pdf, the belief beside the true \
-surface. In a PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a \
-comment below its vertex. Both are coloured by it, viridis from 0 to the largest. What the touches make \
-likelier to be no surface than one is left out. Of a run around an object it is the closed surface that is \
-believed; sigma_m is how far it may lie from there along its normal, and error_m stands beside it: how far it lies \
-from the true surface, negative inside.
+From a run: writes the belief after some touches as FILE.ply or FILE.obj, and the belief beside the true surface as \
+FILE.svg, FILE.png and FILE.pdf. The standard deviation is the property `sigma_m` of a PLY file and a comment below each \
+vertex of an OBJ file. Colours show it on the viridis map, from 0 to the largest. Vertices where a surface is \
+less likely than none are omitted. A run around a whole object gives the closed mean surface; sigma_m is the standard \
+deviation along its normal, and error_m is the signed distance to the true surface, negative inside.
 
-Of a scene: a grid of targets is touched, and FOLDER holds cloud.ply (points of contact with normals), \
-cloud.csv (also targets that were missed), scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops \
-it without writing anything; the files do not depend on the number of threads.")]
+From a scene: touches a grid of targets. FOLDER holds cloud.ply (contact points with normals), cloud.csv (also the \
+misses), scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops it without writing anything; the \
+files do not depend on the number of threads.")]
 pub(super) struct Args {
-    /// A run's folder, a scene (.toml) with an object, or the name of one in scenes/.
+    /// A run's folder, a scene (.toml) with an object, or the name of a scene in scenes/.
     path: PathBuf,
-    /// Of a run: whose belief.
+    /// Run only: planner whose belief is written.
     #[arg(long)]
     planner: Option<String>,
-    /// Of a run: of which trial.
+    /// Run only: trial number.
     #[arg(long, default_value_t = 0)]
     trial: u32,
-    /// Of a run: after how many touches [default: all].
+    /// Run only: number of touches that the belief is fitted to [default: all].
     #[arg(long)]
     touches: Option<u32>,
-    /// Where to: of a run a .ply or .obj file, of a scene a folder [default: runs/SCENE-scan].
+    /// Output: a .ply or .obj file for a run, a folder for a scene [default: runs/SCENE-scan].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// Of a run: vertices along each side of the zone, or around an object cells along the
-    /// surface's longest side [default: the experiment's grid or gp.cells]. Of a scene: targets
-    /// along x and z [default: square cells, 81 along the longer side].
+    /// For a run, vertices along each side of the zone, or cells along the longest side of a whole
+    /// object [default: the experiment's grid or gp.cells]. For a scene, targets along x and z
+    /// [default: square cells, 81 along the longer side].
     #[arg(long, value_name = "N|NxM", value_parser = grid)]
     grid: Option<Grid>,
     #[command(flatten)]
@@ -61,20 +60,20 @@ pub(super) struct Args {
 }
 
 impl Args {
-    /// Whose belief is asked for; of nobody's the name is empty.
+    /// Name of the requested planner; empty if none is given.
     fn planner(&self) -> &str {
         self.planner.as_deref().unwrap_or_default()
     }
 
-    /// Vertices or cells along each side of a belief.
+    /// Returns the vertices or cells along each side of a belief.
     fn side(&self) -> anyhow::Result<Option<usize>> {
         let Some(Grid([columns, rows])) = self.grid else { return Ok(None) };
-        ensure!(columns == rows, "--grid {columns}x{rows}: of a run allowed is one number, N");
+        ensure!(columns == rows, "--grid {columns}x{rows}: a run allows one number, N");
         Ok(Some(columns))
     }
 }
 
-/// Of a run the belief as a mesh, of a scene the contacts of a grid of touches.
+/// Exports a run's belief as a mesh, or the contacts of a grid of touches on a scene.
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let is_run = args.path.is_dir();
     let path = if is_run { args.path.clone() } else { find(&args.path, SCENES)? };
@@ -92,7 +91,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     scan(&path, &args.scan, (args.out.as_deref(), args.grid, args.force), talk)
 }
 
-/// Cells that a belief around an object may be made of, as `gp.cells`.
+/// Allowed cells of a belief around an object, as for `gp.cells`.
 const CELLS: std::ops::RangeInclusive<usize> = 8..=256;
 
 fn belief(args: &Args) -> anyhow::Result<Ending> {
@@ -112,7 +111,7 @@ fn belief(args: &Args) -> anyhow::Result<Ending> {
         args.path.display()
     );
     let touches = chosen(&run, args)?;
-    // The run's own figure of beliefs, of this one only.
+    // Draws the run's figure of beliefs for this planner, trial and touch count only.
     run.experiment.report = ReportSettings {
         touch_counts: vec![touches],
         trial: args.trial,
@@ -139,44 +138,47 @@ fn belief(args: &Args) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// The closed surface believed of an object, and how near it is to the truth.
+/// Closed mean surface of an object, and its error.
 fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
     if let Some(cells) = args.side()? {
         ensure!(
             CELLS.contains(&cells),
-            "--grid {cells}: around an object allowed are {} to {} cells",
+            "--grid {cells}: allowed are {} to {} cells around an object",
             CELLS.start(),
             CELLS.end()
         );
         run.experiment.space.cells = u32::try_from(cells)?;
     }
     let planner = args.planner();
-    let of = || format!("{planner} had no fit after {touches} touches");
+    let of = || format!("{planner} has no fit after {touches} touches");
     let row = replay::row(run, planner).with_context(of)?;
     let truth = whole::truth(run);
     let frame = whole::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
     let frame = frame.with_context(of)?;
-    ensure!(!frame.mesh.1.is_empty(), "{planner} believed in no surface after {touches} touches");
+    ensure!(
+        !frame.mesh.1.is_empty(),
+        "the belief of {planner} contains no surface after {touches} touches"
+    );
     let mut comments = vec![
         whose(run, args, touches),
-        "sigma_m: how far the surface may lie from there, along its normal".into(),
+        "sigma_m: standard deviation of the surface along its normal".into(),
     ];
     if !frame.error_m.is_empty() {
-        comments.push("error_m: distance from the true surface, negative inside".into());
+        comments.push("error_m: signed distance to the true surface, negative inside".into());
     }
     Ok((frame.points(comments), frame.score))
 }
 
-/// The belief over a zone, and how near it is to the truth.
+/// Belief over a zone as a mesh, and its error.
 fn over_zone(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
     let planner = args.planner();
     let replay = Replay::new(run, planner, touches)?
-        .with_context(|| format!("{planner} had no fit after {touches} touches"))?;
+        .with_context(|| format!("{planner} has no fit after {touches} touches"))?;
     let grid = args.side()?.unwrap_or(run.experiment.grid as usize);
     Ok((mesh(run, args, &replay, grid), replay.score()))
 }
 
-/// What a file says of itself first.
+/// First comment line of an exported file.
 fn whose(run: &Run, args: &Args, touches: u32) -> String {
     format!(
         "Palpate {}: belief of {} in trial {} of {} after {touches} touches",
@@ -187,7 +189,10 @@ fn whose(run: &Run, args: &Args, touches: u32) -> String {
     )
 }
 
-/// The touch count asked for, if the run has what is asked for.
+/// Returns the touch count after which the belief is exported.
+///
+/// # Errors
+/// If the run lacks the planner, the trial or the touch count.
 fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
     let (planner, trial) = (args.planner(), &args.trial);
     let planners = &run.experiment.planners;
@@ -214,12 +219,12 @@ fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
     Ok(touches)
 }
 
-/// The belief's mean as a surface in `W`, where there probably is one.
+/// Posterior mean as a surface in `W`, where a surface is more likely than none.
 fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let zone = replay.belief.zone();
     let places = zone.grid(grid);
     let known = replay.is_drawn(places.iter().map(Vec::as_slice));
-    // The vertex that a place becomes, if it becomes one.
+    // Index of the vertex at each place that has one.
     let mut count = 0..;
     let vertices: Vec<Option<usize>> =
         known.iter().map(|known| known.then(|| count.next()).flatten()).collect();

@@ -1,19 +1,19 @@
-//! Experiments and scenes by name: `bird` for `experiments/bird.toml`.
+//! Lookup of experiments and scenes by name: `bird` finds `experiments/bird.toml`.
 
 use anyhow::bail;
 use palpate_input::{files, words};
 use std::path::{Path, PathBuf};
 
-/// Folder of the experiments that come with the program.
+/// Folder of the shipped experiments.
 pub(super) const EXPERIMENTS: &str = "experiments";
-/// Folder of the scenes.
+/// Folder of the shipped scenes.
 pub(super) const SCENES: &str = "scenes";
 
-/// The file that is meant by `name`: a path, or the name of a file in `folder`, here, beside the
-/// program or in `PALPATE_HOME`.
+/// Finds the file for `name`: a path, or the name of a file in `folder`, in the working directory,
+/// beside the program or in `PALPATE_HOME`.
 ///
 /// # Errors
-/// If there is none, with the name most like it.
+/// If no file matches; the message suggests the most similar name.
 pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     let is_plain = name.extension().is_none() && name.components().count() == 1;
     if !is_plain || name.exists() && !name.is_dir() {
@@ -30,7 +30,8 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
 }
 
-/// An experiment names planners, a scene does not; a file that is neither is read as a scene.
+/// Whether the file is an experiment: experiments have `planners` or `scene`, scenes do not. An
+/// unreadable file counts as a scene.
 pub(super) fn is_experiment(path: &Path) -> bool {
     files::text(path, files::TEXT_MAX)
         .ok()
@@ -38,7 +39,7 @@ pub(super) fn is_experiment(path: &Path) -> bool {
         .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
 }
 
-/// The names of the files in `folder`, where [`find`] looks first, in order.
+/// Sorted names of the files in the first `folder` that [`find`] searches.
 pub(super) fn names(folder: &str) -> Vec<String> {
     let files = folders(folder).find_map(|folder| std::fs::read_dir(folder).ok());
     let stem = |path: PathBuf| -> Option<String> {
@@ -51,11 +52,11 @@ pub(super) fn names(folder: &str) -> Vec<String> {
     names
 }
 
-/// Names the folder that `experiments` and `scenes` lie in, if they lie neither here nor beside the
-/// program.
+/// Environment variable: the folder that contains `experiments` and `scenes` if they are neither in
+/// the working directory nor beside the program.
 const HOME: &str = "PALPATE_HOME";
 
-/// Where to look for `folder`.
+/// Candidate locations of `folder`, in search order.
 fn folders(folder: &str) -> impl Iterator<Item = PathBuf> {
     let program = std::env::current_exe().ok();
     let beside = program.and_then(|program| Some(program.parent()?.join(folder)));

@@ -1,4 +1,4 @@
-//! A ball or a plate on the command line.
+//! Options for a ball or a plate of known shape.
 
 use anyhow::Context;
 use nalgebra::{UnitVector3, Vector3};
@@ -6,14 +6,14 @@ use palpate_explore::registration::KnownBody;
 
 #[derive(clap::Args)]
 pub(super) struct KnownBodyArgs {
-    /// A ball of this radius.
+    /// Touch a ball of this radius.
     #[arg(long, value_name = "RADIUS_M", value_parser = radius, requires = "at", conflicts_with = "plate")]
     ball: Option<f64>,
-    /// A plate with this normal, towards the finger, in W.
+    /// Touch a plate with this normal, towards the finger, in W.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, requires = "at", allow_hyphen_values = true)]
     plate: Option<[f64; 3]>,
-    /// Where the ball's centre or a point of the plate is, in W; of a cloud where the mesh's origin
-    /// stands at first, in the cloud's frame.
+    /// Centre of the ball or a point of the plate, in W; with --cloud the initial position of the
+    /// mesh's origin, in the cloud's frame.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, allow_hyphen_values = true)]
     pub(super) at: Option<[f64; 3]>,
 }
@@ -34,14 +34,16 @@ pub(super) fn numbers(text: &str) -> Result<[f64; 3], String> {
 }
 
 impl KnownBodyArgs {
-    /// What is named, if anything is.
+    /// Returns the ball or plate of the options, if one is given.
     pub(super) fn body(&self) -> anyhow::Result<Option<KnownBody>> {
         let Some(at) = self.at else { return Ok(None) };
         if let Some(radius_m) = self.ball {
             return Ok(Some(KnownBody::Ball { centre_w: at.into(), radius_m }));
         }
-        let normal = Vector3::from(self.plate.context("--at: of what? --ball or --plate says")?);
-        let normal_w = UnitVector3::try_new(normal, 1e-9).context("--plate: no direction")?;
+        let normal =
+            Vector3::from(self.plate.context("--at needs --ball RADIUS_M or --plate X,Y,Z")?);
+        let normal_w = UnitVector3::try_new(normal, 1e-9)
+            .context("--plate: the zero vector has no direction")?;
         Ok(Some(KnownBody::Plate { point_w: at.into(), normal_w }))
     }
 }

@@ -16,26 +16,26 @@ Examples:
   palpate list                 everything that has a name
   palpate list planners")]
 pub(super) struct Args {
-    /// What to list [default: all].
+    /// Kind to list [default: all].
     kind: Option<Kind>,
 }
 
-/// What can be listed.
+/// Kinds of things that can be listed.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Kind {
-    /// Files in experiments/, here or beside the program.
+    /// Experiments: files in experiments/, here or beside the program.
     Experiments,
-    /// Files in scenes/.
+    /// Scenes: files in scenes/.
     Scenes,
     /// Planners that an experiment may name.
     Planners,
-    /// What trials are judged by.
+    /// Measures of trials: errors, calibration and effort.
     Measures,
-    /// Tables of [effects] in a scene.
+    /// Simulated effects: tables of [effects] in a scene.
     Effects,
 }
 
-/// Each kind with its lines: name and what it is.
+/// Returns pairs of name and description.
 type Lister = fn() -> Vec<[String; 2]>;
 const KINDS: &[(Kind, &str, Lister)] = &[
     (Kind::Experiments, "experiments (palpate run NAME)", experiments),
@@ -73,7 +73,7 @@ fn scenes() -> Vec<[String; 2]> {
     names(SCENES).iter().map(about).collect()
 }
 
-/// Every planner with what it does.
+/// Names and descriptions of all planners.
 pub(super) fn planners() -> Vec<[String; 2]> {
     entrant::listed().map(|(name, about)| [name, about].map(String::from)).collect()
 }
@@ -93,7 +93,7 @@ fn effects() -> Vec<[String; 2]> {
         .collect()
 }
 
-/// Lines set off to the right, what each name is in a column of its own.
+/// Formats names and descriptions as two indented columns.
 pub(super) fn indented(lines: &[[String; 2]]) -> String {
     let width = lines.iter().map(|[name, _]| name.chars().count()).max().unwrap_or(0);
     lines.iter().map(|[name, about]| format!("  {name:<width$}  {about}\n")).collect()

@@ -55,59 +55,59 @@ Examples:
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
   palpate show scenes/bird_pa10.toml --watch    a trial in a window
-  palpate twin experiments/container_pa10.toml   a stand-in for the real arm, over ROS 2
+  palpate twin experiments/container_pa10.toml   a simulated robot in place of the real one, over ROS 2
   palpate export runs/bird --planner active --out bird.ply
   palpate export scenes/bird.toml           touch the whole zone, write a point cloud
-  palpate run experiments/suite/six.toml    planners on objects that differ: who is better where
+  palpate run experiments/suite/six.toml    compare planners on several objects
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
 
-Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 3 undecided, 130 interrupted; run the same command \
-again to continue.";
+Exit codes: 0 done, 1 a test failed, 2 error (the message gives the reason), 3 undecided, 130 interrupted; repeat the \
+command to continue.";
 
 #[derive(Subcommand)]
 enum Command {
     /// Write a scene and an experiment for a mesh, ready to run.
     New(new::Args),
-    /// Run an experiment: planners × trials, then its report.
+    /// Run an experiment (planners × trials) and write its report.
     Run(run::Args),
-    /// Draw a run's figures and page again from its rows; put shards together.
+    /// Redraw a run's figures and page from its rows; merge shards.
     Report(report::Args),
-    /// Say what a mesh, scene, experiment or run folder holds; watch a trial in a window.
+    /// Describe a mesh, scene, experiment or run folder; watch a trial in a window.
     Show(show::Args),
-    /// Write a run's belief as a mesh, or a scene's contacts as a point cloud.
+    /// Export a run's belief as a mesh, or a scene's contacts as a point cloud.
     Export(export::Args),
     /// Compare planners over several runs.
     Compare(compare::Args),
-    /// Test planners against a baseline: better, ok, worse, or undecided.
+    /// Test planners for regressions against a stored baseline.
     Check(check::Args),
-    /// Show what accuracy costs: error and time of a scene's levels and effects.
+    /// Measure the error and time of simulation levels and effects of a scene.
     Accuracy(accuracy::Args),
-    /// Serve a simulated arm over a laboratory's topics in real time.
+    /// Serve a simulated robot over ROS topics in real time.
     Twin(twin::Args),
-    /// Find by touch where the finger, a ball, a plate or an object stands.
+    /// Register the finger, a ball, a plate or an object by touch.
     Register(register::Args),
-    /// Run a recorded trial again on what was read then, and compare.
+    /// Replay a recorded trial and compare commands and results.
     Replay(replay::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
     Calibrate(calibrate::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
-    /// Print a script with which a shell completes commands.
+    /// Print a shell completion script.
     Completions(completions::Args),
     /// Print every command, setting and column as Markdown.
     Reference(reference::Args),
 }
 
-/// What the help lists commands under; those of no group stand under the last.
+/// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "report", "show", "export"]),
-    ("Judge", &["compare", "check", "accuracy"]),
-    ("Laboratory", &["twin", "register", "replay", "calibrate"]),
+    ("Evaluate", &["compare", "check", "accuracy"]),
+    ("Robot", &["twin", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
 
-/// The program's commands and options, with help that names commands by group.
+/// Builds the command parser; the help groups the commands.
 fn command() -> clap::Command {
     let command = Cli::command().mut_subcommand("run", |run| {
         let planners = list::indented(&list::planners());
@@ -135,13 +135,13 @@ fn command() -> clap::Command {
     ))
 }
 
-/// Runs the program, which was built from `commit`, on the process's arguments.
+/// Runs the program on the process's arguments; `commit` is the commit of the build.
 pub fn main(commit: &str) -> ExitCode {
     ExitCode::from(main_with(std::env::args_os(), &Host { commit, bring: &|_| None }))
 }
 
-/// Runs the program on `arguments`, of which the first is its name, for a host; returns its exit
-/// code.
+/// Runs the program for a host on `arguments`, the first of which is the program's name; returns
+/// the exit code.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
     let outcome = renamed::today(arguments.into_iter().collect()).and_then(|(arguments, note)| {
         let cli = Cli::from_arg_matches(&command().get_matches_from(arguments))
@@ -183,7 +183,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Ending
     }
 }
 
-/// Commands, settings and columns as Markdown: what `docs/reference.md` holds.
+/// Returns commands, settings and columns as Markdown, the text of `docs/reference.md`.
 pub fn reference() -> String {
     reference::text(&Cli::command())
 }

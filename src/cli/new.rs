@@ -21,13 +21,12 @@ Examples:
   palpate new my-part.obj --side top --finger soft
   palpate new scan.ply --unit in --up z --out my-experiments
 
-Looks at the mesh, asks nothing, and writes an experiment, NAME.toml, and its scene, NAME-scene.toml, \
-that run as they are; every guess is said and stands in the scene to be changed. glTF is in metres with y \
-up by its specification; the other formats say neither: they are read in the first of mm, m and cm in \
-which a finger can explore them, and scaled to 0.15 m if there is none. OBJ is taken to have y up, STL and \
-PLY z.")]
+Reads the mesh and writes an experiment, NAME.toml, and its scene, NAME-scene.toml. Both run unchanged. \
+Every guess is printed and is a setting of the scene that you can change. Units: glTF files are in metres with y up by \
+specification. Other formats have no unit: the first of mm, m and cm that gives a size that a finger can explore is used; if none \
+does, the mesh is scaled to 0.15 m. Up: y for OBJ, z for STL and PLY.")]
 pub(super) struct Args {
-    /// A mesh.
+    /// Mesh file.
     mesh: PathBuf,
     /// Side that faces the finger.
     #[arg(long, value_enum, default_value_t)]
@@ -38,7 +37,7 @@ pub(super) struct Args {
     /// Unit of the file's numbers [default: guessed].
     #[arg(long, value_enum)]
     unit: Option<Unit>,
-    /// What touches.
+    /// Finger that touches the object.
     #[arg(long, value_enum, default_value_t)]
     finger: FingerKind,
     /// Let a glTF mesh read buffers outside its own folder.
@@ -52,7 +51,7 @@ pub(super) struct Args {
 }
 
 impl Args {
-    /// A file in the folder asked for.
+    /// Path of a file in the output folder.
     fn beside(&self, file: String) -> PathBuf {
         if self.is_here() { file.into() } else { self.out.join(file) }
     }
@@ -66,7 +65,7 @@ impl Args {
     }
 }
 
-/// What touches.
+/// Kinds of finger that can touch the object.
 #[derive(Clone, Copy, Default, PartialEq, clap::ValueEnum)]
 enum FingerKind {
     /// A rigid fingertip, swept to first contact: body = "cast".
@@ -78,14 +77,14 @@ enum FingerKind {
     Arm,
 }
 
-/// What a finger makes of the files.
+/// Parts of the files that depend on the finger.
 struct Kit {
     body: &'static str,
-    /// Tables of the scene beside object and zone.
+    /// Tables of the scene other than object and zone.
     scene: String,
-    /// What the belief is told of its touches.
+    /// Settings of the belief about the contacts' noise and normals.
     gp: &'static str,
-    /// About the time that the experiment takes.
+    /// Approximate run time of the experiment.
     takes: &'static str,
 }
 
@@ -111,10 +110,10 @@ impl FingerKind {
     }
 }
 
-/// Tables of a soft finger that is moved as `motion` says.
+/// Tables of a soft finger; `motion` has further settings of `[touch]`.
 fn biotac(motion: &str) -> String {
     format!(
-        "\n# A BioTac: its skin, the fluid under it and 19 electrodes, which say where it touches.\n\
+        "\n# A BioTac: its skin, the fluid under it and 19 electrodes, which locate the contact.\n\
          [touch]\n{motion}press_m = 0.0004\n\n\
          [effects.skin]\n[effects.fluid]\n[effects.electrodes]\n"
     )
@@ -124,13 +123,12 @@ const ARM: &str = "\n[arm]                       # a Mitsubishi PA-10; its base 
 
 const SLOWER: &str = "approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger\n";
 
-/// A rigid finger's contacts say how steep the surface is; those of electrodes are too often tilted
-/// the same way (docs/belief.md).
-const EXACT: &str = "normals = true              # a contact says how steep the surface is, too\n";
+/// Enables normals: a rigid finger's contacts give the surface's slope. Normals from electrodes
+/// have a common tilt too often (docs/belief.md).
+const EXACT: &str = "normals = true              # each contact also gives the surface's slope\n";
 
-/// What contacts that electrodes locate are off the surface, RMS (docs/finger.md).
-const LOCATED: &str =
-    "noise_sd_min_m = 0.0003     # of contacts that electrodes locate; more is fitted\n";
+/// RMS distance of contacts located by electrodes from the surface (docs/finger.md).
+const LOCATED: &str = "noise_sd_min_m = 0.0003     # noise of contacts located by electrodes; extra noise is fitted\n";
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = name(&args.mesh)?;
@@ -156,16 +154,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// The mesh's name as that of an experiment.
+/// Derives the experiment's name from the mesh's file name.
 fn name(mesh: &Path) -> anyhow::Result<String> {
     let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
     let name: String = stem.chars().map(|c| if is_plain(c) { c } else { '-' }).take(80).collect();
     let name = name.trim_matches(['-', '.']);
-    ensure!(!name.is_empty(), "{}: a name with a letter or digit is needed", mesh.display());
+    ensure!(!name.is_empty(), "{}: the file name needs a letter or digit", mesh.display());
     Ok(name.into())
 }
 
-/// What is made of a mesh.
+/// Placement of a mesh in a scene, with the guesses that led to it.
 struct Guess {
     up: Up,
     unit: Unit,
@@ -181,7 +179,8 @@ impl Guess {
         let extension = args.mesh.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
         let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
-        // Read in the middle of all units, so that the largest and the smallest can be.
+        // Millimetres are the middle of all units, so that meshes in the largest and the smallest
+        // unit can be read.
         let mesh = args.read(Unit::Mm.metres())?;
         let extent = |mesh: &Mesh| {
             let (low, high) = mesh.bounds();
@@ -197,12 +196,15 @@ impl Guess {
         let position_m = placement::position_m(&turned);
         let bvh = MeshBvh::new(turned.transformed(&pose(position_m, [0.0; 3])));
         let found = placement::zone(&bvh).with_context(|| {
-            format!("{} shows no surface from that side; try --side or --up", args.mesh.display())
+            format!(
+                "{}: no surface visible from that side; try another --side or --up",
+                args.mesh.display()
+            )
         })?;
         Ok(Self { up, unit, scale, size_mm, position_m, rotation_deg, found })
     }
 
-    /// The scene as a file for people.
+    /// Returns the scene as commented TOML.
     fn scene(&self, args: &Args, Kit { body, scene, .. }: &Kit) -> anyhow::Result<String> {
         let Self { unit, scale, position_m, rotation_deg, found, .. } = self;
         let Found { zone, filled } = found;
@@ -216,37 +218,37 @@ impl Guess {
         let datum_y_m = zone.datum_y_m();
         let depth_m = zone.depth_m.unwrap_or_default();
         Ok(format!(
-            "# {}, as `palpate new` guessed it; every number may be changed.\n\
+            "# Scene of {}, guessed by `palpate new`; change any number.\n\
              body = \"{body}\"\n\n\
              [object]\n\
              mesh = {mesh}\n\
              unit = \"{unit}\"                 # of the file's numbers: m, cm, mm, um, in\n\
-             scale = {scale:?}                 # on top of the unit\n{outside}\
+             scale = {scale:?}                 # applied after the unit\n{outside}\
              position_m = {position_m:?}    # of the mesh's origin, in the frame of the robot's base\n\
-             rotation_deg = {rotation_deg:?}    # about the base's x, then y, then z: the side that faces +y is touched\n\n\
-             [zone]                      # touched along -y; {:.0} % of it have a surface\n\
+             rotation_deg = {rotation_deg:?}    # about the base's x, then y, then z: the finger touches the side facing +y\n\n\
+             [zone]                      # touched along -y; {:.0} % of it has a surface\n\
              x_m = {x_m:?}\n\
              z_m = {z_m:?}\n\
-             datum_y_m = {datum_y_m:?}          # heights are measured from here: the middle of the surface\n\
-             depth_m = {depth_m:?}    # nearest and farthest -y at which there may be something\n{scene}",
+             datum_y_m = {datum_y_m:?}          # zero of the heights: the middle of the surface\n\
+             depth_m = {depth_m:?}    # nearest and farthest -y of possible contact\n{scene}",
             args.mesh.file_name().unwrap_or_default().to_string_lossy(),
             100.0 * filled,
         ))
     }
 
-    /// What was guessed, for the terminal.
+    /// Describes the guesses for the terminal.
     fn words(&self, args: &Args) -> String {
         let Self { up, unit, scale, size_mm: [x, y, z], found, .. } = self;
         let scaled = match *scale {
             1.0 => String::new(),
-            scale => format!(", scaled by {scale} to a size that a finger can explore"),
+            scale => format!(", scaled by {scale} to fit a finger"),
         };
         let [width, height] = [found.zone.x_m, found.zone.z_m.unwrap_or_default()]
             .map(|[low, high]| 1e3 * (high - low));
         let [near, far] = found.zone.depth_m.unwrap_or_default();
         format!(
-            "{}: read in {unit}{scaled}: {x:.1} x {y:.1} x {z:.1} mm, {} up; its {} faces the finger\n\
-             zone {width:.0} x {height:.0} mm, {:.0} mm deep, {:.0} % of it have a surface",
+            "{}: unit {unit}{scaled}: {x:.1} x {y:.1} x {z:.1} mm, {} up; its {} faces the finger\n\
+             zone {width:.0} x {height:.0} mm, {:.0} mm deep, {:.0} % of it has a surface",
             args.mesh.display(),
             named(up),
             named(&args.side),
@@ -256,7 +258,7 @@ impl Guess {
     }
 }
 
-/// As the command line names it.
+/// Returns the command-line name of a value.
 fn named(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or(String::new(), |value| value.get_name().into())
 }
@@ -269,10 +271,10 @@ fn experiment_text(name: &str, scene: &str, gp: &str) -> String {
          planners = [\"silhouette\", \"active\", \"sobol\", \"random\"]\n\
          trials = 12                 # of each planner\n\
          seed = 1\n\
-         initial_touches = 5         # random ones that all planners share\n\
-         touches = 40                # of a trial in all\n\
-         grid = 41                   # test places along each side of the zone\n\n\
-         # A belief for objects that nobody has seen; without this table it is the paper's.\n\
+         initial_touches = 5         # random touches, the same for all planners\n\
+         touches = 40                # touches per trial, initial ones included\n\
+         grid = 41                   # test points along each side of the zone\n\n\
+         # Gaussian process for unknown objects; without this table the paper's settings apply.\n\
          [gp]\n\
          kernel = [\"squared_exponential\", \"matern_52\"]\n\
          noise = [1e-4, 1e-1]\n\

@@ -1,45 +1,46 @@
-//! Files and folders that a command is told to write: nobody else's is replaced unasked.
+//! Output files and folders: Palpate replaces files of other programs only with `--force`.
 
 use anyhow::{Context, bail};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Whether a file that Palpate did not write may be replaced.
+/// Permission to replace files that Palpate did not write.
 #[derive(Clone, Copy, clap::Args)]
 pub(super) struct Force {
-    /// Replace a file that Palpate did not write, or write into a folder of other things.
+    /// Replace a file that Palpate did not write, or write to a folder with other files.
     #[arg(long)]
     force: bool,
 }
 
-/// What every file that Palpate writes says in its first bytes or its last.
+/// Marker near the start or end of every file that Palpate writes.
 const MARK: &[u8] = b"palpate";
 
-/// In how many; chosen, longer than any header.
+/// Bytes searched for the marker at each end of a file.
+// heuristic: longer than any header.
 const END: u64 = 1024;
 
 impl Force {
-    /// Makes sure that `path` may be written: it is not there, or Palpate wrote it, or it is a file
-    /// and `--force` is given.
+    /// Checks that `path` may be written: it does not exist, Palpate wrote it, or it is a file and
+    /// `--force` is given.
     ///
     /// # Errors
-    /// If it may not.
+    /// If it may not be written.
     pub(super) fn claim(self, path: &Path) -> anyhow::Result<()> {
         if found(path)? == Found::Other && !self.force {
             bail!(
-                "{} is there, and does not say that Palpate wrote it: --force replaces it",
+                "{} exists and was not written by Palpate; use --force to replace it",
                 path.display()
             );
         }
         Ok(())
     }
 
-    /// The same of `path` and the files beside it that have one of `extensions` instead; if Palpate
-    /// wrote the first, it wrote those.
+    /// Checks `path` and the files beside it with each of `extensions`. If Palpate wrote the first,
+    /// it also wrote the others.
     ///
     /// # Errors
-    /// If one of them may not be written.
+    /// If one of the files may not be written.
     pub(super) fn claim_all(self, path: &Path, extensions: &[&str]) -> anyhow::Result<()> {
         self.claim(path)?;
         if found(path)? == Found::Ours {
@@ -48,23 +49,23 @@ impl Force {
         extensions.iter().try_for_each(|extension| self.claim(&path.with_extension(extension)))
     }
 
-    /// Makes sure that `path`, which people go on to edit, is not there or may be replaced.
+    /// Checks that `path`, a file for the user to edit, does not exist or may be replaced.
     ///
     /// # Errors
-    /// If it is there without `--force`, or is no file.
+    /// If it exists without `--force`, or is not a file.
     pub(super) fn claim_new(self, path: &Path) -> anyhow::Result<()> {
         self.claim(path)?;
         if path.exists() && !self.force {
-            bail!("{} is there: --force replaces it", path.display());
+            bail!("{} exists; use --force to replace it", path.display());
         }
         Ok(())
     }
 
-    /// Makes sure that `path` may become a folder of results of which `own` is one: it is not
-    /// there, empty, or has that file, or `--force` is given.
+    /// Checks that `path` may be a folder of results that contain `own`: it does not exist, is
+    /// empty, contains that file, or `--force` is given.
     ///
     /// # Errors
-    /// If it may not.
+    /// If the folder may not be used.
     pub(super) fn claim_folder(self, path: &Path, own: &str) -> anyhow::Result<()> {
         let is_empty = match fs::read_dir(path) {
             Err(error) if error.kind() == ErrorKind::NotFound => true,
@@ -72,8 +73,8 @@ impl Force {
         };
         if !is_empty && !path.join(own).is_file() && !self.force {
             bail!(
-                "{} holds other things and no {own}: name a new folder, or write beside them with \
-                 --force",
+                "{} contains other files and no {own}: use a new folder, or --force to write to this \
+                 one",
                 path.display()
             );
         }
@@ -81,7 +82,7 @@ impl Force {
     }
 }
 
-/// What is where a file shall be.
+/// Existing file at an output path.
 #[derive(PartialEq)]
 enum Found {
     Nothing,
@@ -97,7 +98,7 @@ fn found(path: &Path) -> anyhow::Result<Found> {
         Ok(kind) => kind,
     };
     if !kind.is_file() {
-        bail!("{name} is a folder, a device or a pipe; allowed is the name of a file");
+        bail!("{name} is a folder, a device or a pipe; allowed is a file");
     }
     let is_ours = is_marked(path).with_context(|| name.to_string())?;
     Ok(if is_ours { Found::Ours } else { Found::Other })
@@ -118,7 +119,7 @@ fn is_marked(path: &Path) -> io::Result<bool> {
     Ok(false)
 }
 
-/// Makes a folder, and those around it.
+/// Creates a folder and its parents.
 pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(path).with_context(|| path.display().to_string())
 }

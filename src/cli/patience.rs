@@ -1,14 +1,15 @@
-//! Steps that take long are named on standard error.
+//! Progress messages for slow steps, on stderr.
 
 use super::terminal::{Talk, tell};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// How long a step may take before its name is shown; chosen.
+/// Time that a step may take before its name is shown.
+// heuristic: a shorter wait needs no message.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Does `work`, which tells the name of each of its steps as it begins, and shows on standard error
-/// those that take long.
+/// Runs `work`, which reports the name of each step at its start, and prints the names of slow
+/// steps to stderr.
 pub(super) fn with_patience<T>(talk: Talk, work: impl FnOnce(&dyn Fn(&str)) -> T) -> T {
     let show = |step: &str| {
         if !talk.quiet {
@@ -30,8 +31,8 @@ fn showing_slow<T>(
     })
 }
 
-/// Shows each of the `begun` steps that no other follows in time, and one now and then of many that
-/// are shorter.
+/// Shows each step of `begun` that runs longer than `patience`. Of many shorter steps it shows one
+/// every [`SEVERAL`] times `patience`.
 fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) {
     let mut shown = Instant::now();
     while let Ok(mut step) = begun.recv() {
@@ -50,7 +51,7 @@ fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) 
     }
 }
 
-/// If steps are each too short to be shown, one is shown after this many times the patience.
+/// Multiple of the patience after which one of many short steps is shown.
 const SEVERAL: u32 = 3;
 
 #[cfg(test)]
@@ -58,13 +59,13 @@ mod tests {
     use super::*;
     use std::sync::Mutex;
 
-    /// The first step ends once it was shown.
+    /// The first step ends after its name is shown.
     #[test]
     fn a_step_that_outlasts_patience_is_shown_once() {
         let (shown, was_shown) = channel();
         let done = showing_slow(
             Duration::from_millis(1),
-            move |step| shown.send(step.to_owned()).expect("somebody waits"),
+            move |step| shown.send(step.to_owned()).expect("receiver is alive"),
             |tell| {
                 tell("slow");
                 was_shown.recv()

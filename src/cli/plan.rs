@@ -1,4 +1,4 @@
-//! `palpate run --plan`: how long each shard of an experiment takes.
+//! `palpate run --plan`: estimates time and memory per shard.
 
 use super::columns::{aligned, duration};
 use super::prepare::simulation;
@@ -9,15 +9,15 @@ use crate::experiment::runner::{self, Shard};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Trials of each planner that are tried for each thread; chosen: the first and last of a batch
-/// leave threads idle, and more of them less so.
+/// Trials per planner and thread in the estimate.
+// heuristic: the first and last trials of a batch leave threads idle; more trials reduce that bias.
 const TRIED: usize = 3;
 
-/// Bytes in the units of `/proc`.
+/// Bytes per unit of `/proc`.
 const KIB: f64 = 1024.0;
 
-/// Runs a few trials of every planner on `threads` threads, 0 for all cores, and prints what each
-/// of `shards` shards will take on this machine.
+/// Runs a few trials of every planner on `threads` threads (0: all cores) and prints the estimated
+/// time and memory of each of `shards` shards on this machine.
 pub(super) fn plan(
     experiment: Experiment,
     shards: u32,
@@ -52,7 +52,7 @@ pub(super) fn plan(
         lines.push([shard, own.len().to_string(), duration(time_s), memory.clone()]);
     }
     print(&format!(
-        "{}{tried} trials were tried on {threads} threads, {} each, after {} of set-up",
+        "{}estimated from {tried} trials on {threads} threads: {} per trial, {} set-up",
         aligned(&lines),
         duration(each_s),
         duration(set_up_s)
@@ -60,7 +60,7 @@ pub(super) fn plan(
     Ok(Ending::Done)
 }
 
-/// The most memory that this process has had, where the system tells.
+/// Peak memory of this process, if the system reports it.
 fn peak_bytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! How far a long command has come, and how it is stopped.
+//! Progress bars and interruption of long commands.
 
 use super::terminal::{Talk, tell};
 use crate::experiment::Experiment;
@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// A flag that the first Ctrl-C raises, to stop after the `pieces` of work in hand; the second
-/// ends the program at once.
+/// Returns a flag that the first Ctrl-C sets, to stop after the running `pieces`; the second Ctrl-C
+/// exits the program.
 pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let raised = stop.clone();
@@ -19,13 +19,13 @@ pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<Atom
         if raised.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        tell(&format!("stopping after the {pieces} in hand; Ctrl-C again to stop at once"));
+        tell(&format!("finishing running {pieces}; press Ctrl-C again to stop at once"));
     };
-    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")?;
+    ctrlc::set_handler(handler).context("cannot handle Ctrl-C")?;
     Ok(stop)
 }
 
-/// A bar over `total` pieces of work.
+/// Progress bar over `total` pieces of work.
 pub(super) fn progress_bar(
     talk: Talk,
     name: &str,
@@ -38,8 +38,9 @@ pub(super) fn progress_bar(
         false => ProgressDrawTarget::stderr(),
     };
     let bar = ProgressBar::with_draw_target(Some(total), target);
-    let template =
-        format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {pieces}, {{elapsed}} gone, {{eta}} left");
+    let template = format!(
+        "{{prefix}} {{wide_bar}} {{pos}}/{{len}} {pieces}, {{elapsed}} elapsed, {{eta}} left"
+    );
     if let Ok(style) = ProgressStyle::with_template(&template) {
         bar.set_style(style);
     }
@@ -50,7 +51,7 @@ pub(super) fn progress_bar(
     bar
 }
 
-/// A bar over the touches of so many trials of `experiment`, to be run and done before.
+/// Progress bar over the touches of `trials` trials to run and `done` finished trials.
 pub(super) fn touches_bar(
     talk: Talk,
     experiment: &Experiment,
@@ -61,7 +62,7 @@ pub(super) fn touches_bar(
     progress_bar(talk, &experiment.name, "touches", (trials + done) * each, done * each)
 }
 
-/// Moves the bar by a touch, or by those that a trial leaves out that ended early.
+/// Advances the bar by a touch; a trial that ended early advances it by its missing touches.
 pub(super) fn touch_step(
     talk: Talk,
     bar: &ProgressBar,
@@ -76,10 +77,11 @@ pub(super) fn touch_step(
     }
 }
 
-/// Work that is done sooner needs no lines of progress; chosen.
+/// Work shorter than this prints no progress lines.
+// heuristic: a short wait needs no message.
 const SOON: Duration = Duration::from_secs(2);
 
-/// Moves the bar; where no terminal shows it, says so in a line for each tenth of what takes long.
+/// Advances the bar. Without a terminal it prints a line per tenth of slow work.
 pub(super) fn step(talk: Talk, bar: &ProgressBar) {
     bar.inc(1);
     let (position, total) = (bar.position(), bar.length().unwrap_or(0));

@@ -27,31 +27,32 @@ Examples:
   palpate register experiments/real_arm.toml --ball 0.02 --at 0,-0.65,0.5
   palpate register models/container.obj --unit mm --cloud runs/container-scan/cloud.ply --at 0,-0.65,0.5
 
-Touches the ball or plate from many sides with many places of the finger, and writes registration.toml: \
-arm.tool_position_m and arm.tool_rotation_deg for the scene, where the body stands, and how sure each is. With --cloud nothing is touched: the contacts are laid onto the object's mesh, and \
-align.toml holds object.position_m and object.rotation_deg for a scene, and how sure they are.")]
+Touches the ball or plate from many sides with many parts of the finger, and writes registration.toml: \
+arm.tool_position_m and arm.tool_rotation_deg for the scene, the body's pose, and the uncertainty of each. With --cloud \
+nothing is touched: the contacts are registered to the object's mesh, and align.toml holds object.position_m and \
+object.rotation_deg for a scene, and their uncertainty.")]
 pub(super) struct Args {
-    /// A scene with an arm, or an experiment (.toml), whose [backend] says which arm, or the name
-    /// of one; with --cloud the object's mesh (.obj, .gltf, .glb, .stl, .ply).
+    /// Scene with an arm (.toml, or its name), or experiment with a [backend]; with --cloud the
+    /// object's mesh (.obj, .gltf, .glb, .stl, .ply).
     file: PathBuf,
-    /// What is touched, and where to about 1 cm.
+    /// Touched body and its position, known to about 1 cm.
     #[command(flatten)]
     body: KnownBodyArgs,
     #[command(flatten)]
     cloud: Cloud,
-    /// How many touches.
+    /// Number of touches.
     #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u16).range(12..=1000))]
     touches: u16,
-    /// Root of the randomness of the sensors and of which touches are considered.
+    /// Seed of the sensor noise and of the candidate touches.
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
+    /// Clear latched faults on the robot before moving (operator only).
     #[arg(long)]
     clear_fault: bool,
     /// Change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The file to write [default: registration.toml, with --cloud align.toml].
+    /// Output file [default: registration.toml, with --cloud align.toml].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -76,10 +77,10 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         false => (Scene::load(&path, &args.set)?, BackendSettings::default()),
     };
     let body =
-        args.body.body()?.context("--ball RADIUS_M or --plate X,Y,Z says what is touched")?;
+        args.body.body()?.context("no body to touch: give --ball RADIUS_M or --plate X,Y,Z")?;
     let environment = Arc::new(known_body::environment(&scene, &body)?);
     let touch = environment.task().touch();
-    let robot = environment.robot().context("no robot touches this scene")?;
+    let robot = environment.robot().context("this scene has no robot")?;
     let of = args.touches.into();
     let design =
         Design::new(&robot, &scene.touch, &body, of, &mut seed::stream(args.seed, 0, "design"))?;
@@ -100,7 +101,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     bar.finish_and_clear();
     let before = scene.arm.as_ref().and_then(|arm| arm.correction());
     let text = format!(
-        "# Palpate {}: found by touch. [arm] goes into the scene.\n\n{}",
+        "# Palpate {}: registration by touch. Copy [arm] into the scene.\n\n{}",
         env!("CARGO_PKG_VERSION"),
         found.tables(before)
     );

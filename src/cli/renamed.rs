@@ -1,13 +1,13 @@
-//! Names that commands had in the version before: they still answer.
+//! Deprecated command names, accepted for one version.
 
 use anyhow::{bail, ensure};
 use std::ffi::OsString;
 
-/// `arguments`, of which the first is the program's name, in today's words, and how its command is
-/// called today if it had another name.
+/// Translates `arguments`, the first of which is the program's name, from deprecated to current
+/// names. Also returns a note if the command's name was deprecated.
 ///
 /// # Errors
-/// If there is no such command any more, or its arguments cannot be put into today's order.
+/// If the command was removed, or its arguments cannot be translated.
 pub(super) fn today(
     mut arguments: Vec<OsString>,
 ) -> anyhow::Result<(Vec<OsString>, Option<String>)> {
@@ -54,9 +54,9 @@ pub(super) fn today(
             rest.extend(["--against", "scene"].map(OsString::from));
             ("accuracy", "accuracy SCENE --against scene")
         }
-        "stress" => bail!("palpate stress is gone: `make hard-cases` runs and explains them all"),
-        "bench" => bail!("palpate bench is gone: `make bench` measures speed"),
-        "cost" => bail!("palpate cost is gone: `make check-cost` counts instructions"),
+        "stress" => bail!("palpate stress was removed; use `make hard-cases`"),
+        "bench" => bail!("palpate bench was removed; use `make bench` to measure speed"),
+        "cost" => bail!("palpate cost was removed; use `make check-cost` to count instructions"),
         _ => {
             arguments.append(&mut rest);
             return Ok((arguments, None));
@@ -72,7 +72,7 @@ fn has(arguments: &[OsString], name: &str) -> bool {
     arguments.iter().any(|argument| value(argument, name).is_some())
 }
 
-/// Gives the option `old` its name of today.
+/// Renames the option `old` to `new`.
 fn rename(arguments: &mut [OsString], old: &str, new: &str) {
     for argument in arguments {
         if let Some(value) = value(argument, old) {
@@ -81,7 +81,7 @@ fn rename(arguments: &mut [OsString], old: &str, new: &str) {
     }
 }
 
-/// What follows the option `name` in its own argument, `=VALUE` or nothing, if it is that option.
+/// Returns the rest of the argument after the option `name`: `=VALUE` or nothing.
 fn value(argument: &OsString, name: &str) -> Option<String> {
     let value = argument.to_str()?.strip_prefix(name)?;
     (value.is_empty() || value.starts_with('=')).then(|| value.into())

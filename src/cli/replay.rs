@@ -15,19 +15,18 @@ use std::path::PathBuf;
 Examples:
   palpate run container_finger --record
   palpate replay runs/container_finger/recordings/active-0000.mcap
-  palpate replay FILE --set scene.touch.press_m=0.001    where would that have been another trial?
+  palpate replay FILE --set scene.touch.press_m=0.001    first difference under a changed setting
 
-Plays what was read in the trial to today's servo, belief and planner, and compares every command and \
-every touch's row with the recorded ones. A trial of a real arm that was interrupted and continued is \
-recorded in parts (active-0000.mcap, active-0000-part-2.mcap, …): given the first, all are replayed. \
-Exit codes: 0 the same, 1 something differs, 2 could not.")]
+Feeds the recorded readings to the current servo, belief and planner, and compares every command and every touch's row \
+with the recording. A trial of a real arm that was interrupted and continued is recorded in parts (active-0000.mcap, \
+active-0000-part-2.mcap, …): given the first, all are replayed. Exit codes: 0 no difference, 1 a difference, 2 error.")]
 pub(super) struct Args {
-    /// A recording, as `palpate run --record` writes them.
+    /// Recording, written by `palpate run --record`.
     file: PathBuf,
     /// Change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Print what came of it as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -51,7 +50,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     Ok(if is_same { Ending::Done } else { Ending::Failed })
 }
 
-/// A file of a recorded trial with its replay.
+/// Recording file of a trial and its replay.
 struct Part {
     file: PathBuf,
     recorded: Recorded,
@@ -91,12 +90,12 @@ fn text(recorded: &Recorded, replay: &Replay) -> String {
     let about = &recorded.about;
     let head =
         format!("{}, trial {}, recorded by palpate {}", about.planner, about.trial, about.version);
-    let cut = if *is_cut { "; the recording ends before its trial" } else { "" };
+    let cut = if *is_cut { "; the recording ends before the trial does" } else { "" };
     let before = match recorded.made {
         0 => String::new(),
-        made => format!(", {made} of them made before this part"),
+        made => format!(", {made} of them from earlier parts"),
     };
-    let same = format!("{touches} touches the same, decisions and belief{before}");
+    let same = format!("{touches} touches identical in decisions and belief{before}");
     match difference {
         None => format!("{head}\n{same}, over {} ticks{cut}", recorded.tick_count),
         Some(difference) => format!("{head}\n{same}{cut}\n{}", words(difference)),
@@ -105,13 +104,15 @@ fn text(recorded: &Recorded, replay: &Replay) -> String {
 
 fn words(difference: &Difference) -> String {
     let reason = |failure: &Option<String>| {
-        failure.as_ref().map_or("whole".into(), |failure| format!("because of: {failure}"))
+        failure
+            .as_ref()
+            .map_or("without failure".into(), |failure| format!("with failure: {failure}"))
     };
     match difference {
         Difference::Command { touch, tick, time_s, joint, recorded, now } => {
             let value = |value: &Option<f64>| value.map_or("nothing".into(), |v| format!("{v:?}"));
             format!(
-                "differs in touch {touch} at tick {tick}, after {time_s:.3} s: joint {joint} was told \
+                "touch {touch} differs at tick {tick}, after {time_s:.3} s: command to joint {joint} recorded \
                  {}, now {}",
                 value(recorded),
                 value(now)
@@ -122,13 +123,13 @@ fn words(difference: &Difference) -> String {
             let from = recorded[..at.min(recorded.len())].rfind(',').map_or(0, |comma| comma + 1);
             let part = |row: &str| brief(row.get(from..).unwrap_or(row));
             format!(
-                "differs in touch {touch}: of the same readings came\n  {}\nand now comes\n  {}",
+                "touch {touch} differs for the same readings: recorded\n  {}\nnow\n  {}",
                 part(recorded),
                 part(now)
             )
         }
         Difference::End { recorded_touches, recorded, now_touches, now } => format!(
-            "differs in its end: it ended after {recorded_touches} touches {}, and now ends after \
+            "the trial's end differs: recorded after {recorded_touches} touches {}, now after \
              {now_touches} {}",
             reason(recorded),
             reason(now)

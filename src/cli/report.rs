@@ -12,17 +12,17 @@ use std::path::PathBuf;
 Examples:
   palpate report runs/toy
   palpate report runs/toy --set report.trial=3 --set report.baselines='[\"sobol\"]'
-  palpate report runs/toy --merge runs/toy-*-of-8            of the shards of palpate run toy --shard I/8
+  palpate report runs/toy --merge runs/toy-*-of-8            merge the shards of palpate run toy --shard I/8
 
-Merged rows are the bytes of a run in one process. A trial that stands in two shards or in none, or a shard of another \
-experiment, is refused.")]
+Merged rows equal, byte for byte, those of a run in one process. Duplicate or missing trials and shards of another \
+experiment are errors.")]
 pub(super) struct Args {
-    /// A run's folder; with --merge a new one.
+    /// Folder of a run; with --merge a new folder.
     folder: PathBuf,
-    /// First put the run folders of these shards together.
+    /// Merge the run folders of these shards first.
     #[arg(long, value_name = "SHARD", num_args = 1..)]
     merge: Vec<PathBuf>,
-    /// Change what is shown, from now on: `report.…` or `question`, and a TOML value; may be
+    /// Change a `report.…` setting or `question` for good: a dotted key and a TOML value; may be
     /// repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,

@@ -29,19 +29,19 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   palpate run experiments/container.toml
   palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
-  palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
-  palpate run experiments/suite/six.toml                 planners on objects that differ
-  palpate run toy --shard 3/8                            an eighth of the trials: palpate report --merge
-  palpate run bird --plan 8 --threads 16                 how long each of 8 shards would take
+  palpate run runs/toy/resolved.toml --out runs/again    repeat a run, byte for byte
+  palpate run experiments/suite/six.toml                 several objects ([sweep])
+  palpate run toy --shard 3/8                            an eighth of the trials; palpate report --merge
+  palpate run bird --plan 8 --threads 16                 estimate time and memory of 8 shards
 
-Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.
-On a finished run, more trials or other planners are run beside those that are there, and trials or
-planners that are no longer listed are kept, but not shown; `question` and `report.…` only draw it
-again. Whatever else is changed wants another folder (--out) or a new start (--fresh).
+Press Ctrl-C to stop after the running trials; repeat the command to continue. On a finished run, new
+trials or planners are added. Trials or planners that are no longer listed are kept but not shown.
+`question` and `report.…` change only the report. Other changes need another folder (--out) or a new
+start (--fresh).
 
-Of an experiment with a [sweep], each combination is a run in runs/NAME; they are compared in units of the errors of sobol (or
-of the first baseline), over all and one by one: tables, the page suite.html and the numbers suite.csv. `palpate compare` does
-the same in units of another planner's.";
+An experiment with a [sweep] runs each combination in runs/NAME. Planners are compared over all
+combinations and per combination, relative to sobol (or the first baseline): tables, the page suite.html
+and the table suite.csv. Use `palpate compare` for another reference planner.";
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -53,27 +53,28 @@ pub(super) struct Args {
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Run this planner too, built in or in Python, MODULE:CLASS; may be repeated. Python wants the
-    /// `palpate` of the Python package.
+    /// Also run this planner, built in or Python (MODULE:CLASS); may be repeated. Python planners
+    /// need the `palpate` of the Python package.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
     /// Threads; 0 means all cores. Results do not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
-    /// Throw away what an earlier run left in the folder.
+    /// Delete the earlier results in the folder and start again.
     #[arg(long)]
     fresh: bool,
-    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate report
-    /// FOLDER --merge SHARDS` puts them together.
+    /// Run shard I of N (every N-th trial) in runs/NAME-I-of-N; merge with `palpate report FOLDER
+    /// --merge SHARDS`.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Only try a few trials, and say what each of N shards would take on this machine alone.
+    /// Estimate time and memory per shard for N shards on this machine, from a few trials; run
+    /// nothing else.
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     plan: Option<u32>,
-    /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
+    /// Record every tick of every trial to recordings/PLANNER-TRIAL.mcap in the run's folder.
     #[arg(long)]
     record: bool,
-    /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
+    /// Clear latched faults on the robot before moving (operator only).
     #[arg(long)]
     clear_fault: bool,
     /// Write rows and summary only, no figures.
@@ -85,7 +86,7 @@ pub(super) struct Args {
 }
 
 impl Args {
-    /// The end of a folder's name that tells a shard.
+    /// Suffix of a shard's folder name.
     fn suffix(&self) -> String {
         self.shard.map(|it| format!("-{}-of-{}", it.index, it.count)).unwrap_or_default()
     }
@@ -106,10 +107,10 @@ pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending
     }
     ensure!(
         args.plan.is_none(),
-        "{}: --plan goes with an experiment without a [sweep]",
+        "{}: --plan needs an experiment without a [sweep]",
         path.display()
     );
-    // All of them are looked at before the first is run.
+    // All combinations are loaded before the first is run.
     let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
     let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let first = experiments[0].clone();
@@ -130,10 +131,10 @@ pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending
     Ok(Ending::Done)
 }
 
-/// The planner in whose errors the cells of a sweep are compared, if it is run.
+/// Preferred reference planner of a sweep's comparison.
 const REFERENCE: &str = "sobol";
 
-/// Compares the finished runs of a sweep: tables on the terminal, and a page in its folder.
+/// Compares the finished runs of a sweep: prints tables and writes a page to its folder.
 fn compare_cells(
     args: &Args,
     (first, name): (&Experiment, &str),
@@ -144,7 +145,7 @@ fn compare_cells(
     let runs: Vec<(String, Run)> = paths.into_iter().map(read).collect::<Result<_, _>>()?;
     let is_usual = first.planners.iter().any(|planner| planner == REFERENCE);
     let against = if is_usual { REFERENCE } else { first.baselines()[0] };
-    // Cells of other planners, or without a truth, have nothing in common.
+    // Cells with different planners, or without ground truth, cannot be compared.
     let Ok(mut compared) = compare(&runs, against) else { return Ok(()) };
     for object in &mut compared.objects {
         let label = object.strip_prefix(name).unwrap_or(object);
@@ -161,7 +162,7 @@ fn compare_cells(
     Ok(())
 }
 
-/// What `load` reads with the settings asked for, and the planners that are to be run too.
+/// Loads the experiment with the given settings and adds the planners of `--planner`.
 fn with_planners(
     args: &Args,
     load: impl Fn(&[String]) -> Result<Experiment, ConfigError>,
@@ -177,15 +178,15 @@ fn with_planners(
     load(&[&args.set[..], &[format!("planners=[{}]", names.join(","))]].concat())
 }
 
-/// What stands in a run's folder after it was run.
+/// Result of a run.
 struct Made {
     path: PathBuf,
-    /// How many trials, and how long they took.
+    /// Number of trials run and their duration.
     words: String,
     tally: Tally,
-    /// How many there should be.
+    /// Expected number of trials.
     total: u64,
-    /// Where and why a real arm stopped, and what is kept.
+    /// Place and reason of a real arm's halt, and the results kept.
     halt: Option<String>,
 }
 
@@ -194,7 +195,7 @@ impl Made {
         self.tally.trials as u64 == self.total
     }
 
-    /// How it ended; says on standard error how many trials failed and why the first did.
+    /// Returns the outcome; prints to stderr the number of failed trials and the first failure.
     fn ending(&self, talk: Talk) -> Ending {
         let Tally { trials, failed } = &self.tally;
         let all_failed = *trials > 0 && failed.len() == *trials;
@@ -216,7 +217,7 @@ impl Made {
     }
 }
 
-/// Runs what is not there yet.
+/// Runs the missing trials.
 fn make(
     args: &Args,
     experiment: Experiment,
@@ -233,24 +234,24 @@ fn make(
     if args.record && !experiment.scene.body.moves() && !simulation.is_real() {
         let body = experiment.scene.body.name();
         bail!(
-            "--record: body = \"{body}\" touches without moving, so that there is nothing to record; \
-             allowed are \"kinematic\" and \"dynamic\""
+            "--record: body = \"{body}\" does not move, so there is nothing to record; allowed are \
+             \"kinematic\" and \"dynamic\""
         );
     }
     if args.shard.is_some() && simulation.is_real() {
-        bail!("--shard: a real arm makes one trial after another; leave it out");
+        bail!("--shard: a real arm runs one trial at a time; remove --shard");
     }
     let path = out.unwrap_or_else(|| {
         PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
     });
     let (mut folder, done) = RunFolder::open(&path, &simulation, host.commit, args.fresh)?;
-    // Before an arm is looked for: another program may hold the folder, or a fault may want an
-    // operator.
+    // Checked before the connection to an arm: another program may hold the folder, or a fault may
+    // need an operator.
     if simulation.is_real() {
         if let Some(reason) = Journal::open(&path)?.halted().filter(|_| !args.clear_fault) {
             bail!(
-                "{}: the run was halted by a fault: {reason}\nlook at the arm, then go on with \
-                 --clear-fault, or use --fresh to start again",
+                "{}: a fault halted the run: {reason}\ncheck the arm, then use --clear-fault to continue, \
+                 or --fresh to start again",
                 path.display()
             );
         }
@@ -270,7 +271,7 @@ fn make(
         None => stop.insert(stop_on_interrupt("trials")?),
     };
 
-    // One that cannot be brought is no harm where all its trials are there.
+    // A planner that cannot be loaded is an error only if trials of it are missing.
     let why = |error: Invalid| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
     let mut jobs = runner::jobs(&simulation, &done).map_err(why)?;
     if let Some(shard) = args.shard {
@@ -295,7 +296,7 @@ fn make(
     let tally = folder.sort(experiment)?;
     let mut words = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
     if !done.is_empty() {
-        words += &format!(", {} were there already", done.len());
+        words += &format!(", {} already done", done.len());
     }
     Ok(Made { path, words, tally, total, halt })
 }
@@ -309,7 +310,7 @@ fn run_one(
 ) -> anyhow::Result<Ending> {
     let made = make(args, experiment, out, stop, (talk, host))?;
     let Made { path, words, total, halt, .. } = &made;
-    // A part of a run is not looked at: its rows need not fit into memory.
+    // A shard is not summarised: its rows may not fit in memory.
     if args.shard.is_some() {
         print(&format!("{words}\nrows in {}", path.display()))?;
         return Ok(made.ending(talk));
@@ -321,14 +322,15 @@ fn run_one(
     report::write_tables(&run, &analysis, path)?;
     if !made.is_finished() {
         text += &format!(
-            "\nstopped with {} of {total} trials in {}; the same command continues",
+            "\nstopped with {} of {total} trials in {}; repeat the command to continue",
             run.rows.len(),
             path.display()
         );
     } else if args.no_report {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
-        report::write(&run, &analysis, path).context("the rows are safe, but the report failed")?;
+        report::write(&run, &analysis, path)
+            .context("the rows are saved, but the report failed")?;
         text += &format!("\nreport: {}", path.join("report.html").display());
     }
     match args.json {
@@ -337,8 +339,8 @@ fn run_one(
     }
     if let Some(halt) = halt {
         let kept = format!(
-            "{halt}; mend what is wrong, and the same command goes on (--clear-fault clears what the \
-             arm's side has latched)"
+            "{halt}; fix the cause, then repeat the command to continue (--clear-fault clears faults \
+             latched on the robot)"
         );
         let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
         if !is_asked {

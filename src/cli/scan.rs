@@ -1,4 +1,4 @@
-//! `palpate export SCENE`: a grid of touches as a cloud of contacts.
+//! `palpate export SCENE`: touches a grid of targets and writes the contact cloud.
 
 use super::output::{Force, make_folder};
 use super::prepare::{environment, needs_zone, simulator};
@@ -14,22 +14,22 @@ use palpate_explore::backend::Fault;
 use palpate_explore::probe::Touch;
 use std::path::Path;
 
-/// How a scene is scanned.
+/// Options of a scan.
 #[derive(clap::Args)]
 pub(super) struct Scan {
-    /// Of a scene: change one setting; may be repeated.
+    /// Scene only: change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub(super) set: Vec<String>,
-    /// Of a scene: threads; 0 means all cores.
+    /// Scene only: threads; 0 means all cores.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub(super) threads: u16,
 }
 
-/// Vertices, cells or targets along each side.
+/// Number of vertices, cells or targets along each side.
 #[derive(Clone, Copy)]
 pub(super) struct Grid(pub(super) [usize; 2]);
 
-/// Most of them along a side.
+/// Largest number along a side.
 const SIDE_MAX: usize = 2001;
 
 pub(super) fn grid(text: &str) -> Result<Grid, String> {
@@ -39,7 +39,7 @@ pub(super) fn grid(text: &str) -> Result<Grid, String> {
     sides.ok_or(format!("allowed is N, or NxM as in 41x51, each 2 to {SIDE_MAX}"))
 }
 
-/// Touches a grid of targets of the scene at `path`, and writes where they made contact.
+/// Touches a grid of targets of the scene at `path` and writes the contacts.
 pub(super) fn scan(
     path: &Path,
     args: &Scan,
@@ -49,11 +49,11 @@ pub(super) fn scan(
     let scene = Scene::load(path, &args.set)?;
     needs_zone(&scene, path)?;
     let environment = environment(scene, talk)?;
-    let mesh = environment.mesh().with_context(|| {
-        format!("{} has no object, so there is no surface to scan", path.display())
-    })?;
+    let mesh = environment
+        .mesh()
+        .with_context(|| format!("{}: no object, so no surface to scan", path.display()))?;
     let zone = environment.task().zone();
-    let zone = zone.with_context(|| format!("{} has no [zone] to scan", path.display()))?;
+    let zone = zone.with_context(|| format!("{}: no [zone] to scan", path.display()))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let folder = out.map_or_else(|| Path::new("runs").join(format!("{name}-scan")), Path::to_owned);
     force.claim_folder(&folder, "cloud.ply")?;
@@ -100,7 +100,7 @@ pub(super) fn scan(
     Ok(Ending::Done)
 }
 
-/// A line per target: where it was, how the touch ended, and the contact with its normal.
+/// Returns a CSV line per target: its position, the outcome, the contact point and its normal.
 fn csv(targets: &[Vec<f64>], touches: &[Result<Touch, Fault>]) -> String {
     let mut text =
         String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");

@@ -30,25 +30,25 @@ use std::path::{Path, PathBuf};
 Examples:
   palpate show models/bird.glb
   palpate show my-part.obj --unit mm
-  palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's own viewer
+  palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's viewer
   palpate show scenes/container.toml --png container.png     a picture of the zone on the object
-  palpate show scenes/bird_around_pa10.toml --png bird.png   what of a whole object can be touched
+  palpate show scenes/bird_around_pa10.toml --png bird.png   reachable surface of a whole object
   palpate show scenes/bird_pa10.toml --render bird.png       the whole scene with its robot
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy
   palpate show scenes/bird_pa10.toml --watch                 a trial of active in a window
   palpate show experiments/container_pa10.toml --watch --planner sobol --speed 5
 
-In the window stand arm, finger and object, and a small ball at every contact found. Drag with the mouse to turn and move, \
-F1 lists the keys, Control+Q or closing the window ends the trial. It needs X11 or Wayland with OpenGL.")]
+The window shows arm, finger and object, and a small ball at every contact. Drag with the mouse to turn and move; F1 lists \
+the keys; Control+Q or closing the window ends the trial. It needs X11 or Wayland with OpenGL.")]
 pub(super) struct Args {
-    /// A mesh (.obj, .gltf, .glb, .stl, .ply), a scene or an experiment (.toml), the name of a
-    /// scene in scenes/, or a run's folder.
+    /// Mesh (.obj, .gltf, .glb, .stl, .ply), scene or experiment (.toml), name of a scene in
+    /// scenes/, or a run's folder.
     path: PathBuf,
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<Unit>,
-    /// Let a .gltf mesh name buffers outside its own folder; a scene says object.outside_buffers.
+    /// Let a .gltf mesh read buffers outside its folder; in a scene use object.outside_buffers.
     #[arg(long)]
     outside_buffers: bool,
     /// Change one setting of a scene or experiment; may be repeated.
@@ -57,10 +57,10 @@ pub(super) struct Args {
     /// Write a scene as MJCF, the format of MuJoCo.
     #[arg(long, value_name = "FILE")]
     mjcf: Option<PathBuf>,
-    /// Draw a scene's object with the zone on it; around an object, what of it can be touched.
+    /// Draw a scene's object with its zone, or the reachable surface of a whole object.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
-    /// Draw a scene with its robot by MuJoCo (needs a build with `--features render`).
+    /// Render a scene and its robot with MuJoCo (needs a build with `--features render`).
     #[arg(long, value_name = "FILE")]
     render: Option<PathBuf>,
     #[command(flatten)]
@@ -94,9 +94,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
             "--outside-buffers",
             args.outside_buffers,
             is_mesh,
-            "a mesh; a scene says object.outside_buffers",
+            "a mesh; in a scene use object.outside_buffers",
         ),
-        ("--unit", args.unit.is_some(), is_mesh, "a mesh; a scene says object.unit"),
+        ("--unit", args.unit.is_some(), is_mesh, "a mesh; in a scene use object.unit"),
     ];
     only_with(&path, &options)?;
     for file in [&args.mjcf, &args.png, &args.render].into_iter().flatten() {
@@ -123,7 +123,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// Test places along each side of the zone from which a scene's heights are described.
+/// Test points along each side of the zone, for the summary of a scene's heights.
 const GRID: usize = 41;
 
 fn run_folder(run: &Run, json: bool) -> String {
@@ -174,38 +174,38 @@ fn scene(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<String> {
     } else if args.mjcf.is_some() || args.render.is_some() {
         ensure!(
             environment.task().ball().is_none(),
-            "a stage that turns the finger around an object has no model in MuJoCo; allowed is a scene \
+            "a stage that turns the finger around an object has no MuJoCo model; allowed is a scene \
              with [arm]"
         );
-        bail!("this scene has no mesh, so there is nothing to write as MJCF or to draw");
+        bail!("this scene has no mesh to write as MJCF or to draw");
     }
     Ok(text)
 }
 
-/// What of one side of the object the finger can touch.
+/// Describes the reachable surface of one side of the object.
 fn one_side(environment: &Environment, talk: Talk) -> String {
     let truth = with_patience(talk, |tell| {
-        tell("looking where the finger can touch the surface");
+        tell("finding the reachable surface");
         Truth::sample(environment, GRID, &|_| ())
     });
     notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
     let (count, places) = (truth.count(), truth.places.len());
-    let mut text = format!("\nsurface in the zone: {count} of {places} test places");
+    let mut text = format!("\nsurface in the zone: {count} of {places} test points");
     if let Some([low, high]) = truth.span_m() {
         text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
     }
     text + &format!("; the finger can touch {} of them\n", truth.reachable_count())
 }
 
-/// The true surface of a whole object, with what of it the finger can touch.
+/// True surface of a whole object, with its reachable part.
 fn shape(environment: &Environment, talk: Talk) -> Option<TrueShape> {
     with_patience(talk, |tell| {
-        tell("looking where the finger can touch the surface");
+        tell("finding the reachable surface");
         TrueShape::of(environment)
     })
 }
 
-/// What of a whole object the finger can touch.
+/// Describes the reachable surface of a whole object.
 fn whole(ball: &Ball, shape: Option<&TrueShape>, talk: Talk) -> String {
     let [x, y, z]: [f64; 3] = ball.centre_w.into();
     let radius_mm = 1e3 * ball.radius_m;
@@ -217,7 +217,7 @@ fn whole(ball: &Ball, shape: Option<&TrueShape>, talk: Talk) -> String {
     text + "\n"
 }
 
-/// A picture of a whole object with what of it can be touched; none of an environment without one.
+/// Picture of a whole object with its reachable surface; `None` without a mesh or a true surface.
 fn what_is_reached(
     ball: &Ball,
     shape: Option<&TrueShape>,
@@ -249,7 +249,7 @@ fn compiled(mjcf: &str) -> String {
 
 #[cfg(not(feature = "mujoco"))]
 fn compiled(_: &str) -> String {
-    "this build is without MuJoCo (feature `mujoco`)".into()
+    "this build has no MuJoCo (feature `mujoco`)".into()
 }
 
 #[cfg(feature = "render")]
@@ -261,5 +261,5 @@ fn draw(mjcf: &str, path: &Path) -> anyhow::Result<()> {
 
 #[cfg(not(feature = "render"))]
 fn draw(_: &str, _: &Path) -> anyhow::Result<()> {
-    bail!("this build cannot draw: build it with --features render")
+    bail!("this build cannot render; build with --features render")
 }

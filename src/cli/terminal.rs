@@ -1,32 +1,32 @@
-//! What a command says, and how it ends.
+//! Terminal output and outcomes of commands.
 
 use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use std::fmt;
 use std::io::{self, Write};
 
-/// How a command ended, if it did not fail.
+/// Outcome of a command that did not fail with an error.
 pub(super) enum Ending {
-    /// Whole.
+    /// The command completed.
     Done,
-    /// What was tested did not hold.
+    /// A test failed.
     Failed,
-    /// What was asked cannot be told.
+    /// The data do not decide the question.
     Undecided,
-    /// The person who began it stopped it.
+    /// The user interrupted the command.
     Interrupted,
 }
 
-/// How much a command says beside its result.
+/// Verbosity of a command.
 #[derive(Clone, Copy, clap::Args)]
 pub(super) struct Talk {
-    /// Say nothing on standard error but errors: no notes, no progress.
+    /// Print only errors to stderr: no notes, no progress.
     #[arg(long, short, global = true)]
     pub(super) quiet: bool,
 }
 
 impl Talk {
-    /// Says on standard error what a user may want to know.
+    /// Prints a note to stderr, unless quiet.
     pub(super) fn note(self, text: impl fmt::Display) {
         if !self.quiet {
             say(AnsiColor::Yellow.on_default().bold(), "note", text);
@@ -34,17 +34,17 @@ impl Talk {
     }
 }
 
-/// Says on standard error why a command could not do what it was asked.
+/// Prints an error to stderr.
 pub(super) fn error(text: impl fmt::Display) {
     say(AnsiColor::Red.on_default().bold(), "error", text);
 }
 
-/// A line on standard error, coloured on a terminal; one who does not listen is no error.
+/// Writes a line to stderr, coloured on a terminal; write errors are ignored.
 fn say(style: Style, kind: &str, text: impl fmt::Display) {
     let _ = writeln!(anstream::stderr(), "{style}{kind}:{style:#} {text}");
 }
 
-/// Prints to standard output; a reader who has gone away is no error.
+/// Prints to stdout; a closed pipe is not an error.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     match writeln!(io::stdout(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -54,8 +54,7 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Prints to standard error. There is no one to tell that it cannot be written, and no work is
-/// worth less for that.
+/// Prints to stderr; write errors are ignored.
 pub(super) fn tell(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }

@@ -27,11 +27,11 @@ Examples:
 
 In another terminal: palpate run real_arm
 
-Serves the simulated arm over the topics of the experiment's [backend] in real time, with what an arm's own \
-computer does: a command that is late, garbled or of a second publisher stops the arm. Events are printed as \
-JSON lines. Ctrl-C ends it. A failure is begun by --inject, or by the service /twin/NAME.";
+Serves a simulated robot over the topics of the experiment's [backend] in real time, with the checks of a robot \
+controller: a late or invalid command, or one of a second publisher, stops the arm. Events are printed as JSON lines. \
+Ctrl-C ends it. Use --inject or the service /twin/NAME to begin a failure.";
 
-/// A line for each failure.
+/// Lists the failures, one per line.
 fn failures() -> String {
     let line = |failure: &Failure| format!("  {:<14} {}", failure.name, failure.about);
     FAILURES.iter().map(line).collect::<Vec<_>>().join("\n")
@@ -40,22 +40,23 @@ fn failures() -> String {
 #[derive(clap::Args)]
 #[command(after_help = format!("{HELP}\n\nFailures:\n{}", failures()))]
 pub(super) struct Args {
-    /// An experiment or a scene (.toml, or the name of a shipped one) whose body moves and whose
-    /// finger is soft.
+    /// Experiment or scene (.toml, or the name of a shipped one) with a moving body and a soft
+    /// finger.
     path: PathBuf,
-    /// In place of the scene's object: what `register` touches.
+    /// Body for `palpate register`, in place of the scene's object.
     #[command(flatten)]
     body: KnownBodyArgs,
     /// Transport [default: the experiment's, or ros2].
     #[arg(long, value_name = "ros2|ros1", value_parser = kind)]
     kind: Option<BackendKind>,
-    /// Domain of ROS 2 [default: the experiment's, ROS_DOMAIN_ID, or 0].
+    /// ROS 2 domain [default: the experiment's, ROS_DOMAIN_ID, or 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
-    /// Begin a failure some seconds after the first movement, and end it: NAME@SECONDS[+SECONDS].
+    /// Inject a failure some seconds after the first movement, for a duration if given; may be
+    /// repeated.
     #[arg(long, value_name = "NAME@AT[+FOR]", value_parser = injection)]
     inject: Vec<Injection>,
-    /// Randomness of the sensors.
+    /// Seed of the sensor noise.
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
     /// Change one setting; may be repeated.
@@ -86,7 +87,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = &mut experiment.scene;
     if scene.effects.wrench.is_none() {
         scene.effects.wrench = Some(WrenchEffect::default());
-        talk.note("the scene has no [effects.wrench]; the twin has the default one");
+        talk.note("the scene has no [effects.wrench]; the default is used");
     }
     let settings = experiment.backend.clone();
     let scene = experiment.scene;
@@ -98,7 +99,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = environment.scene();
     let (Some(body), Some(robot)) = (simulator.body()?, environment.robot()) else {
         bail!(
-            "{}: body = \"{}\" does not move; a twin needs \"kinematic\" or \"dynamic\"",
+            "{}: body = \"{}\" does not move; allowed are \"kinematic\" and \"dynamic\"",
             args.path.display(),
             scene.body.name()
         );
@@ -106,8 +107,8 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let effects = &scene.effects;
     if effects.fluid.is_none() || effects.electrodes.is_none() {
         bail!(
-            "{}: a twin sends tactile frames; it needs [effects.skin], [effects.fluid] and \
-             [effects.electrodes]",
+            "{}: tactile frames need [effects.skin], [effects.fluid] and [effects.electrodes] in the \
+             scene",
             args.path.display()
         );
     }
@@ -115,7 +116,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let open = connect(&settings, Side::Arm, services())?;
     let injections = args.inject.clone();
     let mut twin = Twin::new(body, &robot.chain, &settings, open, injections, args.seed)
-        .context("cannot serve")?;
+        .context("cannot start the simulated robot")?;
     let mut written = Ok(());
     twin.run(&stop, &mut |time_unix_s, event| {
         let line = json!({ "time_unix_s": time_unix_s, "event": event });
@@ -127,7 +128,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// Touches of the experiment that a scene alone makes; a twin makes none by itself.
+/// Touches of the experiment for a scene; the server makes no touches itself.
 const TOUCHES: u32 = 1;
 
 fn experiment(args: &Args) -> anyhow::Result<Experiment> {

@@ -1,4 +1,4 @@
-//! `palpate show --watch`: a trial in a window while it runs.
+//! `palpate show --watch`: shows a running trial in a window.
 
 use super::find::is_experiment;
 use super::prepare::simulation;
@@ -17,7 +17,7 @@ use palpate_explore::probe::{Probe, Swept, Touch};
 use palpate_explore::task::Approach;
 use std::path::Path;
 
-/// What trial is watched, and how fast.
+/// Options of the watched trial.
 #[derive(clap::Args)]
 pub(super) struct Watch {
     /// Open MuJoCo's viewer on a trial while it runs (needs a build with `--features viewer`).
@@ -29,15 +29,16 @@ pub(super) struct Watch {
     /// Touches of the trial [default: the experiment's, or 40].
     #[arg(long, value_name = "N", requires = "watch", value_parser = clap::value_parser!(u32).range(1..=2000))]
     touches: Option<u32>,
-    /// Which of the experiment's trials.
+    /// Trial number.
     #[arg(long, default_value_t = 0, value_name = "N", requires = "watch")]
     trial: u32,
-    /// Simulated seconds in one of the clock, at most.
+    /// Maximum simulated seconds per real second.
     #[arg(long, default_value_t = 1.0, value_name = "X", requires = "watch", value_parser = speed)]
     speed: f64,
 }
 
-/// Touches if nobody says how many; chosen.
+/// Default number of touches.
+// heuristic: the number that `palpate new` writes.
 const TOUCHES: u32 = 40;
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -45,7 +46,7 @@ fn speed(text: &str) -> Result<f64, String> {
     speed.ok_or("allowed is 0.01 to 100".into())
 }
 
-/// Shows a trial of the scene or experiment at `path` until its window is closed.
+/// Shows a trial of the scene or experiment at `path` until the window is closed.
 pub(super) fn watch(
     path: &Path,
     sets: &[String],
@@ -58,7 +59,7 @@ pub(super) fn watch(
     let Some(body) = simulation.simulator().body()? else {
         let (path, body) = (path.display(), simulation.experiment().scene.body.name());
         bail!(
-            "{path}: body = \"{body}\" touches without moving; to be watched are \"kinematic\" and \
+            "{path}: body = \"{body}\" does not move; allowed are \"kinematic\" and \
              \"dynamic\""
         );
     };
@@ -67,7 +68,7 @@ pub(super) fn watch(
     let servo = simulation.servo(Box::new(body), simulation.body_seed(args.trial))?;
     let mut probe = Told { servo, sight: sight.clone(), count: 0 };
     let number = args.trial;
-    // The window has to be drawn by the main thread.
+    // The main thread must draw the window.
     let worker = std::thread::spawn(move || {
         let row = simulation.trial_with(&mut probe, planner, number, &mut |_| Ok(()));
         let _ = print(&ending(&row));
@@ -100,7 +101,7 @@ fn planner(args: &Watch, experiment: &Experiment) -> anyhow::Result<&'static pla
     })
 }
 
-/// A servo that says what each touch found.
+/// Servo that prints the result of each touch.
 struct Told {
     servo: Servo,
     sight: Sight,
@@ -117,8 +118,8 @@ impl Probe for Told {
                 let [x, y, z] = (contact.p_wc.coords * 1e3).into();
                 format!("contact at ({x:.1}, {y:.1}, {z:.1}) mm")
             }
-            Touch::Miss => "met nothing".into(),
-            Touch::Overload => "too much force".into(),
+            Touch::Miss => "no contact".into(),
+            Touch::Overload => "force limit exceeded".into(),
         };
         let _ = print(&format!(
             "{:8.2} s  touch {}: {found}",
@@ -153,7 +154,7 @@ use crate::sim::mujoco::window::Window;
 /// Draws until the window is closed.
 #[cfg(feature = "viewer")]
 fn show(mut window: Window, sight: &Sight) -> anyhow::Result<()> {
-    // As often as a screen is drawn.
+    // Frame time of a 60 Hz display.
     const FRAME: std::time::Duration = std::time::Duration::from_millis(16);
     while window.is_open() {
         window.draw(&sight.seen())?;
@@ -162,7 +163,7 @@ fn show(mut window: Window, sight: &Sight) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What a build without windows has in place of one.
+/// Placeholder for the window in a build without the viewer.
 #[cfg(not(feature = "viewer"))]
 enum Window {}
 

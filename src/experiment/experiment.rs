@@ -1,8 +1,8 @@
-//! What is run: planners × trials on one scene.
+//! Experiments: planners × trials on one scene.
 //!
-//! Only a part of it decides what a row holds: the experiment's [`Experiment::identity`]. The rest
-//! may change on a finished run. More trials and other planners are run beside the rows that are
-//! there; rows of trials or planners that are no longer listed are kept, but not shown.
+//! Only the [`Experiment::identity`] decides what a row contains. Other settings may change on a
+//! finished run: new trials and planners are added to the existing rows. Rows of trials or planners
+//! that are no longer listed are kept but not shown.
 
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::report_settings::{ReportSettings, TOUCHES_MAX};
@@ -22,81 +22,81 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// An experiment with everything that decides its results, and how they are shown.
+/// An experiment: all settings that decide its results and its report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// Names its run folder and its page.
+    /// Name of the run folder and of the page.
     pub name: String,
-    /// The question it answers, printed on its page.
+    /// Question that the experiment answers, printed on its page.
     #[serde(default)]
     pub question: String,
-    /// Names of the planners compared.
+    /// Names of the compared planners.
     pub planners: Vec<String>,
-    /// Trials of each planner.
+    /// Trials per planner.
     pub trials: u32,
-    /// Root of all randomness.
+    /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
-    /// Touches that every planner starts with, the same in one trial: uniformly random places of a
-    /// zone, evenly spread directions around an object.
+    /// Initial touches, the same for all planners: random places in a zone, evenly spread
+    /// directions around an object.
     pub initial_touches: u32,
-    /// Touches of a trial in all.
+    /// Touches per trial, initial ones included.
     pub touches: u32,
-    /// Touches after these at places of a low-discrepancy sequence. The belief predicts them and
-    /// learns nothing of them: what can be measured where nobody knows the truth.
+    /// Held-out touches after these, at low-discrepancy places: they test the belief's predictions
+    /// without ground truth.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub verification_touches: u32,
-    /// Touches after those at targets of earlier ones: how well a touch repeats.
+    /// Touches after those that repeat earlier targets, to measure repeatability.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub repeat_touches: u32,
-    /// Test places along each side of the zone, on which the metrics are taken.
+    /// Test points along each side of the zone, on which the errors are computed.
     #[serde(default = "grid")]
     pub grid: u32,
-    /// How the belief over a zone is fitted; or the path of a file that says it.
+    /// Belief over a zone; a table or the path of a file.
     #[serde(default)]
     pub gp: GpSettings,
-    /// How the belief around a whole object is fitted: there, what `[gp]` says.
+    /// Belief around a whole object; in an experiment file it is the table `[gp]`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub space: SpaceSettings,
-    /// How planners search.
+    /// Search settings of the planners.
     #[serde(default)]
     pub planning: PlanningSettings,
-    /// What the report shows.
+    /// Settings of the report.
     #[serde(default)]
     pub report: ReportSettings,
-    /// Which body carries out the touches: the scene's own, or an arm; or the path of a file that
-    /// says it.
+    /// Robot that makes the touches: simulated or real; a table or the path of a file.
     #[serde(default, skip_serializing_if = "is_default")]
     pub backend: BackendSettings,
-    /// What beliefs are held against, if not the object's own surface.
+    /// Scan used as ground truth, in place of the object's own surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<ScanTruth>,
-    /// The scene, or in a file the path of one, relative to that file.
+    /// Scene; in a file its path, relative to that file.
     pub scene: Scene,
 }
 
-/// The key of the table that makes several experiments of one file.
+/// Key of the table that defines several experiments in one file.
 pub(super) const SWEEP: &str = "sweep";
 
-/// Tables that may stand in a file of their own.
+/// Tables that may be in a separate file.
 const INCLUDED: [&str; 4] = ["scene", "backend", "gp", "space"];
 
-/// Planners that the others are held against, if nobody says which: the paper's two.
+/// Default reference planners, those of the paper.
 const BASELINES: [&str; 2] = ["random", "active"];
 
-/// Planners that version 0.1 had, which sought the highest point.
+/// Planners of version 0.1 that were removed; they sought the highest point.
 const REMOVED: [&str; 2] = ["pi", "ei"];
 
-/// Most touches that a belief is fitted to exactly: it costs the cube of their number.
+/// Maximum touches for an exact fit, whose cost is cubic in their number.
 const EXACT_TOUCHES_MAX: u32 = 2000;
 
-/// Test places along each side of the zone, if nobody says how many; chosen.
+/// Default number of test points along each side of the zone.
+// heuristic: balances resolution and cost.
 const GRID: u32 = 31;
 
 impl Experiment {
-    /// `trials` trials of `touches` touches with each planner on `scene`, every other setting at
-    /// its default.
+    /// Returns an experiment of `trials` trials of `touches` touches with each planner on `scene`,
+    /// with default settings.
     pub fn on(scene: &Scene, planners: &[&str], trials: u32, touches: u32) -> Self {
         Self {
             name: "scene".into(),
@@ -119,36 +119,36 @@ impl Experiment {
         }
     }
 
-    /// Reads an experiment file with the scene it names, and applies `--set` assignments.
+    /// Reads an experiment file and its scene, and applies `--set` assignments.
     ///
     /// # Errors
-    /// The first thing that is wrong, with its place.
+    /// The first invalid setting, with its place.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         Self::finish(Loader::read(path)?, sets)
     }
 
-    /// As [`load`](Self::load), of an experiment's text that stands in the file `path`.
+    /// Reads an experiment from `text`, the contents of the file `path`, as [`load`](Self::load)
+    /// does.
     ///
     /// # Errors
-    /// As [`load`](Self::load).
+    /// See [`load`](Self::load).
     pub fn parse(path: &Path, text: String, sets: &[String]) -> Result<Self, ConfigError> {
         Self::finish(Loader::of(path, text)?, sets)
     }
 
     pub(super) fn finish(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
         if loader.has(SWEEP) {
-            let remedy =
-                "palpate run takes it; here one of its cells is asked for: runs/NAME/resolved.toml";
+            let remedy = "use palpate run, or one of its combinations: runs/NAME/resolved.toml";
             return Err(loader.other("a sweep of experiments", remedy));
         }
         if !loader.has("scene") && !loader.has("planners") && loader.has("zone") {
             return Err(loader.other(
                 "a scene",
-                "palpate show and scan take it as it is; to run it, name it in an experiment: \
+                "use palpate show or export on it; to run it, name it in an experiment: \
                  scene = \"FILE\" (palpate new MESH writes both)",
             ));
         }
-        // `--set scene=FILE` chooses the file; the other assignments then edit what it holds.
+        // `--set scene=FILE` selects the file; the other assignments then edit its settings.
         let is_file = |set: &&String| {
             let key = set.split('=').next().map(str::trim);
             key.is_some_and(|key| INCLUDED.contains(&key))
@@ -160,14 +160,14 @@ impl Experiment {
         let moved_keys = Scene::resolve(&mut loader, "scene.")?;
         loader.resolve_path("truth.scan");
         if loader.has_value("scene.around") {
-            // Version 0.1 wrote the settings of a zone's belief here as well, all of them.
+            // Version 0.1 also wrote the settings of a zone's belief here, all of them.
             let is_of_zone = ["gp.mean", "gp.signal", "gp.free_space"];
             match is_of_zone.iter().all(|key| loader.has_value(key)) {
                 true => drop(loader.take("gp")),
                 false => loader.read_as("gp", "space"),
             }
         }
-        // Version 0.1 wrote the settings of planners that were removed since.
+        // Version 0.1 wrote settings of planners that were removed.
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
         take_former_keys(&mut loader)?;
         let mut experiment: Self = loader.finish()?;
@@ -179,8 +179,9 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// What decides the rows of a run, all else left blank: a row depends on the name of its
-    /// planner and the number of its trial, not on the others, and on nothing that is only shown.
+    /// Returns the settings that decide a run's rows; all others are left blank. A row depends on
+    /// the name of its planner and the number of its trial, not on the other planners and trials,
+    /// and not on the report.
     pub fn identity(&self) -> Self {
         Self {
             question: String::new(),
@@ -191,12 +192,12 @@ impl Experiment {
         }
     }
 
-    /// Whether a trial is one of those that are listed.
+    /// Whether the experiment lists a trial.
     pub fn lists(&self, id: &TrialId) -> bool {
         id.trial < self.trials && self.planners.contains(&id.planner)
     }
 
-    /// Every trial of every planner that is not among `done`, trial by trial.
+    /// Returns every trial of every planner that is not in `done`, ordered by trial.
     pub fn lacks<'a>(&self, done: impl IntoIterator<Item = &'a TrialId>) -> Vec<(u32, &str)> {
         let there: HashSet<_> =
             done.into_iter().map(|id| (id.trial, id.planner.as_str())).collect();
@@ -211,13 +212,13 @@ impl Experiment {
         self.first_listed([&self.report.planners, &self.planners])
     }
 
-    /// Planners that the others are held against.
+    /// Reference planners of the comparisons.
     pub fn baselines(&self) -> Vec<&str> {
         let usual = BASELINES.map(String::from);
         self.first_listed([&self.report.baselines, &usual, &self.planners])
     }
 
-    /// The planners compared that are in the first of `lists` that has one of them.
+    /// Returns the planners of the first of `lists` that contains a compared planner.
     fn first_listed<const N: usize>(&self, lists: [&[String]; N]) -> Vec<&str> {
         let listed = |name: &String| {
             let planner = self.planners.iter().find(|planner| *planner == name);
@@ -227,7 +228,7 @@ impl Experiment {
         lists.into_iter().map(listed).find(|names| !names.is_empty()).unwrap_or_default()
     }
 
-    /// The error that planners are judged by.
+    /// Error measure that ranks the planners.
     pub fn error(&self) -> &'static Measure {
         match self.scene.around {
             None => &RMSE,
@@ -235,13 +236,13 @@ impl Experiment {
         }
     }
 
-    /// Touches of a baseline whose error the others are asked to reach.
+    /// Number of touches of a baseline whose error is the goal of the other planners.
     pub fn goal_touches(&self) -> u32 {
         let goal = self.report.goal_touches.unwrap_or(self.touches);
         goal.clamp(self.initial_touches, self.touches)
     }
 
-    /// Touch counts that stand in tables: those drawn, and the last.
+    /// Touch counts in tables: those drawn, and the last.
     pub fn tabled_touch_counts(&self) -> Vec<u32> {
         let mut counts = self.drawn_touch_counts();
         if counts.last() != Some(&self.touches) {
@@ -250,8 +251,9 @@ impl Experiment {
         counts
     }
 
-    /// Whether the belief after `count` touches is compared with the truth; around a whole object,
-    /// where that takes longer than a touch, after some touches and the last only.
+    /// Whether the belief after `count` touches is compared with the ground truth. Around a whole
+    /// object a comparison takes longer than a touch, so only every `compared_every` touches and
+    /// the last are compared.
     pub fn is_compared(&self, count: u32) -> bool {
         let every = self.scene.around.as_ref().map_or(1, |_| self.space.compared_every);
         count >= self.initial_touches && (count == self.touches || count.is_multiple_of(every))
@@ -283,13 +285,13 @@ fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
-/// Whether a character may stand in the name of an experiment, which names a folder.
+/// Whether a character is allowed in the name of an experiment, which is also a folder's name.
 pub fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "-_.".contains(c)
 }
 
 impl Experiment {
-    /// What cannot be asked for around a whole object.
+    /// Checks the settings that do not apply around a whole object.
     fn check_around(&self, rules: &mut Rules) {
         if self.scene.around.is_none() {
             return;
@@ -302,14 +304,11 @@ impl Experiment {
                 let around = planner::PLANNERS.iter().filter(|entry| entry.zone_only.is_none());
                 let names: Vec<&str> = around.map(|entry| entry.name).chain([ORACLE]).collect();
                 let why = why.unwrap_or_default();
-                format!(
-                    "a planner that goes around an object: {} ({name}: {why})",
-                    names.join(", ")
-                )
+                format!("a planner for whole objects: {} ({name}: {why})", names.join(", "))
             });
         }
         rules.require("truth", "(given)", self.truth.is_none(), || {
-            "no truth: around a whole object it is the object's own surface".into()
+            "no [truth]: around a whole object the ground truth is the object's own surface".into()
         });
         rules.require("touches", self.touches, self.touches <= AROUND_TOUCHES_MAX, || {
             format!("1 to {AROUND_TOUCHES_MAX} around a whole object")
@@ -317,7 +316,7 @@ impl Experiment {
     }
 }
 
-/// Most touches around an object: each is seven numbers of the Gaussian process.
+/// Maximum touches around an object; each adds seven values to the Gaussian process.
 const AROUND_TOUCHES_MAX: u32 = 500;
 
 impl Checked for Experiment {
@@ -337,14 +336,14 @@ impl Checked for Experiment {
             let is_removed = REMOVED.contains(&name.as_str());
             rules.require(&format!("planners[{i}]"), format!("\"{name}\""), !is_removed, || {
                 let names = entrant::allowed(name).join(", ");
-                format!("one of {names}; pi and ei, which sought the highest point, were removed")
+                format!("one of {names}; pi and ei were removed")
             });
             rules.one_of(&format!("planners[{i}]"), name, &entrant::allowed(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
             let is_seen = name != ORACLE || self.backend.kind == BackendKind::Simulated;
             rules.require(&format!("planners[{i}]"), name, is_seen, || {
-                "planners that need not know how a touch will end, or a simulated backend".into()
+                "other planners, or a simulated backend: the oracle needs the ground truth".into()
             });
         }
         rules.number("trials", self.trials.into(), 1.0..=1e6);

@@ -1,7 +1,7 @@
-//! Experiments, their trials, and the folder their results lie in.
+//! Experiments, their trials, and the folder of their results.
 //!
-//! [`Experiment`] is what is run, read from a file or made; [`Simulation`] is the way from it to
-//! its trials; each trial is a row, and everything else is told from rows.
+//! An [`Experiment`] is a set of settings, read from a file or built in code. A [`Simulation`] runs
+//! its trials. Each trial is a row, and all results are computed from the rows.
 //!
 //! ```
 //! use palpate::experiment::{Experiment, Simulation, measure};

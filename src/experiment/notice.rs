@@ -1,5 +1,4 @@
-//! Notices about the numbers of an experiment: each says what makes them mean less than they seem
-//! to, and what to do.
+//! Notices about an experiment's numbers: each explains what limits their meaning, and what to do.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
@@ -9,15 +8,15 @@ use crate::experiment::trial::row::{TrialRow, of_planner};
 use crate::experiment::truth::Truth;
 use palpate_explore::task::Zone;
 
-/// Share of places or touches below which they are few.
+/// Share of points or touches below which a notice is given.
 // heuristic: a quarter.
 const FEW: f64 = 0.25;
 
 /// Share of a surface that counts as all of it.
-// heuristic: what is missing is too little to be seen in a figure.
+// heuristic: the missing part is invisible in a figure.
 const ALMOST_ALL: f64 = 0.99;
 
-/// An R above the first with a centred R below the second says nothing.
+/// A notice is given for an R above the first with a centred R below the second.
 // heuristic: a constant height reaches the first on most objects.
 const HIGH_R: f64 = 0.999;
 const LOW_CENTRED_R: f64 = 0.9;
@@ -26,13 +25,13 @@ fn is_few(part: usize, of: usize) -> bool {
     (part as f64) < FEW * of as f64
 }
 
-/// The notices about the `truth` of an experiment in `zone`, before it is run.
+/// Returns notices about the ground truth of an experiment in `zone`, before it runs.
 pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
     let Some(zone) = zone else { return Vec::new() };
     let (count, of) = (truth.count(), truth.places.len());
     if count == 0 {
         return vec![
-            "nobody knows this surface: only the measures that need no truth are told \
+            "no ground truth: only truth-free measures are reported \
              (verification_touches, repeat_touches)"
                 .into(),
         ];
@@ -40,14 +39,14 @@ pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
     let mut notices = Vec::new();
     if is_few(count, of) {
         notices.push(format!(
-            "only {count} of {of} test places have a surface, and the measures look at no others: the \
-             object fills a small part of the zone (scene.zone, object.unit, object.position_m)"
+            "only {count} of {of} test points lie on the object; errors are computed there: the object \
+             fills a small part of the zone (scene.zone, object.unit, object.position_m)"
         ));
     }
     let reachable = truth.reachable_count();
     if is_few(reachable, count) {
         notices.push(format!(
-            "the finger can touch only {reachable} of {count} test places with a surface: it is too \
+            "the finger can reach only {reachable} of {count} test points on the surface: it is too \
              thick or too steep for this object (finger.radius_m, finger.pitch_deg)"
         ));
     }
@@ -55,30 +54,30 @@ pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
     notices
 }
 
-/// The notice about a truth that is a scan of some contacts, which has errors of its own.
+/// Notice about a ground truth that is a scan, which itself has errors.
 pub fn of_scan(contacts: usize, rmse_m: Option<f64>) -> String {
     let off = match rmse_m {
         Some(rmse_m) => format!(
-            ": where one is left out, the others are {:.2} mm (RMS) off it, and no error below that \
-             means anything",
+            ": its leave-one-out error is {:.2} mm RMS, so smaller errors are \
+             not significant",
             1e3 * rmse_m
         ),
-        None => ", too few to say how far it is off".into(),
+        None => ", too few to estimate its error".into(),
     };
     format!("the truth is a scan of {contacts} contacts{off}")
 }
 
-/// The notice about a whole object of which some cannot be touched.
+/// Notice about a whole object with an unreachable part.
 pub fn of_shape(shape: &TrueShape) -> Option<String> {
     let reachable = shape.reachable_share().filter(|reachable| *reachable < ALMOST_ALL)?;
     Some(format!(
-        "the finger can touch {:.0} % of the object's surface by straight ways from all sides; the \
-         rest is believed from what is around it",
+        "the finger can touch {:.0} % of the object's surface by straight paths from all sides; the \
+         rest is extrapolated",
         100.0 * reachable
     ))
 }
 
-/// The notices about the truth and the rows of an experiment that was run.
+/// Returns notices about the ground truth and the rows of a finished experiment.
 pub(super) fn of_run(experiment: &Experiment, truth: &Truth, rows: &[TrialRow]) -> Vec<String> {
     let mut notices = of_truth(experiment.scene.zone.as_ref(), truth);
     notices.extend(experiment.planners.iter().filter_map(|planner| few_contacts(rows, planner)));
@@ -95,7 +94,7 @@ fn far_datum(zone: &Zone, truth: &Truth) -> Option<String> {
         format!(
             "zone.datum_y_m = {datum_y_m} lies {:.1} mm from the surface (y {low:.4} to {high:.4} m), \
              and the zone is {:.1} mm wide: R (Eq. 5) is near 1 for any belief, and a zero-mean belief \
-             falls back to the datum; left out, it is {:.4}",
+             falls back to the datum; use {:.4}, the default",
             1e3 * away_m,
             1e3 * zone_m,
             0.5 * (low + high)
@@ -107,9 +106,8 @@ fn few_contacts(rows: &[TrialRow], planner: &str) -> Option<String> {
     let touches = || of_planner(rows, planner).flat_map(|row| &row.touches);
     let (contacts, of) =
         (touches().filter(|touch| touch.contact.is_some()).count(), touches().count());
-    is_few(contacts, of).then(|| {
-        format!("{planner}: only {contacts} of {of} touches met the object or could be read")
-    })
+    is_few(contacts, of)
+        .then(|| format!("{planner}: only {contacts} of {of} touches made a usable contact"))
 }
 
 fn blind_r(experiment: &Experiment, rows: &[TrialRow]) -> Option<String> {
@@ -124,10 +122,10 @@ fn blind_r(experiment: &Experiment, rows: &[TrialRow]) -> Option<String> {
     let centred_r = blind.iter().map(|(.., centred_r)| *centred_r).reduce(f64::min)?;
     let planners: Vec<&str> = blind.iter().map(|(planner, ..)| planner.as_str()).collect();
     Some(format!(
-        "R (Eq. 5) of {} is {:.4} at least while centred R is as low as {centred_r:.2}: here R cannot \
-         tell a belief from a constant height; judge by centred R and RMSE",
+        "R (Eq. 5) of {} is at least {:.4} but centred R is as low as {centred_r:.2}: R does not distinguish \
+         the belief from a constant height; use centred R and RMSE",
         planners.join(", "),
-        // Rounded down: what is not 1 is not told as 1.
+        // Rounded down, so that only 1 is printed as 1.
         (r * 1e4).floor() * 1e-4
     ))
 }

@@ -1,14 +1,14 @@
-//! Settings that a real robot needs and that a simulation takes from its mesh.
+//! Settings that a real robot needs and that a simulation takes from the mesh.
 
 use crate::experiment::experiment::Experiment;
 use palpate_input::error::Invalid;
 use palpate_ros::settings::BackendKind;
 
-/// Whether `experiment` says what a real robot needs; one that is simulated needs nothing. Where
-/// the body that is touched is known, the depths are known from it: `is_known` leaves them out.
+/// Checks that `experiment` has the settings that a real robot needs; a simulation needs none. With
+/// `is_known` the touched body is known, so the depths are not needed.
 ///
 /// # Errors
-/// With the settings that are missing, and an example of each.
+/// The missing settings, with an example of each.
 pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), Invalid> {
     let (kind, interlocks) = (experiment.backend.kind, &experiment.backend.interlocks);
     let scene = &experiment.scene;
@@ -42,10 +42,10 @@ pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), Invalid> {
     let line = |(key, example, _): &(&str, &str, bool)| format!("    {key} = {example}");
     let lines: Vec<String> = needed.iter().map(line).collect();
     Err(Invalid::new(format!(
-        "backend.kind = \"{}\" moves a real robot, which needs {}; a simulation would take depths from \
-         the mesh, the ground truth. Give what is true of the cell by --set, or in the files of the \
-         scene and the experiment (experiments/real_arm.toml), in metres in the frame of the robot's \
-         base, as in\n{}",
+        "backend.kind = \"{}\" moves a real robot, which needs {}: only a simulation takes depths from \
+         the mesh. Give the values of your cell by --set, or in the files of the scene and the \
+         experiment (experiments/real_arm.toml), in metres in the frame of the robot's base, as \
+         in\n{}",
         kind.name(),
         names.join(", "),
         lines.join("\n")

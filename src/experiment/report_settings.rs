@@ -1,4 +1,4 @@
-//! What the report of a run shows. It decides no row, so it may change on a finished run.
+//! Settings of a run's report. They do not affect rows, so they may change on a finished run.
 
 use crate::experiment::measure::MEASURES;
 use crate::experiment::trial::entrant;
@@ -6,49 +6,47 @@ use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the report shows.
+/// Settings of a run's report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReportSettings {
-    /// Touch counts after which beliefs are drawn, those that occur; none: a third, two thirds
-    /// and all of the planned touches.
+    /// Touch counts after which beliefs are drawn (default: a third, two thirds and all of the
+    /// planned touches).
     pub touch_counts: Vec<u32>,
-    /// The trial whose beliefs are drawn.
+    /// Trial whose beliefs are drawn.
     pub trial: u32,
-    /// The planners whose beliefs are drawn, those that ran; none: all.
+    /// Planners whose beliefs are drawn (default: all).
     pub planners: Vec<String>,
-    /// The planners that the others are held against, those that ran; none: `random` and
-    /// `active` if they ran, or else every planner is held against every other.
+    /// Reference planners of the comparisons (default: `random` and `active` if they ran, otherwise
+    /// every planner).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub baselines: Vec<String>,
-    /// Touches of a baseline whose error the others are asked to reach, if it makes as many; none:
-    /// all.
+    /// Number of touches of a baseline whose error is the goal of the others (default: all).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub goal_touches: Option<u32>,
-    /// What a publication says, to stand on the page beside what comes out here; those after touch
-    /// counts that occur.
+    /// Published claims, shown on the page beside the results after the same number of touches.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub claims: Vec<Claim>,
 }
 
-/// What a publication says of an experiment.
+/// A claim of a publication about an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
-    /// Where: its figure or section.
+    /// Figure or section of the publication.
     pub place: String,
-    /// What, in words.
+    /// Text of the claim.
     pub says: String,
-    /// The count of touches after which it can be seen.
+    /// Number of touches after which it applies.
     pub touches: u32,
-    /// Names of the measures that show it.
+    /// Names of the measures that test it.
     pub measures: Vec<String>,
 }
 
-/// Most touches of a trial.
+/// Maximum touches per trial.
 pub(super) const TOUCHES_MAX: f64 = 20_000.0;
 
-/// Most beliefs drawn side by side.
+/// Maximum number of beliefs drawn side by side.
 const DRAWN_MAX: usize = 8;
 
 impl Checked for ReportSettings {

@@ -1,4 +1,4 @@
-//! Trials × planners: simulated ones on all cores, those of a real arm one after another.
+//! Execution of trials × planners: simulated trials in parallel, those of a real arm in sequence.
 
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{Entry, JOURNAL, Journal, RunError, RunFolder};
@@ -18,40 +18,40 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// The progress of a run, which is reported from any thread.
+/// Progress of a run, reported from any thread.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress<'a> {
-    /// A touch of a running trial is done.
+    /// A touch of a running trial is finished.
     Touch,
-    /// A trial is done.
+    /// A trial is finished.
     Trial(&'a TrialRow),
 }
 
-/// A trial to be run, and its planner.
+/// A trial to run, and its planner.
 pub type Job<'a> = (u32, &'a dyn PlannerFactory);
 
-/// Every trial of every planner that `done` lacks, trial by trial.
+/// Returns every trial of every planner that `done` lacks, ordered by trial.
 ///
 /// # Errors
-/// If the experiment lists a planner that is not there.
+/// If the experiment lists a planner that is not available.
 pub fn jobs<'a>(simulation: &'a Simulation, done: &[TrialId]) -> Result<Vec<Job<'a>>, Invalid> {
     let known = |(trial, name): (u32, &str)| {
         let planner = simulation.planner(name);
-        let problem = format!("planner `{name}` is not built into this program");
-        let mend = "run it with the Python package's palpate, or from Rust by \
-                    Simulation::with_planners";
+        let problem = format!("planner `{name}` is not available in this program");
+        let mend = "run it with the palpate of the Python package, or from Rust with \
+                         Simulation::with_planners";
         Ok((trial, planner.ok_or_else(|| Invalid::new(problem).mend(mend))?))
     };
     simulation.experiment().lacks(done).into_iter().map(known).collect()
 }
 
-/// A part of an experiment's trials, for a machine or task of its own: every `count`-th trial, with
-/// all its planners.
+/// A part of an experiment's trials for one machine or task: every `count`-th trial, with all
+/// planners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Its number, from 1.
+    /// Number of the shard, from 1.
     pub index: u32,
-    /// The number of shards.
+    /// Number of shards.
     pub count: u32,
 }
 
@@ -71,21 +71,21 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// Whether it has a trial.
+    /// Whether the shard contains a trial.
     pub fn has(self, trial: u32) -> bool {
         trial % self.count == self.index - 1
     }
 
-    /// Leaves its own of all jobs.
+    /// Removes the jobs of other shards.
     pub fn keep(self, jobs: &mut Vec<Job>) {
         jobs.retain(|(trial, _)| self.has(*trial));
     }
 }
 
-/// Runs `jobs` and adds each row to `folder` as it finishes; returns how many trials it ran.
+/// Runs `jobs` and adds each row to `folder` when it finishes; returns the number of trials run.
 ///
 /// A trial is recorded if `recorded` names the run's folder. When `stop` becomes true, running
-/// trials are finished and no others begun. `threads` 0 means all cores.
+/// trials finish and no others start. `threads` 0 means all cores.
 ///
 /// # Errors
 /// If a row cannot be stored, or threads cannot be started.
@@ -99,8 +99,8 @@ pub fn run(
 ) -> Result<usize, RunError> {
     let pool = pool(threads)?;
     let finished = Mutex::new((folder, 0));
-    // Handed out one by one, so that rows finish about in order and an interrupted run has
-    // whole pairs.
+    // Jobs are handed out one by one, so that rows finish roughly in order and an interrupted run
+    // has complete pairs.
     pool.install(|| {
         jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
             if stop.load(Ordering::Relaxed) {
@@ -108,7 +108,7 @@ pub fn run(
             }
             let row = run_caught(simulation, (trial, planner), recorded, progress);
             if row.failure.is_some() && stop.load(Ordering::Relaxed) {
-                // What stopped the run may have failed it: it is run again.
+                // The interruption may have caused the failure; the trial is run again.
                 return Ok(());
             }
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
@@ -122,7 +122,7 @@ pub fn run(
     Ok(count)
 }
 
-/// Runs `jobs` and keeps their rows in memory, in the jobs' order; those begun after `stop` became
+/// Runs `jobs` and returns their rows in the jobs' order; jobs not started before `stop` became
 /// true are left out.
 ///
 /// # Errors
@@ -145,10 +145,10 @@ pub fn rows(
     Ok(found.into_iter().flatten().collect())
 }
 
-/// Threads of its own for a piece of work; 0 means all cores.
+/// Thread pool for a piece of work; 0 means all cores.
 ///
 /// # Errors
-/// If they cannot be started.
+/// If the threads cannot be started.
 pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, Invalid> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -156,8 +156,8 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, Invalid> {
         .map_err(|error| Invalid::new(format!("cannot start {threads} threads: {error}")))
 }
 
-/// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault
-/// in somebody's code does not lose the others' work.
+/// Runs one trial. A panic of a planner or probe becomes the trial's failure, so that it does not
+/// lose the other trials.
 fn run_caught(
     simulation: &Simulation,
     (trial, planner): Job,
@@ -178,14 +178,15 @@ fn run_caught(
     })
 }
 
-/// Runs the trials of a real arm that `done` lacks, one after another, until one fails or `stop`
-/// becomes true between two touches. Every touch is kept in the journal of `folder`, from which an
-/// interrupted trial goes on.
+/// Runs the trials of a real arm that `done` lacks, in sequence, until one fails or `stop` becomes
+/// true between two touches. Every touch is stored in the journal of `folder`, from which an
+/// interrupted trial continues.
 ///
-/// Returns how many trials it finished and, if it went no further, where, why, and what is kept.
+/// Returns the number of finished trials and, if it stopped early, the trial, the reason and the
+/// stored touches.
 ///
 /// # Errors
-/// If a row or touch cannot be stored, or a planner is not there.
+/// If a row or touch cannot be stored, or a planner is not available.
 pub fn run_real(
     simulation: &Simulation,
     (folder, done): (&mut RunFolder, &[TrialId]),
@@ -214,8 +215,8 @@ pub fn run_real(
                 return match made.target == touched.row.target {
                     true => Ok(()),
                     false => Err(Fault::from(Invalid::new(format!(
-                        "touch {touch} was made at {target:?}, and would be made elsewhere now: the program \
-                         or the experiment is not what it was; --fresh begins anew"
+                        "touch {touch}: recorded target {target:?} differs from the current plan; program or \
+                         experiment changed, use --fresh to start again"
                     )))),
                 };
             }
@@ -244,7 +245,7 @@ pub fn run_real(
         }
         let touches = journal.touches(trial, name).len();
         let kept = folder.path().join(JOURNAL);
-        let kept = format!("{touches} touches of it are kept in {}", kept.display());
+        let kept = format!("{touches} touches are stored in {}", kept.display());
         return Ok((finished, Some(format!("{name}, trial {trial}: {reason}\n{kept}"))));
     }
     Ok((finished, None))

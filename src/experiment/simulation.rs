@@ -1,4 +1,4 @@
-//! From an experiment to its trials: the one way that everything goes which runs a simulation.
+//! Simulation of an experiment's trials.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
@@ -21,22 +21,22 @@ use palpate_ros::settings::BackendKind;
 use rand::RngExt;
 use std::sync::Arc;
 
-/// An experiment with everything that its trials share: the scene built, its models compiled, the
-/// truth sampled. It never changes, and threads share it.
+/// An experiment with the data that its trials share: the built scene, the compiled models and the
+/// sampled ground truth. It is immutable and shared between threads.
 pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,
     truth: Arc<GroundTruth>,
-    /// The arm that touches in place of the simulated body, once it is connected.
+    /// Connected arm that replaces the simulated body.
     lab: Option<Arc<Lab>>,
-    /// The notice about a truth that was scanned.
+    /// Notice about a scanned ground truth.
     scanned: Option<String>,
-    /// Planners that are not built in: the oracle, and those that were added.
+    /// Planners that are not built in: the oracle, and added ones.
     own_planners: Vec<Box<dyn PlannerFactory>>,
 }
 
 impl Simulation {
-    /// Builds the experiment's scene, compiles its models and samples the truth.
+    /// Builds the experiment's scene, compiles its models and samples the ground truth.
     ///
     /// # Errors
     /// If the scene cannot be built or simulated, or the zone has no surface.
@@ -44,15 +44,15 @@ impl Simulation {
         Self::new_telling(experiment, &|_| ())
     }
 
-    /// As [`new`](Self::new); `tell` is called with the name of each step that may take long, as it
-    /// begins.
+    /// Builds the simulation as [`new`](Self::new) does, and calls `tell` with the name of each
+    /// slow step when it starts.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// See [`new`](Self::new).
     pub fn new_telling(mut experiment: Experiment, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
         real_robot::check(&experiment, false)?;
         if experiment.backend.kind != BackendKind::Simulated {
-            // Otherwise taken from the mesh.
+            // A simulation takes this from the mesh.
             if let Some(zone) = &mut experiment.scene.zone {
                 zone.datum_y_m.get_or_insert(0.0);
             }
@@ -62,16 +62,16 @@ impl Simulation {
         Self::sampled(experiment, Arc::new(environment), tell)
     }
 
-    /// As [`new`](Self::new), in an environment that is there already; its scene takes the place of
-    /// the experiment's.
+    /// Builds the simulation in an existing environment, whose scene replaces the experiment's.
     ///
     /// # Errors
-    /// If it cannot be simulated, or the zone has no surface.
+    /// If the scene cannot be simulated, or the zone has no surface.
     pub fn within(experiment: Experiment, environment: Arc<Environment>) -> Result<Self, Invalid> {
         Self::sampled(experiment, environment, &|_| ())
     }
 
-    /// In an environment whose truth is sampled as the experiment asks.
+    /// Builds the simulation in an environment and samples the ground truth that the experiment
+    /// selects.
     fn sampled(
         experiment: Experiment,
         environment: Arc<Environment>,
@@ -87,7 +87,7 @@ impl Simulation {
         };
         if environment.task().zone().is_some() && !truth.is_known() {
             return Err(Invalid::new(
-                "no place of the zone has a surface along the approach: nothing to explore",
+                "no surface in the zone along the approach; check scene.zone and object.position_m",
             ));
         }
         let shape = TrueShape::of(&environment);
@@ -96,11 +96,11 @@ impl Simulation {
         Ok(Self { scanned, ..Self::made(experiment, truth)? })
     }
 
-    /// As [`within`](Self::within), held against a `truth` that was sampled before; an unknown one
-    /// leaves the measures that need none.
+    /// Builds the simulation as [`within`](Self::within) does, with a ground truth sampled before.
+    /// Without a known truth only truth-free measures are computed.
     ///
     /// # Errors
-    /// If it cannot be simulated.
+    /// If the scene cannot be simulated.
     pub fn against(
         experiment: Experiment,
         environment: Arc<Environment>,
@@ -119,35 +119,35 @@ impl Simulation {
         Ok(Self { experiment, simulator, truth, lab: None, scanned: None, own_planners })
     }
 
-    /// With planners that are not built in, under the names that the experiment lists them by.
+    /// Adds planners that are not built in, under the names that the experiment lists.
     pub fn with_planners(mut self, planners: Vec<Box<dyn PlannerFactory>>) -> Self {
         self.own_planners.extend(planners);
         self
     }
 
-    /// The planner of a name: one that is built in or [own](Self::with_planners), or the oracle.
+    /// Finds a planner by name: built in, [added](Self::with_planners), or the oracle.
     pub fn planner(&self, name: &str) -> Option<&dyn PlannerFactory> {
         let built_in = planner::by_name(name).map(|entry| entry as &dyn PlannerFactory);
         let mut own = self.own_planners.iter().map(|planner| &**planner);
         built_in.or_else(|| own.find(|planner| planner.name() == name))
     }
 
-    /// What is run, with everything that it left to its object written out.
+    /// Returns the experiment, with the settings derived from its object filled in.
     pub fn experiment(&self) -> &Experiment {
         &self.experiment
     }
 
-    /// The scene, built.
+    /// Built scene.
     pub fn environment(&self) -> &Arc<Environment> {
         self.simulator.environment()
     }
 
-    /// What makes the trials' bodies.
+    /// Factory of the trials' bodies.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
 
-    /// What of the experiment may not be meant.
+    /// Warnings about likely configuration mistakes.
     pub fn notices(&self) -> Vec<String> {
         let mut notices: Vec<String> = self.simulator.notices();
         notices.extend(notice::of_truth(self.task().zone(), self.truth()));
@@ -156,35 +156,35 @@ impl Simulation {
         notices
     }
 
-    /// The truth on the test grid.
+    /// Ground truth on the test grid.
     pub fn truth(&self) -> &Truth {
         &self.truth.truth
     }
 
-    /// The true surface of a whole object; none where one side is explored.
+    /// True surface of a whole object; `None` for a zone.
     pub fn shape(&self) -> Option<&TrueShape> {
         self.truth.shape.as_ref()
     }
 
-    /// What the robot is told.
+    /// Exploration task: the part of the scene that the robot knows.
     pub fn task(&self) -> &Task {
         self.environment().task()
     }
 
-    /// Seed of all the randomness of a trial's body.
+    /// Seed of all random numbers of a trial's body.
     pub fn body_seed(&self, trial: u32) -> u64 {
         seed::stream(self.experiment.seed, trial.into(), "body").random()
     }
 
-    /// Whether the experiment wants an arm that is not simulated here.
+    /// Whether the experiment uses a real arm.
     pub fn is_real(&self) -> bool {
         self.experiment.backend.kind != BackendKind::Simulated
     }
 
-    /// Connects to the arm that the experiment wants, and none if it wants a simulated one.
+    /// Connects to the experiment's arm; returns `None` for a simulated one.
     ///
     /// # Errors
-    /// If it cannot be reached, or is not in a state to be driven.
+    /// If the arm cannot be reached, or is not ready to be moved.
     pub fn connect(&mut self) -> Result<Option<Arc<Lab>>, LinkFault> {
         if self.is_real() {
             let lacks = || LinkFault::Arm("the scene has no object to touch".into());
@@ -194,11 +194,11 @@ impl Simulation {
         Ok(self.lab.clone())
     }
 
-    /// What is moved in a trial: the arm that is connected, or the simulated body; none where a
-    /// touch is no motion.
+    /// Returns the backend of a trial: the connected arm or the simulated body; `None` if touches
+    /// are computed without motion.
     ///
     /// # Errors
-    /// If no arm is connected, or there is no memory for the body's state.
+    /// If no arm is connected, or memory for the body's state is missing.
     pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         match &self.lab {
             Some(lab) => Ok(Some(Box::new(lab.body()))),
@@ -207,18 +207,18 @@ impl Simulation {
         }
     }
 
-    /// What drives `body` through touches, within the experiment's interlocks.
+    /// Returns the servo that moves `body` through touches, within the experiment's interlocks.
     ///
     /// # Errors
-    /// If it cannot be brought to its start.
+    /// If the body cannot be moved to its start.
     pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
         self.simulator.servo_within(body, seed, &self.experiment.backend.interlocks)
     }
 
-    /// What touches in a trial.
+    /// Returns the probe that makes a trial's touches.
     ///
     /// # Errors
-    /// If the body cannot be brought to its start, or no arm is connected.
+    /// If the body cannot be moved to its start, or no arm is connected.
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
         let seed = self.body_seed(trial);
         match self.body()? {
@@ -227,7 +227,7 @@ impl Simulation {
         }
     }
 
-    /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
+    /// Runs one trial of `planner` from start to end; the row contains any failure.
     pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
         match self.probe(trial) {
             Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(())),
@@ -235,8 +235,8 @@ impl Simulation {
         }
     }
 
-    /// Runs a trial like [`trial`](Self::trial) with the touches of any `probe`, and calls
-    /// `observer` after each.
+    /// Runs a trial like [`trial`](Self::trial) with any `probe`, and calls `observer` after each
+    /// touch.
     pub fn trial_with(
         &self,
         probe: &mut dyn Probe,

@@ -1,22 +1,24 @@
-//! Several experiments in one file: every combination of the values in its table `[sweep]`.
+//! Sweeps: several experiments in one file, one per combination of the values in the table
+//! `[sweep]`.
 
 use crate::experiment::experiment::{Experiment, SWEEP, is_plain};
 use palpate_input::config::{ConfigError, Loader};
 use std::path::Path;
 use toml::Value;
 
-/// Most combinations; chosen, more are a slip.
+/// Maximum number of combinations.
+// heuristic: more are probably a mistake.
 const MOST: usize = 10_000;
 
-/// Settings whose values are names of files, relative to the experiment's.
+/// Settings whose values are file names, relative to the experiment's file.
 const FILES: [&str; 4] = ["scene", "backend", "scene.object.mesh", "truth.scan"];
 
-/// One combination.
+/// One combination of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
-    /// What tells it from the others, in letters that a folder may have.
+    /// Label that distinguishes it from the others, usable in a folder's name.
     pub label: String,
-    /// Assignments as after `--set`.
+    /// Assignments, in the form of `--set`.
     pub sets: Vec<String>,
 }
 
@@ -26,10 +28,11 @@ fn is_file(key: &str, value: &str) -> bool {
         || (["scene.arm.model", "scene.effects.sensor"].contains(&key) && value.ends_with(".toml"))
 }
 
-/// The combinations of the file at `path`, the last key's values in a row; none without a sweep.
+/// Returns the combinations of the file at `path`, the last key varying fastest; empty without a
+/// sweep.
 ///
 /// # Errors
-/// If the file cannot be read, or the table is not of keys with lists.
+/// If the file cannot be read, or the table does not consist of keys with lists.
 pub fn cells(path: &Path) -> Result<Vec<Cell>, ConfigError> {
     let mut loader = Loader::read(path)?;
     let Some(sweep) = loader.take(SWEEP) else { return Ok(Vec::new()) };
@@ -64,7 +67,7 @@ pub fn cells(path: &Path) -> Result<Vec<Cell>, ConfigError> {
     Ok(cells)
 }
 
-/// Keys with dots, and their lists; whether that is all there is.
+/// Collects dotted keys and their lists; returns whether the table contains nothing else.
 fn flatten(prefix: &str, value: &Value, axes: &mut Vec<(String, Vec<Value>)>) -> bool {
     match value {
         Value::Table(table) => table.iter().all(|(key, value)| {
@@ -79,7 +82,8 @@ fn flatten(prefix: &str, value: &Value, axes: &mut Vec<(String, Vec<Value>)>) ->
     }
 }
 
-/// The last part of a key and a value, or the value's place where it is no word or number.
+/// Label of a value: the last part of the key with the value, or with the value's index if it is
+/// not a plain word or number.
 fn label(key: &str, value: &Value, place: usize) -> String {
     let key = key.rsplit('.').next().unwrap_or(key);
     let text = match value {
@@ -97,10 +101,10 @@ fn label(key: &str, value: &Value, place: usize) -> String {
 }
 
 impl Experiment {
-    /// Reads one cell of the file at `path`: its name ends with the cell's label.
+    /// Reads one combination of the file at `path`; appends its label to the experiment's name.
     ///
     /// # Errors
-    /// As [`load`](Self::load).
+    /// See [`load`](Self::load).
     pub fn load_cell(path: &Path, cell: &Cell, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
         loader.take(SWEEP);

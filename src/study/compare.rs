@@ -1,9 +1,9 @@
-//! Planners over several runs: errors in units of one planner's, objects won and lost, the share of
-//! what could be gained, and performance profiles, after rliable (Agarwal et al. 2021).
+//! Comparison of planners over several runs: errors relative to one planner, objects won and lost,
+//! share of the possible gain, and performance profiles, after rliable (Agarwal et al. 2021).
 //!
-//! An object is an experiment's name. A trial's score on it is its error over the trial's span,
-//! exp(mean log RMSE), in units of the reference planner's in the same trial, so that objects of
-//! different sizes count alike. Less is better, and the reference has 1.
+//! An object is an experiment's name. The score of a trial is its error over the touches, exp(mean
+//! log RMSE), divided by that of the reference planner in the same trial, so that objects of
+//! different sizes count equally. Smaller is better; the reference has score 1.
 
 use super::check::judged::JUDGED;
 use crate::experiment::measure::outline::TENTHS;
@@ -17,26 +17,26 @@ use palpate_input::error::Invalid;
 use rand::RngExt;
 use std::collections::HashMap;
 
-/// The planner that gains nothing; the [`ORACLE`] gains all that can be.
+/// Planner with zero gain; the [`ORACLE`] has the full gain.
 pub const FLOOR: &str = "random";
 
 /// Results of planners on objects.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Compared {
-    /// The planner whose errors are the unit.
+    /// Reference planner.
     pub against: String,
     /// Names of the objects.
     pub objects: Vec<String>,
-    /// The planners compared.
+    /// Compared planners.
     pub contenders: Vec<Contender>,
 }
 
-/// A planner, of one run of each object where an object has several.
+/// A planner, with one run per object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contender {
-    /// Its name.
+    /// Name of the planner.
     pub name: String,
-    /// Its results on each object.
+    /// Results on each object.
     pub results: Vec<ObjectResult>,
 }
 
@@ -44,13 +44,13 @@ pub struct Contender {
 /// are counted after the initial touches, beliefs are rated after the last touch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjectResult {
-    /// Scores of the trials that the reference finished too.
+    /// Scores of the trials that the reference finished, too.
     pub scores: Vec<f64>,
-    /// Share of the touches that met nothing.
+    /// Share of touches without contact.
     pub missed: Option<f64>,
-    /// Share of the plans that the planner's own rule could not decide.
+    /// Share of fallback plans.
     pub stalled: Option<f64>,
-    /// Mean lateral travel of a trial.
+    /// Mean lateral travel per trial.
     pub travel_m: Option<f64>,
     /// Mean share of the truth in the 95 % band.
     pub coverage: Option<f64>,
@@ -58,21 +58,21 @@ pub struct ObjectResult {
     pub brier: Option<f64>,
     /// Mean intersection over union of the silhouettes.
     pub iou: Option<f64>,
-    /// Places given a probability of a surface in each tenth, and those of them that have one.
+    /// Test points in each tenth of the probability of a surface, and those of them with a surface.
     pub reliability: [[u32; 2]; TENTHS],
 }
 
 impl Contender {
-    /// Its scores on each object.
+    /// Scores on each object.
     pub fn scores(&self) -> Vec<&[f64]> {
         self.results.iter().map(|result| result.scores.as_slice()).collect()
     }
 }
 
-/// Compares runs, each with its folder's name, in units of the planner `against`.
+/// Compares runs, each with its folder's name, relative to the planner `against`.
 ///
 /// # Errors
-/// If the first run of an object lacks that planner, or runs of one name do not share their trials.
+/// If the first run of an object lacks that planner, or runs of one name have different trials.
 pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invalid> {
     let mut objects: Vec<String> = Vec::new();
     let mut units: Vec<HashMap<u32, f64>> = Vec::new();
@@ -86,7 +86,7 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
         };
         if let Some((first, _)) = of_name().find(|(_, other)| pairing(other) != pairing(run)) {
             let problem = format!(
-                "{folder} and {first} are both \"{name}\", but seed, touches or grid differ: their \
+                "{folder} and {first} are both \"{name}\" but differ in seed, touches or grid, so their \
                  trials do not pair"
             );
             return Err(Invalid::new(problem));
@@ -96,9 +96,8 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
         if known.is_none() {
             let unit = logs(run, against);
             if unit.is_empty() {
-                let problem = format!(
-                    "has no trials of \"{against}\" that others could be held against (--against)"
-                );
+                let problem =
+                    format!("has no trials of the reference planner \"{against}\" (--against)");
                 return Err(Invalid::new(problem).at(folder));
             }
             objects.push(name.clone());
@@ -131,7 +130,7 @@ fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
     finished.filter_map(|row| Some((row.trial, of(row, &run.experiment)?))).collect()
 }
 
-/// The results of a planner in units of `unit`, the mean log RMSE of the reference's trials.
+/// Results of a planner relative to `unit`, the mean log RMSE of the reference's trials.
 fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     let finished: Vec<&TrialRow> =
         of_planner(&run.rows, planner).filter(|row| row.failure.is_none()).collect();
@@ -177,8 +176,8 @@ pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
     (!middle.is_empty()).then(|| mean(middle))
 }
 
-/// The interquartile mean over all strata, with the 95 % interval of a bootstrap that draws within
-/// each; none where a stratum is empty.
+/// Interquartile mean over all strata, with the 95 % interval of a bootstrap within each stratum;
+/// `None` if a stratum is empty.
 pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     if strata.is_empty() || strata.iter().any(|stratum| stratum.is_empty()) {
         return None;
@@ -192,8 +191,8 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     Some(estimate(&sizes, (seed, "compare"), of))
 }
 
-/// The probability that a trial of `one` is better than one of `other`, averaged over the objects
-/// that both explored; a tie is half.
+/// Probability that a trial of `one` is better than one of `other`, averaged over the objects that
+/// both explored; a tie counts half.
 pub fn improvement(one: &Contender, other: &Contender) -> Option<f64> {
     let shares: Vec<f64> = (one.scores().into_iter().zip(other.scores()))
         .filter(|(a, b)| !a.is_empty() && !b.is_empty())
@@ -206,7 +205,7 @@ pub fn improvement(one: &Contender, other: &Contender) -> Option<f64> {
     (!shares.is_empty()).then(|| mean(&shares))
 }
 
-/// The share of trials, averaged over objects, with a score of at most `score`.
+/// Share of trials with a score of at most `score`, averaged over objects.
 pub fn profile(contender: &Contender, score: f64) -> f64 {
     let strata = contender.scores().into_iter().filter(|scores| !scores.is_empty());
     let shares: Vec<f64> = strata
@@ -215,9 +214,8 @@ pub fn profile(contender: &Contender, score: f64) -> f64 {
     mean(&shares)
 }
 
-/// Geometric mean of scores over objects, each object counted once, with the interval of a
-/// bootstrap over trials, drawn within each object; none where an object has no score, or there is
-/// none.
+/// Geometric mean of scores over objects with equal weights, with the interval of a bootstrap over
+/// trials within each object; `None` if an object has no score, or there is no object.
 pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     if strata.is_empty() || strata.iter().any(|scores| scores.is_empty()) {
         return None;
@@ -227,10 +225,10 @@ pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     Some(estimate(&counts(&logs), (seed, "suite"), of))
 }
 
-/// Share of the way from [`FLOOR`] to the [`ORACLE`] that a contender comes, in log error averaged
-/// over objects: (floor − contender) / (floor − ceiling). Trials are drawn together, for they are
-/// of the same start. None where one of the three lacks an object of `objects`, has another number
-/// of trials, or no way is left to go.
+/// Share of the gap from [`FLOOR`] to the [`ORACLE`] that a planner closes, in log error averaged
+/// over objects: (floor − contender) / (floor − ceiling). Trials of the same number are drawn
+/// together because they share initial touches. `None` if one of the three lacks an object of
+/// `objects` or has another number of trials, or if the gap is zero.
 pub fn gap_closed(
     compared: &Compared,
     contender: &Contender,
@@ -263,7 +261,7 @@ fn counts(strata: &[Vec<f64>]) -> Vec<usize> {
     strata.iter().map(Vec::len).collect()
 }
 
-/// The mean over strata of the means of their picked trials.
+/// Mean over strata of the means of their picked trials.
 fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
     let means = strata.iter().zip(picks).map(|(values, picks)| {
         picks.iter().map(|pick| values[*pick]).sum::<f64>() / picks.len() as f64
@@ -271,8 +269,8 @@ fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
     mean(&means.collect::<Vec<_>>())
 }
 
-/// A statistic of all trials of strata of these sizes, with the 95 % interval of a bootstrap that
-/// draws within each stratum, the same for the same `seed` and `purpose`.
+/// Statistic of all trials of strata of these sizes, with the 95 % interval of a bootstrap within
+/// each stratum; deterministic for a `seed` and `purpose`.
 fn estimate(
     sizes: &[usize],
     (seed, purpose): (u64, &str),

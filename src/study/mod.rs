@@ -1,9 +1,9 @@
-//! Questions asked of many touches.
+//! Studies over many touches.
 //!
-//! * [`accuracy`]: what does accuracy cost? Variants of a scene, coarser, finer, or with an effect
-//!   switched, against a reference: error, time, and the cheapest scene within a tolerance.
-//! * [`check`]: are planners what they were? The same trials again, held against a committed file.
-//! * [`compare`](mod@compare): planners over several runs.
+//! * [`accuracy`]: accuracy against cost. Compares coarser, finer or switched variants of a scene
+//!   with a reference: error, time, and the cheapest scene within a tolerance.
+//! * [`check`]: regression test of planners against a stored baseline.
+//! * [`compare`](mod@compare): comparison of planners over several runs.
 
 pub mod accuracy;
 pub mod check;

@@ -1,4 +1,4 @@
-"""An independent ROS 1 peer: rospy. What it does is in ../peer.py."""
+"""Independent ROS 1 peer on rospy; see ../peer.py."""
 import os
 import pathlib
 import sys
@@ -65,7 +65,7 @@ KINDS = {
 
 
 class Inbox:
-    """What has come on a topic since it was last looked at."""
+    """Messages on a topic since the last call of take()."""
 
     def __init__(self, name, kind):
         self.lock, self.messages = threading.Lock(), []

@@ -1,4 +1,4 @@
-"""An independent ROS 2 peer: Eclipse Cyclone DDS. What it does is in ../peer.py."""
+"""Independent ROS 2 peer on Eclipse Cyclone DDS; see ../peer.py."""
 import pathlib
 import sys
 import time
@@ -143,7 +143,7 @@ class BiotacAll(IdlStruct, typename="sr_robot_msgs::msg::dds_::BiotacAll_"):
     header: Header
     tactiles: array[Biotac, 5]
 
-# A service of std_srvs/Trigger as Cyclone's rmw carries it: the identity of a request in front of its data.
+# Service std_srvs/Trigger as Cyclone's rmw encodes it: the request's identity precedes the data.
 @dataclass
 class TriggerRequest(IdlStruct, typename="std_srvs::srv::dds_::Trigger_Request_"):
     guid: uint64
@@ -187,7 +187,7 @@ class Inbox:
         self.reader = reader
 
     def take(self):
-        # A writer that leaves hands over a sample without data.
+        # A writer that leaves sends a sample without data.
         is_whole = lambda sample: any(getattr(sample, name, None) is not None for name in ("header", "stamp"))
         return list(filter(is_whole, self.reader.take(N=100)))
 
@@ -235,8 +235,8 @@ class Link:
         return count
 
     def arm(self, span):
-        """An arm that stands still: its status once, before anybody listens; its services in another participant,
-        two seconds later. Returns the services that were called."""
+        """Simulates an arm at rest. Publishes its status once before any subscriber exists, and its services in
+        another participant two seconds later. Returns the services that were called."""
         def now():
             at = time.time()
             return Header(Time(int(at), int((at % 1) * 1e9)), "")

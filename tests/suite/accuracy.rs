@@ -1,4 +1,4 @@
-//! The fidelity levels, the fall of their errors, and tolerances.
+//! Tests of fidelity levels, their convergence, and tolerances.
 
 use crate::common::shipped;
 use palpate::robot::finger::profile::Profile;
@@ -42,9 +42,9 @@ fn every_level_is_a_scene_that_can_be_built_and_saved() {
     assert!(converging().all(|level| level.senses == reference.senses && level.shell.is_none()));
 }
 
-/// The bar tells an order of one from no fall at all and from two. Measured with these targets:
-/// 1.31 in the time step, which scatters, for how late within a tick a touch is detected depends on
-/// where the tick falls; 1.13 in the points.
+/// The bounds separate first order from no convergence and from second order. Measured with these
+/// targets: 1.31 in the time step, which scatters because detection within a tick depends on the
+/// tick's phase; 1.13 in the points.
 #[test]
 fn the_error_falls_with_the_resolution_as_it_should() {
     let scene = scene(&[]);
@@ -63,8 +63,8 @@ fn touched(scene: &Scene, targets: &[Target]) -> Touches {
     touch_all(&Simulator::new(environment).unwrap(), targets, 0).unwrap()
 }
 
-/// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from
-/// an order of a half and of two. Measured: 1.06 and 1.08.
+/// The scheme is explicit in the skin's force and semi-implicit in the joints, so of first order.
+/// The bounds separate it from orders ½ and 2. Measured: 1.06 and 1.08.
 #[test]
 #[cfg(feature = "mujoco")]
 fn with_masses_the_error_in_contact_falls_with_the_step() {
@@ -77,7 +77,7 @@ fn with_masses_the_error_in_contact_falls_with_the_step() {
     }
 }
 
-/// What only a rigid finger has does not stay with a soft one, which would be refused.
+/// Settings for a rigid finger alone are removed for a soft one, where they would be invalid.
 #[test]
 fn a_rigid_scene_leaves_its_geometry_to_rigid_levels() {
     let sets = ["body=\"dynamic\"", "effects={}", "solver={collision=\"sdf\", sdf={iterations=5}}"];
@@ -100,8 +100,8 @@ fn a_tolerance_is_a_number_with_a_unit() {
     }
 }
 
-/// A fine level is near its own model's reference, a rigid one nearer the truth; the truth has no
-/// forces.
+/// A fine level is close to its own model's reference, a rigid one closer to the truth; true forces
+/// are unknown.
 #[test]
 fn what_stays_within_a_tolerance_depends_on_its_origin() {
     let of = |error_m: f64| Spread { mean: error_m, p95: error_m, ..Spread::default() };
@@ -124,7 +124,7 @@ fn what_stays_within_a_tolerance_depends_on_its_origin() {
     assert_eq!(rigid.p95(Quantity::Force, truth), None);
 }
 
-/// The cheapest level is one that stays within, and a level compared with itself has no error.
+/// The cheapest level stays within the tolerance, and a level compared with itself has no error.
 #[test]
 fn the_cheapest_level_is_tried_on_other_targets() {
     let scene = scene(&[]);
@@ -165,14 +165,14 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
     assert!(error.contains("touch.approach_m_s") && error.contains("at most 0.0"), "{error}");
     let slower = format!("touch.approach_m_s={}", 0.999 * limit_m_s);
     assert!(load(&[&slower]).is_ok());
-    // Coarser ticks and more frames leave less; a body that is not moved has no limit.
+    // Coarser ticks and more frames lower the limit; a body that does not move has none.
     let coarser = scene(&["touch.period_s=0.02"]).approach_limit_m_s().unwrap();
     assert!(coarser < limit_m_s);
     assert!(load(&["touch.approach_m_s=0.5", "body=\"cast\""]).is_ok());
 }
 
-/// At the fastest approach that is allowed the finger comes to rest within its skin and fluid, and
-/// deeper than at a quarter of it; half as fast again is too fast for a contact.
+/// At the fastest allowed approach the finger comes to rest within its skin and fluid, and deeper
+/// than at a quarter of it; half as fast again is too fast for contact detection.
 #[test]
 fn at_the_limit_of_approach_the_skin_is_not_used_up() {
     let mut scene = noise_free(&scene(&[]));

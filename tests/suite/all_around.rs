@@ -1,5 +1,5 @@
-//! Bodies that touch a whole object from all sides: what they feel, how they roll the finger, what
-//! they do not reach, and that they come there.
+//! Tests of bodies that touch a whole object from all sides: contacts, roll of the finger,
+//! unreachable directions, and reached targets.
 
 use crate::common::shapes::sphere_mesh;
 use crate::common::shipped::{contact, environment, scene};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 const MIDDLE_W: [f64; 3] = [0.0, -0.65, 0.5];
 const RADIUS_M: f64 = 0.05;
 
-/// A sphere in place of the object of `scene`.
+/// Builds the environment of `scene` with a sphere as the object.
 fn with_sphere(scene: Scene) -> Result<Arc<Environment>, Invalid> {
     let bvh = MeshBvh::new(sphere_mesh(MIDDLE_W.into(), RADIUS_M, 60));
     let report = Box::<MeshReport>::default();
@@ -32,15 +32,15 @@ fn around(name: &str, sets: &[&str]) -> Arc<Environment> {
     with_sphere(scene(name, sets)).unwrap()
 }
 
-/// Faces, edges and corners of a cube.
+/// Directions to the faces, edges and corners of a cube.
 fn outwards() -> impl Iterator<Item = Vector3<f64>> {
     let steps = || [-1.0, 0.0, 1.0].into_iter();
     let all = steps().flat_map(move |x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
     all.map(Vector3::from).filter(|outward| outward.norm() > 0.5)
 }
 
-/// The finger is the same on every side, so it errs on none by more than on the one side that a
-/// zone looks at: here the zone in front, over which the sphere leans to all sides.
+/// The finger's error on any side is at most its error on the one side of a zone, here the zone in
+/// front, where the sphere slopes in all directions.
 #[test]
 fn a_soft_finger_feels_a_sphere_from_all_sides_as_well_as_from_one() {
     let off_m = |p_w: &Point3<f64>| ((p_w - Point3::from(MIDDLE_W)).norm() - RADIUS_M).abs();
@@ -88,7 +88,7 @@ fn the_finger_is_rolled_only_where_it_must_be_and_always_the_same() {
     assert!(rolled > 0);
 }
 
-/// What is below: neither comes the hull there, nor does a touch from there begin.
+/// Below the support neither the hull may move nor a touch may start.
 #[test]
 fn nothing_goes_below_what_the_object_stands_on() {
     for name in ["container_around.toml", "container_around_finger.toml"] {
@@ -116,7 +116,7 @@ fn nothing_goes_below_what_the_object_stands_on() {
     }
 }
 
-/// What an arm says it reaches it does reach, one after the other in any order.
+/// An arm reaches every target that it reports as reachable, in any order.
 #[test]
 fn an_arm_comes_to_all_that_it_reaches() {
     let sets = ["body=\"kinematic\""];
@@ -139,8 +139,7 @@ fn an_arm_comes_to_all_that_it_reaches() {
     assert!((10..40).contains(&reached), "{reached}");
 }
 
-/// The arm of `scenes/container_around_pa10.toml`, which stands at these joints, in rad, and meets
-/// nothing.
+/// Arm of `scenes/container_around_pa10.toml` at rest at these joints, rad, without contact.
 fn standing_at(q: [f64; 7]) -> Box<dyn Backend> {
     let home = format!("arm.home_deg={:?}", q.map(f64::to_degrees));
     let sets = ["body=\"kinematic\"", "object.position_m=[0, -3, 0.5]", &home];
@@ -148,8 +147,8 @@ fn standing_at(q: [f64; 7]) -> Box<dyn Backend> {
     Box::new(Kinematic::new(&Arc::new(far)).unwrap())
 }
 
-/// Where touches from all sides once left the arm, and along which of 420 directions it was to go
-/// next: elbow on the other side, wrist wound up, shoulder nearly at its limit, behind the object.
+/// Joints after touches from all sides, and the next of 420 directions: elbow on the other side,
+/// wrist turned far, shoulder near its limit, behind the object.
 const LEFT_AT: [([f64; 7], usize); 6] = [
     ([1.3223, -0.7235, -1.4155, 1.8936, -1.6301, -0.7120, 1.7469], 154),
     ([-1.3248, 1.5450, 1.9588, 1.6553, 3.8247, -0.9869, 1.5909], 196),
@@ -159,8 +158,8 @@ const LEFT_AT: [([f64; 7], usize); 6] = [
     ([0.4303, 0.4438, 0.0858, 1.6614, -1.9527, 2.3476, 2.7834], 229),
 ];
 
-/// It comes there, or does not set out; the latter only from where nothing but a way that was not
-/// tried out had brought it.
+/// The arm reaches the target or does not start; the latter only from a pose that it reached by an
+/// unchecked movement.
 #[test]
 fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move() {
     let environment = environment("container_around_pa10.toml", &["body=\"kinematic\""]);
@@ -180,7 +179,7 @@ fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move()
     assert!(arrived.len() >= 4, "{arrived:?}");
 }
 
-/// No movement is made that was not tried out.
+/// Only checked movements are made.
 #[test]
 fn an_arm_that_knows_no_way_does_not_move() {
     let environment = environment("container_around_pa10.toml", &["body=\"kinematic\""]);

@@ -1,4 +1,4 @@
-//! A control tick asks the allocator for nothing.
+//! Test that a control tick does not allocate memory.
 
 use crate::common::counting::allocations;
 use palpate::explore::control::{Controller, Goal};
@@ -11,7 +11,7 @@ fn the_controller_allocates_nothing() {
     let mut q = chain.home;
     let mut goal = Goal::still(chain.forward(&q));
     let mut controller = Controller::new(chain, 0.004).unwrap();
-    // Out of reach, past singularities and limits.
+    // The goal is out of reach, past singularities and limits.
     goal.x_wt.translation.vector.y = -3.0;
     let count = allocations(|| {
         for _ in 0..2000 {
@@ -32,7 +32,7 @@ fn interlocks_allocate_nothing() {
     let environment = shipped::environment("container_finger.toml", &sets);
     let body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
     let (robot, task) = (environment.robot().unwrap(), environment.task());
-    // So near to the table that the guard looks at every tick.
+    // The tip is so close to the table that the guard checks every tick.
     let settings = InterlockSettings { lowest_m: Some(0.22), ..InterlockSettings::default() };
     let mut body = interlocked(body, &robot, task, None, &settings).unwrap();
     let mut command = Command { qdot: vec![0.0; 7] };
@@ -121,7 +121,7 @@ fn a_tick_with_a_shell_in_contact_allocates_nothing() {
             while state.frame().is_some() {}
         }
     };
-    // The first way sizes what is remembered.
+    // The first path sizes the buffers.
     go();
     assert_eq!(allocations(go), 0);
 }

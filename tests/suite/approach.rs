@@ -1,4 +1,4 @@
-//! A zone may look at its object from any side.
+//! Tests of zones that face any side of an object.
 
 use crate::common::shapes::Dice;
 use crate::common::shipped::scene;
@@ -10,7 +10,7 @@ use palpate::task::Zone;
 use proptest::prelude::*;
 use std::sync::Arc;
 
-/// The scene with object and zone turned together about `W`'s origin.
+/// Returns the scene with object and zone rotated together about `W`'s origin.
 fn turned(scene: &Scene, x_ww: &Isometry3<f64>) -> Scene {
     let pose = |x: Isometry3<f64>| {
         let (roll, pitch, yaw) = x.rotation.euler_angles();
@@ -24,12 +24,12 @@ fn turned(scene: &Scene, x_ww: &Isometry3<f64>) -> Scene {
     scene
 }
 
-/// What is found at each target, in the zone's own terms: place, height, normal.
+/// Contact at each target in the zone's frame: place, height, normal.
 fn found(scene: Scene, targets: &[Vec<f64>]) -> Vec<Option<[f64; 6]>> {
     let environment = Arc::new(Environment::build(scene).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let zone = environment.task().zone().unwrap();
-    // A body of its own for each: no touch begins where another ended.
+    // Each target has its own body, so that touches are independent.
     let touch = |target: &Vec<f64>| match (simulator.probe(3).unwrap())
         .touch(&environment.task().approach(&target[..].into()).unwrap())
         .unwrap()
@@ -45,7 +45,7 @@ fn found(scene: Scene, targets: &[Vec<f64>]) -> Vec<Option<[f64; 6]>> {
     targets.iter().map(touch).collect()
 }
 
-/// A sensor whose counts are smooth in what is felt: a count more or less is no rounding.
+/// Settings of a sensor with smooth counts, so that rounding has no effect.
 const STEADY: [&str; 5] = [
     "effects.electrodes.noise=0",
     "effects.electrodes.drift_counts=0",
@@ -54,8 +54,8 @@ const STEADY: [&str; 5] = [
     "effects.fluid.quantise=false",
 ];
 
-/// From +x, and from a side that is no axis: the object's side that is explored is the same, so
-/// everything found is, in the zone's frame.
+/// The same side of the object, explored from +x and from an oblique direction, gives the same
+/// contacts in the zone's frame.
 #[test]
 fn a_side_is_the_same_from_wherever_it_is_explored() {
     let from_x = Isometry3::rotation(nalgebra::Vector3::z() * -std::f64::consts::FRAC_PI_2);
@@ -63,16 +63,16 @@ fn a_side_is_the_same_from_wherever_it_is_explored() {
         Translation3::new(0.1, -0.2, 0.05),
         UnitQuaternion::from_euler_angles(0.4, -0.3, 2.1),
     );
-    // The rigid hull is exact from anywhere. The slides of a stage stand along W's axes, so the soft
-    // finger moves alike where the zone's axes are those of W, in another order: askew, three slides
-    // brake together what one would.
+    // The rigid hull is exact in any frame. The slides of a stage are parallel to W's axes, so the
+    // soft finger moves equally if the zone's axes are a permutation of W's; in an oblique frame
+    // three slides brake together.
     for (name, sets, sides) in [
         ("bird.toml", &[][..], &[from_x, askew][..]),
         ("container.toml", &[], &[from_x, askew]),
         ("container_finger.toml", &STEADY, &[from_x]),
     ] {
         let scene = scene(name, sets);
-        // No target so round that a movement's last tick hangs on rounding.
+        // Targets avoid round numbers, so that a movement's last tick does not depend on rounding.
         let mut dice = Dice(5);
         let mut share = || 0.5 + 0.45 * dice.roll();
         let targets: Vec<_> =
@@ -113,8 +113,8 @@ fn the_truth_and_the_default_depth_turn_with_the_zone() {
 }
 
 proptest! {
-    /// place and height are the inverse of point, and an approach goes over its place from the near
-    /// depth to the far one, whatever the pose.
+    /// place and height are the inverse of point, and an approach passes over its place from the
+    /// near depth to the far one, for any pose.
     #[test]
     fn a_zones_places_are_where_its_approaches_go(seed in any::<u64>()) {
         let mut dice = Dice(seed);
@@ -144,7 +144,7 @@ proptest! {
     }
 }
 
-/// Without a simulator nobody knows where the object is: a zone must say it.
+/// Without a simulator the object's position is unknown, so a zone must give its depth.
 #[test]
 fn a_zone_without_depth_is_no_task() {
     let finger = palpate::robot::Finger::default();
@@ -153,13 +153,13 @@ fn a_zone_without_depth_is_no_task() {
     assert!(error.to_string().contains("zone.depth_m"), "{error}");
 }
 
-/// A depth range of one's own: the object must be in it, and not in front of it.
+/// A given depth range must contain the object, and the object must not be in front of it.
 #[test]
 fn a_depth_range_beside_the_object_is_refused() {
     let build = |set: &str| Environment::build(scene("bird.toml", &[set]));
     let error = build("zone.depth_m=[0.0, 0.1]").err().unwrap().to_string();
     assert!(error.contains("depth"), "{error}");
-    // The bird's breast is nearer than its middle, from which heights are measured.
+    // The bird's breast is closer than its middle, the zero of the heights.
     let error = build("zone.depth_m=[0.65, 0.8]").err().unwrap().to_string();
     assert!(error.contains("begins at 0.65 m"), "{error}");
     let own = build("zone.depth_m=[0.4, 0.8]").unwrap();

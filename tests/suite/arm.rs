@@ -1,4 +1,4 @@
-//! The arm: its chain and its MuJoCo model must be the same arm.
+//! Tests that the arm's kinematic chain and its MuJoCo model agree.
 
 use palpate::math::seed;
 use palpate::robot::arm::{ArmSettings, Chain, Joints};
@@ -23,7 +23,7 @@ fn arm(model: &str) -> ArmSettings {
     }
 }
 
-/// Chains that are tested: both link sets on an odd base, and the stage.
+/// Chains under test: both link sets on a displaced base, and the stage.
 fn chains() -> [(Environment, Chain); 3] {
     [Some(arm("pa10")), Some(arm("pa10_a")), None].map(|arm| {
         let environment = environment(arm);
@@ -157,7 +157,7 @@ mod mujoco {
             for (i, joint) in chain.joints.iter().enumerate() {
                 let id = model.name_to_id(MjtObjBase::mjOBJ_JOINT, &joint.name);
                 assert_eq!(id, Some(i), "{}", joint.name);
-                // The stop stands 3 degrees beyond the servo's limit.
+                // The stop is 3 degrees beyond the servo's limit.
                 let stop = joint.q_limits[1] + 3.0_f64.to_radians();
                 assert!((model.jnt_range()[i][1] - stop).abs() < 1e-6, "{}", joint.name);
                 assert_eq!(model.name_to_id(MjtObjBase::mjOBJ_ACTUATOR, &joint.name), Some(i));
@@ -184,7 +184,7 @@ mod mujoco {
         }
     }
 
-    /// At zero command against gravity: from the start, and after a motion that changes the load.
+    /// At zero command against gravity, from the start and after a motion that changes the load.
     /// With a proportional servo alone the arm sags 6 degrees in this time.
     #[test]
     fn servos_do_not_sag() {
@@ -239,8 +239,8 @@ mod mujoco {
         }
     }
 
-    /// Held against more than they can give, the servos' integrals must not grow; let go, the
-    /// joints must come to rest where they were let go, without swinging back or chattering.
+    /// Servos pushed beyond their torque limits do not wind up; after release the joints come to
+    /// rest in place, without swinging back or chattering.
     #[test]
     fn saturated_servos_neither_wind_up_nor_chatter() {
         let twist = Vector3::new(20.0, 0.0, 0.0);
@@ -317,7 +317,7 @@ mod mujoco {
         let Fault::Diverged { time_s, state } = &fault else { panic!("{fault}") };
         assert!(*time_s > 0.0);
         assert_eq!(state.len(), 14);
-        // Reset by MuJoCo, the velocities would be zero.
+        // MuJoCo's reset would set the velocities to zero.
         assert!(state[7..].iter().any(|speed| !speed.is_finite() || speed.abs() > 1.0));
         assert!(plant.step(&[0.0; 7], &Wrench::default()).is_err());
         plant.reset(&home).unwrap();
@@ -359,7 +359,7 @@ mod mujoco {
                 assert_eq!(first, thread.join().unwrap());
             }
         });
-        // Another trial on the same data must not see the one before it.
+        // Another trial on the same data is independent of the previous one.
         let mut plant = Plant::new(Arc::clone(&model)).unwrap();
         for _ in 0..2 {
             plant.reset(home.as_slice()).unwrap();

@@ -1,4 +1,5 @@
-//! Commands on whole objects: what they write is read back, and what goes over a zone refuses.
+//! Tests of commands on whole objects: outputs can be read back, and commands for zones reject
+//! whole objects.
 
 use crate::common::program::{fails, folder, palpate, said, succeeds};
 use crate::common::shipped::scene;
@@ -9,7 +10,8 @@ use palpate::sim::known_body;
 use std::fs;
 use tempfile::TempDir;
 
-/// The tetrahedron of [`folder`] as a whole, and an experiment that a second is enough for.
+/// A folder with the tetrahedron of [`folder`] as a whole object, and an experiment that runs in a
+/// second.
 fn around() -> TempDir {
     let folder = folder();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -60,7 +62,7 @@ fn planners_around_an_object_are_held_against_what_they_were() {
     succeeds(folder.path(), &[&check[..], &["--bless", "so it is"]].concat());
     let same = succeeds(folder.path(), &check);
     assert!(same.trim_end().ends_with("identical"), "{same}");
-    // Touches are the same, and what is made of them is not.
+    // Touches are equal, but their evaluation differs.
     let other = palpate(folder.path(), &[&check[..], &["--set", "gp.cells=24"]].concat());
     let told = String::from_utf8_lossy(&other.stdout).into_owned();
     assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{told} {}", said(&other));
@@ -77,13 +79,13 @@ fn what_goes_over_a_zone_refuses_a_whole_object() {
     assert!(shown.contains("ball: 9") && shown.contains("% of the surface"), "{shown}");
     assert!(!shown.contains("zone") && !shown.contains("refuses"), "{shown}");
     let mjcf = ["show", "scene.toml", "--mjcf", "it.xml"];
-    fails(folder.path(), &mjcf, &["no model in MuJoCo", "[arm]"]);
+    fails(folder.path(), &mjcf, &["no MuJoCo model", "[arm]"]);
     succeeds(folder.path(), &["show", "scene.toml", "--png", "reach.png"]);
     assert!(folder.path().join("reach.png").is_file());
-    fails(folder.path(), &["show", "scene.toml", "--watch"], &["touches without moving"]);
+    fails(folder.path(), &["show", "scene.toml", "--watch"], &["does not move"]);
 }
 
-/// A robot that goes around objects registers itself at one side of a body.
+/// A robot for whole objects registers at one side of a body.
 #[test]
 fn a_known_body_takes_the_place_of_a_whole_object() {
     let body = KnownBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
@@ -93,7 +95,7 @@ fn a_known_body_takes_the_place_of_a_whole_object() {
     assert!(environment.task().zone().unwrap().dimension() == 2);
 }
 
-/// Centre and radius say nothing of the mesh, whose hash does.
+/// Centre and radius do not identify the mesh; its hash does.
 #[test]
 fn a_run_does_not_resume_on_another_mesh() {
     let folder = around();
@@ -103,7 +105,7 @@ fn a_run_does_not_resume_on_another_mesh() {
     succeeds(folder.path(), &run(&[]));
     let mesh = folder.path().join("mesh.obj");
     let text = fs::read_to_string(&mesh).unwrap();
-    // What is not geometry does not count.
+    // Changes of comments do not matter, only changes of geometry.
     fs::write(&mesh, format!("# the same\n{text}")).unwrap();
     succeeds(folder.path(), &run(&["--set", "trials=3"]));
     fs::write(&mesh, text.replace("v 0 0 1\n", "v 0 0 0.9\n")).unwrap();
@@ -112,7 +114,7 @@ fn a_run_does_not_resume_on_another_mesh() {
     succeeds(folder.path(), &run(&["--fresh"]));
 }
 
-/// The ball that follows from the object's size is checked before anything runs.
+/// The ball derived from the object's size is checked before the run.
 #[test]
 fn an_object_too_small_to_go_around_is_refused_at_once() {
     let folder = around();
@@ -124,7 +126,8 @@ fn an_object_too_small_to_go_around_is_refused_at_once() {
     assert!(!folder.path().join("runs").exists());
 }
 
-/// The folder has the truth that figures need: it may move, and the mesh may go or change.
+/// The folder contains the truth for figures: it can be moved, and the mesh can be deleted or
+/// changed.
 #[test]
 fn a_report_needs_its_folder_alone() {
     let folder = around();

@@ -1,4 +1,4 @@
-//! What every body promises, asked of each of them and of each with a wrapper around it.
+//! Tests of the backend contract, for every body and every wrapper around it.
 
 use crate::common::shipped;
 use palpate::backend::delay::Delayed;
@@ -24,7 +24,7 @@ fn environment(sets: &[&str]) -> Arc<Environment> {
     shipped::environment("container_finger.toml", sets)
 }
 
-/// Puts a wrapper around a body.
+/// Function that wraps a body.
 type Wrap = fn(Box<dyn Backend>, &Chain) -> Box<dyn Backend>;
 
 const WRAPS: [(&str, Wrap); 5] = [
@@ -55,7 +55,7 @@ fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> Interlocked {
     Interlocked::new(body, &site, &InterlockSettings::default()).unwrap()
 }
 
-/// Shows `check` every body, each in every wrapper.
+/// Runs `check` on every body in every wrapper.
 fn each(check: impl Fn(&str, &mut dyn Backend, &Chain)) {
     for kind in KINDS {
         for arm in [None, Some("arm={links=\"C\"}")] {
@@ -75,7 +75,7 @@ fn each(check: impl Fn(&str, &mut dyn Backend, &Chain)) {
     }
 }
 
-/// The same gentle motion for every body, within its limits.
+/// Slow motion within the limits of every body.
 fn motion(tick: u32, joints: usize) -> Command {
     let phase = f64::from(tick) * 0.02;
     Command {
@@ -93,7 +93,7 @@ fn run(body: &mut dyn Backend, seed: u64, ticks: u32) -> Vec<Reading> {
 }
 
 fn bits(readings: &[Reading]) -> String {
-    // Debug prints the shortest digits that tell two numbers apart.
+    // Debug output has the shortest digits that distinguish two numbers.
     format!("{readings:?}")
 }
 
@@ -193,8 +193,8 @@ fn limits_hold_acceleration_and_braking_and_leave_a_good_command_alone() {
         let period_s = limited.capabilities().period_s;
         let mut before = vec![0.0; chain.joints.len()];
         for _ in 0..2000 {
-            // Away from the object, as fast as it goes, into the limits; of an arm the joints that
-            // turn it about its foot and its hand about itself.
+            // Moves away from the object at full speed into the limits; on an arm, the joints that
+            // turn the foot and the hand.
             let last = before.len() - 1;
             let is_asked = |i: usize| last == 2 || i.is_multiple_of(last);
             let qdot = (0..=last).map(|i| if is_asked(i) { 9.0 } else { 0.0 }).collect();
@@ -259,8 +259,8 @@ fn a_delayed_body_does_later_what_the_bare_one_does() {
     }
 }
 
-/// Watching changes no reading and shows the last; the body is never ahead of the clock by more
-/// than the sleep it saves up, and it stops when nobody watches any more.
+/// A live view changes no reading and shows the last one. The body is ahead of real time by at most
+/// its sleep granularity, and stops when the view is closed.
 #[test]
 fn a_watched_body_is_the_same_body_at_the_pace_of_the_clock() {
     let simulator = Simulator::new(environment(&[EFFECTS_DRY])).unwrap();
@@ -268,7 +268,7 @@ fn a_watched_body_is_the_same_body_at_the_pace_of_the_clock() {
     let (mut watched, sight) = Watched::new(simulator.body().unwrap().unwrap(), 4.0);
     let begun = std::time::Instant::now();
     let readings = run(&mut watched, 3, 20);
-    // A machine that is busy only makes it later.
+    // On a busy machine it is only later.
     let last = readings.last().unwrap();
     assert!(begun.elapsed().as_secs_f64() > last.time_s / 4.0 - 0.01);
     assert!(bits(&run(bare.as_mut(), 3, 20)) == bits(&readings));

@@ -1,4 +1,4 @@
-//! The pieces that benches time run, and their shares of what the machine can do are computed right.
+//! Tests of the benchmarks' workloads and of their shares of the machine's limits.
 
 #[path = "../../benches/common/pieces/mod.rs"]
 #[allow(dead_code)]
@@ -17,7 +17,7 @@ fn every_piece_runs_and_has_a_name_of_its_own() {
     all.iter_mut().for_each(|piece| (piece.run)());
 }
 
-/// Twice the operations in the same work is twice the share; what counts none has none.
+/// Twice the operations in the same time is twice the share; without operations there is no share.
 #[test]
 fn shares_are_rates_over_those_of_the_limits() {
     let work = || {

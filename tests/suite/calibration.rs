@@ -1,4 +1,4 @@
-//! What recordings of real sensors say of the finger's constants.
+//! Tests of the finger's constants on recordings of real sensors.
 
 use palpate::math::least_squares::FitError;
 use palpate::robot::finger::frame::ELECTRODES;
@@ -13,15 +13,15 @@ fn recordings() -> Recordings {
     serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap()
 }
 
-/// Fewer points of the skin than a scene has: the fit is faster, and a count off by a few.
+/// Model with fewer skin points than in a scene: the fit is faster, and counts differ slightly.
 fn coarse() -> Model {
     let mut model = Model::default();
     model.skin.samples = 250;
     model
 }
 
-/// The bars: 85 counts and 95 % of the signs (one sensor's table of counts used for the other
-/// is off by 69 and 82), and at every load better than if nothing changed.
+/// Bounds: 85 counts and 95 % of the signs (one sensor's counts predict the other's with an error
+/// of 69 and 82), and a smaller error than the no-change predictor at every load.
 #[test]
 fn constants_of_one_sensor_predict_the_other() {
     let held_out = leave_one_out(&coarse(), &recordings().sensors, Free::Constants).unwrap();
@@ -34,7 +34,7 @@ fn constants_of_one_sensor_predict_the_other() {
         for (force_n, score) in &held.loads {
             assert!(score.model_counts < score.no_change_counts, "{force_n} N: {score:?}");
         }
-        // The offset is one that an untouched sensor shows too, 1.08 to 1.2.
+        // An untouched sensor shows the same offset, 1.08 to 1.2.
         let offset = held.fit.sessions[0].offset;
         assert!((1.02..1.25).contains(&offset), "{offset}");
     }
@@ -43,7 +43,7 @@ fn constants_of_one_sensor_predict_the_other() {
     assert!(all.model_counts <= 85.0 && all.right_sign() >= 0.95, "{all:?}");
 }
 
-/// What a session made with known numbers is found to be.
+/// The fit recovers the parameters of a synthetic session.
 #[test]
 fn a_fit_finds_what_a_recording_was_made_with() {
     let mut model = coarse();
@@ -62,7 +62,7 @@ fn a_fit_finds_what_a_recording_was_made_with() {
     assert!((session.mean_roll_rad() - 0.05).abs() < 0.02, "{session:?}");
 }
 
-/// An offset and nothing else: all electrodes better conducting, no load felt.
+/// A pure offset, with all electrodes more conductive and no load, is identified.
 #[test]
 fn an_offset_alone_is_told_as_one() {
     let mut recording = recordings().sensors.remove(0);
@@ -78,7 +78,7 @@ fn an_offset_alone_is_told_as_one() {
 
 #[test]
 fn a_constant_that_recordings_do_not_determine_is_refused() {
-    // Electrodes that fall to nothing at once are sensed through no spread at all.
+    // Electrodes that drop to zero at once show no spread.
     let mut recording = recordings().sensors.remove(0);
     recording.near_normal_loads.truncate(2);
     for bin in &mut recording.near_normal_loads {
@@ -114,7 +114,7 @@ fn what_no_sensor_can_say_is_refused_by_name() {
     assert_eq!(fit(&coarse(), &[], Free::Sessions), Err(FitError::Empty));
 }
 
-/// Mean errors over loads weigh each entry alike.
+/// Mean errors over loads weight all entries equally.
 #[test]
 fn scores_add_up() {
     let one =

@@ -1,4 +1,4 @@
-//! Planners held against what they were.
+//! Tests of the regression test of planners (`palpate check`).
 
 use crate::common::program::palpate;
 use palpate::experiment::{Experiment, Simulation, runner};
@@ -18,14 +18,13 @@ use std::sync::atomic::AtomicBool;
 
 const ALPHA: f64 = 0.05;
 
-/// Nearly normal: the sum of twelve uniform numbers, less six.
+/// Approximately normal: the sum of twelve uniform numbers, minus six.
 fn normal(rng: &mut impl rand::Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// Of normal values around nothing an interval that one may look at after every ten of fifty leaves
-/// nothing out in at most five of a hundred samples; of exponential ones, which it is not made for,
-/// in hardly more.
+/// For normal values of mean 0, an interval evaluated after every ten of fifty misses in at most 5
+/// % of samples; for exponential values, outside its assumptions, in slightly more.
 #[test]
 fn intervals_hold_whenever_one_looks() {
     let samples = 2000;
@@ -51,7 +50,7 @@ fn intervals_hold_whenever_one_looks() {
     }
 }
 
-/// A shift of a spread is found by twenty, and the interval holds it.
+/// A shift of one standard deviation is detected within twenty values and lies in the interval.
 #[test]
 fn what_differs_is_found() {
     let mut found = 0;
@@ -70,7 +69,7 @@ fn what_differs_is_found() {
     assert_eq!((one.interval, one.p), ([f64::NEG_INFINITY, f64::INFINITY], 1.0));
 }
 
-/// Differences around `shift` that spread like `sd`, in every measure.
+/// Results for differences around `shift` with standard deviation `sd`, in every measure.
 fn judged(shift: f64, sd: f64, count: usize) -> Vec<palpate::study::check::Judgement> {
     let mut rng = seed::stream(7, count as u64, "judged");
     let mut values = || (0..count).map(|_| shift + sd * normal(&mut rng)).collect::<Vec<f64>>();
@@ -105,8 +104,7 @@ fn baseline(simulation: &Simulation) -> Baseline {
     Baseline::new(simulation, &rows, "a test")
 }
 
-/// The same rows are identical; a planner that is not there any more, or whose trials are now
-/// other ones, is not.
+/// Equal rows are identical; a removed planner, or other trials, are missing.
 #[test]
 fn rows_are_held_against_a_baseline() {
     let stop = AtomicBool::new(false);
@@ -128,7 +126,7 @@ fn rows_are_held_against_a_baseline() {
     assert_eq!(text.lines().count(), 9);
 }
 
-/// From the command line: written, held against, damaged, of another experiment.
+/// Command line: write a baseline, compare, a damaged baseline, another experiment.
 #[test]
 fn a_check_says_by_its_exit_code() {
     let folder = tempfile::tempdir().unwrap();
@@ -154,28 +152,28 @@ fn a_check_says_by_its_exit_code() {
     let texts = reports.each_ref().map(|path| fs::read_to_string(path).unwrap());
     assert!(texts[0].contains("<testcase name=\"active\"") && texts[0].contains("failures=\"0\""));
     assert!(texts[1].contains("| active |") && texts[2].starts_with("<svg"));
-    // Of a planner that differs little can be said after four trials.
+    // Four trials decide for a planner with small differences.
     let (code, said) = check(&["--set", "gp.noise_sd_m=0.3", "--junit", junit]);
     assert!([Some(1), Some(3)].contains(&code), "{code:?} {said}");
     assert!(said.contains("settings or the object's file"), "{said}");
     let told = fs::read_to_string(junit).unwrap();
     assert!(told.contains("<failure") || told.contains("<error"), "{told}");
     let (code, said) = check(&["--set", "seed=5"]);
-    assert!(code == Some(2) && said.contains("`seed` is 2016 there and 5"), "{said}");
+    assert!(code == Some(2) && said.contains("`seed` is 2016 in the baseline and 5"), "{said}");
     let text = fs::read_to_string(&file).unwrap();
     fs::write(&file, text.replacen("\"trial\":1", "\"trial\":x", 1)).unwrap();
     let (code, said) = check(&[]);
     assert!(code == Some(2) && said.contains("toy.jsonl:4:"), "{said}");
 }
 
-/// The paper's planner, but that it keeps away from the zone's border: worse on purpose.
+/// The paper's planner, but away from the zone's border, to be worse.
 struct Shy {
     own: Box<dyn Planner>,
     margin: f64,
 }
 
-/// How far it keeps away, as a share of the zone's sides; found so that the container's mean log
-/// RMSE is no more than 5 % more: it is 3.8 %.
+/// Distance from the border as a share of the zone's sides.
+// heuristic: raises the container's mean log RMSE by 3.8 %, below 5 %.
 const MARGIN: f64 = 0.015;
 
 fn margin() -> f64 {
@@ -218,7 +216,7 @@ static RESEEDED: Entry = Entry {
     },
 };
 
-/// A check of `new` against the planner `old` with a fresh seed: its verdict, its trials, and the
+/// Checks `new` against the planner `old` with a new seed; returns the verdict, the trials and the
 /// mean difference of mean log RMSE.
 fn one_check(name: &str, seed: u64, old: &Entry, new: &Entry) -> (Verdict, usize, f64) {
     let path = format!("experiments/{name}.toml");
@@ -244,9 +242,9 @@ fn one_check(name: &str, seed: u64, old: &Entry, new: &Entry) -> (Verdict, usize
     unreachable!("fifty trials are some")
 }
 
-/// What is 5 % worse is flagged in 95 of 100 checks, and other random numbers in at most 3; with
-/// the experiment that `PALPATE_CHECKED` names, `PALPATE_CHECKS` times; `PALPATE_CHANGE` names
-/// one of the two changes.
+/// A planner that is 5 % worse is detected in 95 of 100 checks, and other seeds are flagged in at
+/// most 3. The experiment is `PALPATE_CHECKED`, the number of checks `PALPATE_CHECKS`;
+/// `PALPATE_CHANGE` selects one of the two changes.
 #[test]
 #[ignore = "takes minutes: cargo test --release --test suite -- --ignored --nocapture check::"]
 fn a_loss_of_five_percent_is_flagged_and_other_random_numbers_are_not() {

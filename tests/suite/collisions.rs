@@ -1,4 +1,4 @@
-//! Links in the way of things: MuJoCo lets them collide, and the guard stops before they do.
+//! Tests of collisions of links: MuJoCo models them, and the guard stops before them.
 
 use crate::common::shipped::environment;
 use palpate::backend::interlock::InterlockSettings;
@@ -18,7 +18,8 @@ fn arm(sets: &[&str]) -> Arc<Environment> {
     environment("container_pa10.toml", sets)
 }
 
-/// Lowers the arm onto the table for three seconds; the lowest that any part was, and why it ended.
+/// Lowers the arm onto the table for three seconds; returns the lowest point of any part, and the
+/// reason of the end.
 fn lower(environment: &Arc<Environment>, guarded: bool) -> (f64, Option<Fault>) {
     let simulator = Simulator::new(Arc::clone(environment)).unwrap();
     let mut body = simulator.body().unwrap().unwrap();
@@ -37,7 +38,7 @@ fn lower(environment: &Arc<Environment>, guarded: bool) -> (f64, Option<Fault>) 
     let links: Vec<_> = robot.capsules().into_iter().filter(|link| link.link >= 3).collect();
     let mut lowest_m = f64::INFINITY;
     for tick in 0..1500 {
-        // The shoulder leans forwards, which carries forearm and hand down.
+        // Leaning the shoulder forwards lowers forearm and hand.
         let faster = (f64::from(tick) * 0.002).min(0.25);
         let mut qdot = vec![0.0; 7];
         qdot[1] = faster;
@@ -59,7 +60,7 @@ fn an_arm_is_stopped_by_the_table_and_by_the_guard_before_it() {
     let (through_m, _) = lower(&arm(&[]), false);
     assert!(through_m < -0.1, "{through_m}");
     let (against_m, _) = lower(&arm(&[TABLE]), false);
-    // What contact yields to the shoulder's 232 N·m, and what capsules are larger than cylinders.
+    // Compliance of the contact under the shoulder's 232 N·m, and capsules larger than cylinders.
     assert!((-0.02..0.001).contains(&against_m), "{against_m}");
     for sets in [&[][..], &[TABLE]] {
         let (before_m, fault) = lower(&arm(sets), true);
@@ -69,8 +70,8 @@ fn an_arm_is_stopped_by_the_table_and_by_the_guard_before_it() {
     }
 }
 
-/// Where nothing collides, links that could do so change nothing; without them the model is the
-/// text that it was.
+/// Without collisions, links that can collide change nothing; without such links the model's text
+/// is unchanged.
 #[test]
 fn a_touch_far_from_everything_is_the_same_to_the_bit() {
     let touched = |environment: &Arc<Environment>| {
@@ -88,7 +89,7 @@ fn a_touch_far_from_everything_is_the_same_to_the_bit() {
 
 #[test]
 fn links_that_meet_push_each_other() {
-    // The elbow folds, the hand comes down beside the foot.
+    // Folds the elbow and moves the hand down beside the foot.
     let fold = |environment: &Arc<Environment>| {
         let simulator = Simulator::new(Arc::clone(environment)).unwrap();
         let mut body = simulator.body().unwrap().unwrap();

@@ -1,4 +1,4 @@
-//! The command line as people know it.
+//! Tests of the command line.
 
 use crate::common::program::{command, ended, fails, folder, palpate, said, succeeds};
 use std::fs;
@@ -31,7 +31,7 @@ fn experiments_and_scenes_are_found_by_name() {
     assert!(folder.path().join("runs/small/trials.jsonl").is_file());
 }
 
-/// Names of the version before still answer, with a note that says today's.
+/// Deprecated command names still work, with a note of the new name.
 #[test]
 fn commands_answer_to_their_old_names() {
     let folder = folder();
@@ -45,7 +45,7 @@ fn commands_answer_to_their_old_names() {
             &["align", "scan/cloud.ply", "mesh.obj", "--position=0,0,0"],
             &["register MESH --cloud CLOUD"],
         ),
-        (&["watch", "scene.toml"], &["show SCENE --watch", "touches without moving"]),
+        (&["watch", "scene.toml"], &["show SCENE --watch", "does not move"]),
         (&["fidelity", "scene.toml", "--touches", "x"], &["invalid value 'x'"]),
     ];
     for (old, says) in renamed {
@@ -54,15 +54,13 @@ fn commands_answer_to_their_old_names() {
         assert!(says.iter().all(|words| output.contains(words)), "{old:?}: {output}");
     }
     for gone in ["stress", "bench", "cost"] {
-        fails(folder.path(), &[gone], &["is gone", "make "]);
+        fails(folder.path(), &[gone], &["was removed", "make "]);
     }
     fails(folder.path(), &["merge"], &["palpate report FOLDER --merge SHARDS"]);
     fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);
-    // In the help each command stands once, under its group.
+    // The help lists each command once, in its group.
     let help = succeeds(folder.path(), &["--help"]);
-    for (group, name) in
-        [("Explore:", "  export "), ("Laboratory:", "  twin "), ("More:", "  list ")]
-    {
+    for (group, name) in [("Explore:", "  export "), ("Robot:", "  twin "), ("More:", "  list ")] {
         assert!(help.find(group) < help.find(name), "{help}");
         assert_eq!(help.matches(&format!("\n{name}")).count(), 1, "{help}");
     }
@@ -95,7 +93,7 @@ fn a_summary_is_told_to_programs() {
     assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), told);
 }
 
-/// Progress is for what takes long, and for who wants it.
+/// Progress appears only for slow work, and not with --quiet.
 #[test]
 fn short_work_says_nothing_beside_its_result() {
     let folder = folder();
@@ -138,7 +136,7 @@ fn files_of_others_are_replaced_by_force_only() {
     fs::write(folder.path().join("notes.txt"), "mine").unwrap();
     let says = ["no cloud.ply", "--force"];
     fails(folder.path(), &["export", "scene.toml", "--grid", "3x3", "--out", "."], &says);
-    // Its own files it replaces.
+    // Palpate's own files are replaced.
     for _ in 0..2 {
         succeeds(folder.path(), &["export", "scene.toml", "--grid", "3x3", "--out", "new"]);
         succeeds(folder.path(), &["show", "scene.toml", "--mjcf", "scene.xml"]);
@@ -154,10 +152,10 @@ fn an_exported_belief_replaces_its_own_files_only() {
     succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
     let export = ["export", "runs/small", "--planner", "random", "--out", "it.ply"];
     fs::write(folder.path().join("it.svg"), "mine").unwrap();
-    fails(folder.path(), &export, &["it.svg is there", "--force"]);
+    fails(folder.path(), &export, &["it.svg exists", "--force"]);
     assert!(!folder.path().join("it.ply").exists());
     succeeds(folder.path(), &[&export[..], &["--force"]].concat());
     succeeds(folder.path(), &export);
     let onto_mesh = ["export", "runs/small", "--planner", "random", "--out", "mesh.obj"];
-    fails(folder.path(), &onto_mesh, &["mesh.obj is there", "--force"]);
+    fails(folder.path(), &onto_mesh, &["mesh.obj exists", "--force"]);
 }

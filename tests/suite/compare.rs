@@ -1,4 +1,4 @@
-//! Planners over several runs.
+//! Tests of the comparison of planners over several runs.
 
 use crate::common::program::palpate;
 use palpate::experiment::statistics::equal_error::Estimate;
@@ -27,7 +27,7 @@ fn the_interquartile_mean_is_the_textbooks() {
 }
 
 proptest! {
-    /// Who is better one way is worse the other, a shift is a shift, and a profile rises to one.
+    /// Comparisons are antisymmetric, a shift is recovered, and a profile increases to one.
     #[test]
     fn comparisons_are_consistent(
         a in prop::collection::vec(0.1..9.0_f64, 1..30),
@@ -45,7 +45,7 @@ proptest! {
     }
 }
 
-/// Two runs of one experiment and one of another, from the command line.
+/// Compares two runs of one experiment and one of another from the command line.
 #[test]
 fn runs_are_compared_from_the_command_line() {
     let folder = tempfile::tempdir().unwrap();

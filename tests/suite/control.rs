@@ -1,4 +1,4 @@
-//! The controller: it follows where it can, and its limits hold where it cannot.
+//! Tests of the controller: tracking where possible, and limits everywhere.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use palpate::explore::control::{Controller, Goal, posture};
@@ -22,8 +22,8 @@ fn slides() -> Chain {
     stage([0.0, -0.6, 0.5].into(), Finger::default().r_at())
 }
 
-/// Steps the arm exactly as commanded towards `goal(t)` and holds every limit at every tick.
-/// Returns the last posture, the worst damping and how far the tip was off last.
+/// Steps the arm exactly as commanded towards `goal(t)` and checks all limits at every tick.
+/// Returns the last posture, the largest damping and the last error of the tip.
 fn drive(
     chain: &Chain,
     start: Joints,
@@ -65,8 +65,8 @@ fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..Default::default() })]
 
-    /// Postures anywhere, limits and singularities included, and goals anywhere, most of them
-    /// out of reach, with a velocity that no arm could follow.
+    /// Any posture, including limits and singularities, and any goal, mostly out of reach, with
+    /// velocities beyond any arm.
     #[test]
     fn limits_hold_for_any_goal(
         fractions in prop::array::uniform7(prop_oneof![Just(0.0), Just(1.0), Just(0.5), 0.0..1.0]),
@@ -83,13 +83,13 @@ proptest! {
         let x_wt = Isometry3::new(Vector3::from(place), Vector3::from(turn));
         drive(&chain, q, 300, |t| Goal {
             x_wt,
-            // Changes its sign every 0.2 s.
+            // The sign changes every 0.2 s.
             twist: Vector6::from(twist) * (-1.0_f64).powi((t / 0.2) as i32),
         });
     }
 }
 
-/// Out along -y at 0.1 m/s until the elbow is straight and beyond, and back again.
+/// Out along -y at 0.1 m/s until the elbow is straight and beyond, and back.
 #[test]
 fn a_goal_that_leaves_the_reach_and_returns_is_met_again() {
     let chain = arm();
@@ -142,7 +142,7 @@ fn a_goal_beyond_a_joints_limit_is_met_again_on_its_way_back() {
     assert!(off < 1e-4, "{off}");
 }
 
-/// Upright, all axes lie in one plane and no direction along the arm is left.
+/// Upright, all axes lie in one plane and no direction along the arm can be commanded.
 #[test]
 fn the_arm_leaves_its_upright_posture() {
     let chain = arm();
@@ -161,7 +161,7 @@ fn away_from_trouble_the_goal_is_followed_exactly() {
         let mut q = chain.home;
         for tick in 0..1000 {
             let t = tick as f64 * PERIOD_S;
-            // 20 mm/s, after a start within the acceleration limits.
+            // Speed 20 mm/s, after a start within the acceleration limits.
             let speed = 0.02 * (t / 0.2).min(1.0);
             let along = if t < 0.2 { 0.05 * t * t } else { 0.02 * (t - 0.1) };
             let mut twist = Vector6::zeros();
@@ -185,8 +185,8 @@ fn the_null_space_brings_the_elbow_home_while_the_tip_stands() {
     let chain = arm();
     let start = chain.forward(&chain.home);
     let mut q = chain.home;
-    // Away from home with the tip where it was: a turn of the elbow about the line from shoulder
-    // to wrist, found by driving there.
+    // A start away from home with the same tip pose: the elbow turned about the line from shoulder
+    // to wrist, found by a simulated motion.
     let mut odd = chain.clone();
     odd.home[2] += 0.8;
     q = drive(&odd, q, 2000, |_| Goal::still(start)).0;
@@ -242,7 +242,7 @@ fn every_place_of_the_scenes_has_a_posture() {
                     assert!((x.translation.vector - p.coords).norm() < 1e-8);
                     assert!(x.rotation.angle_to(&attitude) < 1e-7);
                     assert_eq!(q, chain.clamp(&q));
-                    // At home and near it: nowhere close to a limit or a singularity.
+                    // Home and its neighbourhood are far from limits and singularities.
                     for (i, joint) in chain.joints.iter().enumerate() {
                         let room = (q[i] - joint.q_limits[0]).min(joint.q_limits[1] - q[i]);
                         assert!(room > 0.1, "{name} {place:?} {} {room}", joint.name);
@@ -276,7 +276,7 @@ fn a_place_out_of_reach_says_by_how_much() {
     let ahead = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -std::f64::consts::FRAC_PI_2);
     let x_wt = Isometry3::from_parts(Translation3::new(0.0, -2.0, 0.317), ahead);
     let Err(ArmError::OutOfReach { distance_m, .. }) = posture(&chain, &x_wt) else { panic!() };
-    // Shoulder to fingertip, outstretched: 0.45 + 0.48 + 0.07 + 0.12 m.
+    // Distance from shoulder to fingertip, stretched: 0.45 + 0.48 + 0.07 + 0.12 m.
     assert!((distance_m - (2.0 - 1.12)).abs() < 0.01, "{distance_m}");
     let turned = Translation3::new(0.0, -0.6, 0.5).into();
     let Err(ArmError::OutOfReach { angle_rad, .. }) = posture(&slides(), &turned) else { panic!() };
@@ -331,7 +331,7 @@ mod mujoco {
     }
 }
 
-/// Pose and Jacobian of a reading are found once; asking for the pose first changes no command.
+/// Pose and Jacobian of a reading are computed once; querying the pose first changes no command.
 #[test]
 fn a_pose_that_was_asked_for_changes_no_command() {
     let chain = arm();

@@ -1,4 +1,4 @@
-//! `tests/cost.py`, which holds the instructions of fixed work against a committed table.
+//! Tests of `tests/cost.py`, which compares instruction counts with a stored table.
 
 use crate::common::program::ended;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// The script on a table of its own, with the program of these tests.
+/// The script with its own table and the program of these tests.
 struct Script {
     folder: TempDir,
 }
@@ -20,7 +20,7 @@ impl Script {
         self.folder.path().join("cost.toml")
     }
 
-    /// Runs it on the table as it is: exit code and output.
+    /// Runs the script on the unchanged table; returns exit code and output.
     fn run(&self, more: &[&str]) -> (Option<i32>, String) {
         let mut command = Command::new("python3");
         command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("tests/cost.py").arg(self.table());
@@ -30,7 +30,7 @@ impl Script {
         (output.status.code(), said)
     }
 
-    /// Runs it on `text`.
+    /// Runs the script on `text`.
     fn check(&self, text: &str) -> (Option<i32>, String) {
         fs::write(self.table(), text).unwrap();
         self.run(&[])
@@ -39,7 +39,7 @@ impl Script {
 
 const WORK: &str = "[[work]]\nexperiment = \"toy\"\n";
 
-/// A table is held against this program only where the numbers can be compared.
+/// A table is compared only with a program of comparable counts.
 #[test]
 fn counts_of_another_program_are_skipped() {
     let script = Script::new();
@@ -62,8 +62,8 @@ fn a_bad_table_is_an_error() {
     }
 }
 
-/// The same program counts the same within a thousandth, whatever else runs, and what is a tenth more
-/// is worse. Skipped without valgrind.
+/// The same program gives equal counts within 0.1 % under any load, and 10 % more is worse. Skipped
+/// without valgrind.
 #[test]
 fn a_trial_is_counted_by_valgrind() {
     let script = Script::new();
@@ -85,7 +85,7 @@ fn a_trial_is_counted_by_valgrind() {
     assert!(code == Some(1) && said.contains("WORSE (2 % are borne)"), "{said}");
 }
 
-/// Prints what `python` does with the script's functions.
+/// Returns the output of `python` code that uses the script's functions.
 fn python(code: &str) -> String {
     let mut command = Command::new("python3");
     let code = format!("import pathlib, sys; sys.path.insert(0, 'tests'); import cost; {code}");
@@ -95,7 +95,7 @@ fn python(code: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Two percent more are worse, a planner without a count is missing, and a new one passes.
+/// Two percent more is worse, a planner without a count is missing, and a new planner passes.
 #[test]
 fn instructions_are_judged_planner_by_planner() {
     for (before, now, verdict, code) in [
@@ -120,7 +120,7 @@ fn instructions_are_judged_planner_by_planner() {
     assert_eq!(python(total).trim(), "12345");
 }
 
-/// What is written is what is committed, byte by byte.
+/// The stored table equals the written one, byte by byte.
 #[test]
 fn the_committed_table_is_whole() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/baselines/cost.toml");

@@ -1,4 +1,4 @@
-//! When frames say contact: how often of nothing, and from what force on.
+//! Tests of contact detection: the rate of false alarms, and the force at detection.
 
 use crate::common::shapes::square;
 use palpate::config::Rules;
@@ -21,7 +21,7 @@ use rand_chacha::ChaCha8Rng;
 
 const PITCHES_DEG: [f64; 4] = [90.0, 70.0, 45.0, 20.0];
 
-/// Frames of a tare, and of the way after it.
+/// Frames of a tare, and of the approach after it.
 const TARE: usize = 5;
 const WAY: usize = 100;
 
@@ -29,7 +29,7 @@ fn sds(by: Alarm, threshold_sds: f64, frames: u32) -> Detection {
     Detection { by, threshold_sds: Some(threshold_sds), frames, ..Detection::default() }
 }
 
-/// A sensor that nobody touches, without its skin: only noise.
+/// An untouched sensor without its skin: noise only.
 struct Untouched {
     electrodes: Electrodes,
     fluid: FluidEffect,
@@ -40,8 +40,8 @@ struct Untouched {
 }
 
 impl Untouched {
-    /// With an open electrode and one ten times as noisy, if they are named. PDC is not rounded, so
-    /// that its noise is normal.
+    /// Creates the sensor, with an open electrode and one with tenfold noise if named. PDC is not
+    /// rounded, so that its noise is normal.
     fn new(seed: u64, bad: Option<[usize; 2]>) -> Self {
         let mut effect = ElectrodesEffect::default();
         if let Some([open, _]) = bad {
@@ -67,7 +67,7 @@ impl Untouched {
     fn frame(&mut self) -> Frame {
         self.common = self.electrodes.next(&self.common, FRAME_S, &mut self.rng);
         let Self { electrodes, common, rng, counts, drift, .. } = self;
-        // As the fluid conducts better: dE/d ln G = E (1 − E / 4095).
+        // Effect of the fluid's conductivity G: dE/d ln G = E (1 − E / 4095).
         let counts = std::array::from_fn(|i| {
             let ideal = counts[i] + *drift * counts[i] * (1.0 - counts[i] / 4095.0);
             electrodes.convert(i, ideal, common, rng)
@@ -83,7 +83,7 @@ impl Untouched {
         (0..count).map(|_| self.frame()).collect()
     }
 
-    /// How many of so many ways, each after a tare, end in an alarm.
+    /// Number of approaches, each after a tare, that end in an alarm.
     fn alarms(&mut self, detection: &Detection, ways: usize) -> usize {
         let mut detector = Detector::new(detection.clone());
         let mut alarmed = 0;
@@ -96,12 +96,12 @@ impl Untouched {
     }
 }
 
-/// Probability that frame after frame in `WAY` frames `n` in a row are beyond `threshold`, where
-/// they share the error of a tare whose variance is `share` of theirs: for each error u, runs of
-/// length n of independent frames (Feller), then the mean over u.
+/// Probability that `n` consecutive frames of `WAY` exceed `threshold` if all share the error of a
+/// tare with variance `share` of theirs: for each error u, runs of length n of independent frames
+/// (Feller), averaged over u.
 fn alarm_probability(threshold: f64, n: u32, share: f64) -> f64 {
     let runs = |p: f64| {
-        // state[k]: k frames in a row so far; the last is the alarm.
+        // state[k] is the probability of a current run of k frames; the last entry is the alarm.
         let n = n as usize;
         let mut state = vec![0.0; n + 1];
         state[0] = 1.0;
@@ -122,11 +122,10 @@ fn alarm_probability(threshold: f64, n: u32, share: f64) -> f64 {
     (-160..=160).map(|i| step * density(at(i)) * runs(beyond(at(i)))).sum()
 }
 
-/// The law: how often a finger that touches nothing is told that it does follows from the threshold
-/// in standard deviations and the frames that must agree. By the pressure exactly; electrodes share
-/// of a tare's error next to nothing in their sum of squares, so they lie between frames that
-/// share it and frames that do not. Neither drift nor shared noise, neither an open nor a noisy
-/// electrode is in it.
+/// The false-alarm rate follows from the threshold in standard deviations and the number of
+/// consecutive frames. For the pressure it is exact. Electrodes share almost nothing of a tare's
+/// error in their sum of squares, so their rate is between those with and without a shared error.
+/// Drift, shared noise, and an open or a noisy electrode have no effect.
 #[test]
 fn false_alarms_follow_from_threshold_and_frames() {
     let ways = 1500;
@@ -141,8 +140,8 @@ fn false_alarms_follow_from_threshold_and_frames() {
         println!(
             "{threshold} sd, {n} frames: {pressure} of {shared:.1}, {electrodes:?} of {own:.1}"
         );
-        // Four standard deviations of what is counted, and a fifth for what Student's and the cube
-        // root's approximations leave.
+        // Four standard deviations of the count, plus a fifth for the approximations of Student's t
+        // and the cube root.
         let within = |found: usize, low: f64, high: f64| {
             let found = found as f64;
             found > 0.8 * low - 4.0 * low.sqrt() && found < 1.2 * high + 4.0 * high.sqrt()
@@ -154,8 +153,8 @@ fn false_alarms_follow_from_threshold_and_frames() {
     }
 }
 
-/// At four standard deviations in two frames, a quarter of an hour of ways is without alarm, by the
-/// law less than one in a hundred hours.
+/// At four standard deviations in two frames, fifteen minutes of approaches give no alarm; the
+/// expected rate is below one in a hundred hours.
 #[test]
 fn at_four_standard_deviations_nothing_is_told_of_nothing() {
     let an_hour = 3600.0 / FRAME_S / WAY as f64 * alarm_probability(4.0, 2, 1.0 / TARE as f64);
@@ -165,9 +164,9 @@ fn at_four_standard_deviations_nothing_is_told_of_nothing() {
     }
 }
 
-/// While the fluid warms, electrodes go up together, by 0.1 in the logarithm of what it conducts
-/// or 70 to 100 counts each, ten times their noise: that is no contact. One that changes alone by
-/// that is. A threshold on the mean of their changes would take the first for it.
+/// While the fluid warms, electrodes rise together by 0.1 in log conductivity, or 70 to 100 counts
+/// each, ten times their noise: this is not a contact. A change of one electrode alone is. A
+/// threshold on the mean change would confuse the two.
 #[test]
 fn common_drift_is_no_contact_and_a_change_of_its_own_is() {
     let mut sensor = Untouched::new(3, None);
@@ -179,14 +178,14 @@ fn common_drift_is_no_contact_and_a_change_of_its_own_is() {
     }
     sensor.counts[12] -= 20.0 * NOISE_COUNTS[12];
     assert!(!detector.update(&sensor.frame()) && detector.update(&sensor.frame()));
-    // It says so until the electrode is back, and for as many frames.
+    // The alarm stays until the electrode recovers, for as many frames.
     assert!(sensor.frames(50).iter().all(|frame| detector.update(frame)));
     sensor.counts[12] = BASELINES_COUNTS[12];
     assert!(detector.update(&sensor.frame()) && !detector.update(&sensor.frame()));
 }
 
-/// An electrode that grows noisy alarms at first; after twenty tares it is known to be noisy, and
-/// the others still tell.
+/// An electrode that becomes noisy causes alarms at first; after twenty tares its noise is known,
+/// and the others still detect contact.
 #[test]
 fn a_noisy_electrode_is_learnt() {
     let mut sensor = Untouched::new(4, None);
@@ -206,8 +205,7 @@ fn a_noisy_electrode_is_learnt() {
     assert!(above(&rest, &mut sensor) > 150);
 }
 
-/// A finger whose first touches come from a sensor that says nothing of noise: it wants frames
-/// until it knows.
+/// A finger without known noise requires frames of rest first.
 #[test]
 fn noise_is_learnt_from_twenty_frames_of_rest() {
     let mut sensor = Untouched::new(6, None);
@@ -216,14 +214,14 @@ fn noise_is_learnt_from_twenty_frames_of_rest() {
     detector.tare(&sensor.frames(21));
     assert_eq!(detector.wants(), 0);
     assert_eq!(Detector::new(Detection::default()).wants(), 0);
-    // Without a tare nothing is heard, nor from a frame without the channels asked for.
+    // Without a tare, or without the required channels in a frame, detection is not available.
     assert!(!Detector::new(sds(Alarm::Both, 4.0, 2)).hears(&sensor.frame()));
     let dry = Frame { pdc_counts: None, ..sensor.frame() };
     assert!(detector.hears(&dry) && !detector.hears(&Frame::default()));
 }
 
-/// Force of a plane on the finger when contact is told, and the same by [`Detection::default`];
-/// infinite if it is not.
+/// Force of a plane on the finger at detection, and the same with [`Detection::default`]; infinite
+/// without detection.
 fn told_n(effects: &Effects, sensor: Option<&Sensor>, pitch_deg: f64, speed_m_s: f64) -> [f64; 2] {
     let finger = Finger::default();
     let tip = match sensor {
@@ -261,8 +259,8 @@ fn told_n(effects: &Effects, sensor: Option<&Sensor>, pitch_deg: f64, speed_m_s:
     told_n
 }
 
-/// At any pitch a plane is felt at less than 0.1 N, by a finger so slow that it overruns nothing: by
-/// the nominal sensor and by others, an open and a noisy electrode among them.
+/// At any pitch a slow finger, without overrun, detects a plane below 0.1 N, with the nominal
+/// sensor and with others, including an open and a noisy electrode.
 #[test]
 fn contact_is_told_below_a_tenth_of_a_newton_at_any_pitch() {
     let effects = Effects::biotac();
@@ -278,8 +276,8 @@ fn contact_is_told_below_a_tenth_of_a_newton_at_any_pitch() {
     }
 }
 
-/// What is overrun is speed times the frames that must agree: the force told at twice the speed is
-/// that of up to twice the way, and no slow finger presses harder than a fast one.
+/// The overrun is speed times the number of consecutive frames: at twice the speed the force is
+/// that of up to twice the distance, and no slow finger presses harder than a fast one.
 #[test]
 fn the_rest_of_the_force_is_overrun() {
     for pitch_deg in PITCHES_DEG {
@@ -294,7 +292,7 @@ fn the_rest_of_the_force_is_overrun() {
     }
 }
 
-/// Files that say nothing of it mean what they did, and say nothing of it when they are written.
+/// Files without detection settings keep their meaning and are written without them.
 #[test]
 fn detection_by_counts_is_written_as_ever() {
     let written = toml::to_string(&Detection::default()).unwrap();

@@ -1,4 +1,5 @@
-//! Distances of convex bodies against brute force, and the robot's capsules against its model.
+//! Tests of distances of convex bodies against brute force, and of the robot's capsules against its
+//! model.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate::geometry::distance::{HalfSpace, OrientedBox};
@@ -12,7 +13,7 @@ use std::path::Path;
 const STEPS: usize = 200;
 
 fn point() -> impl Strategy<Value = Point3<f64>> {
-    // Corners of a grid too, so that segments are parallel, meet and are of no length.
+    // Includes grid corners, so that segments are parallel, intersect or have zero length.
     let free = prop::array::uniform3(-1.0..1.0);
     let grid = prop::array::uniform3(-1i8..=1).prop_map(|p| p.map(f64::from));
     prop_oneof![free, grid].prop_map(Point3::from)
@@ -26,7 +27,7 @@ fn along(capsule: &Capsule) -> impl Iterator<Item = Point3<f64>> {
     (0..=STEPS).map(|i| capsule.p0_w + (capsule.p1_w - capsule.p0_w) * (i as f64 / STEPS as f64))
 }
 
-/// Half a step of a capsule's axis: by how much its nearest sample may miss.
+/// Half a step of a capsule's axis: the error bound of its nearest sample.
 fn coarse_m(capsule: &Capsule) -> f64 {
     (capsule.p1_w - capsule.p0_w).norm() / STEPS as f64
 }
@@ -77,7 +78,7 @@ pub fn robot(model: &str) -> Robot {
     Robot { chain, finger: Finger::default(), is_soft: true }
 }
 
-/// `key="a b c"` of a tag.
+/// Reads `key="a b c"` of a tag.
 fn numbers(tag: &str, key: &str) -> Vec<f64> {
     let after = tag.split_once(&format!(" {key}=\"")).unwrap().1;
     after.split('"').next().unwrap().split(' ').map(|text| text.parse().unwrap()).collect()
@@ -108,7 +109,8 @@ fn surface(kind: &str, ends: &[f64], radius_m: f64) -> Vec<Point3<f64>> {
     points
 }
 
-/// A guard that looked at less than the model would find links apart that touch.
+/// The guard's capsules contain the model's shapes, so that it never reports touching links as
+/// separate.
 #[test]
 fn every_shape_of_the_models_lies_within_the_capsules_of_its_link() {
     for (file, model) in [("a.xml", "pa10_a"), ("c.xml", "pa10")] {
@@ -138,8 +140,8 @@ fn every_shape_of_the_models_lies_within_the_capsules_of_its_link() {
 }
 
 proptest! {
-    /// No point within a finger's radius of any link moves by more than the bound that allows the
-    /// guard not to look.
+    /// No point within a finger's radius of any link moves by more than the bound within which the
+    /// guard skips checks.
     #[test]
     fn no_point_moves_by_more_than_the_joints_reaches_say(
         q in prop::array::uniform7(-1.0f64..1.0),

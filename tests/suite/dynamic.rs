@@ -1,4 +1,4 @@
-//! The dynamic body: against the kinematic one, in its speed, its limits and its force of contact.
+//! Tests of the dynamic body: agreement with the kinematic one, limits of speed, and contact force.
 
 use crate::common::shipped::{contact, environment};
 use nalgebra::{Isometry3, Translation3};
@@ -19,7 +19,7 @@ const DYNAMIC: &str = "body=\"dynamic\"";
 const DRY: &str = "effects={skin={}}";
 const WET: &str = "effects={skin={}, fluid={}}";
 
-/// Keeps every reading of a body.
+/// Wrapper that keeps every reading of a body.
 struct Tap {
     inner: Box<dyn Backend>,
     readings: Arc<Mutex<Vec<Reading>>>,
@@ -41,7 +41,7 @@ impl Backend for Tap {
     }
 }
 
-/// A touch with everything that was read during it.
+/// Returns a touch with all readings during it.
 fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading>) {
     let simulator = Simulator::new(Arc::clone(environment)).unwrap();
     let readings = Arc::new(Mutex::new(Vec::new()));
@@ -52,7 +52,7 @@ fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading
     (touch, readings)
 }
 
-/// Presses the finger to `deep` from `above` and waits; what it feels there.
+/// Presses the finger to `deep` from `above` and waits; returns the load there.
 fn press(simulator: &Simulator, above: &Isometry3<f64>, deep: &Isometry3<f64>) -> IdealContact {
     let mut body = simulator.body().unwrap().unwrap();
     let mut reading = body.reset(1).unwrap().clone();
@@ -100,9 +100,9 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
     assert!(force < 1e-3 && place < 1e-5, "{force} {place}");
 }
 
-/// The same approach, detection and rest. Servos take 40 ms (arm) to stop the finger, by which it
-/// ends deeper; what remains after ten time constants of the controller (0.2 s) is what a tick of a
-/// slow approach makes of depth.
+/// Same approach, detection and rest. Servos take 40 ms (arm) to stop the finger, so it ends
+/// deeper; after ten time constants of the controller (0.2 s) the remaining difference is one tick
+/// of a slow approach.
 #[test]
 fn a_slow_touch_is_the_kinematic_one() {
     let slow = [
@@ -119,7 +119,7 @@ fn a_slow_touch_is_the_kinematic_one() {
                 let sets: Vec<&str> = [carrier, DRY, body].into_iter().chain(slow).collect();
                 let (touch, readings) =
                     tapped(&environment("container_finger.toml", &sets), &target);
-                // The last tick before the finger is pulled back.
+                // Last tick before the finger is retracted.
                 let rests = |reading: &&Reading| {
                     reading.applied.qdot.iter().all(|qdot| qdot.abs() < 1e-3)
                         && reading.ideal().is_some_and(|ideal| ideal.force_n > 0.0)
@@ -134,7 +134,7 @@ fn a_slow_touch_is_the_kinematic_one() {
     }
 }
 
-/// The force when the pressure has been above its threshold for the frames it takes.
+/// Force when the pressure has exceeded its threshold for the required frames.
 fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
     let detection = &environment.scene().touch.detection;
     let pdc = |reading: &Reading| reading.frames().last().and_then(|frame| frame.pdc_counts);
@@ -142,7 +142,7 @@ fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
     let mut above = 0;
     for reading in readings {
         let Some(counts) = pdc(reading) else { continue };
-        // The tare averages the noise of a count or two; so high only a contact is.
+        // The tare averages the noise of one or two counts; only a contact exceeds this.
         above = if counts - rest > detection.threshold_counts { above + 1 } else { 0 };
         if above == detection.frames {
             return reading.ideal().map_or(0.0, |ideal| ideal.force_n);
@@ -205,7 +205,8 @@ fn a_touch_stops_gently_and_keeps_its_limits_and_its_line() {
     }
 }
 
-/// As stiff as contact and arm are, an approach at the usual 20 mm/s would end in an overload.
+/// With the stiffness of contact and arm, an approach at the usual 20 mm/s would end in an
+/// overload.
 #[test]
 fn a_finger_without_skin_finds_the_surface() {
     for name in ["container_finger.toml", "bird_finger.toml"] {
@@ -229,8 +230,8 @@ fn a_finger_without_skin_finds_the_surface() {
     }
 }
 
-/// The limit is √(m / k). A skin whose every constant is 100 times larger bears 100 times the force
-/// at the same depth, so with the limit of force 100 times larger that of the step is a tenth.
+/// The limit is √(m / k). A skin with 100 times larger constants bears 100 times the force at the
+/// same depth, so with a 100 times larger force limit the step limit is a tenth.
 #[test]
 fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_not() {
     let soft = environment("container_finger.toml", &[ARM, DYNAMIC, DRY]);
@@ -294,7 +295,7 @@ fn steps_that_do_not_fit_are_refused_when_the_scene_is_read() {
     assert_eq!(scene.solver.steps(scene.period_s()), Some(5));
 }
 
-/// A millimetre of error in the object's place shows in the contact, a new one for each seed.
+/// A millimetre of error in the object's position appears in the contact, different for each seed.
 #[test]
 fn registration_errors_move_what_is_found_and_nothing_else() {
     let touch = |effects: &str, seed: u64| {
@@ -318,7 +319,8 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
     }
 }
 
-/// With bias, drift, noise, weight and resolution the sensor still finds contact without a fluid.
+/// With bias, drift, noise, weight and resolution the force sensor still detects contact without a
+/// fluid.
 #[test]
 fn a_force_sensor_tells_contact_where_no_fluid_does() {
     for body in ["body=\"kinematic\"", DYNAMIC] {

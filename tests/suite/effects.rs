@@ -1,4 +1,4 @@
-//! Effects and their switches.
+//! Tests of effects and their switches.
 
 use crate::common::shipped;
 use palpate::math::seed;
@@ -14,8 +14,8 @@ fn scene(sets: &[&str]) -> Scene {
     shipped::scene("container_finger.toml", sets)
 }
 
-/// Every switch turns the other way and back, and changes nothing but itself and what means
-/// nothing without it.
+/// Every switch toggles and toggles back, and changes only itself and the effects that depend on
+/// it.
 #[test]
 fn a_switch_is_what_it_says() {
     let scene = scene(&["effects.timing={}"]);
@@ -35,7 +35,7 @@ fn a_switch_is_what_it_says() {
     }
 }
 
-/// Every key of the scene's `[effects]` can be switched.
+/// Every key of the scene's `[effects]` has a switch.
 #[test]
 fn every_effect_of_a_scene_has_its_switch() {
     let keys = toml::Table::try_from(Effects::all()).unwrap();
@@ -51,7 +51,7 @@ fn every_effect_of_a_scene_has_its_switch() {
     assert_eq!(wholes, keys.len());
 }
 
-/// What is dropped for want of what it needs is what a scene with it would be refused for.
+/// Effects removed for a missing requirement are those for which a scene is rejected.
 #[test]
 fn effects_without_what_they_need_are_refused_and_dropped() {
     let accepted = |effects: &Effects| {
@@ -79,7 +79,7 @@ fn effects_without_what_they_need_are_refused_and_dropped() {
     }
 }
 
-/// Effects that a skin alone can be given, and whose state is the fingertip's.
+/// Effects that only require a skin and whose state is the fingertip's.
 const BESIDE_SKIN: [&str; 6] =
     ["fluid", "fluid.vibration", "electrodes", "creep", "thermal", "friction"];
 
@@ -99,8 +99,8 @@ fn an_effect_that_is_off_has_no_state() {
     }
 }
 
-/// A finger without effects but its skin and fluid does what these do, and nothing else: the loads of
-/// the skin to the bit, and frames of pressure alone. `benches/finger.rs` times both.
+/// A finger with only skin and fluid gives exactly the skin's loads, and frames with pressure only.
+/// `benches/finger.rs` times both.
 #[test]
 fn a_finger_without_effects_feels_what_its_skin_feels() {
     let environment =

@@ -1,4 +1,4 @@
-//! The programs of `examples/` do what they say.
+//! Tests of the programs in `examples/`.
 
 #[path = "../../crates/palpate-explore/examples/own_backend.rs"]
 mod own_backend;
@@ -14,8 +14,8 @@ use palpate::explore::probe::Touch;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 
-/// The servo over a body written by hand, with nothing of the simulator: contacts lie on the wall,
-/// for what this body feels is exact, and the belief knows the plane.
+/// The servo drives a body without a simulator: contacts lie on the wall, because this body's
+/// readings are exact, and the belief finds the plane.
 #[test]
 fn the_servo_drives_a_body_that_no_simulator_made() {
     let source = include_str!("../../crates/palpate-explore/examples/own_backend.rs");
@@ -31,7 +31,7 @@ fn the_servo_drives_a_body_that_no_simulator_made() {
     }
 }
 
-/// It chooses targets in a zone and around an object, and its errors are numbers of both.
+/// The example planner selects targets in a zone and around an object, and its errors are finite.
 #[test]
 fn an_own_planner_explores_zones_and_whole_objects() {
     for experiment in ["toy", "around"] {
@@ -40,7 +40,7 @@ fn an_own_planner_explores_zones_and_whole_objects() {
     }
 }
 
-/// The mean over the touches lies between the errors that it is of.
+/// The mean over the touches lies between its errors.
 #[test]
 fn an_own_measure_is_found_from_rows() {
     let rows = own_measure::rows().unwrap();
@@ -51,15 +51,14 @@ fn an_own_measure_is_found_from_rows() {
     assert!(low < value && value < high, "{low} {value} {high}");
 }
 
-/// A switch knows no place, but the container is nearly flat in its middle.
+/// A switch cannot locate contact, but the container is nearly flat in its middle.
 #[test]
 fn an_own_sensor_ends_touches_and_places_them() {
     let below_m = own_sensor::touch().unwrap();
     assert!(below_m.abs() < 2e-3, "{below_m}");
 }
 
-/// An arm with six joints that is not built in reaches the same object, and touches it as a stage
-/// does.
+/// An arm from a file, with six joints, reaches the same object and touches it like a stage.
 #[test]
 fn an_arm_from_a_file_touches() {
     let touched = |sets: &[&str]| {
@@ -82,7 +81,7 @@ fn an_arm_from_a_file_touches() {
     }
 }
 
-/// An arm's file that is wrong is refused with its name, the key, and what is allowed.
+/// An invalid arm file is rejected with its name, the key, and the allowed values.
 #[test]
 fn a_wrong_arm_is_refused_by_name() {
     let text = std::fs::read_to_string("examples/ur5e.toml").unwrap();

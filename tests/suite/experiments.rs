@@ -1,4 +1,4 @@
-//! What the shipped experiments must show, run whole or cut down in trials.
+//! Tests of the shipped experiments' results, with all or some of the trials.
 
 use palpate::experiment::measure::{EDGE_RMSE, R, RMSE};
 use palpate::experiment::statistics::equal_error::equal_error;
@@ -33,23 +33,23 @@ fn after(experiment: &Experiment, rows: &[TrialRow], planner: &str, touches: u32
     curve.into_iter().find(|point| point.touches == touches).unwrap()
 }
 
-/// The curve counts as found at this correlation (chosen); a trial that stalls for good ends below.
-/// Measured: the worst of 50 trials ends at 0.9994.
+/// Correlation from which the curve counts as found; a trial that stalls permanently ends below.
+// heuristic: the worst of 50 trials ends at 0.9994.
 const FOUND: f64 = 0.99;
 
-/// The paper: "almost reaches 1 after 23 touches". Global maximum likelihood on a dense grid, an
-/// independent implementation, gives 0.989 at 23, 0.994 at 25 and 0.9986 at 30 (20 trials).
+/// The paper states "almost reaches 1 after 23 touches". Global maximum likelihood on a dense grid,
+/// an independent implementation, gives 0.989 at 23, 0.994 at 25 and 0.9986 at 30 (20 trials).
 #[test]
 fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
     let (experiment, rows) = run("toy.toml", &["planners=[\"active\", \"random\"]"]);
     assert_eq!((experiment.trials, experiment.initial_touches, experiment.touches), (50, 3, 50));
-    // No more than two standard errors of the mean below that implementation.
+    // At most two standard errors of the mean below that implementation.
     let r = |planner, touches| *after(&experiment, &rows, planner, touches).of(&R).unwrap();
     for (touches, theirs) in [(23, 0.989), (25, 0.994), (30, 0.9986)] {
         let (mean, error) = (r("active", touches).mean, r("active", touches).error.unwrap());
         assert!(mean >= theirs - 2.0 * error, "{touches}: {mean} ± {error}");
     }
-    // Ahead of random by more than three standard errors of the difference.
+    // Better than random by more than three standard errors of the difference.
     let [active, random] = ["active", "random"].map(|planner| r(planner, 23));
     let error = active.error.unwrap().hypot(random.error.unwrap());
     assert!(active.mean - random.mean > 3.0 * error, "{} {}", active.mean, random.mean);
@@ -59,23 +59,23 @@ fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
     }
 }
 
-/// A start that reads the same height three times stalls a planner that trusts its collapsed
-/// belief; this one records the stall and goes on.
+/// Three equal heights at the start stall a planner that trusts its belief without variance; this
+/// one records the stall and continues.
 #[test]
 fn toy_constant_starts_stall_visibly_and_recover() {
     let (_, rows) = run("toy.toml", &["planners=[\"active\"]"]);
     let constant =
         |row: &&TrialRow| row.touches[..3].iter().all(|touch| touch.contact.unwrap()[1] == 1.0);
     let starts: Vec<&TrialRow> = rows.iter().filter(constant).collect();
-    // One start in eight reads this height three times: 6.25 of 50, with a standard deviation of
-    // 2.3; two of these below are 1.6.
+    // One start in eight has three equal heights: 6.25 of 50, with a standard deviation of 2.3; two
+    // standard deviations below is 1.6.
     assert!(starts.len() >= 2, "{} constant starts", starts.len());
     assert!(starts.iter().all(|row| row.touches.last().unwrap().metrics.unwrap().r >= FOUND));
     let stalls = rows.iter().flat_map(|row| &row.touches).filter(|touch| touch.stall.is_some());
     assert!(stalls.count() > 0);
 }
 
-/// Measured: 0.26 mm against 0.50 mm, a half; two thirds leave room for the rounding of other
+/// Measured: 0.26 mm against 0.50 mm, about a half; two thirds allow for rounding on other
 /// machines. The object is straight along z, and every trial learns the longer scale along it.
 #[test]
 fn container_active_needs_two_thirds_of_the_error_and_learns_the_straight_axis() {
@@ -91,7 +91,7 @@ fn container_active_needs_two_thirds_of_the_error_and_learns_the_straight_axis()
     assert_eq!(longer_along_z.count(), rows.len());
 }
 
-/// Ten of the fifty trials. Measured: 1.5 mm against 3.2 mm, a half; two thirds, as on the
+/// Ten of the fifty trials. Measured: 1.5 mm against 3.2 mm, about a half; two thirds, as for the
 /// container.
 #[test]
 fn bird_active_is_better_in_the_outer_tenth() {
@@ -101,8 +101,7 @@ fn bird_active_is_better_in_the_outer_tenth() {
     assert!(active <= random * 2.0 / 3.0, "{active} {random}");
 }
 
-/// A zone that looks past the object at its sides: those targets are misses, and a planner that
-/// kept asking for them would never get on.
+/// In a zone wider than the object, targets beside it are misses; a planner must not repeat them.
 #[test]
 fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
     let sets = [
@@ -133,9 +132,9 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
     }
 }
 
-/// At most two fifths of the way of `active` for at most a fifth more touches to equal error, with
-/// the same settings on toy and container: what the planner is offered for. No target is asked for
-/// twice. Measured: 1.11 and 1.00 times the touches, 0.20 and 0.32 of the way.
+/// `travel` moves at most two fifths of the distance of `active` for at most a fifth more touches
+/// to equal error, with the same settings on toy and container, and repeats no target. Measured:
+/// 1.11 and 1.00 times the touches, 0.20 and 0.32 of the distance.
 #[test]
 fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     let both = "planners=[\"active\", \"travel\"]";
@@ -153,8 +152,8 @@ fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     }
 }
 
-/// The body's time is told where a touch is motion: more after every touch, the same for every
-/// planner up to the last touch that they share.
+/// The time of a moving body increases with every touch and is the same for every planner up to
+/// their last common touch.
 #[test]
 fn a_body_that_moves_tells_its_time() {
     let sets = ["trials=1", "touches=7", "planners=[\"active\", \"random\"]"];
@@ -170,10 +169,10 @@ fn a_body_that_moves_tells_its_time() {
     assert!(cast.iter().flat_map(|row| &row.touches).all(|touch| touch.time_s.is_none()));
 }
 
-/// A prior mean and a prior on the length scales that know nothing of the toy: its median is the
-/// geometric middle of the default range, whose ends lie two standard deviations away. Nowhere
-/// worse than random by more than the standard error, and found by touch 22: after 21 the mean R is
-/// 0.9897 with a standard error of 0.0015, and of 200 other trials 0.9909.
+/// Prior mean and length-scale prior without knowledge of the toy: the median is the geometric
+/// middle of the default range, whose bounds are two standard deviations away. The planner is
+/// nowhere worse than random by more than the standard error, and finds the curve by touch 22:
+/// after 21 the mean R is 0.9897 with a standard error of 0.0015, and 0.9909 over 200 other trials.
 #[test]
 fn toy_slope_with_generic_priors_is_never_behind_random_and_found_by_touch_22() {
     let sets = [
@@ -196,7 +195,7 @@ fn toy_slope_with_generic_priors_is_never_behind_random_and_found_by_touch_22() 
     }
 }
 
-/// As `resolved.toml` of version 0.1 holds them.
+/// Settings as in `resolved.toml` of version 0.1.
 #[test]
 fn settings_of_removed_planners_are_read_and_ignored() {
     let load = |sets: &[String]| Experiment::load("experiments/toy.toml".as_ref(), sets).unwrap();

@@ -1,5 +1,5 @@
-//! What holds for every figure: nothing is cut off or printed over, axes say what they are, both
-//! sides of a map have one scale, and no belief is drawn where there is no surface.
+//! Tests of all figures: nothing is clipped or overprinted, axes are labelled, both sides of a map
+//! have one scale, and beliefs are drawn only where a surface is likely.
 
 use crate::common::runs::{CURVE, SURFACE, run, tip_behind};
 use palpate::experiment::store::Run;
@@ -10,7 +10,7 @@ use palpate::report::replay::Replay;
 use palpate::report::style::{self, ON_DARK};
 use resvg::usvg::{Group, Node, Rect};
 
-/// Every figure of a run that applies, by name.
+/// Returns every applicable figure of a run, by name.
 fn figures(run: &Run) -> Vec<(&'static str, String)> {
     let drawn = FIGURES.iter().map(|figure| (figure.name, (figure.draw)(run).unwrap()));
     drawn.filter_map(|(name, svg)| Some((name, svg?))).collect()
@@ -20,7 +20,7 @@ fn figure(run: &Run, name: &str) -> String {
     figures(run).into_iter().find(|(of, _)| *of == name).unwrap().1
 }
 
-/// Runs that differ in what there is to draw.
+/// Runs with different content to draw.
 fn runs() -> Vec<Run> {
     let mut short = run(SURFACE);
     short.experiment.report.touch_counts = vec![20];
@@ -42,7 +42,7 @@ fn runs() -> Vec<Run> {
     vec![run(CURVE), run(SURFACE), short, crowded, run(&small), run(&flat), ended]
 }
 
-/// Every text of a drawing with its box.
+/// Returns every text of a drawing with its box.
 fn texts(svg: &str) -> Vec<(String, Rect)> {
     fn walk(group: &Group, found: &mut Vec<(String, Rect)>) {
         for node in group.children() {
@@ -61,8 +61,7 @@ fn texts(svg: &str) -> Vec<(String, Rect)> {
     found
 }
 
-/// By the metrics of the font that pictures are drawn with: nothing written is cut off or printed
-/// over.
+/// Checks with the metrics of the drawing's font that no text is clipped or overprinted.
 pub fn reads_well(name: &str, svg: &str) {
     let size = tree(svg).unwrap().size();
     let texts = texts(svg);
@@ -92,7 +91,7 @@ fn nothing_written_is_cut_off_or_printed_over() {
     }
 }
 
-/// A legend needs no more room than it is given, unless one entry alone does.
+/// A legend fits its width unless a single entry does not.
 #[test]
 fn a_legend_has_rows() {
     let entries = |count: usize| (0..count).map(|_| (Swatch::Cross(style::INK), "ten lettrs"));
@@ -104,7 +103,7 @@ fn a_legend_has_rows() {
     assert_eq!(Legend::new(10.0, entries(0)).more_px(), 0.0);
 }
 
-/// Pixels of a millimetre along the first panel's x and along its other axis, from its ticks.
+/// Pixels per millimetre along the first panel's x and its other axis, from the ticks.
 fn px_per_mm(svg: &str) -> [f64; 2] {
     let ticks = |anchor: &str, coordinate: &str| -> Vec<(f64, f64)> {
         let is_tick = format!("font-size=\"11.5\" text-anchor=\"{anchor}\" fill=\"#222222\">");
@@ -117,7 +116,7 @@ fn px_per_mm(svg: &str) -> [f64; 2] {
         lines.filter_map(read).collect()
     };
     [ticks("middle", "x"), ticks("end", "y")].map(|ticks| {
-        // The first two ticks are those of the first panel.
+        // The first two ticks belong to the first panel.
         let [(low, from), (high, to)] = [ticks[0], ticks[1]];
         (to - from).abs() / (high - low)
     })
@@ -141,8 +140,8 @@ fn a_millimetre_is_as_long_on_both_axes() {
     }
 }
 
-/// Over the trials of each planner, from the first touch that has a belief; each panel with the
-/// names of its axes and its letter.
+/// Each panel has a band over the trials of each planner from the first belief on, axis labels and
+/// its letter.
 #[test]
 fn every_measure_has_a_band_from_the_first_belief_on() {
     let run = run(SURFACE);
@@ -186,7 +185,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     let drawn = replay.is_drawn(places.clone());
     assert!(places.zip(&drawn).all(|(place, drawn)| *drawn || place[0].abs() > 0.03));
     assert!(drawn.iter().any(|drawn| !drawn));
-    // Of an object that every touch meets, everything is drawn.
+    // If every touch meets the object, everything is drawn.
     let mut full = crate::common::runs::run(SURFACE);
     full.rows.iter_mut().for_each(|row| row.touches.retain(|touch| touch.contact.is_some()));
     let replay = Replay::new(&full, "active", 8).unwrap().unwrap();
@@ -194,7 +193,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     assert!(replay.is_drawn(places).iter().all(|drawn| *drawn));
 }
 
-/// One place keeps its surface, or there would be no range of heights: hardly anything is left.
+/// One place keeps its surface for a range of heights; almost everything is omitted.
 #[test]
 fn nothing_is_drawn_of_a_belief_without_a_surface() {
     for (settings, names) in

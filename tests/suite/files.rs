@@ -1,5 +1,5 @@
-//! Files that are named to the program: read if they are regular files, with a byte order mark or
-//! without, and refused in words otherwise; streams that cannot be written stop no work.
+//! Tests of input files: regular files with or without a byte order mark are read, other files are
+//! rejected; streams that cannot be written do not stop the work.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -70,7 +70,7 @@ fn streams_that_cannot_be_written_stop_no_work() {
     let folder = folder();
     let run = |out: &str, stderr: Stdio| {
         let mut command = command(folder.path(), &["run", "small.toml", "--out", out]);
-        // Notes of progress go to standard error, one for each tenth of the trials.
+        // Progress notes go to stderr, one per tenth of the trials.
         command.args(["--set", "trials=12"]).stdout(Stdio::null()).stderr(stderr).status().unwrap()
     };
     assert!(run("full", full()).success());
@@ -82,7 +82,7 @@ fn streams_that_cannot_be_written_stop_no_work() {
     assert_eq!(rows("full").iter().filter(|&&byte| byte == b'\n').count(), 12);
     let status = command(folder.path(), &["run", "none.toml"]).stderr(full()).status().unwrap();
     assert_eq!(status.code(), Some(2), "an error that nobody can read is still one");
-    // Nor is a full standard output a panic, or silent.
+    // A full stdout causes an error message, not a panic.
     let mut shown = command(folder.path(), &["show", "mesh.obj"]);
     let shown = shown.stdout(full()).stderr(Stdio::piped()).spawn().unwrap();
     let shown = shown.wait_with_output().unwrap();
@@ -90,7 +90,7 @@ fn streams_that_cannot_be_written_stop_no_work() {
     assert!(said(&shown).starts_with("error: standard output: "), "{}", said(&shown));
 }
 
-/// The program with files of at most `blocks` of 512 bytes, as if the disk were full beyond.
+/// Runs the program with a file size limit of `blocks` of 512 bytes, as on a full disk.
 fn on_a_small_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process::Output {
     let program = env!("CARGO_BIN_EXE_palpate");
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
@@ -127,7 +127,7 @@ const DOCUMENT: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]
 "bufferViews": [{"buffer": 0, "byteLength": 36}],
 "buffers": [{"byteLength": 36, "uri": "URI"}]}"#;
 
-/// How one triangle is shown.
+/// Text of a shown single triangle.
 const ONE: &str = "triangles           1 of 1";
 
 #[test]
@@ -151,7 +151,7 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
     {
         fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", uri)).unwrap();
         assert!(succeeds(folder.path(), &show).contains(ONE), "{uri}");
-        // The document's folder may be the current one.
+        // The document's folder can be the current one.
         succeeds(&at("inner"), &["show", "mesh.gltf"]);
     }
     let absolute = at("outside.bin").display().to_string();
@@ -170,7 +170,7 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
         fails(folder.path(), &["export", "gltf.toml"], &says);
         let shown = succeeds(folder.path(), &[&show[..], &["--outside-buffers"]].concat());
         assert!(shown.contains(ONE), "{uri}: {shown}");
-        // A single triangle in the plane z = 0 has nothing over the zone, but it was read.
+        // A single triangle in the plane z = 0 covers no part of the zone, but it was read.
         let set = ["show", "gltf.toml", "--set", "object.outside_buffers=true"];
         let output = palpate(folder.path(), &set);
         assert!(!said(&output).contains("outside_buffers"), "{uri}: {}", said(&output));
@@ -178,10 +178,10 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
     fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", "../../../../../../etc/passwd"))
         .unwrap();
     fails(folder.path(), &show, &["/etc/passwd lies outside the mesh's folder"]);
-    fails(folder.path(), &["show", "scene.toml", "--outside-buffers"], &["goes with a mesh"]);
+    fails(folder.path(), &["show", "scene.toml", "--outside-buffers"], &["applies only to a mesh"]);
 }
 
-/// A link in a run's folder cannot make the program change a file outside of it.
+/// A symbolic link in a run's folder cannot change a file outside.
 #[test]
 fn nothing_is_written_through_a_symbolic_link() {
     let folder = folder();
@@ -209,7 +209,7 @@ fn nothing_is_written_through_a_symbolic_link() {
         fs::write(&outside, &text).unwrap();
         let _ = fs::remove_file(&file);
         symlink(&outside, &file).unwrap();
-        // Also where it is written.
+        // The same for the partial file.
         symlink(&outside, format!("{}.part", file.display())).unwrap();
         for arguments in [&report[..], &more, &again] {
             succeeds(folder.path(), arguments);
@@ -242,7 +242,7 @@ fn nothing_is_written_through_a_symbolic_link() {
     assert_eq!(fs::read_dir(&elsewhere).unwrap().count(), 0);
 }
 
-/// Numbers that no trial comes to are refused, with the row that has them.
+/// Impossible numbers are rejected with their row.
 #[test]
 fn a_row_with_an_impossible_number_is_refused() {
     let folder = folder();

@@ -1,4 +1,5 @@
-//! The soft fingertip against closed forms, energy, a slow twin and everything that can go wrong.
+//! Tests of the soft fingertip against closed forms, energy, a reference implementation and edge
+//! cases.
 
 use crate::common::shipped::near;
 use std::f64::consts::PI;
@@ -22,7 +23,7 @@ use proptest::prelude::*;
 
 const CAVITY_PA_M3: f64 = 1e13;
 
-/// The origin of `T` at `origin_w`, its direction `towards_t` down.
+/// Pose with the origin of `T` at `origin_w` and its direction `towards_t` down.
 fn over(origin_w: Vector3<f64>, towards_t: &Vector3<f64>) -> Isometry3<f64> {
     let turn = Rotation3::rotation_between(towards_t, &-Vector3::z()).unwrap();
     Isometry3::from_parts(origin_w.into(), UnitQuaternion::from_rotation_matrix(&turn))
@@ -46,8 +47,8 @@ fn winkler(column: &Column) -> f64 {
     1.0 / (1.0 / column.skin_pa_m + 1.0 / column.flatten_pa_m)
 }
 
-/// Springs k along the radii of a sphere R, pressed by δ on a plane at h = R − δ:
-/// F = 2 π k R² (R ln(R/h) − δ).
+/// Springs k along the radii of a sphere R, pressed by δ on a plane at h = R − δ: F = 2 π k R² (R
+/// ln(R/h) − δ).
 fn sphere_n(k: f64, r: f64, depth: f64) -> f64 {
     2.0 * PI * k * r * r * (r * (r / (r - depth)).ln() - depth)
 }
@@ -129,7 +130,7 @@ fn force_and_torque_are_the_gradient_of_the_energy() {
             };
             let moved = slope(&|shift| Translation3::from(shift).into());
             near(moved, load.force_n[axis], 0.01 * load.force_n.norm());
-            // A rotation by step / 10 mm, so that points move as far as above.
+            // Rotates by step / 10 mm, so that points move as far as above.
             let turned = slope(&|shift| Isometry3::rotation(shift * 100.0)) / 100.0;
             near(turned, load.torque_nm[axis], 0.01 * load.force_n.norm() * 10e-3);
         }
@@ -148,13 +149,13 @@ fn the_fluid_keeps_its_volume_and_pushes_the_free_skin_out() {
     assert!(load.pressure_pa > 1e3 && load.displaced_m3 > 1e-8);
     let least = wet.map(|(_, inward_m)| *inward_m).fold(0.0, f64::min);
     assert!(least < -5e-5 && least > -1e-3, "{least}");
-    // Beyond ε of the contact, nothing of it is left.
+    // Beyond ε of the contact there is no force.
     let far = over(Vector3::new(0.0, 0.0, 0.02), &direction_t(0.1, 0.0));
     assert_eq!(skin.press(&plane(), &far, &mut pressed), Ok(Load::default()));
     assert!(pressed.inward_m.iter().chain(&pressed.indentation_m).all(|&moved| moved == 0.0));
 }
 
-/// The wrench by brute force: all triangles for every ray, bisection for the pressure.
+/// Wrench by brute force: all triangles for every ray, bisection for the pressure.
 fn slow_wrench(
     skin: &Skin,
     mesh: &Mesh,
@@ -219,7 +220,8 @@ fn the_wrench_is_that_of_a_slow_twin() {
     }
 }
 
-/// Work a motion does on the finger by a load, over a closed path, from and to no contact.
+/// Work of a motion on the finger and by a load, over a closed path without initial and final
+/// contact.
 fn work_of_a_cycle(effects: &Effects, slide_m: f64) -> (f64, f64) {
     let tip = Fingertip::new(&Finger::default(), effects);
     let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));

@@ -1,4 +1,4 @@
-//! The fingertip's measures, its settings, and that a step does not allocate.
+//! Tests of the fingertip's dimensions, its settings, and steps without allocation.
 
 use crate::common::counting::allocations;
 use crate::common::shipped::near;

@@ -1,4 +1,4 @@
-//! What the sensor sends, and what can be read back from it.
+//! Tests of the sensor's signals and of what can be inferred from them.
 
 use crate::common::quiet::{plane, quiet};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
@@ -27,7 +27,7 @@ fn height(height_m: f64) -> TipMotion {
     over(Vector3::new(0.0, 0.0, height_m), &-Vector3::z())
 }
 
-/// Frames of a finger that moves as `motion` says over time.
+/// Frames of a finger with a given `motion` over time.
 fn frames(
     effects: &Effects,
     seed: u64,
@@ -162,7 +162,7 @@ fn channels_are_sampled_in_the_order_of_the_slots() {
     assert_eq!(channel(36), Channel::Electrode(18));
     assert_eq!([38, 40, 42].map(channel), [Channel::Pdc, Channel::Tac, Channel::Tdc]);
     assert!((0..22).all(|i| channel(2 * i + 1) == Channel::Pac(i)));
-    // While the pressure rises, PDC of a skewed frame is read before its end, E1 long before.
+    // While the pressure rises, PDC of a skewed frame is sampled before its end, E1 much earlier.
     let sinking = |t: f64| height(8.1e-3 - 0.01 * t);
     let ideal = frames(&quiet(), 1, 50, sinking);
     let timing = Some(palpate::sim::finger::effects::timing::TimingEffect {
@@ -235,7 +235,7 @@ fn contact_is_found_after_enough_frames_and_lost_likewise() {
     assert_eq!(Frame::mean(&[]), Frame::default());
 }
 
-/// The power that electrodes need not compute is the same number.
+/// The skipped power computation of electrodes gives the same number.
 #[test]
 fn powers_of_one_are_as_computed() {
     for k in 1..100 {

@@ -1,4 +1,4 @@
-//! Fits reach the global maximum of the likelihood.
+//! Tests that fits reach the global maximum of the likelihood.
 
 use crate::common::shipped::toy;
 use palpate::experiment::{Experiment, Simulation};
@@ -18,7 +18,7 @@ use std::path::Path;
 
 static KERNEL: SquaredExponential = SquaredExponential;
 
-/// The ranges of noise and signal that a belief searches by default.
+/// Default search ranges of noise and signal.
 fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
     let (noise_ratio, signal_sd) = ((1e-4, 1e-2).into(), (1e-3, 1e3).into());
     SearchBox {
@@ -31,8 +31,8 @@ fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
     }
 }
 
-/// The slow twin of a fit: the profiled likelihood on a dense grid over the same box, with so many
-/// levels of each length and of the noise.
+/// Reference implementation of a fit: the profiled likelihood on a dense grid over the same box,
+/// with `levels` of each length scale and of the noise.
 fn best_on_grid(bounds: &SearchBox, touches: &Observations, levels: [usize; 2]) -> f64 {
     let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, touches);
     let level = |Range { low, high, .. }: Range, i: usize, of: usize| {
@@ -63,7 +63,7 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations, levels: [usize; 2]) 
     best
 }
 
-/// The fits of whole trials as they run, each begun from the one before, and cold.
+/// Fits of whole trials in sequence, each started from the previous one, and cold fits.
 #[test]
 fn fits_of_the_toys_trials_reach_the_global_maximum() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -90,8 +90,8 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
     assert!(fits == 192 && 100 * warm.max(cold) <= fits, "{short}");
 }
 
-/// Few touches whose noise is the sensor's: of the six decades of its ratio the ends say nothing. In
-/// this trial fits that looked at no more than these took every touch for a spike.
+/// For few touches with sensor noise, the bounds of the noise ratio's six decades are
+/// uninformative. A search with only these levels explained every touch of this trial as a spike.
 #[test]
 fn fits_of_a_known_noise_reach_the_global_maximum() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -115,8 +115,8 @@ fn fits_of_a_known_noise_reach_the_global_maximum() {
     assert_eq!(fits, 16);
 }
 
-/// A trial's fits begin from the last one and do not scan each time; what they reach is what a
-/// scan would have, but for a twentieth of a nat until the next scan.
+/// A trial's fits start from the previous one without a full scan; they reach the scan's result
+/// within 0.05 nat until the next scan.
 #[test]
 fn fits_touch_by_touch_reach_what_cold_fits_reach() {
     let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
@@ -142,7 +142,7 @@ fn fits_touch_by_touch_reach_what_cold_fits_reach() {
     assert!(fits == 56 && short <= 1 && worst < 0.05, "{short} of {fits}, worst {worst}");
 }
 
-/// An edge across both axes; a long wave with a short one on it; a plateau with a steep rim.
+/// An oblique edge; a long wave with a short one on it; a plateau with a steep rim.
 fn hard_surfaces() -> [fn(f64, f64) -> f64; 3] {
     [
         |x, z| if x + 0.3 * z < 0.6 { 0.0 } else { 1.0 },
@@ -151,9 +151,9 @@ fn hard_surfaces() -> [fn(f64, f64) -> f64; 3] {
     ]
 }
 
-/// On surfaces that no length fits well the likelihood has many tops. A fit may climb the second
-/// highest where they differ by less than a tenth of a nat, which no data could tell apart; it
-/// does once: two scales, touched five times.
+/// On surfaces that no length scale fits well the likelihood has many maxima. A fit may find the
+/// second one if it is lower by less than a tenth of a nat, which data cannot distinguish; it does
+/// once: two scales, five touches.
 #[test]
 fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
     let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
@@ -178,7 +178,8 @@ fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
     assert!(fits == 36 && short <= 1 && worst < 0.1, "{short} of {fits}, worst {worst}");
 }
 
-/// With many touches the hills are sought with every second one, and so on; the top is that of all.
+/// With many touches the maxima are searched with every second touch, and so on; the result is that
+/// of all touches.
 #[test]
 fn a_fit_of_many_touches_reaches_the_global_maximum() {
     let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
@@ -208,9 +209,9 @@ fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
     assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
 }
 
-/// Draws of a Gaussian process with other lengths along each of six axes (random waves, Rahimi &
-/// Recht 2007): the fit is at least as likely as what they were drawn with, and few matrices are
-/// factored though there are six lengths.
+/// Draws of a Gaussian process with different length scales along six axes (random waves, Rahimi &
+/// Recht 2007): the fit is at least as likely as the true parameters, and few matrices are
+/// factorised in spite of six length scales.
 #[test]
 fn a_fit_in_six_dimensions_finds_what_draws_were_made_with() {
     let lengths = [0.3, 0.5, 0.8, 1.2, 2.0, 0.4];
@@ -259,14 +260,14 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
     let known = SearchBox { touch_noise: TouchNoise::Known(0.05), ..free.clone() };
     let known = known.fit(&KERNEL, &touches).hyperparameters;
     assert!((known.noise_sd - 0.05).abs() < 1e-12, "{known:?}");
-    // A sensor that is better than what the kernel cannot follow changes nothing, a worse one counts.
+    // A sensor noise below the kernel's misfit changes nothing; a larger one is a lower bound.
     let least = |sd| SearchBox { touch_noise: TouchNoise::AtLeast(sd), ..free.clone() };
     let fitted = |sd| least(sd).fit(&KERNEL, &touches).hyperparameters;
     assert_eq!(fitted(0.9 * found.noise_sd), found);
     assert_eq!(fitted(0.05), known);
 }
 
-/// The likeliest of kernels is the one that is likeliest alone, and a row tells which it was.
+/// The selected kernel is the one with the largest individual likelihood, and a row records it.
 #[test]
 fn of_several_kernels_the_likeliest_is_taken() {
     let bounds = search_box(Mean::Zero, vec![(0.05, 4.0).into()]);

@@ -1,12 +1,12 @@
-//! Layers: inside a package a module imports only from lower layers, and no files import each other in
-//! a circle. Between packages the compiler sees to both.
+//! Tests of layers: within a package a module imports only from lower layers, and files have no
+//! circular imports. The compiler checks both between packages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Layers of a package's modules, lowest first; modules of one layer do not import each other. All modules
-/// that are not named are one layer above those that are.
+/// Layers of a package's modules, lowest first; modules of one layer do not import each other.
+/// Unnamed modules form one layer above the named ones.
 const LAYERS: [(&str, &[&[&str]]); 6] = [
     ("palpate_input", &[&["files", "words"], &["error"]]),
     ("palpate_gp", &[&["math"]]),
@@ -16,10 +16,10 @@ const LAYERS: [(&str, &[&[&str]]); 6] = [
     ("palpate", &[&["sim"], &["experiment"], &["study"], &["report"], &["cli"]]),
 ];
 
-/// A module by its path: its package, then the modules below.
+/// Path of a module: its package, then the modules below.
 type Module = Vec<String>;
 
-/// The folder with a package's sources.
+/// Folder of a package's sources.
 fn folder(package: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     match package {
@@ -42,10 +42,10 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The sources without comments and without their unit tests.
+/// Sources without comments and unit tests.
 struct Tree {
     texts: BTreeMap<Module, String>,
-    /// Where a name that a module passes on comes from.
+    /// Origin of re-exported names.
     passed_on: BTreeMap<Module, Module>,
 }
 
@@ -82,7 +82,7 @@ impl Tree {
         tree
     }
 
-    /// The paths of our packages that a module names, and whether it passes each on.
+    /// Returns the paths of workspace packages that a module names, and whether it re-exports each.
     fn imports(&self, module: &Module) -> Vec<(bool, Module)> {
         let mut found = Vec::new();
         let mut rest = String::new();
@@ -135,7 +135,7 @@ impl Tree {
         Some(from)
     }
 
-    /// The file that what stands at `path` is written in.
+    /// Returns the file that defines the item at `path`.
     fn file(&self, path: &Module) -> Module {
         let mut path = path.clone();
         for _ in 0..8 {
@@ -154,7 +154,7 @@ impl Tree {
         known.into_iter().find(|head| self.texts.contains_key(head)).unwrap()
     }
 
-    /// Which files each file imports; what a module only passes on is not its own.
+    /// Returns the files that each file imports; re-exports do not count.
     fn edges(&self) -> BTreeMap<Module, BTreeSet<Module>> {
         let to = |module: &Module| {
             let used = self.imports(module).into_iter().filter(|(is_passed_on, _)| !is_passed_on);
@@ -170,7 +170,7 @@ fn is_import(line: &str) -> bool {
     line.starts_with("use ") || (line.starts_with("pub") && line.contains("use "))
 }
 
-/// Every path of an import with braces.
+/// Expands an import with braces to all paths.
 fn expanded(tree: &str) -> Vec<String> {
     let Some(open) = tree.find('{') else { return vec![tree.trim().to_owned()] };
     let (head, body) = (tree[..open].trim(), &tree[open + 1..tree.rfind('}').unwrap()]);
@@ -191,7 +191,7 @@ fn expanded(tree: &str) -> Vec<String> {
     parts.flat_map(|part| expanded(part)).map(|part| format!("{head}{part}")).collect()
 }
 
-/// The layer of a module in its package.
+/// Layer of a module in its package.
 fn layer(module: &Module) -> usize {
     let (_, layers) = LAYERS.iter().find(|(package, _)| *package == module[0]).unwrap();
     let holds = |names: &&&[&str]| module.get(1).is_some_and(|name| names.contains(&name.as_str()));
@@ -214,7 +214,7 @@ fn imports_point_down() {
     assert!(seen > 400, "the test found only {seen} imports");
 }
 
-/// The layer of all modules of a package that [`LAYERS`] does not name.
+/// Layer of all modules of a package that [`LAYERS`] does not name.
 fn unnamed(package: &str) -> usize {
     LAYERS.iter().find(|(known, _)| *known == package).unwrap().1.len()
 }
@@ -223,7 +223,7 @@ fn unnamed(package: &str) -> usize {
 fn no_files_import_each_other_in_a_circle() {
     let mut edges = Tree::read().edges();
     assert!(edges.len() > 150);
-    // A file that imports no other is in no circle; take such files away until none is left.
+    // A file without imports is in no circle; such files are removed until none is left.
     loop {
         let ends: Vec<Module> =
             edges.iter().filter(|(_, to)| to.is_empty()).map(|(from, _)| from.clone()).collect();
@@ -247,7 +247,7 @@ fn no_files_import_each_other_in_a_circle() {
     }
 }
 
-/// A planner that could see the object could peek at the truth.
+/// Planners cannot access the object, so they cannot use the ground truth.
 #[test]
 fn planners_see_the_belief_and_nothing_else() {
     let tree = Tree::read();
@@ -271,7 +271,7 @@ fn planners_see_the_belief_and_nothing_else() {
     assert!(seen > 20, "the test found only {seen} imports");
 }
 
-/// A report is drawn from a run's folder: nothing in it builds a scene.
+/// A report is generated from a run's folder and builds no scene.
 #[test]
 fn reports_know_nothing_of_the_simulator() {
     let mut seen = 0;
@@ -313,7 +313,7 @@ fn every_folder_of_the_program_is_a_layer() {
     }
 }
 
-/// The explorer cannot see the truth: no package below the program depends on it.
+/// No package below the program depends on it, so the explorer cannot access the ground truth.
 #[test]
 fn no_package_below_depends_on_the_program() {
     for (package, _) in LAYERS.iter().filter(|(package, _)| *package != "palpate") {
@@ -325,13 +325,13 @@ fn no_package_below_depends_on_the_program() {
     }
 }
 
-/// The test's own reading of imports, on what it must understand.
+/// Tests the parser of imports on all required forms.
 #[test]
 fn imports_are_read_whole() {
     assert_eq!(expanded("a::{b, c::{d, e as f}}"), ["a::b", "a::c::d", "a::c::e as f"]);
     let edges = Tree::read().edges();
     let path = |text: &str| -> Module { text.split('/').map(str::to_owned).collect() };
-    // Through a name that a front page passes on, and through one in the midst of an expression.
+    // Through a re-exported name, and in the middle of an expression.
     assert!(
         edges[&path("palpate_explore/belief/height_field")]
             .contains(&path("palpate_explore/task/zone"))

@@ -1,5 +1,5 @@
-//! A run's folder that a crash or a full disk left at any moment resumes, or is begun anew by the
-//! same command; what others put into a folder is never touched.
+//! Tests of run folders after crashes or full disks: the same command resumes or restarts the run,
+//! and files of other programs are never changed.
 
 use std::fs;
 use std::path::Path;
@@ -15,10 +15,10 @@ use crate::common::program::{command, fails, folder, said, succeeds};
 use palpate::experiment::store::{Entry, Journal};
 use palpate::experiment::trial::row::TouchRow;
 
-/// Kills of one test; `PALPATE_FUZZ` asks for more.
+/// Number of kills; `PALPATE_FUZZ` sets more.
 const KILLS: u64 = 100;
 
-/// Runs that are killed at the same time.
+/// Number of runs killed in parallel.
 const WORKERS: u64 = 4;
 
 fn begun(folder: &Path, out: &Path, more: &[&str]) -> Command {
@@ -31,7 +31,7 @@ fn run(folder: &Path, out: &Path, more: &[&str]) -> Output {
     begun(folder, out, more).output().unwrap()
 }
 
-/// One folder whose run is killed once or twice, and resumed.
+/// Kills a run once or twice and resumes it.
 fn kill_and_resume(folder: &Path, kill: u64, longest: Duration, whole: &[u8]) {
     let out = folder.join(format!("killed-{kill}"));
     let mut random = ChaCha8Rng::seed_from_u64(kill);
@@ -62,7 +62,7 @@ fn kills_at_random_moments_of_the_first_second_all_resume() {
     let folder = folder.path();
     let started = Instant::now();
     assert!(run(folder, &folder.join("whole"), &["--no-report"]).status.success());
-    // A run that is over sooner is killed in all of its life.
+    // A shorter run is killed at any time of its life.
     let longest = started.elapsed().min(Duration::from_secs(1));
     let whole = fs::read(folder.join("whole/trials.jsonl")).unwrap();
     let asked =
@@ -79,7 +79,7 @@ fn kills_at_random_moments_of_the_first_second_all_resume() {
     });
 }
 
-/// A folder as a crash leaves it: files and how many of their bytes.
+/// Folder contents after a crash: files and their first bytes.
 type Left = &'static [(&'static str, &'static [u8])];
 
 const BEGINNINGS: [Left; 8] = [
@@ -102,7 +102,7 @@ fn every_beginning_that_a_crash_leaves_is_begun_anew() {
     assert!(run(folder.path(), &other, &["--set", "seed=1", "--no-report"]).status.success());
     let rows = fs::read(whole.join("trials.jsonl")).unwrap();
     for (i, beginning) in BEGINNINGS.iter().enumerate() {
-        // What was begun may be another experiment, as long as nothing of it was run.
+        // A started run without rows may be replaced by another experiment.
         for begun in [&whole, &other] {
             for fresh in [&["--no-report"][..], &["--no-report", "--fresh"]] {
                 let out = TempDir::new_in(folder.path()).unwrap();
@@ -120,9 +120,9 @@ fn every_beginning_that_a_crash_leaves_is_begun_anew() {
             }
         }
     }
-    // With rows it is not taken: another run's rows are lost by --fresh only.
+    // With rows it is kept: only --fresh deletes another run's rows.
     let refused = run(folder.path(), &other, &[]);
-    assert!(said(&refused).contains("holds another experiment"), "{}", said(&refused));
+    assert!(said(&refused).contains("contains another experiment"), "{}", said(&refused));
 }
 
 #[test]
@@ -146,21 +146,21 @@ fn what_others_put_into_a_folder_is_not_touched() {
         let out_name = out.to_str().unwrap();
         for fresh in [&[][..], &["--fresh"]] {
             let arguments = [&["run", "small.toml", "--out", out_name], fresh].concat();
-            fails(folder.path(), &arguments, &["this folder holds something else", "--out"]);
+            fails(folder.path(), &arguments, &["this folder contains other files", "--out"]);
         }
         assert_eq!(fs::read_dir(&out).unwrap().count(), files.len(), "{i}");
         for (name, text) in *files {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap(), *text, "{i}: {name}");
         }
     }
-    // Beside a run's own files they stay, whatever is begun anew.
+    // Other files beside a run's own files are kept in any case.
     succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
     fs::write(folder.path().join("runs/small/notes.txt"), "mine").unwrap();
     succeeds(folder.path(), &["run", "small.toml", "--no-report", "--fresh", "--set", "seed=3"]);
     assert_eq!(fs::read_to_string(folder.path().join("runs/small/notes.txt")).unwrap(), "mine");
 }
 
-/// A finished touch counts as soon as it is in the journal, and is there when it is opened again.
+/// A finished touch is in the journal at once and is read when it is opened again.
 #[test]
 fn a_journal_has_the_touches_that_were_added() {
     let folder = TempDir::new().unwrap();

@@ -1,5 +1,5 @@
-//! STL and PLY, binary and as text: the same mesh as from OBJ, what the program writes read back,
-//! and hostile files refused in words.
+//! Tests of STL and PLY, binary and text: the same mesh as from OBJ, files that the program writes,
+//! and hostile files.
 
 use std::fmt::Write;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::common::program::{fails, folder, succeeds};
 #[path = "../../crates/palpate-geometry/tests/suite/gltf_sample.rs"]
 mod gltf_sample;
 
-/// A pyramid over a square: five corners, a face of four and four of three.
+/// A pyramid over a square: five corners, a quadrilateral and four triangles.
 const CORNERS: [[f32; 3]; 5] =
     [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 3.0]];
 const FACES: [&[u8]; 5] = [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
@@ -58,7 +58,7 @@ fn stl_binary(header: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The header of a PLY with colours and a list of its own, which are passed over.
+/// PLY header with colours and an extra list, which are skipped.
 fn ply_header(format: &str) -> String {
     format!(
         "ply\nformat {format} 1.0\ncomment of a test\nobj_info none\nelement vertex 5\n\
@@ -104,7 +104,7 @@ fn ply_binary(is_little: bool) -> Vec<u8> {
     bytes
 }
 
-/// A file of every format and encoding, to be altered.
+/// A file of every format and encoding, for alteration.
 pub fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let (document, bytes) = gltf_sample::tetrahedron();
     vec![
@@ -150,7 +150,7 @@ fn every_format_and_encoding_holds_the_same_mesh() {
         let mesh = written(folder.path(), name, &bytes).unwrap_or_else(|error| panic!("{error}"));
         let found = (mesh.vertices().len(), mesh.triangles().len());
         assert_eq!(found, (5, 6), "{name}");
-        // A third of base times height; outside is outside.
+        // Volume: a third of base times height; normals point outwards.
         assert!((mesh.volume_m3() - 4.0).abs() < 1e-6, "{name}: {}", mesh.volume_m3());
     }
     let mesh = written(folder.path(), "two.stl", two.as_bytes()).unwrap();
@@ -229,7 +229,7 @@ fn what_scan_and_export_write_is_read_back() {
         assert!(said.contains("36 vertices, 50 triangles"), "{said}");
         let shown = succeeds(folder.path(), &["show", name]);
         assert!(shown.contains("triangles           50 of 50"), "{shown}");
-        // It can be touched where it came from.
+        // The exported mesh can be touched.
         let scene = format!("scene.object.mesh={name}");
         succeeds(
             folder.path(),

@@ -1,8 +1,8 @@
-//! Valid files and settings, altered at random: whatever comes of it, the program neither panics
-//! nor hangs, and says in its own words what it refuses.
+//! Fuzz tests with randomly altered files and settings: the program neither panics nor hangs, and
+//! rejects invalid input with clear messages.
 //!
-//! The alterations are the same every time. `PALPATE_FUZZ` is the number of cases of each target:
-//! `make fuzz` asks for 100000, of which a thousandth go through the program itself.
+//! The alterations are deterministic. `PALPATE_FUZZ` is the number of cases per target: `make fuzz`
+//! uses 100000, a thousandth of them through the program itself.
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -25,17 +25,17 @@ use tempfile::TempDir;
 use crate::common::program::{EXPERIMENT, SCENE, command, ended, folder, said, succeeds};
 use crate::formats;
 
-/// Cases of each target if nobody asks for more.
+/// Default number of cases per target.
 const CASES: u32 = 300;
 
-/// A case that takes longer hangs.
+/// Time after which a case counts as a hang.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn cases() -> u32 {
     std::env::var("PALPATE_FUZZ").map_or(CASES, |count| count.parse().expect("a number of cases"))
 }
 
-/// One alteration; places are shares of the length, so that they stay in it.
+/// One alteration; positions are shares of the length.
 #[derive(Clone, Debug)]
 enum Edit {
     Set(f64, u8),
@@ -43,12 +43,12 @@ enum Edit {
     Remove(f64, usize),
     Repeat(f64, usize),
     Cut(f64),
-    /// Puts something else in place of the number at or behind a place.
+    /// Replaces the number at or after a position.
     Number(f64, Vec<u8>),
     Line(f64, f64),
 }
 
-/// What breaks parsers.
+/// Values that often break parsers.
 const WORDS: [&str; 36] = [
     "0",
     "-0",
@@ -150,7 +150,7 @@ fn altered(original: &[u8], edits: &[Edit]) -> Vec<u8> {
     bytes
 }
 
-/// Tries `try_out` on as many values of `strategy` as are asked for.
+/// Runs `try_out` on `count` values of `strategy`.
 fn fuzz<S: Strategy>(strategy: S, count: u32, try_out: impl Fn(&S::Value) -> Result<(), String>) {
     let config = Config {
         cases: count,
@@ -164,7 +164,7 @@ fn fuzz<S: Strategy>(strategy: S, count: u32, try_out: impl Fn(&S::Value) -> Res
     outcome.unwrap_or_else(|error| panic!("{error}"));
 }
 
-/// What a piece of work says if it refuses; a panic or no end is an error.
+/// Returns the error of a piece of work; a panic or a hang is an error of the test.
 fn survived(work: impl FnOnce() -> Result<(), String> + Send + 'static) -> Result<(), String> {
     let (sender, receiver) = channel();
     thread::spawn(move || sender.send(catch_unwind(AssertUnwindSafe(work))));
@@ -176,7 +176,7 @@ fn survived(work: impl FnOnce() -> Result<(), String> + Send + 'static) -> Resul
     }
 }
 
-/// Words of the language, which no message uses.
+/// Words of the programming language, forbidden in messages.
 const LEAKS: [&str; 10] = [
     "expected u32",
     "expected u64",
@@ -190,7 +190,7 @@ const LEAKS: [&str; 10] = [
     "panicked",
 ];
 
-/// Insists that a message says something, and that in words.
+/// Requires a non-empty message in plain words.
 fn worded(message: &str) -> Result<(), String> {
     match LEAKS.iter().find(|leak| message.contains(**leak)) {
         Some(leak) => Err(format!("\"{leak}\" in: {message}")),
@@ -214,7 +214,7 @@ fn meshes() {
     });
 }
 
-/// What an experiment is written out as loads to the same again.
+/// A written experiment loads to the same experiment.
 fn loads(path: &Path, sets: &[String]) -> Result<(), String> {
     let experiment = Experiment::load(path, sets).map_err(|error| error.to_string())?;
     let again = path.with_file_name("again.toml");
@@ -268,7 +268,7 @@ fn assignments() {
     });
 }
 
-/// All keys of a table, dotted.
+/// Collects all keys of a table, dotted.
 fn collect(table: &toml::Table, prefix: &str, keys: &mut Vec<String>) {
     for (name, value) in table {
         let key = format!("{prefix}{name}");
@@ -292,14 +292,14 @@ fn finished() -> (TempDir, Vec<(PathBuf, Vec<u8>)>) {
     (folder, files.into())
 }
 
-/// Puts a run's files back and alters one.
+/// Restores a run's files and alters one.
 fn damage(files: &[(PathBuf, Vec<u8>)], file: usize, edits: &[Edit]) {
     files.iter().for_each(|(path, bytes)| fs::write(path, bytes).unwrap());
     let (path, bytes) = &files[file];
     fs::write(path, altered(bytes, edits)).unwrap();
 }
 
-/// Everything that is told and drawn of a run.
+/// Generates all outputs of a run.
 fn told(path: &Path, draw: bool) -> Result<(), String> {
     let run = Run::read(path).map_err(|error| error.to_string())?;
     let analysis = Analysis::of(&run);
@@ -322,7 +322,7 @@ fn run_folders() {
     fuzz((0..files.len(), edits()), cases(), |(file, edits)| {
         damage(&files, *file, edits);
         drawn.set(drawn.get() + 1);
-        // To draw takes a hundred times as long as to read.
+        // Drawing takes a hundred times as long as reading.
         let (path, draw) = (path.clone(), drawn.get() % 10 == 0);
         survived(move || told(&path, draw))
     });

@@ -1,4 +1,4 @@
-//! What must hold before a body is moved.
+//! Tests of the checks before a body may be moved.
 
 use crate::common::fake::{World, body_of};
 #[cfg(feature = "mujoco")]
@@ -71,7 +71,8 @@ fn counts(reading: &mut Reading, change: fn(&mut [f64; 19])) {
     reading.frames_mut().for_each(|frame| change(frame.electrode_counts.as_mut().unwrap()));
 }
 
-/// A real robot needs its cell and depths from a person; a simulation takes them from the mesh.
+/// A real robot needs its cell's limits and depths from the user; a simulation takes them from the
+/// mesh.
 #[cfg(feature = "mujoco")]
 #[test]
 fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
@@ -109,7 +110,7 @@ fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
     assert!(!Path::new(out).exists());
 }
 
-/// Another program that holds the folder is found before the arm is looked for.
+/// A folder locked by another program is detected before the connection to the arm.
 #[cfg(feature = "mujoco")]
 #[test]
 fn a_folder_that_may_not_be_used_is_refused_before_the_arm_is_looked_for() {

@@ -1,4 +1,4 @@
-//! Rays, nearest points and sweeps against analytic laws and slow twins.
+//! Tests of rays, nearest points and sweeps against analytic laws and reference implementations.
 
 use crate::common::shipped::near;
 use std::sync::Arc;
@@ -77,7 +77,7 @@ fn ray_ends_at_its_greatest_distance() {
     assert!(bvh.ray(&point(f64::NAN, 0.0, 0.0), &down, 100.0).is_none());
 }
 
-/// From inside a closed mesh every ray must hit, above all those through edges and vertices.
+/// From inside a closed mesh every ray must hit, including rays through edges and vertices.
 #[test]
 fn no_ray_slips_between_triangles() {
     for offset in [0.0, 1.0, 100.0] {
@@ -198,7 +198,7 @@ fn overlap_is_contact_at_once() {
     let pierced = Capsule { p0_w: point(0.2, 0.1, 0.5), p1_w: point(0.2, 0.1, 1.5), radius_m: 0.1 };
     let hit = bvh.sweep(&pierced, &unit(0.0, 0.3, -1.0), 1.0).unwrap();
     assert_eq!((hit.travel_m, hit.normal.z), (0.0, 1.0));
-    // Exactly touching is contact, a hair away is not.
+    // Exact tangency is contact; a tiny gap is not.
     let touching = Capsule::sphere(point(0.0, 0.0, 1.5), 0.5);
     assert_eq!(bvh.sweep(&touching, &up, 1.0).unwrap().travel_m, 0.0);
     let apart = Capsule::sphere(point(0.0, 0.0, 1.5 + 1e-9), 0.5);
@@ -222,8 +222,8 @@ fn sphere_sweep_of_no_radius_is_a_ray() {
     }
 }
 
-/// A needle sweeps a parallelogram: its ends run through the triangle, or a side of the triangle
-/// runs through the parallelogram.
+/// A needle sweeps a parallelogram: its ends pass through the triangle, or a side of the triangle
+/// passes through the parallelogram.
 #[test]
 fn needle_agrees_with_the_parallelogram_it_sweeps() {
     let mut dice = Dice(7);
@@ -269,7 +269,7 @@ fn check_ray(mesh: &Mesh, bvh: &MeshBvh, origin: &Point3<f64>, direction: &UnitV
             .fold(f64::INFINITY, f64::min)
     };
     let found = bvh.ray(origin, direction, 1e3).map_or(f64::INFINITY, |hit| hit.distance_m);
-    // A twin without exact edges can only bracket a ray that grazes one.
+    // A reference without exact edges can only bracket a grazing ray.
     let (narrow, wide) = (slow(-1e-9), slow(1e-9));
     assert!(found <= narrow + 1e-9 && found >= wide - 1e-9, "{wide} <= {found} <= {narrow}");
 }
@@ -360,7 +360,7 @@ fn vertex() -> impl Strategy<Value = Vector3<f64>> {
     [coordinate(), coordinate(), coordinate()].prop_map(Vector3::from)
 }
 
-/// Fat triangles, and slivers whose third corner is a hair off the opposite side.
+/// Well-shaped triangles, and slivers with the third corner almost on the opposite side.
 fn triangle() -> impl Strategy<Value = Triangle> {
     let sliver = (vertex(), vertex(), vertex(), -0.2..1.2f64, -9.0..-2.0f64).prop_map(
         |(a, b, off, along, exponent)| [a, b, a + (b - a) * along + off * 10f64.powf(exponent)],

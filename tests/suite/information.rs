@@ -1,4 +1,4 @@
-//! Contact normals and swept free space, from the touch to the recorded belief.
+//! Tests of contact normals and swept free space, from the touch to the recorded belief.
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::trial::row::TrialRow;
@@ -34,7 +34,7 @@ fn run(name: &str, sets: &[&str], number: u32) -> (Experiment, Truth, TrialRow) 
     (simulation.experiment().clone(), simulation.truth().clone(), row)
 }
 
-/// No surface is where the finger has passed, and a miss reaches behind all of it.
+/// The swept volume contains no surface, and a miss reaches behind all of it.
 #[test]
 fn the_surface_is_below_what_the_finger_has_swept() {
     for name in ["container.toml", "bird.toml"] {
@@ -63,7 +63,7 @@ fn the_surface_is_below_what_the_finger_has_swept() {
                 let height_m = height_m.unwrap();
                 bounded += 1;
                 tight += usize::from(ceiling_m < height_m + 1e-3);
-                // The mesh is not quite the formula that is the truth.
+                // The mesh differs slightly from the true formula.
                 assert!(height_m < ceiling_m + 2e-4, "{name}: {height_m} {ceiling_m}");
             }
         }
@@ -76,8 +76,8 @@ fn the_surface_is_below_what_the_finger_has_swept() {
     }
 }
 
-/// Contacts on two ridges; between them a finger came to a depth. What is a little below the mean
-/// lowers it; far below, there is an edge rather than a surface, and the mean stays.
+/// Contacts on two ridges, with a sweep to some depth between them. A bound slightly below the mean
+/// lowers it; a bound far below indicates an edge, and the mean stays.
 #[test]
 fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
     let believe = |depth_m: Option<f64>| {
@@ -110,14 +110,14 @@ fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
     let (after, after_sd) = at(&lowered, [0.0, 0.0]);
     assert!(after < before - 0.2 * before_sd, "{before} {before_sd} {after}");
     assert!(after_sd > 0.0 && after_sd <= before_sd, "{before_sd} {after_sd}");
-    // The contacts are still met.
+    // The contacts are still fitted.
     let [(here, _), (there, _)] = [&without, &lowered].map(|belief| at(belief, [0.04, 0.0]));
     assert!((here - there).abs() < 5e-4, "{here} {there}");
     let edge = believe(Some(before - 10.0 * before_sd.max(1e-3)));
     assert_eq!(at(&edge, [0.0, 0.0]), (before, before_sd));
 }
 
-/// The mean turns as the normals say, which tell the two sides of one contact apart.
+/// Normals tilt the mean, and distinguish the two sides of a contact.
 #[test]
 fn normals_tilt_the_belief_and_grazing_ones_are_dropped() {
     for (normal_w, slopes) in [
@@ -159,7 +159,7 @@ fn the_toys_normals_are_its_slopes() {
     }
 }
 
-/// Touches and hyperparameters read back from their line make the belief that was measured.
+/// Touches and hyperparameters read from a row reproduce the measured belief.
 #[test]
 fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
     for (normals, free_space) in [(false, false), (true, false), (false, true), (true, true)] {
@@ -192,7 +192,7 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
     }
 }
 
-/// Exact normals are worth touches: the container's front is found with a third of the error.
+/// Exact normals replace touches: the container's error is a third.
 #[test]
 fn exact_normals_find_the_container_sooner() {
     for number in 0..2 {
@@ -214,8 +214,8 @@ fn a_kernel_without_slopes_is_refused_with_those_that_have_them() {
     assert!(load("container.toml", &["gp.free_space=true", "gp.kernel=\"matern_32\""]).is_ok());
 }
 
-/// A band as wide as the contacts say holds more of an object with edges than one as wide as the
-/// likelihood says, of the same surface.
+/// For an object with edges, a band scaled by leave-one-out residuals covers more than one scaled
+/// by the likelihood.
 #[test]
 fn contacts_say_how_wide_the_band_is() {
     let [likely, left_out] = ["likelihood", "leave_one_out"].map(|band| {
@@ -234,7 +234,7 @@ fn contacts_say_how_wide_the_band_is() {
     assert!(left_out.nlpd < likely.nlpd, "{left_out:?} {likely:?}");
 }
 
-/// The paper's belief, which stands in a file, is what holds where nothing is said.
+/// The paper's belief file equals the default settings.
 #[test]
 fn the_belief_of_the_paper_is_the_default() {
     let [plain, paper] = [None, Some("gp=experiments/beliefs/paper.toml")]

@@ -1,18 +1,18 @@
-//! The program somewhere else: with MuJoCo's library beside it, it runs wherever it lies.
+//! Tests that the installed program runs from any folder with MuJoCo's library beside it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// A program without the search path that cargo gives its own.
+/// Command without cargo's library search path.
 fn command(program: &Path) -> Command {
     let mut command = Command::new(program);
     command.env_remove("LD_LIBRARY_PATH");
     command
 }
 
-/// Where the loader finds the libraries of `program` called libmujoco.
+/// Path at which the loader finds libmujoco for `program`.
 fn library(program: &Path) -> Option<PathBuf> {
     let output = command(program).env("LD_TRACE_LOADED_OBJECTS", "1").output().unwrap();
     let found = String::from_utf8(output.stdout).unwrap();
@@ -26,7 +26,7 @@ fn a_copy_takes_the_library_beside_it_and_runs() {
     let program = Path::new(env!("CARGO_BIN_EXE_palpate"));
     let original = library(program).expect("the program is linked to MuJoCo");
     for (program_at, library_at) in [("palpate", ""), ("bin/palpate", "lib")] {
-        // On the disk of the program, which is large and need not be written again.
+        // On the program's disk, because the program is large.
         let folder = TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
         let copy = folder.path().join(program_at);
         let beside = folder.path().join(library_at);

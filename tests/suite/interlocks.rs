@@ -1,4 +1,4 @@
-//! Interlocks: each trips on its cause and on nothing that is in order, and stays tripped.
+//! Tests of interlocks: each trips on its cause only, and stays tripped.
 
 use crate::common::fake::{Fake, World, body_of};
 use crate::common::shipped;
@@ -34,10 +34,10 @@ fn command(joints: usize, tick: u32) -> Command {
     Command { qdot: vec![0.02 * (f64::from(tick) * 0.01).sin(); joints] }
 }
 
-/// What a body that is otherwise in order reads wrong from tick 100 on.
+/// Fault in the readings of a body from tick 100 on.
 type Breaks = fn(u64, &mut Reading);
 
-/// Cause, interlock, whether it waits.
+/// Cause, interlock, and fault.
 const CAUSES: [(&str, Breaks); 13] = [
     ("force", |tick, reading| force(reading, (0.5 * (tick - 100) as f64).min(40.0))),
     ("force rate", |_, reading| force(reading, 24.0)),
@@ -79,7 +79,7 @@ fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() 
         let said = trip.to_string();
         assert!(said.starts_with(&format!("{named} is ")), "{named}: {said}");
         assert!(trip.found > trip.limit || trip.unit == "counts", "{said}");
-        // The longest that any of them waits is 0.2 s, 100 ticks; a spike needs two readings.
+        // The longest delay is 0.2 s, 100 ticks; a spike needs two readings.
         assert!(tick <= 205, "{named}: {tick}");
         let commands = fake.commands();
         assert!(commands.last().unwrap().iter().all(|qdot| *qdot == 0.0), "{named}");
@@ -94,7 +94,7 @@ fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() 
     }
 }
 
-/// How far the tip of a stage goes on after its joints froze, and what stopped it.
+/// Distance that a stage's tip moves after its joints freeze, and the interlock that stops it.
 fn frozen(speed_m_s: f64, noise: f64) -> (f64, String) {
     let site = site(stage(Point3::origin(), Finger::default().r_at()));
     let world = World { freezes: Some((400, noise)), ..World::real() };
@@ -104,7 +104,7 @@ fn frozen(speed_m_s: f64, noise: f64) -> (f64, String) {
     (fake.places()[400][1] - fake.last()[1], fault.to_string())
 }
 
-/// Positions repeated to the bit, and positions that only tremble.
+/// Positions that repeat exactly, and positions with noise only.
 #[test]
 fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
     for speed_m_s in [0.0001, 0.001, 0.003, 0.005, 0.015, 0.04, 0.1] {
@@ -112,7 +112,7 @@ fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
         println!("{speed_m_s} m/s: {:.2} mm, {said}", 1e3 * went_m);
         let found = ["joint standstill of Y", "position tracking error of Y"];
         assert!(found.iter().any(|words| said.contains(words)), "{said}");
-        // 0.1 s and one tick, or what shows; and the way to rest.
+        // 0.1 s and one tick, or the visible distance, plus the stopping distance.
         assert!(went_m < 0.01 && went_m < (speed_m_s * 0.13).max(4e-4), "{speed_m_s}: {went_m}");
         let (went_m, said) = frozen(speed_m_s, 1e-6);
         println!("{speed_m_s} m/s: {:.2} mm, {said}", 1e3 * went_m);
@@ -121,7 +121,7 @@ fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
     }
 }
 
-/// A servo that lags, and one that smooths, do not count as frozen.
+/// Lagging and smoothing servos do not count as frozen.
 #[test]
 fn joints_that_lag_by_less_than_is_allowed_trip_nothing() {
     for lag in [5, 40] {
@@ -136,12 +136,12 @@ fn joints_that_lag_by_less_than_is_allowed_trip_nothing() {
     }
 }
 
-/// Bounds hold where the tip may be, not only where it was last seen.
+/// Bounds apply to the possible position of the tip, not only to the last observed one.
 #[test]
 fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {
     let mut site = site(stage(Point3::origin(), Finger::default().r_at()));
     site.tip_w = Some([Point3::origin(); 2]);
-    // Nothing else stops it.
+    // No other interlock stops it.
     let settings = InterlockSettings {
         tip_margin_m: 0.05,
         frozen_s: 100.0,
@@ -157,7 +157,7 @@ fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {
     assert!((-0.0501..-0.04).contains(&fake.last()[1]), "{:?}", fake.last());
 }
 
-/// Not "-0.0451 m inside": where it stands, and where to bring it.
+/// The message gives the pose and how to correct it, not only a negative margin.
 #[test]
 fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
     let mut site = arm();
@@ -172,12 +172,12 @@ fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
     assert_eq!(body.step(&command(7, 101)).unwrap_err(), fault);
 }
 
-/// One reading alone is no force.
+/// A single reading does not count as a force.
 #[test]
 fn a_single_spike_of_force_is_none() {
     let world = World {
         breaks: Some((100, |tick, reading| {
-            // Between two readings from which a rise is measured.
+            // Between two readings used for a rise.
             if tick % 50 == 2 {
                 force(reading, 100.0);
             }
@@ -188,7 +188,7 @@ fn a_single_spike_of_force_is_none() {
     (0..300).for_each(|tick| assert!(body.step(&command(7, tick)).is_ok()));
 }
 
-/// While a touch is thought about nobody reads, and noise may bring back the value of before.
+/// Nothing is read during planning, and noise may repeat the earlier value.
 #[test]
 fn an_electrode_that_reads_the_same_before_and_after_a_pause_is_not_frozen() {
     let world = World {
@@ -217,7 +217,7 @@ fn a_simulated_body_is_cleared_by_its_reset() {
     assert!(body.step(&command(7, 0)).is_ok());
 }
 
-/// A wall of 20 N/mm across y; the tip goes against it at 20 mm/s.
+/// Moves the tip at 20 mm/s against a wall of 20 N/mm across y.
 fn pressed(
     wall: impl Fn(f64) -> f64 + Send + 'static,
     settings: &InterlockSettings,
@@ -254,7 +254,7 @@ fn too_much_force_is_left_by_the_way_it_came_and_no_farther_than_said() {
     assert_eq!(fake.last()[1], deepest);
 }
 
-/// Pulled back, a hook would hold.
+/// A hook would block the retraction.
 #[test]
 fn going_back_ends_where_the_force_rises() {
     let caught = std::sync::Mutex::new(0.0f64);
@@ -267,7 +267,7 @@ fn going_back_ends_where_the_force_rises() {
     let (fault, fake) = pressed(hook, &InterlockSettings::default());
     assert!(matches!(fault, Fault::Interlock { .. }));
     let (deepest, last) = (fake.places().iter().map(|q| q[1]).fold(0.0, f64::min), fake.last()[1]);
-    // 2 N at 20 N/mm are 0.1 mm; to stop from 20 mm/s takes 0.2 mm.
+    // 2 N at 20 N/mm are 0.1 mm; stopping from 20 mm/s takes 0.2 mm.
     assert!((0.003..0.0042).contains(&(last - deepest)), "{}", last - deepest);
 }
 
@@ -281,7 +281,7 @@ fn it_goes_back_from_nothing_but_force() {
         let back = fake.commands().iter().flatten().fold(0.0, |least: f64, &qdot| least.min(qdot));
         assert_eq!(back, 0.0, "{named}");
     }
-    // Nor from force, if the skin is silent too.
+    // The same for force, if the skin also sends nothing.
     let both: Breaks = |tick, reading| {
         reading.samples.clear();
         force(reading, (0.24 * (tick - 100) as f64).min(26.0));
@@ -336,8 +336,8 @@ fn no_touch_of_a_shipped_scene_comes_near_one() {
     }
 }
 
-/// Where the finger is not stopped by what it is to feel, the interlock stops it: the depth of the
-/// zone, the box around the ways.
+/// If no sensor stops the finger, an interlock does: the depth of the zone, or the box around the
+/// paths.
 #[test]
 fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
     let environment = shipped::environment("container_finger.toml", &[]);
@@ -361,7 +361,7 @@ fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// Whatever is commanded, up to ten times what a joint can do.
+    /// For any command, up to ten times a joint's limits.
     #[test]
     fn whatever_is_commanded_limits_hold_and_the_tip_stays_in_its_box(
         wild in prop::collection::vec(prop::array::uniform7(-1.0f64..1.0), 1..12),
@@ -399,7 +399,7 @@ proptest! {
                 prop_assert!((qdot[i] - before[i]).abs() <= step, "{}", joint.name);
             }
             let tip = chain.forward(&chain.joints_from(q).unwrap()).translation.vector - home.coords;
-            // The grain of looking ahead.
+            // Resolution of the look-ahead.
             prop_assert!(tip.amax() <= room.x + 1e-3, "{tip}");
             before.clone_from(qdot);
         }

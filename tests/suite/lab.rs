@@ -1,5 +1,5 @@
-//! An arm behind topics: run in a network namespace by `make test-ros2` and `make test-ros1`, and
-//! ignored without one, because DDS sends to whoever is near.
+//! Tests of an arm over topics, run in a network namespace by `make test-ros2` and `make
+//! test-ros1`. They are ignored otherwise, because DDS multicasts to the local network.
 
 use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row};
 use palpate::backend::pace;
@@ -21,16 +21,15 @@ use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// How many touches are made with each planner; fewer where time is short.
+/// Number of touches per planner; fewer if time is short.
 fn touches() -> u32 {
     std::env::var("PALPATE_TOUCHES").ok().and_then(|text| text.parse().ok()).unwrap_or(20)
 }
 
-/// Most times that a machine may be late.
+/// Maximum number of overruns due to a busy machine.
 const LATE: u32 = 4;
 
-/// Runs an exploration; where the machine was too late for the arm's computer, the same command
-/// goes on.
+/// Runs an exploration; after an overrun of the robot controller the same command continues it.
 fn run_to_its_end(network: &Network, planner: &str, out: &Path) {
     for halts in 0..=LATE {
         let mut run = network.run(planner, touches(), out);
@@ -50,8 +49,8 @@ fn run_to_its_end(network: &Network, planner: &str, out: &Path) {
     panic!("{planner}: late {LATE} times");
 }
 
-/// An exploration with each planner, one after another, so that each has a processor for either
-/// side; meanwhile a peer of another implementation reads what the first explorer sends.
+/// Runs an exploration with each planner in turn, so that each side has a processor; meanwhile an
+/// independent peer reads the first explorer's messages.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_container_is_explored_over_topics_as_in_the_simulator() {
@@ -87,7 +86,7 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
         far.push(row.touches.last().unwrap().metrics.unwrap().rmse_m);
         let entry = palpate::explore::planner::by_name(planner).unwrap();
         near.push(simulation.trial(entry, 0).touches.last().unwrap().metrics.unwrap().rmse_m);
-        // The same targets, one after another, by the body in this process.
+        // The same targets in sequence, with the body in this process.
         let mut probe = simulation.probe(0).unwrap();
         let mut off_m = Vec::new();
         for touch in &row.touches {
@@ -105,17 +104,17 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
         off_m.sort_by(f64::total_cmp);
         let [.., second_m, worst_m] = off_m.as_slice() else { panic!("{off_m:?}") };
         println!("{planner}: contacts off the simulator's by {:.3} mm at most", 1e3 * worst_m);
-        // Where the surface is steep a tick that comes late moves the contact: one may.
+        // On a steep surface a late tick moves the contact; one such contact is allowed.
         assert!(*second_m < 3e-4 && *worst_m < 6e-4, "{planner}: {off_m:?}");
     }
     println!("RMSE of active and random, over topics {far:?} m, in the simulator {near:?} m");
-    // Who wins is asked where somebody does.
+    // The winner is compared only if the difference is clear.
     if near[0].max(near[1]) > 1.5 * near[0].min(near[1]) {
         assert_eq!(far[0] < far[1], near[0] < near[1], "{far:?} {near:?}");
     }
 }
 
-/// Written from the table of topics alone, it makes a touch, with either driver's messages.
+/// A peer written from the table of topics alone makes a touch, with the messages of either driver.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
@@ -137,15 +136,15 @@ fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
         let told = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success(), "{told}{}", String::from_utf8_lossy(&output.stderr));
         let felt_m = serde_json::from_str::<Value>(&told).unwrap()["felt_y_m"].as_f64().unwrap();
-        // The container's front stands at most 60 mm before its axis at y = -0.65 m; the tip's centre is
-        // 7 mm before that.
+        // The container's front is at most 60 mm before its axis at y = -0.65 m; the tip's centre
+        // is 7 mm before that.
         assert!((-0.65..-0.58).contains(&felt_m), "{felt_m}");
         println!("{peer}: {}", told.trim());
         twin.end();
     }
 }
 
-/// Commands at 250 Hz to a peer of another implementation, which answers each.
+/// Commands at 250 Hz to an independent peer, which answers each.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_loop_loses_nothing_at_250_hz() {
@@ -162,7 +161,7 @@ fn the_loop_loses_nothing_at_250_hz() {
     let period = Duration::from_millis(4);
     let echo = Arc::clone(&answers);
     let take = move |delivery| {
-        // The peer sends the stamp of the command back.
+        // The peer returns the stamp of the command.
         if let Delivery::Packet { packet: Packet::Joints(message), .. } = delivery {
             echo.lock().unwrap().push((message.header.stamp.s(), pace::now_s()));
         }
@@ -172,7 +171,7 @@ fn the_loop_loses_nothing_at_250_hz() {
     let names =
         JointNames::new(["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from).into());
     let send = || link.send(names.command(pace::now_s(), &[0.0; 7], &topic));
-    // Until the two have found each other.
+    // Waits for discovery.
     while answers.lock().unwrap().is_empty() {
         send();
         sleep(Duration::from_millis(50));
@@ -204,7 +203,7 @@ fn the_loop_loses_nothing_at_250_hz() {
     peer.wait().unwrap();
 }
 
-/// A fault in the middle of a trial: what was touched is kept, and the same command goes on.
+/// After a fault in the middle of a trial the touches are kept, and the same command continues.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_run_that_was_halted_goes_on() {
@@ -215,16 +214,16 @@ fn a_run_that_was_halted_goes_on() {
     let first = network.run("random", 6, &out).arg("--record").output().unwrap();
     let said = String::from_utf8_lossy(&first.stderr).into_owned();
     assert_eq!(first.status.code(), Some(2), "{said}");
-    assert!(said.contains("emergency stop") && said.contains("touches of it are kept"), "{said}");
+    assert!(said.contains("emergency stop") && said.contains("touches are stored"), "{said}");
     let lines = |text: &str| text.lines().filter(|line| line.contains("\"touch\"")).count();
     let journal = fs::read_to_string(out.join("touches.jsonl")).unwrap();
     let kept = lines(&journal);
     assert!((1..6).contains(&kept), "{journal}");
-    assert!(said.contains(&format!("{kept} touches of it are kept")), "{said}");
+    assert!(said.contains(&format!("{kept} touches are stored")), "{said}");
     sleep(Duration::from_millis(1500));
     let unseen = network.run("random", 6, &out).output().unwrap();
     let said = String::from_utf8_lossy(&unseen.stderr).into_owned();
-    assert!(said.contains("halted by a fault") && said.contains("--clear-fault"), "{said}");
+    assert!(said.contains("a fault halted the run") && said.contains("--clear-fault"), "{said}");
     let mut second = network.run("random", 6, &out);
     let second = second.args(["--clear-fault", "--record"]).output().unwrap();
     assert!(second.status.success(), "{}", String::from_utf8_lossy(&second.stderr));
@@ -232,20 +231,20 @@ fn a_run_that_was_halted_goes_on() {
     assert_eq!((row.failure, row.touches.len()), (None, 6));
     let after = fs::read_to_string(out.join("touches.jsonl")).unwrap();
     assert!(after.starts_with(&journal) && lines(&after) == 6);
-    // Both parts of the recording replay, on any machine.
+    // Both parts of the recording can be replayed, on any machine.
     let whole = out.join("recordings/random-0000.mcap");
     let replay = network.palpate(&["replay", whole.to_str().unwrap()]).output().unwrap();
     let told = String::from_utf8_lossy(&replay.stdout).into_owned();
     assert!(replay.status.success(), "{told}{}", String::from_utf8_lossy(&replay.stderr));
     assert!(
-        told.contains("random-0000-part-2.mcap") && told.contains("6 touches the same"),
+        told.contains("random-0000-part-2.mcap") && told.contains("6 touches identical"),
         "{told}"
     );
     twin.end();
 }
 
-/// Status published once and latched; services in another participant than the topics, found two
-/// seconds later, whose requests carry their identity in the payload.
+/// Status published once and latched; services in another participant than the topics, discovered
+/// two seconds later, with the request identity in the payload.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_of_another_implementation_is_heard_and_answers() {
@@ -254,7 +253,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
         return;
     }
     let arm = network.peer("arm", &["14"]).stdout(Stdio::piped()).spawn().unwrap();
-    // The status was published before anybody was there to hear it.
+    // The status was published before any subscriber existed.
     sleep(Duration::from_millis(1500));
     let chain = ArmSettings::default().chain().unwrap();
     let on_change = BackendSettings { status_on_change: true, ..network.settings.clone() };
@@ -263,7 +262,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
         lab.call(&service).unwrap_or_else(|fault| panic!("{}: {fault}", service.name("/pa10")));
     }
     drop(lab);
-    // The wrong mapping never gets an answer, and the message names the setting.
+    // The wrong mapping gets no answer, and the message names the setting.
     let other =
         BackendSettings { service_mapping: MappingKind::Enhanced, patience_s: 2.0, ..on_change };
     let lab = Lab::join(&other, &chain).unwrap();
@@ -281,7 +280,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     }
 }
 
-/// How often each network interface of this namespace has joined the multicast group of DDS.
+/// Number of memberships of each network interface of this namespace in the DDS multicast group.
 fn multicast_members(device: &str) -> u32 {
     let text = fs::read_to_string("/proc/net/igmp").unwrap();
     let mut is_device = false;

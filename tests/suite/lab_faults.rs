@@ -1,5 +1,5 @@
-//! What goes wrong between an explorer and its arm, one after another: who sees it, and how soon the
-//! arm stands still. Prints the table of `docs/safety.md`.
+//! Tests of failures between an explorer and its arm: which side detects each, and how soon the arm
+//! is at rest. Prints the table of `docs/safety.md`.
 
 use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, signal};
 use palpate::backend::pace;
@@ -13,7 +13,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Later than this nothing was seen; far more than any limit, for machines that are busy.
+/// Time without detection; far above any limit, for busy machines.
 const NOT_SEEN_S: f64 = 0.6;
 
 /// An exploration that is disturbed while the arm moves.
@@ -38,7 +38,7 @@ impl Scene {
         Self { network, twin, explorer, folder }
     }
 
-    /// Waits for the explorer's end; what it said, and when it halted.
+    /// Waits for the explorer's end; returns its output and the time of its halt.
     fn halted(&mut self) -> (String, f64) {
         let mut said = String::new();
         let mut errors = self.explorer.stderr.take().unwrap();
@@ -49,7 +49,7 @@ impl Scene {
         (said, halt["time_unix_s"].as_f64().unwrap())
     }
 
-    /// How long after `since_s` the twin stood still at first, if it had not before; it does by now.
+    /// Time from `since_s` to the first rest of the twin; it must be at rest now.
     fn rest_s(&self, since_s: f64) -> f64 {
         assert!(self.twin.rest_s().is_some(), "{:?}", self.twin.events);
         let events = self.twin.events.lock().unwrap();
@@ -68,7 +68,7 @@ fn told(what: &str, seen_s: Option<f64>, rest_s: Option<f64>, said: &str) {
     assert!([seen_s, rest_s].into_iter().flatten().all(|time_s| time_s < NOT_SEEN_S), "{what}");
 }
 
-/// What fails on the arm's side, and what the explorer says of it.
+/// Failures on the arm's side, and the explorer's message for each.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn what_fails_on_the_arms_side_stops_the_exploration() {
@@ -94,7 +94,7 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
         let begins = |event: &Value| event["failure"]["is_on"] == true;
         let at_s = scene.twin.wait_for(begins, 1.0);
         sleep(Duration::from_millis(500));
-        // After too much force the finger goes back, and then the explorer tells.
+        // After a force-limit violation the finger retracts first, then the explorer reports it.
         let goes_back = name == "force_spike";
         let seen_s = Some(halted_s - at_s).filter(|_| !goes_back);
         let rest_s = Some(scene.rest_s(at_s)).filter(|_| !goes_back);
@@ -104,7 +104,7 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
     assert!(other.is_empty(), "{other:?}");
 }
 
-/// What a network does to packets without losing the arm: the exploration goes on.
+/// Network disturbances that do not lose the arm: the exploration continues.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn loss_latency_and_noise_are_lived_with() {
@@ -131,7 +131,7 @@ fn the_death_of_either_side_stops_the_other() {
         let seen_s = scene.twin.alarmed_s(at_s) - at_s;
         told(&format!("SIG{name} of the explorer"), Some(seen_s), Some(scene.rest_s(at_s)), "");
         if name == "STOP" {
-            // What was queued moves nothing, and the explorer is told.
+            // Queued commands move nothing, and the explorer gets an error.
             let count = scene.twin.events.lock().unwrap().len();
             signal(&scene.explorer, "CONT");
             let (said, _) = scene.halted();
@@ -152,7 +152,7 @@ fn the_death_of_either_side_stops_the_other() {
         told(&format!("SIG{name} of the arm's side"), Some(halted_s - at_s), None, &said);
         assert!(said.contains("no new message on"), "{said}");
         if name == "STOP" {
-            // It wakes with a command that is old by now.
+            // It resumes with an outdated command.
             signal(&scene.twin.child, "CONT");
             let at_s = pace::now_s();
             sleep(Duration::from_secs(1));
@@ -161,7 +161,7 @@ fn the_death_of_either_side_stops_the_other() {
     }
 }
 
-/// A wire is pulled, and put back.
+/// A network cable is disconnected and reconnected.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
@@ -190,7 +190,7 @@ fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
 }
 
-/// Somebody else commands the arm, too.
+/// A second publisher also commands the arm.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_second_publisher_of_commands_stops_the_arm() {
@@ -207,14 +207,14 @@ fn a_second_publisher_of_commands_stops_the_arm() {
         sleep(Duration::from_millis(20));
     }
     let (said, halted_s) = scene.halted();
-    // Over ROS 1 the arm's side cannot tell publishers apart; the explorer asks the master.
+    // Over ROS 1 the arm's side cannot distinguish publishers; the explorer queries the master.
     let is_told_by_arm = said.contains("alarm");
     let at_s = if is_told_by_arm { scene.twin.alarmed_s(before_s) } else { before_s };
     told("two publishers", Some(halted_s - at_s), Some(scene.rest_s(at_s)), &said);
     assert!(said.contains("two publishers") || said.contains("2 publishers"), "{said}");
 }
 
-/// What an explorer does not begin with.
+/// States in which an explorer does not start.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_that_speaks_otherwise_is_not_moved() {
@@ -230,7 +230,7 @@ fn an_arm_that_speaks_otherwise_is_not_moved() {
     assert_eq!(twin.last(|event| event == "moving"), None);
 }
 
-/// A way that would take a link below the table is not begun.
+/// A path that moves a link below the table is not started.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_way_into_the_table_is_refused_before_it_is_begun() {

@@ -1,4 +1,4 @@
-//! Every integration test in one program, so that the library is linked once.
+//! All integration tests in one program, so that the library is linked once.
 
 mod common;
 

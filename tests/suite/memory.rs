@@ -1,11 +1,11 @@
-//! What the Gaussian process holds at its largest, counted by the allocator.
+//! Tests of the Gaussian process's peak memory, counted by the allocator.
 
 use crate::common::counting::peak_bytes;
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::{Mean, Observations, Posterior};
 
-/// Peak of `work` above what was held before, in doubles per n².
+/// Peak memory of `work` above the initial memory, in doubles per n².
 fn doubles_per_square<R>(n: usize, work: impl FnOnce() -> R) -> f64 {
     peak_bytes(work) as f64 / 8.0 / (n * n) as f64
 }

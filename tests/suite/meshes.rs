@@ -1,4 +1,4 @@
-//! What `palpate export` writes.
+//! Tests of `palpate export`.
 
 use palpate::sim::{Environment, Scene};
 use std::fs;
@@ -14,20 +14,20 @@ fn palpate(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Runs it, which must succeed.
+/// Runs the program, which must succeed.
 fn done(arguments: &[&str]) {
     let output = palpate(arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// What it answers to a mistake.
+/// Returns the error message of an invalid command.
 fn refused(arguments: &[&str]) -> String {
     let output = palpate(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// The numbers of a PLY's vertices and faces.
+/// Numbers of a PLY file's vertices and faces.
 fn ply(path: &Path) -> (Vec<Vec<f64>>, Vec<Vec<usize>>) {
     let text = fs::read_to_string(path).unwrap();
     let (head, body) = text.split_once("end_header\n").unwrap();
@@ -44,7 +44,7 @@ fn ply(path: &Path) -> (Vec<Vec<f64>>, Vec<Vec<usize>>) {
     (vertices.iter().map(numbers).collect(), faces.iter().map(indices).collect())
 }
 
-/// The container bulges everywhere, so the finger feels its true surface.
+/// The container is convex, so the finger touches its true surface.
 #[test]
 fn a_scan_is_the_surface_and_does_not_depend_on_threads() {
     let folder = TempDir::new().unwrap();
@@ -94,7 +94,7 @@ fn a_belief_is_exported_as_it_was_and_mistakes_say_what_is_allowed() {
     }
     let is_sure = |point: &Vec<f64>| (0.0..0.05).contains(&point[9]) && point[4] > 0.0;
     assert!(points.iter().all(is_sure));
-    // The RMSE of the vertices against the recorded truth is the recorded one.
+    // The RMSE of the vertices relative to the recorded truth is the recorded one.
     let run_read = palpate::experiment::store::Run::read(Path::new(run)).unwrap();
     let (truth, datum_m) =
         (&run_read.truth, run_read.experiment.scene.zone.as_ref().unwrap().datum_y_m());

@@ -1,11 +1,11 @@
-//! Messages say in the user's words what is wrong, where, and what is allowed: no type of the
-//! program's language, no number of hundreds of digits.
+//! Tests of error messages: they give the problem, its place and the allowed values in the user's
+//! terms, without types of the programming language and without very long numbers.
 
 use std::fs;
 
 use crate::common::program::{EXPERIMENT, SCENE, fails, folder};
 
-/// Words of the language and of its parsers.
+/// Words of the programming language and of its parsers.
 const LEAKS: [&str; 14] = [
     "expected u32",
     "u64",
@@ -115,17 +115,17 @@ fn a_damaged_row_is_faulted_at_its_line() {
         (
             format!("\"target\":{{\"place\":[{coordinate},"),
             "\"target\":{\"place\":[".into(),
-            "touch 1: a target of 1 coordinates where 2 are needed",
+            "touch 1: a target has 1 coordinates; needed are 2",
         ),
         (
             format!("\"target\":{{\"place\":[{coordinate}"),
             format!("\"target\":{{\"place\":[{coordinate},0.2"),
-            "touch 1: a target of 3",
+            "touch 1: a target has 3",
         ),
         (
             format!("\"length_scales\":[{length},"),
             "\"length_scales\":[".into(),
-            "a fit of 1 length scales",
+            "a fit has 1 length scales",
         ),
         (
             format!("\"length_scales\":[{length}"),
@@ -152,5 +152,5 @@ fn a_damaged_row_is_faulted_at_its_line() {
     let text = fs::read_to_string(&surface).unwrap();
     let cut = text.trim_end().rsplit_once('\n').unwrap().0;
     fs::write(&surface, format!("{cut}\n")).unwrap();
-    fails(folder.path(), &export, &["surface.csv:25", "24 test places of 25"]);
+    fails(folder.path(), &export, &["surface.csv:25", "24 test points of 25"]);
 }

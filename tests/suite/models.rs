@@ -1,4 +1,5 @@
-//! The analytic objects against slow twins, and the meshes in `models/` against the objects.
+//! Tests of the analytic objects against reference implementations, and of the meshes in `models/`
+//! against the objects.
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -7,22 +8,22 @@ use nalgebra::{Matrix4, Point3, Vector3, point, vector};
 use palpate::geometry::implicit::Implicit;
 use palpate::geometry::surfaces;
 
-/// Most that a triangle may be off the surface, metres; `models/SOURCE.md` gives what is measured.
+/// Largest distance of a triangle from the surface, m; `models/SOURCE.md` has the measured values.
 const MESH_ERROR_M: f64 = 5e-5;
 
 fn surface(name: &str) -> &'static dyn Implicit {
     surfaces::by_name(name).unwrap()
 }
 
-/// Point `n` of an even spread over the unit cube: multiples of the inverse powers of the real
-/// root of x⁴ = x + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
+/// Point `n` of an even spread over the unit cube: multiples of the inverse powers of the real root
+/// of x⁴ = x + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
 fn spread(n: usize) -> Vector3<f64> {
     let root: f64 = 1.220_744_084_605_759_5;
     let inverse = 1.0 / root;
     vector![inverse, inverse.powi(2), inverse.powi(3)].map(|step| (0.5 + n as f64 * step).fract())
 }
 
-/// Point `n` of an even spread over the box of `surface`, with 20 mm around it.
+/// Point `n` of an even spread over the box of `surface`, with a margin of 20 mm.
 fn around(surface: &dyn Implicit, n: usize) -> Point3<f64> {
     let [low, high] = surface.bounds().map(|corner| corner.coords);
     let margin = Vector3::repeat(0.02);
@@ -76,7 +77,7 @@ fn projection_lands_on_the_surface() {
                 let q = surface.project(p).unwrap();
                 assert!(surface.value(q).abs() < 1e-14);
                 assert!((q - p).norm() >= value.abs() - 1e-15);
-                // The gradient is shortest, 1/4, at the rim of the bird's foot, 13 by 52 mm.
+                // The gradient is smallest, 1/4, at the rim of the bird's foot, 13 by 52 mm.
                 assert!((q - p).norm() < 5.0 * value.abs(), "{name} from {p} to {q}");
             }
         }
@@ -144,7 +145,7 @@ fn input_that_is_not_finite_gives_nan_or_none() {
             assert_eq!(surface.ray(origin, along, f64::NAN), None);
             assert_eq!(surface.ray(origin, along, -1.0), None);
         }
-        // Where the gradient vanishes there is nowhere to go.
+        // A zero gradient gives no direction.
         surface.project(Point3::origin());
     }
 }
@@ -181,13 +182,13 @@ fn bounds_enclose_the_surface() {
     }
 }
 
-/// Height of the front, the largest y of the object over (x, z), metres.
+/// Height of the front: the largest y of the object over (x, z), m.
 fn front_m(surface: &dyn Implicit, x_m: f64, z_m: f64) -> Option<f64> {
     let above_m = 0.2;
     surface.ray(point![x_m, above_m, z_m], -Vector3::y(), 1.0).map(|depth_m| above_m - depth_m)
 }
 
-/// Heights over a rectangle, every millimetre.
+/// Heights over a rectangle, at every millimetre.
 fn heights_m(surface: &dyn Implicit, x_mm: i32, z_mm: [i32; 2]) -> Vec<Option<f64>> {
     (-x_mm..=x_mm)
         .flat_map(|x| (z_mm[0]..=z_mm[1]).map(move |z| (f64::from(x) * 1e-3, f64::from(z) * 1e-3)))
@@ -250,7 +251,7 @@ fn nose_is_thinner_than_a_fingertip() {
     assert!(tip_m - beside_m > 0.012, "it protrudes by {}", tip_m - beside_m);
 }
 
-/// Triangles in the object's own frame, metres.
+/// Triangles in the object's frame, metres.
 struct Mesh {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[usize; 3]>,
@@ -279,7 +280,7 @@ fn bird_mesh() -> Mesh {
     let to_scene = Matrix4::from(node.transform().matrix()).cast::<f64>();
     let primitive = node.mesh().unwrap().primitives().next().unwrap();
     let reader = primitive.reader(|_| gltf.blob.as_deref());
-    // glTF's +y is up and its +z the front; ours are +z and +y.
+    // glTF has +y up and +z in front; ours has +z up and +y in front.
     let to_own = |v: Point3<f64>| point![-v.x, v.z, v.y];
     let vertices = reader
         .read_positions()

@@ -1,4 +1,4 @@
-//! The effects that a scene needs, where theory says what they do.
+//! Tests of the effects that a scene needs, in cases with known theory.
 
 use crate::common::program::{fails, palpate};
 use palpate::sim::Scene;
@@ -11,7 +11,7 @@ use palpate::study::accuracy::verdict::Relevance;
 use std::fs;
 use tempfile::TempDir;
 
-/// Rises along x by `slope_deg`.
+/// A plane that rises along x by `slope_deg`.
 fn plane(slope_deg: f64) -> String {
     let rise_m = 0.06 * slope_deg.to_radians().tan();
     let corner =
@@ -40,7 +40,7 @@ fn folder(slope_deg: f64, more: &str) -> TempDir {
     folder
 }
 
-/// Whether `effect` is needed on a plane; touches of one trial are ten.
+/// Whether `effect` is needed on a plane, with ten touches per trial.
 fn need(
     slope_deg: f64,
     more: &str,
@@ -58,9 +58,9 @@ fn need(
     whole.variants[0].relevance.unwrap()
 }
 
-/// Coulomb: on a slope beyond the friction cone, atan 0.783 = 38°, the skin slips and friction adds
-/// √(1 + μ²) − 1 = 27 % to the force, 0.06 N of the 0.2 N of a usual touch; pressed at right
-/// angles it adds nothing. So it is whether the scene has friction or not.
+/// Coulomb friction: on a slope beyond the friction cone, atan 0.783 = 38°, the skin slips and
+/// friction adds √(1 + μ²) − 1 = 27 % to the force, 0.06 N of the 0.2 N of a typical touch; at
+/// normal incidence it adds nothing. This holds for scenes with and without friction.
 #[test]
 fn friction_is_needed_on_a_slope_beyond_its_cone() {
     for more in ["", "[effects.friction]"] {
@@ -69,9 +69,9 @@ fn friction_is_needed_on_a_slope_beyond_its_cone() {
     }
 }
 
-/// A finger switched on in the cold warms by a third of 25 K in a touch's two seconds, and its
-/// fluid conducts by 2 % better for each: tens of counts of the thousands that electrodes read. One
-/// that is as warm as its own heat makes it does not.
+/// A cold finger warms by a third of 25 K in the two seconds of a touch, and its fluid's
+/// conductivity rises by 2 % per kelvin: tens of the thousands of counts of an electrode. A finger
+/// at its steady temperature shows no change.
 #[test]
 fn heat_is_needed_in_a_finger_that_warms_up() {
     let cold = "[effects.thermal]\nstart_c = 15.0\nfinger_c = 40.0\ntime_constant_s = 5.0";
@@ -79,15 +79,15 @@ fn heat_is_needed_in_a_finger_that_warms_up() {
     assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 80), Relevance::NotNeeded);
 }
 
-/// None of ten touches beyond the tolerance may be one in four of all.
+/// With zero of ten touches beyond the tolerance, the true share can be a quarter.
 #[test]
 fn few_touches_cannot_tell() {
     assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 10), Relevance::Undecided);
     assert_eq!(need(50.0, "[effects.friction]", ("friction", "0.03N"), 10), Relevance::Needed);
 }
 
-/// A dry finger that tells contact by a force sensor of such noise is refused, so the fluid is named
-/// and needed, whatever it changes.
+/// A dry finger that detects contact with such a noisy force sensor is rejected, so the fluid is
+/// needed.
 #[test]
 fn what_a_scene_is_refused_without_is_needed() {
     assert_eq!(need(0.0, "[effects.wrench]", ("fluid", "1000mm"), 10), Relevance::Needed);
@@ -105,7 +105,7 @@ fn what_a_scene_is_refused_without_is_needed() {
     assert!(!kinematic.contains(&"collision".to_string()));
 }
 
-/// What the full scene has beside the one given is what its body can have.
+/// The full scene contains the additional effects that its body supports.
 #[test]
 fn the_full_scene_is_one_that_is_accepted() {
     let folder = folder(0.0, "");
@@ -122,8 +122,8 @@ fn the_full_scene_is_one_that_is_accepted() {
     }
 }
 
-/// The scene that is written is one, lacks what it is said to lack, and stays within the tolerance
-/// on targets that it was not chosen on.
+/// The written scene is valid, lacks the named effects, and stays within the tolerance on held-out
+/// targets.
 #[test]
 fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     let folder = folder(0.0, "[effects.thermal]\n[effects.friction]");
@@ -148,7 +148,7 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     }
     let electrodes = text.lines().find(|line| line.starts_with("without electrodes ")).unwrap();
     assert!(electrodes.ends_with("  needed"), "{electrodes}");
-    assert!(text.contains("of 20 beyond") && text.contains("this one build"), "{text}");
+    assert!(text.contains("of 20 beyond") && text.contains("this build"), "{text}");
     let [whole, less] = ["scene.toml", "less/cheapest.toml"]
         .map(|name| Scene::load(&folder.join(name), &[]).unwrap());
     assert!(less.effects.thermal.is_none() && less.effects.friction.is_none());
@@ -164,7 +164,7 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     assert!(study["cheapest"]["is_confirmed"].as_bool().unwrap());
     assert_eq!(study["effects"]["variants"][0]["name"], "without skin");
     assert!(folder.join("less/accuracy.png").is_file());
-    // What is there is not replaced, unless Palpate wrote it.
+    // Existing files are replaced only if Palpate wrote them.
     fs::create_dir(folder.join("mine")).unwrap();
     fs::write(folder.join("mine/cheapest.toml"), "body = \"cast\"\n").unwrap();
     let last = arguments.len() - 1;
@@ -172,7 +172,7 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     fails(folder, &arguments, &["mine", "--force"]);
 }
 
-/// What is said of a change is where its interval lies about the margin.
+/// The relevance of a change depends on the position of its interval relative to the margin.
 #[test]
 fn a_change_is_needed_beyond_the_margin_and_not_within() {
     let need = |low: f64, high: f64| Relevance::of_change(Some([low, high]), Some(1.0));
@@ -189,8 +189,9 @@ fn a_change_is_needed_beyond_the_margin_and_not_within() {
     assert_eq!(Relevance::of_change(Some([0.0, 0.0]), None), Relevance::Undecided);
 }
 
-/// Vibration moves no contact, so it changes no verdict, at any margin; electrodes, which err where
-/// exact contacts do not, do. Both are held to a verdict of planners that do not see them.
+/// Vibration moves no contact, so it changes no verdict at any margin; electrodes, which have
+/// errors where exact contacts have none, do. Both are tested with a verdict of planners that do
+/// not use them.
 #[test]
 fn a_verdict_calls_for_what_changes_it() {
     let folder = folder(20.0, "[effects.fluid.vibration]");
@@ -219,9 +220,9 @@ fn a_verdict_calls_for_what_changes_it() {
     let vibration = said(&text, "fluid.vibration");
     assert!(vibration.contains(" 0.000 [0.000, 0.000] ") && vibration.ends_with(" not needed"));
     assert!(!said(&text, "electrodes").ends_with("not needed"));
-    assert!(text.contains(", without fluid.vibration\n") && text.contains("it stays within"));
+    assert!(text.contains(", without fluid.vibration\n") && text.contains(": confirmed within"));
     assert!(text.contains("in 6 trials") && text.contains("in 4 trials"));
-    assert!(text.contains("this one build"));
+    assert!(text.contains("this build"));
     let less = Scene::load(&folder.join("less/cheapest.toml"), &[]).unwrap();
     assert!(less.effects.fluid.unwrap().vibration.is_none() && less.effects.electrodes.is_some());
     // Within a metre nothing matters.
@@ -229,7 +230,7 @@ fn a_verdict_calls_for_what_changes_it() {
     assert!(said(&text, "electrodes").ends_with("not needed"), "{text}");
 }
 
-/// Touches that all planners share make no difference between them.
+/// Initial touches, which all planners share, make no difference between them.
 #[test]
 fn where_neither_planner_wins_there_is_no_verdict_to_change() {
     let folder = folder(0.0, "");
@@ -238,13 +239,13 @@ fn where_neither_planner_wins_there_is_no_verdict_to_change() {
     fails(folder.path(), &[&arguments[..], &["verdict"]].concat(), &wants);
 }
 
-/// Of touches that are a trial each.
+/// Share of touches that are each a trial.
 fn share(count: usize, of: usize) -> Share {
     let touches = (0..of).map(|i| vec![i < count]).collect::<Vec<_>>();
     Share::of(&touches).unwrap()
 }
 
-/// Of none in n, 1 − 0.025^(1/n); of 4 in 20, Clopper and Pearson's tables.
+/// For 0 of n the bound is 1 − 0.025^(1/n); for 4 of 20 it is in Clopper and Pearson's tables.
 #[test]
 fn an_interval_is_the_textbooks() {
     let [low, high] = share(0, 100).interval;
@@ -256,7 +257,7 @@ fn an_interval_is_the_textbooks() {
     assert_eq!(Share::of(&[]), None);
 }
 
-/// Ten trials whose touches are all alike tell no more than ten touches.
+/// Ten trials of identical touches count as ten touches.
 #[test]
 fn touches_that_are_alike_count_once() {
     let alike: Vec<Vec<bool>> = (0..10).map(|i| vec![i < 4; 10]).collect();
@@ -264,7 +265,7 @@ fn touches_that_are_alike_count_once() {
     let ten = share(4, 10).interval;
     assert!(low <= ten[0] && high >= ten[1], "{low} {high}");
     assert!(high - low > 2.0 * (share(40, 100).interval[1] - share(40, 100).interval[0]));
-    // One touch in trials of ten is hardly more than none.
+    // One touch in trials of ten is hardly more than zero.
     let one: Vec<Vec<bool>> = (0..12).map(|i| (0..10).map(|j| i + j == 0).collect()).collect();
     let [_, high] = Share::of(&one).unwrap().interval;
     assert!(high >= share(1, 120).interval[1], "{high}");

@@ -1,4 +1,4 @@
-//! From a mesh that nobody has prepared to a report, in two commands.
+//! Tests of the two commands from an unprepared mesh to a report.
 
 use crate::common::program::{fails, palpate, said, succeeds};
 use crate::common::shapes::sphere_mesh;
@@ -14,7 +14,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// An egg of 120 x 80 x 100 units, without a side that is like another.
+/// An asymmetric egg of 120 x 80 x 100 units.
 fn egg() -> Mesh {
     sphere_mesh(Point3::origin(), 50.0, 24)
 }
@@ -74,7 +74,7 @@ fn two_commands_lead_from_any_mesh_to_a_report() {
         let said = succeeds(folder.path(), &["new", mesh]);
         let next = format!("palpate run {name}.toml");
         assert!(said.contains(&next), "{said}");
-        // Fewer than it says, for the sake of the time this takes.
+        // Fewer trials and touches, for a shorter test.
         let fewer = ["--set", "trials=1", "--set", "touches=12"];
         succeeds(folder.path(), &[&["run", &format!("{name}.toml")], &fewer[..]].concat());
         assert!(folder.path().join("runs").join(name).join("report.html").is_file(), "{mesh}");
@@ -92,7 +92,7 @@ fn every_finger_has_a_scene_that_can_be_built() {
             assert!(output.status.success(), "{finger} {side}: {}", said(&output));
             assert_eq!(said(&output), "", "{finger} {side}");
         }
-        // What the suite says is best for objects that nobody has seen, and the sensor's own noise.
+        // Settings that are best for unknown objects in the suite, and the sensor's noise.
         let written = Experiment::load(&folder.path().join("container.toml"), &[]).unwrap();
         let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/toy.toml");
         let objects = ["gp=experiments/beliefs/objects.toml".to_owned()];
@@ -106,7 +106,7 @@ fn every_finger_has_a_scene_that_can_be_built() {
 #[test]
 fn the_side_that_is_named_faces_the_finger() {
     let folder = folder();
-    // Its sides are 126 x 84 x 200 mm: what is seen of them, and how deep.
+    // Its sides are 126 x 84 x 200 mm: visible sizes and depths.
     for (side, seen) in [("front", [0.126, 0.2]), ("right", [0.084, 0.2]), ("top", [0.126, 0.084])]
     {
         let up = ["new", "container.obj", "--up", "z", "--side", side, "--force"];
@@ -122,7 +122,7 @@ fn the_side_that_is_named_faces_the_finger() {
     }
 }
 
-/// The named side faces +y and what is up stays up, whichever axis a file has up.
+/// The named side faces +y, and the up axis stays up, for any up axis of the file.
 #[test]
 fn turns_are_those_that_are_named() {
     let gltf = |v: Vector3<f64>| Vector3::new(-v.x, v.z, v.y);
@@ -159,7 +159,7 @@ fn sizes_are_guessed_from_what_a_finger_can_explore() {
     assert_eq!(size(0.2, None), (Unit::M, 1.0));
     assert_eq!(size(20.0, None), (Unit::Cm, 1.0));
     assert_eq!(size(8.0, Some(Unit::In)), (Unit::In, 1.0));
-    // Of no size at all: as large as a hand, in numbers that can be read.
+    // Without a plausible unit the mesh is scaled to the size of a hand, in readable numbers.
     for (extent, unit) in [(2.0, None), (4000.0, None), (1e-5, None), (30.0, Some(Unit::M))] {
         let (unit, scale) = size(extent, unit);
         let size_m = extent * unit.metres() * scale;
@@ -174,7 +174,7 @@ fn what_cannot_be_made_an_experiment_is_refused_and_nothing_replaced() {
     fails(folder.path(), &["new", "none.obj"], &["none.obj"]);
     fails(folder.path(), &["new", "egg.ply", "--side", "inside"], &["inside", "front"]);
     fs::write(folder.path().join("egg.toml"), "mine").unwrap();
-    fails(folder.path(), &["new", "egg.ply"], &["egg.toml is there", "--force"]);
+    fails(folder.path(), &["new", "egg.ply"], &["egg.toml exists", "--force"]);
     assert_eq!(fs::read_to_string(folder.path().join("egg.toml")).unwrap(), "mine");
     assert!(!folder.path().join("egg-scene.toml").exists());
     succeeds(folder.path(), &["new", "egg.ply", "--out", "deep/er"]);
@@ -189,6 +189,6 @@ fn a_mesh_and_a_scene_are_shown_with_the_way_on() {
     succeeds(folder.path(), &["show", "egg-scene.toml", "--png", "egg.png"]);
     let png = fs::read(folder.path().join("egg.png")).unwrap();
     assert_eq!(&png[1..4], b"PNG");
-    // Its own picture is replaced, a scene is not.
+    // The program's own picture is replaced, a scene is not.
     succeeds(folder.path(), &["show", "egg-scene.toml", "--png", "egg.png"]);
 }

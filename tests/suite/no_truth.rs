@@ -1,4 +1,5 @@
-//! What is told where nobody knows the truth: verification touches, repeated ones, scans as truth.
+//! Tests of runs without ground truth: verification touches, repeated touches, and scans as ground
+//! truth.
 
 use palpate::experiment::measure;
 use palpate::experiment::statistics::analysis::Analysis;
@@ -31,8 +32,8 @@ fn row(experiment: Experiment, planner: &str, trial: u32) -> TrialRow {
 
 const WITH: [&str; 2] = ["verification_touches=12", "repeat_touches=4"];
 
-/// The belief is the same with and without them, their places are those of the trial, and the
-/// measures stand after the last touch only.
+/// Verification touches do not change the belief, their places depend on the trial, and their
+/// measures exist only after the last touch.
 #[test]
 fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
     let plain = row(container(&[]), "active", 1);
@@ -56,8 +57,8 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
     }
 }
 
-/// The exact cast repeats itself to the bit, and the error at touches is of the size of the error
-/// on the test grid.
+/// The exact cast is perfectly repeatable, and the error at verification touches is similar to the
+/// error on the test grid.
 #[test]
 fn an_exact_probe_repeats_and_verifies() {
     let verified = row(container(&["verification_touches=200", "repeat_touches=6"]), "active", 0);
@@ -74,7 +75,7 @@ fn an_exact_probe_repeats_and_verifies() {
     }
 }
 
-/// Nobody knows the surface: everything is drawn that can be, and nothing is told of a truth.
+/// Without a known surface all possible figures are drawn, and no errors are reported.
 #[test]
 fn a_run_without_truth_is_told() {
     for with in [&WITH[..], &[]] {
@@ -98,20 +99,20 @@ fn a_run_without_truth_is_told() {
         report::write_tables(&run, &analysis, folder.path()).unwrap();
         report::write(&run, &analysis, folder.path()).unwrap();
         let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
-        assert!(page.contains("nobody knows this surface"));
+        assert!(page.contains("no ground truth"));
         let visible = page.split("<script").next().unwrap();
         assert!(!visible.contains("NaN") && !visible.contains("mean R (Eq. 5) is"), "{visible}");
         assert_eq!(page.contains("At held-out verification touches"), !with.is_empty());
         let text = report::tables::summary::text(&run);
-        assert!(text.contains("nobody knows this surface"), "{text}");
+        assert!(text.contains("no ground truth"), "{text}");
         assert_eq!(text.contains("verification rmse"), !with.is_empty(), "{text}");
         let csv = fs::read_to_string(folder.path().join("summary.csv")).unwrap();
         assert!(csv.lines().count() > 1 && !csv.contains("NaN"));
     }
 }
 
-/// The heights of a tilted plane come back exactly, nothing is told beyond the scan, and leaving a
-/// contact out changes nothing.
+/// The heights of a tilted plane are reproduced exactly, nothing is reported beyond the scan, and
+/// leaving a contact out changes nothing.
 #[test]
 fn a_scan_is_a_truth() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Scenes and runs that work but may not be meant: the program says so.
+//! Tests of warnings about likely mistakes in valid scenes and runs.
 
 use crate::common::program::{fails, palpate, said};
 use std::fs;
@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::Output;
 use tempfile::TempDir;
 
-/// The shipped scene `name` with lines replaced, as `scene.toml` in a folder of its own, and an
-/// experiment on it.
+/// A folder with the shipped scene `name`, some lines replaced, as `scene.toml`, and an experiment
+/// on it.
 fn folder(name: &str, changes: &[(&str, &str)]) -> TempDir {
     let home = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut scene = fs::read_to_string(home.join("scenes").join(name)).unwrap();
@@ -34,7 +34,7 @@ fn table(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into()
 }
 
-/// A column of `summary.csv` for a planner after some touches.
+/// Returns a column of `summary.csv` for a planner after some touches.
 fn summary(folder: &TempDir, planner: &str, touches: &str, column: &str) -> f64 {
     let mut reader = csv::Reader::from_path(folder.path().join("runs/it/summary.csv")).unwrap();
     let at = reader.headers().unwrap().iter().position(|name| name == column).unwrap();
@@ -51,7 +51,7 @@ fn a_scene_that_means_what_it_says_is_told_nothing() {
     assert_eq!(said(&output), "");
 }
 
-/// Fingers of three sizes on the container: the error does not grow with what differs from 7 mm.
+/// Fingers of three radii on the container: the error does not grow with the difference from 7 mm.
 #[test]
 fn a_soft_finger_of_another_radius_has_no_bias_of_the_difference() {
     for radius in ["0.006", "0.007", "0.008"] {
@@ -72,7 +72,7 @@ fn a_datum_that_is_left_out_is_the_middle_of_the_surface() {
     assert!(!table(&output).contains("note:") && said(&output).is_empty(), "{}", said(&output));
     let resolved = fs::read_to_string(folder.path().join("runs/it/resolved.toml")).unwrap();
     let line = resolved.lines().find(|line| line.starts_with("datum_y_m = ")).unwrap();
-    // Where the surface is: 22.1 to 40.0 mm in front of the object's middle at y = -0.65.
+    // The surface is 22.1 to 40.0 mm in front of the object's middle at y = -0.65.
     let datum_y_m: f64 = line["datum_y_m = ".len()..].parse().unwrap();
     assert!((datum_y_m - (-0.65 + 0.5 * (0.0221 + 0.0400))).abs() < 2e-4, "{datum_y_m}");
 }
@@ -87,7 +87,7 @@ fn a_datum_far_from_the_surface_and_an_r_that_says_nothing_are_told() {
         assert!(words.contains("the zone is 120.0 mm wide"), "{words}");
     }
     assert!(summary(&folder, "random", "8", "r_mean") > 0.999);
-    assert!(text.contains("R cannot tell a belief from a constant height"), "{text}");
+    assert!(text.contains("R does not distinguish the belief from a constant height"), "{text}");
     assert!(text.contains("random, sobol"), "{text}");
 }
 
@@ -98,7 +98,7 @@ fn a_forgotten_unit_is_told_with_the_one_that_fits() {
     let notes = said(&output);
     assert!(notes.contains("1667 times larger than the zone"), "{notes}");
     assert!(notes.contains("in \"mm\" it would measure 0.2000 m"), "{notes}");
-    assert!(notes.contains("can touch only 0 of 1681 test places"), "{notes}");
+    assert!(notes.contains("can reach only 0 of 1681 test points"), "{notes}");
     let bird =
         folder("bird.toml", &[("[zone]", "[zone]"), ("[object]", "[object]\nunit = \"mm\"")]);
     let notes = said(&palpate(bird.path(), &["show", "scene.toml"]));
@@ -113,10 +113,10 @@ fn few_places_and_few_contacts_are_told_before_and_after() {
     let (text, notes) = (table(&output), said(&output));
     let page = fs::read_to_string(folder.path().join("runs/it/report.html")).unwrap();
     for words in [&text, &notes, &page] {
-        assert!(words.contains("of 441 test places have a surface"), "{words}");
+        assert!(words.contains("of 441 test points lie on the object"), "{words}");
     }
     for words in [&text, &page] {
-        assert!(words.contains("touches met the object or could be read"), "{words}");
+        assert!(words.contains("touches made a usable contact"), "{words}");
     }
 }
 
@@ -178,7 +178,7 @@ fn a_soft_finger_without_tables_is_a_biotac_and_says_so() {
     assert_eq!(said(&quiet), "");
 }
 
-/// The radius is set in a scene, and what it costs is said there.
+/// A note gives the cost of a radius that differs from the calibrated one.
 #[test]
 fn a_soft_finger_of_another_size_is_told_what_it_costs() {
     let folder = folder("container_finger.toml", &[]);

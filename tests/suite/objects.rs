@@ -1,4 +1,4 @@
-//! Planners over a suite of objects: what is said of them, and what the best of them can do.
+//! Tests of planners over several objects: the statistics, and the order of the planners.
 
 use crate::common::program::palpate;
 use palpate::experiment::sweep::cells;
@@ -21,8 +21,8 @@ fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> Compared {
 }
 
 proptest! {
-    /// Random closes nothing of its gap and the oracle all, who is halfway in each trial half of
-    /// it, and the unit of the errors does not matter.
+    /// Random closes none of the gap and the oracle all of it; a planner half-way in each trial
+    /// closes half, for any unit of the errors.
     #[test]
     fn a_gap_is_closed_from_random_to_the_oracle(
         random in prop::collection::vec(1.0..9.0_f64, 2..20),
@@ -72,8 +72,8 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
     names.iter().map(of).collect()
 }
 
-/// Over six objects that differ, asking where there is a surface is ahead of an even spread, and
-/// never in doubt; and who sees the truth is ahead of both.
+/// Over six different objects, `silhouette` is better than an even spread and never stalls; the
+/// oracle is better than both.
 #[test]
 fn planners_keep_their_order_on_six_objects() {
     let path = Path::new("experiments/suite/six.toml");
@@ -90,7 +90,7 @@ fn planners_keep_their_order_on_six_objects() {
     assert!(silhouette < sobol - 0.05 && oracle < silhouette - 0.1, "{sums:?}");
 }
 
-/// A belief that is fitted anew for each touch that is tried foresees what follows a touch.
+/// An oracle with new fits for each candidate predicts the effect of a touch.
 #[test]
 fn an_oracle_may_fit_again() {
     let path = Path::new("experiments/suite/six.toml");
@@ -103,8 +103,8 @@ fn an_oracle_may_fit_again() {
     assert!(found[1] < found[0] - 0.05, "{found:?}");
 }
 
-/// Free space is knowledge: over the touches of an even spread it makes the belief of no object
-/// worse by more than trials differ anyway, and that of all together better.
+/// With the touches of an even spread, free space makes the belief of no object significantly
+/// worse, and the overall error smaller.
 #[test]
 fn free_space_makes_no_belief_worse() {
     let mut found = Vec::new();
@@ -126,8 +126,8 @@ fn free_space_makes_no_belief_worse() {
     assert!(found.iter().all(|(_, log)| *log < 0.05) && mean < -0.01, "{mean}: {found:?}");
 }
 
-/// The runs of a sweep are compared: tables, a page and numbers, the same when they are there
-/// already.
+/// The runs of a sweep are compared in tables, a page and a CSV file; existing runs give the same
+/// result.
 #[test]
 fn a_sweep_is_compared_when_it_is_run() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Planners that are not built in: a program adds them to its simulation.
+//! Tests of external planners, which a program adds to its simulation.
 
 use palpate::experiment::runner;
 use palpate::experiment::store::{Run, RunError, RunFolder};
@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
-/// Random touches, or none after some.
+/// Random touches, or none after some touches.
 struct Mine {
     touches: usize,
 }
@@ -61,8 +61,8 @@ fn rows_of(
     RunFolder::open(path, simulation, "unknown", fresh)
 }
 
-/// Its trials begin as those of the others do, stand in the same folder, and the folder is read
-/// without it.
+/// Its trials have the same initial touches as the others', are in the same folder, and can be read
+/// without the planner.
 #[test]
 fn an_own_planner_is_one_of_the_experiments() {
     let simulation = simulation(8);
@@ -77,7 +77,7 @@ fn an_own_planner_is_one_of_the_experiments() {
     let names: Vec<_> = run.rows.iter().map(|row| row.planner.as_str()).collect();
     assert_eq!(names, ["mine:Random", "random", "mine:Random", "random"]);
     drop(rows_of(&simulation, folder.path(), false).unwrap());
-    // An edited planner is another one.
+    // An edited planner counts as another planner.
     let edited = self::simulation(5);
     let error = rows_of(&edited, folder.path(), false).err().unwrap();
     assert!(error.to_string().contains("planner mine:Random has changed"), "{error}");
@@ -90,7 +90,7 @@ fn an_own_planner_is_one_of_the_experiments() {
     }
 }
 
-/// One that names no target ends its own trial, whose touches are kept.
+/// A planner without a target ends its own trial, whose touches are kept.
 #[test]
 fn a_planner_that_names_no_target_fails_its_trial() {
     let simulation = simulation(5);
@@ -99,13 +99,13 @@ fn a_planner_that_names_no_target_fails_its_trial() {
     assert_eq!(row.touches.len(), 5);
 }
 
-/// What nobody brought is said before anything is run.
+/// A missing planner is an error before the run.
 #[test]
 fn a_planner_that_is_not_there_is_an_error() {
     let experiment = simulation(8).experiment().clone();
     let bare = Simulation::new(experiment).unwrap();
     let error = runner::jobs(&bare, &[]).err().unwrap().to_string();
-    assert!(error.starts_with("planner `mine:Random` is not built into this program"), "{error}");
+    assert!(error.starts_with("planner `mine:Random` is not available in this program"), "{error}");
     assert!(bare.planner("random").is_some());
 }
 
@@ -116,8 +116,8 @@ fn names_of_own_planners_have_a_module() {
     assert!(planner::PLANNERS.iter().all(|entry| !is_own(entry.name)));
 }
 
-/// Planners named on the command line are run beside the file's; one that the program does not have
-/// is refused before anything is run, and says where it would be.
+/// Planners of the command line run beside the file's; an unavailable one is rejected before the
+/// run, with a hint.
 #[test]
 fn the_command_line_adds_planners() {
     let folder = tempfile::tempdir().unwrap();

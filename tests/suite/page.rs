@@ -1,7 +1,7 @@
-//! The page of a run in a browser: what is moved and clicked changes what is drawn, and it fits
-//! and can be read at every width, on light and on dark paper.
+//! Tests of a run's page in a browser: controls change the picture, and the page fits and is
+//! readable at every width, on light and dark backgrounds.
 //!
-//! Without a Chromium this is skipped, and says so; `make page-test` insists on one.
+//! They are skipped with a note if there is no Chromium; `make page-test` requires one.
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::statistics::analysis::Analysis;
@@ -14,8 +14,8 @@ use std::process::Command;
 
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 
-/// Acts on the page and leaves a fingerprint of the picture, and the words below it, after each
-/// act.
+/// Script that operates the page and records a fingerprint of the picture and its caption after
+/// each action.
 pub const DRIVER: &str = r#"
 const explorer = document.getElementById("explorer");
 const log = document.createElement("pre");
@@ -55,7 +55,7 @@ const key = (key) => () => explorer.querySelector("canvas").dispatchEvent(new Ke
 })();
 "#;
 
-/// A browser without a screen runs its clock ahead of its frames, so drawing waits for the clock.
+/// A headless browser's clock runs ahead of its frames, so drawing waits for the clock.
 pub const CLOCK: &str =
     "<script>window.requestAnimationFrame = (draw) => setTimeout(draw);</script>";
 
@@ -66,11 +66,11 @@ fn browser() -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// Says how the page is laid out in a frame of this width to the page around it.
+/// Script that reports the layout of the page in a frame of this width to the outer page.
 const SURVEYOR: &str = r##"
 const say = (...words) => parent.postMessage(words.join(" | "), "*");
 addEventListener("error", (event) => say("error: " + event.message));
-// Colours are left to the browser to read.
+// The browser parses the colours.
 const pen = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
 function rgba(colour) {
   pen.clearRect(0, 0, 1, 1);
@@ -78,7 +78,7 @@ function rgba(colour) {
   pen.fillRect(0, 0, 1, 1);
   return [...pen.getImageData(0, 0, 1, 1).data];
 }
-// Relative luminance and contrast as WCAG 2.2 defines them.
+// Relative luminance and contrast as in WCAG 2.2.
 function luminance(colour) {
   const linear = (part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
   const [r, g, b] = rgba(colour).slice(0, 3).map((part) => linear(part / 255));
@@ -131,7 +131,7 @@ addEventListener("load", () => setTimeout(() => {
 }, 200));
 "##;
 
-/// A page around frames of the page, which writes down what they say.
+/// A page with the page in frames, which logs their messages.
 fn around(page: &str, widths: &[u32]) -> String {
     let frames = widths.iter().map(|width| {
         format!("<iframe src=\"{page}\" style=\"width:{width}px;height:900px;border:0\"></iframe>")
@@ -144,7 +144,7 @@ fn around(page: &str, widths: &[u32]) -> String {
     )
 }
 
-/// The report page of a made-up run in a folder, with a script at its end.
+/// The report page of a synthetic run in a folder, with a script at its end.
 fn page(folder: &Path, run: &Run, script: &str) -> PathBuf {
     let path = folder.join("report.html");
     report::write(run, &Analysis::of(run), folder).unwrap();
@@ -155,7 +155,7 @@ fn page(folder: &Path, run: &Run, script: &str) -> PathBuf {
     path
 }
 
-/// The lines of the log of a page in a browser, each of as many parts.
+/// Lines of the log of a page in a browser, each with `N` parts.
 pub fn log<const N: usize>(browser: &Path, path: &Path, options: &[&str]) -> Vec<[String; N]> {
     let profile = tempfile::tempdir().unwrap();
     let output = Command::new(browser)
@@ -179,34 +179,35 @@ pub fn log<const N: usize>(browser: &Path, path: &Path, options: &[&str]) -> Vec
         .collect()
 }
 
-/// The browser, if there is one; where it must be there, it is.
+/// Path of the browser, if there is one; fails if it is required.
 pub fn browser_or_note() -> Option<PathBuf> {
     let browser = browser();
     if browser.is_none() {
         assert!(std::env::var_os("PALPATE_PAGE_TEST").is_none(), "no Chromium in PATH");
-        // Not by a macro: its output would be kept from whoever runs the tests.
+        // A macro's output would be captured by the test harness.
         let _ = writeln!(io::stderr(), "tests/suite/page.rs: SKIPPED, no Chromium in PATH");
     }
     browser
 }
 
-/// What the driver wrote after its acts on the page of a made-up run: name, fingerprint, words.
+/// Log of the driver's actions on the page of a synthetic run: name, fingerprint, caption.
 fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
     let folder = tempfile::tempdir().unwrap();
     log(browser, &page(folder.path(), &run(settings), DRIVER), &[])
 }
 
-/// In pixels of the page: what is narrower than a phone, a small window and a large one.
+/// Page widths, pixels: narrower than a phone, a small window, a large one.
 const WIDTHS: [u32; 3] = [1400, 800, 400];
 
-/// What WCAG 2.2 asks of words (1.4.3, AA) and of what else is to be seen (1.4.11).
+/// Contrasts required by WCAG 2.2 for text (1.4.3, AA) and for graphics (1.4.11).
 const WORDS_CONTRAST: f64 = 4.5;
 const SHAPE_CONTRAST: f64 = 3.0;
-/// Smallest words of a figure in pixels; chosen as what can be read without a glass.
+/// Smallest text of a figure, pixels.
+// heuristic: readable without magnification.
 const FIGURE_WORDS_PX: f64 = 9.0;
 
-/// At every width, on light and on dark paper: the page does not scroll sideways, tables and
-/// figures do in their boxes, with a cue and the head of the line in place; everything can be read.
+/// At every width, on light and dark backgrounds: the page does not scroll sideways; tables and
+/// figures scroll in their boxes, with a cue and a fixed first column; all text is readable.
 #[test]
 fn the_page_fits_every_width_on_light_and_dark_paper() {
     let Some(browser) = browser_or_note() else { return };

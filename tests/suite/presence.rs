@@ -1,4 +1,4 @@
-//! Where there probably is a surface, and planners that ask.
+//! Tests of the probability of a surface and of planners that use it.
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::sweep::cells;
@@ -21,7 +21,7 @@ fn zone() -> Zone {
     Zone::new([0.0, SIDE_M], Some([0.0, SIDE_M]))
 }
 
-/// A touch asked for at a target: a contact there, or none.
+/// Adds a touch at a target to the belief, with or without contact.
 fn touch(belief: &mut HeightField, zone: &Zone, target: &[f64], meets: bool) {
     let p_wt = zone.point(target, 0.0);
     let contact = Contact { p_wc: p_wt, normal_w: Vector3::y() };
@@ -30,8 +30,8 @@ fn touch(belief: &mut HeightField, zone: &Zone, target: &[f64], meets: bool) {
 }
 
 proptest! {
-    /// A probability everywhere, none where a hull has passed and met nothing; a touch is as likely to
-    /// meet something as any place under its hull.
+    /// Presence is a probability everywhere, 0 where a hull has passed without contact; the
+    /// probability that a touch hits is at least that of any place under its hull.
     #[test]
     fn presence_is_a_probability(
         touches in collection::vec((0.0..SIDE_M, 0.0..SIDE_M, any::<bool>()), 1..12),
@@ -53,8 +53,8 @@ proptest! {
     }
 }
 
-/// Before any touch there is a surface everywhere; a miss says most where it was, a contact
-/// likewise, and one with the rim of the hull that there is less on the hull's side.
+/// Before any touch there is a surface everywhere. A miss lowers the probability most at its place,
+/// a contact raises it; a contact with the hull's rim lowers it on the hull's side.
 #[test]
 fn touches_speak_for_their_surroundings() {
     let zone = zone();
@@ -66,7 +66,7 @@ fn touches_speak_for_their_surroundings() {
     let along: Vec<f64> =
         (0..6).map(|i| silhouette.at(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
     assert!(along.is_sorted_by(|a, b| a >= b) && along[0] > 0.9 && along[5] < 0.5, "{along:?}");
-    // The finger slants down: it was below its target, not above.
+    // The finger slants down: it passed below its target, not above.
     let [below, above] = [-0.012, 0.012].map(|z| silhouette.at(&[0.08, 0.05 + z]));
     assert!(below == 0.0 && above > 0.0, "{below} {above}");
     let radius_m = Finger::default().radius_m;
@@ -89,8 +89,8 @@ fn simulation(scene: &str) -> Simulation {
     Simulation::new(Experiment::load(Path::new("experiments/bird.toml"), &sets).unwrap()).unwrap()
 }
 
-/// Squared error of the probability of a surface over the test places after a trial, and that of
-/// the share of them that have one, which nobody knows before.
+/// Squared error of the probability of a surface over the test points after a trial, and that of
+/// the true share of points with a surface, which is unknown to the planner.
 fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
     let row = simulation.trial(planner::by_name(planner).unwrap(), 0);
     assert_eq!(row.failure, None);
@@ -119,8 +119,8 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
     sums.map(|sum| sum / truth.places.len() as f64)
 }
 
-/// Thirty touches tell more of where there are surfaces than their share of the zone, and no plan
-/// of the planner that asks for them repeats another.
+/// Thirty touches predict the surface better than its share of the zone does, and the planner
+/// repeats no target.
 #[test]
 fn a_silhouette_is_found() {
     let (mut found, mut by_share) = (0.0, 0.0);
@@ -134,7 +134,7 @@ fn a_silhouette_is_found() {
     assert!(found < 0.65 * by_share, "{found} {by_share}");
 }
 
-/// A trial that was broken off plans on as if it had not been: its rows say what its misses swept.
+/// A resumed trial plans as if uninterrupted: its rows contain the volumes that its misses swept.
 #[test]
 fn a_trial_goes_on_where_it_was_broken_off() {
     let simulation = simulation("star");
@@ -148,7 +148,8 @@ fn a_trial_goes_on_where_it_was_broken_off() {
     assert_eq!(simulation.trial_with(&mut resumed, planner, 0, &mut |_| Ok(())), whole);
 }
 
-/// Defaults and constants are chosen with one half of the suite and held against the other.
+/// Each object belongs to one half of the suite: defaults and constants are tuned on one and tested
+/// on the other.
 #[test]
 fn every_object_stands_in_one_half() {
     for (kind, folder) in [("", "scenes/suite"), ("around-", "scenes/suite/around")] {
@@ -169,14 +170,14 @@ fn every_object_stands_in_one_half() {
     }
 }
 
-/// The scenes of a folder.
+/// Returns the scenes of a folder.
 fn scenes(folder: &str) -> Vec<PathBuf> {
     let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     paths.filter(|path| path.is_file()).collect()
 }
 
-/// Every object of the suite is closed, in front of the finger, and has the part of its zone that
-/// makes it differ.
+/// Every object of the suite is closed, is in front of the finger, and has its characteristic
+/// feature in its zone.
 #[test]
 fn the_suite_is_whole() {
     let scenes = scenes("scenes/suite");

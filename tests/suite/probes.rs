@@ -1,4 +1,4 @@
-//! One touch: the finger's hull against the exact mesh, and the analytic curve.
+//! Tests of one touch: the finger's hull against the exact mesh, and the analytic curve.
 
 use crate::common::shipped::environment;
 use palpate::explore::probe::{Contact, Probe, Touch};
@@ -36,9 +36,9 @@ fn the_toy_is_read_where_it_is_asked() {
     }
 }
 
-/// The front is the ellipse y = 40 mm √(1 − (x / 60 mm)²), straight along z. A sphere of radius
-/// r touches it from outside where the outward normal leads to the sphere's centre, so the
-/// contact at ellipse point (x, y) belongs to the target x + r·n_x.
+/// The front is the ellipse y = 40 mm √(1 − (x / 60 mm)²), straight along z. A sphere of radius r
+/// touches it where the outward normal points to the sphere's centre, so the contact at ellipse
+/// point (x, y) belongs to the target x + r·n_x.
 #[test]
 fn the_container_is_touched_where_the_ellipses_normal_says() {
     for t in [-0.7f64, -0.4, -0.1, 0.0, 0.3, 0.6] {
@@ -73,8 +73,8 @@ fn past_the_object_the_finger_meets_nothing() {
 }
 
 proptest! {
-    /// Where the sweep stops, the hull touches the mesh at the contact that the probe returns, and
-    /// enters it nowhere.
+    /// At the end of the sweep, the hull touches the mesh at the returned contact and intersects it
+    /// nowhere.
     #[test]
     fn the_finger_stops_at_the_surface(x in -0.04..0.04f64, z in 0.44..0.54f64, is_bird in any::<bool>()) {
         let environment = if is_bird { &*BIRD } else { &*CONTAINER };

@@ -1,4 +1,4 @@
-//! Where the finger can touch: grooves whose answer is known.
+//! Tests of the reachable surface in grooves with a known solution.
 
 use nalgebra::Point3;
 use palpate::geometry::bvh::MeshBvh;
@@ -35,7 +35,7 @@ fn environment(profile: &[(f64, f64)], finger: &str) -> Environment {
 
 const SPHERE: &str = "radius_m = 0.007\nlength_m = 0";
 
-/// (x, whether it is reachable) along the middle of the zone.
+/// Pairs (x, reachable) along the middle of the zone.
 fn across(environment: &Environment) -> Vec<(f64, bool)> {
     let places: Vec<Vec<f64>> = (-190..=190).map(|i| vec![1e-4 * f64::from(i), 0.0]).collect();
     let heights: Vec<_> = places.iter().map(|place| environment.true_height_m(place)).collect();
@@ -43,8 +43,8 @@ fn across(environment: &Environment) -> Vec<(f64, bool)> {
     places.iter().map(|place| place[0]).zip(reachable).collect()
 }
 
-/// A sphere of radius r in a groove y = |x|·tan(φ) touches its sides r·sin(φ) from the middle, and
-/// stands (x − x₀)²/(2r·cos³φ) off the side at x nearby.
+/// A sphere of radius r in a groove y = |x|·tan(φ) touches its sides at r·sin(φ) from the middle;
+/// its distance from the side at a nearby x is (x − x₀)²/(2r·cos³φ).
 #[test]
 fn the_ground_of_a_v_groove_is_out_of_reach() {
     for slope_deg in [20.0f64, 35.0, 50.0] {
@@ -58,7 +58,7 @@ fn the_ground_of_a_v_groove_is_out_of_reach() {
             if inside > width(2.5e-4) {
                 assert!(!is_reachable, "{slope_deg}: {x} of {touched}");
             }
-            // Targets end with the zone, and contacts a little before.
+            // Targets end with the zone, and contacts slightly before.
             if inside < width(0.5e-4) && x.abs() < 0.012 {
                 assert!(is_reachable, "{slope_deg}: {x} of {touched}");
             }
@@ -75,7 +75,7 @@ fn a_slot_narrower_than_the_finger_hides_its_ground() {
             assert_eq!(is_reachable, x.abs() > 0.00395, "{finger}: {x}");
         }
     }
-    // A finger that fits reaches the ground, but not into the corners.
+    // A finger that fits reaches the bottom, but not the corners.
     for (x, is_reachable) in across(&environment(&profile, "radius_m = 0.001\nlength_m = 0")) {
         if x.abs() < 0.0028 {
             assert!(is_reachable, "{x}");
@@ -94,7 +94,7 @@ fn a_plane_is_all_in_reach_and_nothing_is_beside_the_object() {
     assert!(across(&short).iter().all(|(x, is_reachable)| *is_reachable == (*x < 0.01 + 1e-9)));
 }
 
-/// The slow twin lets every finger down and looks at all of them.
+/// The reference implementation lowers every finger and tests all of them.
 fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
     let (zone, finger) = (environment.task().zone().unwrap(), &environment.scene().finger);
     let steps: Vec<f64> = (zone.extents_m().iter())
@@ -124,7 +124,7 @@ fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
     places.iter().map(|place| is_reachable(place).unwrap_or(false)).collect()
 }
 
-/// Bumps and dents of any height on a turned grid, some of it missing: slopes, overhangs, holes.
+/// Bumps and dents of any height on a rotated grid with gaps: slopes, overhangs, holes.
 fn random_relief(rng: &mut ChaCha8Rng, rough_m: f64) -> Mesh {
     const SIDE: usize = 14;
     let mut number = || rng.random::<f64>() - 0.5;

@@ -1,5 +1,5 @@
-//! Recordings: what was written is read back to the bit, others read it too, and a trial played
-//! again is the same trial.
+//! Tests of recordings: they are read back exactly, other programs can read them, and a replayed
+//! trial is the same trial.
 
 use crate::common::counting::allocations;
 use crate::common::program::{MESH, command, ended, fails, said, succeeds};
@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use tempfile::TempDir;
 
-/// A file in memory that can be looked into, full after so many bytes.
+/// An in-memory file with a size limit.
 #[derive(Clone)]
 struct Paper(Arc<Mutex<Vec<u8>>>, usize);
 
@@ -67,7 +67,7 @@ fn about(capabilities: &Capabilities) -> About {
     }
 }
 
-/// A body that returns what it is given.
+/// A body that returns given readings.
 struct Fake(Capabilities, Vec<Result<Reading, Fault>>, Reading);
 
 impl Fake {
@@ -100,7 +100,7 @@ impl Backend for Fake {
     }
 }
 
-/// Every number of a reading, so that also those that are none can be compared.
+/// Bits of every number of a reading, to compare NaN as well.
 fn bits(reading: &Reading) -> Vec<Option<u64>> {
     let mut all = vec![reading.time_s];
     let mut bits = Vec::new();
@@ -137,7 +137,7 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
     bits
 }
 
-/// Any bits, also of what is no number.
+/// Any bit pattern, including NaN and infinity.
 fn any_number() -> impl Strategy<Value = f64> + Clone {
     prop_oneof![any::<u64>().prop_map(f64::from_bits), -10.0..10.0]
 }
@@ -184,7 +184,7 @@ fn any_reading() -> impl Strategy<Value = Reading> {
     )
 }
 
-/// Cases of each law; `PALPATE_FUZZ` asks for more.
+/// Cases per property; `PALPATE_FUZZ` sets more.
 fn cases() -> u32 {
     std::env::var("PALPATE_FUZZ").map_or(64, |count| count.parse().expect("a number of cases"))
 }
@@ -192,7 +192,7 @@ fn cases() -> u32 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(cases()))]
 
-    /// Whatever a body reads and is told is played to the bit, and its fault in its words.
+    /// Any readings and commands are replayed exactly, and faults with their message.
     #[test]
     fn any_tick_is_played_to_the_bit(
         ticks in proptest::collection::vec(
@@ -220,7 +220,7 @@ proptest! {
         prop_assert_eq!(recorded.tick_count, ticks.len() + 2);
         prop_assert_eq!(recorded.ending.clone().unwrap().failure.unwrap(), "it was lost");
         let mut player = Player::new(recorded);
-        // Again from the start, as often as it is reset.
+        // Each reset restarts the replay.
         for _ in 0..2 {
             let other = player.reset(8).unwrap_err();
             prop_assert_eq!(other, Fault::NeverReset { seed: 8 });
@@ -236,7 +236,7 @@ proptest! {
         }
     }
 
-    /// Any byte altered, anywhere: it is read, or refused in words.
+    /// A file with any altered byte is read or rejected with a message.
     #[test]
     fn no_bytes_make_the_reader_panic(
         edits in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>()), 1..6),
@@ -265,7 +265,7 @@ thread_local! {
     static SHORT: Vec<u8> = short(40).0;
 }
 
-/// A recording of two touches of so many ticks of a gentle motion, and what was read.
+/// A recording of two touches with `ticks` ticks each of a slow motion, and its readings.
 fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
     let environment = shipped::environment("container_finger.toml", &[EVERYTHING]);
     let body = Simulator::new(environment).unwrap().body().unwrap().unwrap();
@@ -289,7 +289,7 @@ fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
     (bytes, readings)
 }
 
-/// The same file with ticks that end before what they say of slips, as their definition then does.
+/// Returns the same file with ticks that end before the slip fields, as in an older definition.
 fn without_slips(bytes: &[u8]) -> Vec<u8> {
     let mut writer = mcap::Writer::new(io::Cursor::new(Vec::new())).unwrap();
     let (mut schemas, mut channels) = (HashMap::new(), HashMap::new());
@@ -416,7 +416,7 @@ fn what_others_read_is_what_was_read() {
 
 #[test]
 fn a_file_that_was_cut_is_read_up_to_the_cut() {
-    // Longer than the 64 kB that LZ4 compresses as one.
+    // More than the 64 kB that LZ4 compresses as one block.
     let (bytes, _) = short(160);
     let whole = Recorded::of(bytes.clone()).unwrap();
     assert!(whole.ending.is_some());
@@ -464,7 +464,7 @@ fn a_disk_that_is_full_is_a_fault() {
         });
         let fault = ended.unwrap_err();
         assert!(matches!(fault, Fault::Unrecorded { time_s: 2.5, .. }), "{fault}");
-        // And it stays so.
+        // The error persists.
         assert!(recorder.step(&Command { qdot: vec![0.0; 3] }).is_err());
         assert!(recording.end(2.5, &Ending::default()).is_err());
     }
@@ -486,12 +486,12 @@ fn recording_a_tick_asks_for_no_memory_but_for_the_index() {
     let about = about(body().capabilities());
     let recording = Recording::new(Box::new(io::sink()), &about, clock).unwrap();
     let recorded = count(Box::new(Recorder::new(body(), recording)));
-    // Five channels have an index of their messages, a list that doubles its size: four times.
+    // Five channels have an index of their messages, a list that doubles its capacity: four times.
     let more = recorded - count(body());
     assert!(more <= 5 * 4, "{more} in 2000 ticks");
 }
 
-/// An experiment of few touches.
+/// An experiment with few touches.
 fn experiment(sets: &[&str]) -> Experiment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/container_finger.toml");
     let few = ["touches=5", "initial_touches=3", "grid=11"];
@@ -540,7 +540,7 @@ fn a_recorded_trial_is_played_to_the_same_rows() {
 fn what_acts_otherwise_is_found_where_it_first_does() {
     let folder = TempDir::new().unwrap();
     let (_, path) = record(folder.path(), &[]);
-    // Pressing deeper begins where a contact was told; the way there is the same.
+    // A deeper press differs from the detection of contact on; the approach is the same.
     let pressed = replayed(&path, &["scene.touch.press_m=0.0005"]).unwrap();
     let Some(Difference::Command { touch: 1, tick, time_s, recorded, now, .. }) =
         pressed.difference
@@ -548,13 +548,13 @@ fn what_acts_otherwise_is_found_where_it_first_does() {
         panic!("{pressed:?}");
     };
     assert!(tick > 100 && time_s > 0.4 && recorded != now, "{pressed:?}");
-    // Travelling slower does at once.
+    // A slower travel differs at once.
     let slow = replayed(&path, &["scene.touch.travel_m_s=0.03"]).unwrap();
     let Some(Difference::Command { tick: earlier, .. }) = slow.difference else {
         panic!("{slow:?}")
     };
     assert!(earlier < tick);
-    // Another belief is seen in the first row that has one.
+    // Another belief differs in the first row that has one.
     let believed = replayed(&path, &["gp.noise_sd_m=0.001"]).unwrap();
     assert!(matches!(believed.difference, Some(Difference::Row { touch: 3, .. })), "{believed:?}");
     let fewer = replayed(&path, &["touches=4"]).unwrap();
@@ -567,7 +567,7 @@ fn what_acts_otherwise_is_found_where_it_first_does() {
     );
     let other = replayed(&path, &["seed=1"]).unwrap_err();
     assert!(matches!(other, Fault::NeverReset { .. }), "{other}");
-    // As far as it goes, one that was cut is the same.
+    // A cut recording is the same up to its end.
     let bytes = fs::read(&path).unwrap();
     for share in [0.3, 0.6, 0.9] {
         fs::write(&path, &bytes[..(share * bytes.len() as f64) as usize]).unwrap();
@@ -594,7 +594,7 @@ fn the_program_records_and_replays() {
     for name in ["random-0000", "random-0001", "active-0000", "active-0001"] {
         let file = format!("run/recordings/{name}.mcap");
         let said = succeeds(path, &["replay", &file]);
-        assert!(said.contains("3 touches the same"), "{said}");
+        assert!(said.contains("3 touches identical"), "{said}");
     }
     let file = "run/recordings/active-0001.mcap";
     let json = succeeds(path, &["replay", file, "--json"]);
@@ -604,18 +604,18 @@ fn the_program_records_and_replays() {
     let other = ended(&mut command(path, &changed), "replay");
     assert_eq!(other.status.code(), Some(1), "{}", said(&other));
     let words = String::from_utf8(other.stdout).unwrap();
-    assert!(words.contains("differs in touch 1 at tick "), "{words}");
+    assert!(words.contains("touch 1 differs at tick "), "{words}");
     fails(path, &["replay", "small.toml"], &["small.toml", "not a recording"]);
     fails(path, &["replay", "none.mcap"], &["none.mcap"]);
     let cast = ["run", "small.toml", "--set", "scene.body=\"cast\"", "--record", "--out", "cast"];
     fails(path, &cast, &["--record", "\"cast\"", "nothing to record"]);
     assert!(!path.join("cast").exists());
-    // A new start takes the recordings of the old one with it.
+    // A fresh start deletes the old recordings.
     succeeds(path, &["run", "small.toml", "--out", "run", "--no-report", "--fresh"]);
     assert_eq!(fs::read_dir(path.join("run/recordings")).unwrap().count(), 0);
 }
 
-/// Each part replays by itself, and the program replays them as one.
+/// Each part can be replayed alone, and the program replays them together.
 #[test]
 fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let folder = TempDir::new().unwrap();
@@ -651,12 +651,12 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     }
     let file = path.to_str().unwrap();
     let said = succeeds(folder.path(), &["replay", file]);
-    assert_eq!(said.matches("touches the same").count(), 3, "{said}");
-    assert!(said.contains("5 touches the same, decisions and belief, 4 of them made before"));
+    assert_eq!(said.matches("touches identical").count(), 3, "{said}");
+    assert!(said.contains("5 touches identical in decisions and belief, 4 of them from earlier"));
     let json = succeeds(folder.path(), &["replay", file, "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["parts"][1]["made_before"], 4);
-    // A difference in a later part alone is one of the whole.
+    // A difference in a later part counts as a difference of the trial.
     let other = replayed(&parts[2], &["scene.touch.travel_m_s=0.03"]).unwrap();
     assert!(matches!(other.difference, Some(Difference::Command { touch: 5, .. })), "{other:?}");
     fs::copy(&parts[1], folder.path().join("other.mcap")).unwrap();
@@ -664,5 +664,5 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     bytes.truncate(bytes.len() / 2);
     fs::write(&parts[2], bytes).unwrap();
     let cut = succeeds(folder.path(), &["replay", file]);
-    assert!(cut.contains("ends before its trial"), "{cut}");
+    assert!(cut.contains("ends before the trial"), "{cut}");
 }

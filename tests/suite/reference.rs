@@ -1,4 +1,4 @@
-//! `docs/reference.md` says what the code says.
+//! Tests that `docs/reference.md` is up to date.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ fn the_reference_is_what_the_code_says() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference.md");
     let text = palpate::cli::reference();
     let text = text.trim_end().to_owned() + "\n";
-    // What `make reference` asks for.
+    // Set by `make reference`.
     if std::env::var_os("PALPATE_WRITE_REFERENCE").is_some() {
         fs::write(&path, &text).unwrap();
     }
@@ -19,7 +19,7 @@ fn the_reference_is_what_the_code_says() {
     assert_eq!(text.lines().count(), written.lines().count(), "run `make reference`");
 }
 
-/// Every setting of a resolved experiment is in it, with a range or names wherever one is checked.
+/// The reference contains every setting of a resolved experiment, with its range or allowed names.
 #[test]
 fn no_setting_is_left_out() {
     let text = palpate::cli::reference();

@@ -1,4 +1,4 @@
-//! Where finger, ball, plate and object stand, found by touch.
+//! Tests of the registration of finger, ball, plate and object by touch.
 
 use nalgebra::{
     DMatrix, DVector, Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3,
@@ -24,7 +24,7 @@ use proptest::prelude::*;
 use rand::RngExt;
 use std::sync::Arc;
 
-/// Observations y at x of a + b·x, and of a parameter that they do not see.
+/// Observations y at x of a + b·x, with a further parameter that does not affect them.
 struct Line(Vec<(f64, f64)>);
 
 impl Problem for Line {
@@ -43,8 +43,8 @@ impl Problem for Line {
     }
 }
 
-/// Against the closed form of a straight line, whose covariance is s²(XᵀX)⁻¹; an outlier changes
-/// nothing, and what nothing depends on stays where it was.
+/// Agrees with the closed form of a straight line, whose covariance is s²(XᵀX)⁻¹; an outlier
+/// changes nothing, and an undetermined parameter keeps its value.
 #[test]
 fn a_line_is_fitted_with_its_covariance() {
     let mut random = seed::stream(3, 0, "line");
@@ -78,8 +78,8 @@ fn pa10(is_soft: bool) -> Robot {
 
 const BALL: KnownBody = KnownBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
 
-/// Poses of kinematics at which a finger that stands off by `error` touches `body`, from many sides
-/// with many of its places.
+/// Kinematic poses at which a finger displaced by `error` touches `body`, from many sides with many
+/// parts of the finger.
 fn touches(
     robot: &Robot,
     error: &Isometry3<f64>,
@@ -124,11 +124,11 @@ fn touches(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4))]
 
-    /// Without noise the law is inverted, wherever the finger stands, and an outlier of half a
-    /// centimetre is left out: that of a rigid finger to 0.02 mm and 0.1°; that of a soft one, of
-    /// which give, gain and felt side are sought too, to 0.2 mm and 0.3°. The roll of either hangs
-    /// on a corner of its tip: 0.3° of a rigid finger, which the search leaves 0.16° off once in
-    /// 200 cases; of a soft one what the fit itself says, within three standard deviations.
+    /// Without noise the registration is exact for any pose of the finger, and an outlier of half a
+    /// centimetre is rejected: to 0.02 mm and 0.1° for a rigid finger; to 0.2 mm and 0.3° for a
+    /// soft one, for which compliance, gain and contact side are also estimated. The roll is
+    /// determined by a corner of the tip only: 0.3° for a rigid finger, with an error of 0.16° once
+    /// in 200 cases; for a soft one three standard deviations of the fit.
     #[test]
     fn exact_touches_give_the_finger_back(
         place in prop::array::uniform3(-3e-3..3e-3),
@@ -161,8 +161,8 @@ proptest! {
     }
 }
 
-/// The more a finger gives way, the farther it has to go, beyond no give at all too: a fit that
-/// tries less than none finds back.
+/// The more compliant a finger, the farther it moves, also for negative compliance; a fit that
+/// tries negative values recovers.
 #[test]
 fn a_way_grows_with_the_give() {
     let outline = Outline::of(&pa10(true));
@@ -173,7 +173,8 @@ fn a_way_grows_with_the_give() {
     assert!((way_m(-1e-7) - way_m(0.0)).abs() < 1e-6 && (way_m(1e-7) - way_m(0.0)).abs() < 1e-6);
 }
 
-/// A plate says nothing of a finger that never turns: what is lost is named, and does not move.
+/// A plate does not determine the roll of a finger that never turns: the message names the
+/// parameter, which keeps its value.
 #[test]
 fn what_touches_do_not_determine_is_said_and_not_invented() {
     let robot = pa10(false);
@@ -194,8 +195,7 @@ fn what_touches_do_not_determine_is_said_and_not_invented() {
     }
     assert!(found.found.correction.translation.vector.norm() < 1e-3);
     let whole = conclude(&all, &robot, &plate, all.len()).unwrap();
-    // A finger that gives way alike everywhere cannot be told from a plate that stands farther
-    // back.
+    // A uniformly compliant finger is indistinguishable from a plate that is farther away.
     assert_eq!(whole.undetermined, ["give"]);
     let of_finger = whole.sds.iter().zip(parameters(&plate)).take(6);
     assert!(of_finger.map(|(sd, (_, unit))| sd / unit).all(|share| share < 0.3));
@@ -213,8 +213,8 @@ fn a_stage_is_refused_before_it_touches() {
     assert!(refused.contains("required are 20; a finger must be turned"), "{refused}");
 }
 
-/// 2 mm and 2° of error in the mount of a soft finger on a PA-10, in the kinematic body: found to
-/// what docs/your-robot.md says, with a ball that stands 4 mm from where it is said to be.
+/// An error of 2 mm and 2° in the mount of a soft finger on a PA-10 (kinematic body) is found to
+/// the accuracy in docs/your-robot.md, with a ball 4 mm from its stated position.
 #[test]
 fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     let mut scene = Scene::load(
@@ -248,8 +248,8 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     assert!(turn_deg[0].abs() < 4.0 * x_sd_deg.max(0.3), "{turn_deg:?} {x_sd_deg}");
 }
 
-/// A correction of exactly the error makes the finger stand where it is believed to, and none
-/// leaves the chain as it is to the bit.
+/// A correction equal to the error puts the finger in its believed pose; without a correction the
+/// chain is unchanged exactly.
 #[test]
 fn a_correction_moves_the_tool() {
     let plain = ArmSettings::default();
@@ -271,7 +271,7 @@ fn too_few_contacts_are_refused() {
     let outline = Outline::of(&robot);
     let start = HandEyeFit::start(BALL);
     let none: [RegistrationTouch; 0] = [];
-    // Without touches there is what was plausible, and nothing else.
+    // Without touches the covariance is the prior's.
     let foreseen = palpate::math::least_squares::foresee(&HandEyeFit::new(&outline, &none), &start);
     assert!(foreseen.unwrap().undetermined.len() >= 11);
     struct Nothing;
@@ -302,7 +302,7 @@ fn brick() -> MeshBvh {
     mesh(block([-0.03, -0.02, -0.05], [0.05, 0.02, 0.04]))
 }
 
-/// Points on faces of a mesh, as a scan leaves them, moved to where it stands.
+/// Points on faces of a mesh, as in a scan, in the mesh's world pose.
 fn cloud(mesh: &MeshBvh, x_wo: &Isometry3<f64>, count: usize, seed: u64) -> Vec<Point3<f64>> {
     let mut random = seed::stream(seed, 0, "cloud");
     let triangles = mesh.mesh().triangles().len();
@@ -320,7 +320,7 @@ fn cloud(mesh: &MeshBvh, x_wo: &Isometry3<f64>, count: usize, seed: u64) -> Vec<
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// A cloud of a brick is laid back onto it from any start nearby.
+    /// The cloud of a brick is registered from any nearby initial pose.
     #[test]
     fn random_poses_are_recovered(
         place in prop::array::uniform3(-0.6..0.6),
@@ -340,7 +340,8 @@ proptest! {
     }
 }
 
-/// A ball may turn as it likes and a wall slide: both are said, and the mesh stays there.
+/// A ball is free to rotate and a wall to slide: both are reported, and the mesh keeps its pose in
+/// these directions.
 #[test]
 fn what_a_cloud_does_not_determine_is_said() {
     let sphere = mesh(ball(Point3::origin(), 0.03, 60));

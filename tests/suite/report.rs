@@ -1,4 +1,4 @@
-//! Figures and page of made-up runs.
+//! Tests of figures and pages of synthetic runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::measure::outline::Outline;
@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// Every file of a folder's report by name.
+/// Returns every file of a folder's report by name.
 fn written(run: &Run, folder: &Path) -> BTreeMap<String, Vec<u8>> {
     report::write(run, &Analysis::of(run), folder).unwrap();
     [folder.to_owned(), folder.join("figures")]
@@ -64,7 +64,7 @@ fn page_needs_nothing_and_trusts_nothing() {
     for resource in ["http:", "https:", "src=", "<link", "@import", "url(", "<script>alert"] {
         assert!(!page.contains(resource), "{resource}");
     }
-    // The explorer's data and its script.
+    // Data and script of the explorer.
     assert_eq!(page.matches("<script").count(), 2);
     assert_eq!(page.matches("</script").count(), 2);
     assert!(page.contains("&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &amp; &quot;this"));
@@ -151,13 +151,13 @@ fn ticks_are_round() {
     assert_eq!(labels(Axis::log([1e-5, 0.01]).unwrap()), ["1e−5", "1e−4", "0.001", "0.01"]);
     assert_eq!(labels(Axis::log([2.0, 12.0]).unwrap()), ["2", "3", "5", "7", "10"]);
     assert!(Axis::log([0.0, f64::NAN]).is_none());
-    // No range, or hardly one, must not make endless labels.
+    // A zero or tiny range gives a finite number of labels.
     assert!(labels(Axis::linear(1.0, 1.0, 5.0)).len() < 10);
     assert!(labels(Axis::linear(0.0, 1e-320, 5.0)).len() < 10);
 }
 
-/// Twice the error of `active` at every count, so twice its touches; each table in words and as a
-/// file.
+/// Twice the error of `active` at every count gives twice its touches; each table exists as text
+/// and as a file.
 #[test]
 fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
     let mut run = run(SURFACE);
@@ -169,7 +169,7 @@ fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
     report::write_tables(&run, &Analysis::of(&run), folder.path()).unwrap();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let equal = read("equal_error.csv");
-    // 0.02 / count is twice 0.02 / 20 at 10, and random is never better than twice that.
+    // 0.02 / count is twice 0.02 / 20 at 10, and random never falls below twice that.
     assert!(
         equal.contains("active,random,rmse_m,2,0.002,20.0,10.0,10.0,10.0,0.5,0.5,0.5"),
         "{equal}"
@@ -186,8 +186,8 @@ fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
     }
 }
 
-/// What a publication says stands beside the same number here; after touches that do not occur it
-/// says nothing.
+/// A published claim appears beside the same number of this run; a claim at another touch count is
+/// omitted.
 #[test]
 fn claims_stand_beside_what_came_out() {
     let mut run = run(SURFACE);
@@ -206,7 +206,7 @@ fn claims_stand_beside_what_came_out() {
     assert!(!page.contains("it is nowhere"));
 }
 
-/// A belief in a whole object.
+/// Metrics of a whole object.
 const SHAPE: ShapeMetrics = ShapeMetrics {
     chamfer_m: Some(0.002),
     chamfer_share: Some(0.01),
@@ -219,7 +219,7 @@ const SHAPE: ShapeMetrics = ShapeMetrics {
     coverage: Some(0.9),
 };
 
-/// Measures of whole objects stand nowhere in what is told of a zone.
+/// Runs over a zone show no measures of whole objects.
 #[test]
 fn a_zone_has_no_measures_of_whole_objects() {
     let run = run(SURFACE);
@@ -237,8 +237,7 @@ fn a_zone_has_no_measures_of_whole_objects() {
     }
 }
 
-/// What follows from the table of measures does so for each of them: columns, comparison, panel,
-/// column of the page, claim.
+/// Every measure of the table appears in columns, comparison, panel, column of the page, and claim.
 #[test]
 fn a_measure_is_told_wherever_measures_are() {
     let mut run = run(SURFACE);
@@ -269,7 +268,7 @@ fn a_measure_is_told_wherever_measures_are() {
         let ends = ["median", "median_low", "median_high"];
         assert_eq!(ends.map(has), [aggregate.has_median(); 3], "{measure:?}");
         assert_eq!(has("minus_random_low"), measure.is_error, "{measure:?}");
-        // Nothing is told of what no row holds.
+        // Measures without values in the rows are omitted.
         let is_told = run.rows.iter().any(|row| measure.of(row, 20).is_some());
         let is_compared = is_told && measure.direction != Direction::Neither;
         assert_eq!(comparison.contains(&format!(",{},", measure.id)), is_compared, "{measure:?}");
@@ -291,8 +290,8 @@ fn a_measure_is_told_wherever_measures_are() {
     assert_eq!(summary.lines().count(), 1 + rows);
 }
 
-/// Planners are held against the baselines asked for, against the paper's if nobody asks, and
-/// against each other where neither of these ran; what is asked for and did not run is no baseline.
+/// Planners are compared with the requested baselines; by default with the paper's, or with each
+/// other if neither of these ran. A requested planner that did not run is no baseline.
 #[test]
 fn planners_are_held_against_their_baselines() {
     let asked = |planners: [&str; 3], baselines: &[&str]| {

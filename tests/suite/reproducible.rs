@@ -1,5 +1,5 @@
-//! The same bytes for any number of threads, after a kill, after an interrupt, and however often
-//! trials and planners are added; what is only shown changes no row.
+//! Tests of reproducibility: the same bytes for any number of threads, after a kill, after an
+//! interrupt, and for any order of added trials and planners; report settings change no row.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ fn finish(out: &Path, arguments: &[&str]) -> Vec<u8> {
     fs::read(trials(out)).unwrap()
 }
 
-/// What a whole run prints.
+/// Returns the output of a complete run.
 fn output(out: &Path, arguments: &[&str]) -> String {
     let output = command(out, arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -41,7 +41,7 @@ fn trials(out: &Path) -> PathBuf {
     out.join("trials.jsonl")
 }
 
-/// Waits until the run has written some of its rows; false if it ended before.
+/// Waits until the run has written some of its rows; returns false if it ended before.
 fn half_way(out: &Path, child: &mut Child) -> bool {
     let patience = Instant::now() + Duration::from_secs(60);
     loop {
@@ -63,7 +63,7 @@ fn threads_do_not_change_a_byte() {
     assert_eq!(one.iter().filter(|&&byte| byte == b'\n').count(), 60);
 }
 
-/// Most threads that a run has at once, on a machine of which rayon believes it has 40 cores.
+/// Maximum number of threads of a run on a machine that reports 40 cores to rayon.
 fn most_threads(out: &Path, threads: &str) -> usize {
     let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
         .args(["run", "experiments/container.toml", "--set", "trials=2", "--no-report"])
@@ -85,8 +85,8 @@ fn most_threads(out: &Path, threads: &str) -> usize {
     most
 }
 
-/// Beside the worker there are the main thread, one that waits for it, and those that listen for
-/// Ctrl-C and for slow steps.
+/// Besides the worker there are the main thread, a thread that waits for the worker, and threads
+/// for Ctrl-C and slow steps.
 #[test]
 fn threads_bound_what_comes_before_the_trials_too() {
     let folder = TempDir::new().unwrap();
@@ -104,7 +104,7 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     assert!(half_way(&out, &mut child), "finished before it could be killed");
     child.kill().unwrap();
     child.wait().unwrap();
-    // As if the kill had come in the middle of a write.
+    // As after a kill in the middle of a write.
     let mut cut = fs::read(trials(&out)).unwrap();
     cut.extend_from_slice(b"{\"trial\":11,\"planner\":\"act");
     fs::write(trials(&out), cut).unwrap();
@@ -161,14 +161,14 @@ fn trials_and_planners_added_later_give_the_bytes_of_a_run_at_once() {
     assert!(grown == finish(&folder.path().join("whole"), &all));
     let resolved = |run: &str| fs::read(folder.path().join(run).join("resolved.toml")).unwrap();
     assert!(resolved("grown") == resolved("whole"));
-    // What is no longer listed is not shown, but kept, and is there when it is listed again.
+    // Unlisted trials are kept but not shown, and appear when listed again.
     for fewer in [&few, &more] {
         assert!(finish(&out, fewer) == grown);
     }
     let summary = fs::read_to_string(out.join("summary.csv")).unwrap();
     assert!(!summary.contains("active") && summary.contains("\nrandom,35,5,"), "{summary}");
     let again = output(&out, &all);
-    assert!(again.contains("\n0 trials in ") && again.contains("15 were there"), "{again}");
+    assert!(again.contains("\n0 trials in ") && again.contains("15 already done"), "{again}");
     assert!(fs::read(trials(&out)).unwrap() == grown);
 }
 

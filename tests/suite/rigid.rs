@@ -1,5 +1,4 @@
-//! A finger without skin, against the object in each geometry that MuJoCo knows, and how its steps
-//! are made.
+//! Tests of a finger without skin on every collision geometry of MuJoCo, and of its integrators.
 
 use crate::common::shipped::scene;
 use mujoco_rs::wrappers::mj_data::MjData;
@@ -53,9 +52,8 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
     targets.iter().map(&mut touch).collect()
 }
 
-/// How coarsely a geometry knows an object of this size: not at all, by the cells of the height
-/// field (101 over the zone and twice the finger's hull), or by those of MuJoCo's octree (64 a
-/// side).
+/// Resolution of a geometry for an object of this size: exact, the cells of the height field (101
+/// over the zone and twice the finger's hull), or those of MuJoCo's octree (64 per side).
 fn cell_m(collision: Collision, size_m: f64) -> f64 {
     match collision {
         Collision::Hull => 0.0,
@@ -66,11 +64,11 @@ fn cell_m(collision: Collision, size_m: f64) -> f64 {
 
 const ALL: [Collision; 3] = [Collision::HeightField, Collision::Hull, Collision::Sdf];
 
-/// Under a ball that rests on it, how far a contact yields: its force at the alarm, of some
-/// newtons, over a stiffness of thousands of newtons per metre.
+/// Compliance of a contact under a resting ball: its force at detection, a few newtons, divided by
+/// a stiffness of thousands of newtons per metre.
 const YIELD_M: f64 = 5e-4;
 
-/// On a convex object all geometries agree with the ball's formula, and push it outwards.
+/// On a convex object all geometries agree with the analytic ball, and push outwards.
 #[test]
 fn every_geometry_meets_a_ball_where_it_is_and_pushes_away_from_it() {
     const BALL_M: f64 = 0.03;
@@ -90,8 +88,8 @@ fn every_geometry_meets_a_ball_where_it_is_and_pushes_away_from_it() {
     }
 }
 
-/// A block with a groove of 90° along x, 20 mm deep: a ball of radius r rests on both its sides r
-/// √2 above its bottom, where the hull has a lid.
+/// A block with a groove of 90° along x, 20 mm deep: a ball of radius r rests on both sides r √2
+/// above the bottom; the convex hull closes the groove.
 fn groove() -> Mesh {
     let profile = [
         [-0.04, -0.04],
@@ -113,7 +111,7 @@ fn groove() -> Mesh {
         let k = (i + 1) % count;
         triangles.push([i, k, count + i]);
         triangles.push([k, count + k, count + i]);
-        // The bottom of the groove sees every corner of its end.
+        // The bottom of the groove is visible from every corner of its end.
         if i != bottom && k != bottom {
             triangles.push([bottom, k, i]);
             triangles.push([count + bottom, count + i, count + k]);
@@ -156,14 +154,14 @@ fn a_distance_needs_an_inside() {
     assert_eq!(refused("solver.collision=\"hull\""), None);
 }
 
-/// Amplitude and frequency of a motion that every joint is told at once: its speed never changes
-/// faster than by 2π · 2 Hz · 0.3 rad/s = 3.8 rad/s².
+/// Amplitude and frequency of a motion commanded to all joints: the acceleration is at most 2π · 2
+/// Hz · 0.3 rad/s = 3.8 rad/s².
 const SWING_RAD_S: f64 = 0.3;
 const SWING_HZ: f64 = 2.0;
 const SWING_RAD_S2: f64 = std::f64::consts::TAU * SWING_HZ * SWING_RAD_S;
 
-/// The fastest change of a joint's speed, rad/s², once an arm has got into its swing, over postures
-/// all over the joints' ranges.
+/// Largest joint acceleration, rad/s², in the steady motion of an arm, over postures across the
+/// joints' ranges.
 fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
     let mut scene = scene("container_pa10.toml", &[]);
     (scene.solver.integrator, scene.solver.step_s) = (integrator, step_s);
@@ -191,13 +189,13 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
     most
 }
 
-/// Linear theory of what the limit on explicit steps keeps: below 2 over the largest rate of the
-/// servos, the largest eigenvalue of M⁻¹ diag(kv), Euler's steps are stable, below 2.79 Runge and
-/// Kutta's. At 1 ms both are in every posture, at 2 ms neither.
+/// Linear theory of the limit on explicit steps: below 2 divided by the servos' largest rate, the
+/// largest eigenvalue of M⁻¹ diag(kv), Euler's steps are stable; below 2.79, Runge-Kutta's. At 1 ms
+/// both are stable in every posture, at 2 ms neither is.
 #[test]
 fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     for links in ["arm={links=\"C\"}", "arm={links=\"A\"}"] {
-        // With Euler's steps the mass matrix is that of the arm.
+        // With Euler steps the mass matrix is the arm's.
         let euler = ["solver={integrator=\"euler\", step_s=1e-3}", links];
         let environment = Environment::build(scene("container_pa10.toml", &euler)).unwrap();
         let model = Models::new(&environment).unwrap().plant;
@@ -225,8 +223,8 @@ fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     }
 }
 
-/// With every integrator and step that is allowed the arm follows a slow swing about as gently as
-/// it is told. With Euler's steps of 2 ms, which are refused, some motor chatters.
+/// With every allowed integrator and step the arm follows a slow motion smoothly. With Euler steps
+/// of 2 ms, which are rejected, some motor chatters.
 #[test]
 fn no_integrator_makes_the_servos_chatter() {
     use Integrator::{Euler, Implicit, ImplicitFast, Rk4};
@@ -240,9 +238,9 @@ fn no_integrator_makes_the_servos_chatter() {
     assert!(chatter > 10.0 * SWING_RAD_S2, "{chatter}");
 }
 
-/// Where nothing rubs, a step with the servos' gains in the mass matrix is that of MuJoCo's own
-/// servos, which are implicit in their velocities; where joints rub, MuJoCo finds what they do as if
-/// no servo damped, and the arm moves otherwise.
+/// Without joint friction, a step with the servos' gains in the mass matrix equals one of MuJoCo's
+/// own servos, which are implicit in their velocities. With joint friction, MuJoCo computes the
+/// friction as if the servos had no damping, and the arm moves differently.
 #[test]
 fn gains_in_the_mass_matrix_are_mujocos_servos_where_nothing_rubs() {
     let environment = Environment::build(scene("container_pa10.toml", &[])).unwrap();
@@ -268,13 +266,12 @@ fn gains_in_the_mass_matrix_are_mujocos_servos_where_nothing_rubs() {
         most
     };
     let rubbing = apart_rad_s(&text);
-    // A joint may carry numbers of a user's.
+    // A joint may have user-defined numbers.
     let smooth = apart_rad_s(&text.replace("frictionloss=", "user="));
     assert!(smooth < 1e-9 && rubbing > 1e-3, "{smooth} {rubbing}");
 }
 
-/// At the same small step all integrators land where the default does: what is left of their
-/// differences is of the order of the step.
+/// At the same small step all integrators agree with the default to the order of the step.
 #[test]
 fn every_integrator_presses_alike() -> Result<(), Fault> {
     let pressed = |integrator: Integrator| -> Result<f64, Fault> {
@@ -283,7 +280,7 @@ fn every_integrator_presses_alike() -> Result<(), Fault> {
         let simulator = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let mut body = simulator.body()?.unwrap();
         let mut force_n = 0.0;
-        // The stage stands 17 mm in front of the object.
+        // The stage is 17 mm in front of the object.
         for (speed_m_s, ticks) in [(0.05, 170), (0.005, 100), (0.0, 250)] {
             for _ in 0..ticks {
                 let reading = body.step(&Command { qdot: vec![0.0, -speed_m_s, 0.0] })?;
@@ -301,9 +298,9 @@ fn every_integrator_presses_alike() -> Result<(), Fault> {
     Ok(())
 }
 
-/// Why `[solver]` has neither iterations nor tolerance: where one finger touches and seven joints
-/// rub, one iteration of MuJoCo's solver finds the force that a hundred do, to the last digits of
-/// its default tolerance.
+/// Reason why `[solver]` has neither iterations nor tolerance: with one contact and friction in
+/// seven joints, one iteration of MuJoCo's solver finds the force of a hundred, to the last digits
+/// of its default tolerance.
 #[test]
 fn one_iteration_finds_the_force_of_contact() {
     let scene = scene("bird_finger.toml", &["body=\"dynamic\"", "effects={}"]);

@@ -1,4 +1,5 @@
-//! Scene and experiment files: all that ship load, all that are saved mean the same.
+//! Tests of scene and experiment files: all shipped files load, and saved files have the same
+//! meaning.
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::experiment::Experiment;
@@ -59,7 +60,7 @@ fn settings_are_overridden_in_order_and_reach_into_the_scene() {
     assert!(object.mesh.is_file(), "{}", object.mesh.display());
 }
 
-/// The mesh is the truth to within its tested distance from the formula, wherever it is placed.
+/// The mesh equals the truth to within its tested distance from the formula, at any pose.
 #[test]
 fn the_mesh_and_its_formula_give_the_same_heights() {
     for name in ["container", "bird"] {
@@ -76,8 +77,8 @@ fn the_mesh_and_its_formula_give_the_same_heights() {
             })
             .collect();
         errors.sort_by(f64::total_cmp);
-        // Along a slope of 60 degrees a distance of 0.05 mm is 0.1 mm of height; at the nose's
-        // side the height jumps.
+        // Along a slope of 60 degrees a distance of 0.05 mm is 0.1 mm of height; at the nose's side
+        // the height jumps.
         assert!(errors[errors.len() * 99 / 100] < 1e-4, "{name}: {errors:?}");
     }
 }
@@ -95,8 +96,7 @@ fn the_generated_model_names_the_object_the_board_and_the_finger() {
     assert!(mjcf::scene(&toy, mjcf::Mode::Picture).is_none());
 }
 
-/// Seen from outside every triangle of pad and nail turns counter-clockwise, and the pad is towards
-/// −z.
+/// From outside, every triangle of pad and nail is counter-clockwise, and the pad faces −z.
 #[test]
 fn faces_of_the_fingertip_look_outwards() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
@@ -137,8 +137,7 @@ fn mujoco_compiles_the_generated_model() {
     assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());
 }
 
-/// A setting that would change nothing, or be unstable, is refused with its key and what is
-/// allowed.
+/// A setting without effect, or an unstable one, is rejected with its key and the allowed values.
 #[test]
 fn solver_settings_that_mean_nothing_are_refused() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird_pa10.toml");
@@ -187,7 +186,7 @@ fn damaged(text: &str, at: usize, bytes: &[u8], removed: usize) -> Vec<u8> {
 }
 
 proptest! {
-    /// Whatever stands in a file, reading it ends in a value or an error.
+    /// Reading any file returns a value or an error.
     #[test]
     fn damaged_files_never_panic(
         at in 0..10_000usize,

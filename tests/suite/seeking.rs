@@ -1,5 +1,5 @@
-//! Where an object is and how much of it there is, is not known: the ball may be far too large, the
-//! pieces several, and all contacts off alike.
+//! Tests of objects of unknown position and size: the ball may be much too large, there may be
+//! several pieces, and all contacts may share an error.
 
 use crate::common::around::{belief, belief_with, meet, simulation, trial};
 use nalgebra::{Point3, Vector3};
@@ -7,7 +7,7 @@ use palpate::explore::around::{ImplicitSurface, SpaceSettings};
 use palpate::geometry::spread::directions;
 use palpate::task::Aim;
 
-/// A ball of 40 mm met from 30 sides.
+/// Belief after touches of a ball of 40 mm from 30 sides.
 fn touched(mut belief: ImplicitSurface) -> ImplicitSurface {
     for out in directions(30) {
         let p_wc = Point3::from(out.scale(0.04));
@@ -18,7 +18,7 @@ fn touched(mut belief: ImplicitSurface) -> ImplicitSurface {
     belief
 }
 
-/// The same touches make the same belief in a ball of any size.
+/// The same touches give the same belief in a ball of any size.
 #[test]
 fn the_ball_may_be_too_large() {
     let [near, far] = [0.08, 0.5].map(|ball_m| touched(belief(ball_m, 0.007)));
@@ -31,7 +31,8 @@ fn the_ball_may_be_too_large() {
     assert!((volumes[0] / volumes[1] - 1.0).abs() < 1e-3, "{volumes:?}");
 }
 
-/// What all contacts are off by adds to every deviation, as the root of the sum of squares.
+/// A common error of all contacts adds to every standard deviation, as the root of the sum of
+/// squares.
 #[test]
 fn what_contacts_have_in_common_is_not_averaged_away() {
     let [exact, off] = [0.0, 3e-4].map(|offset_m| {
@@ -45,14 +46,13 @@ fn what_contacts_have_in_common_is_not_averaged_away() {
     }
 }
 
-/// Two balls far from each other.
+/// Two distant balls.
 fn apart(p: Vector3<f64>) -> f64 {
     let one = |x: f64| (p - Vector3::x() * x).norm() - 0.016;
     one(-0.045).min(one(0.045))
 }
 
-/// Every planner that looks where its belief is unsure looks as well where there is none, and finds
-/// the second of two pieces.
+/// Every uncertainty-based planner also explores empty regions and finds the second of two pieces.
 #[test]
 fn a_piece_that_no_touch_has_met_is_looked_for() {
     let simulation = simulation(apart, "planners = [\"active\"]\ntouches = 40");

@@ -1,5 +1,5 @@
-//! The file with the constants of a sensor, and scenes of version 0.1 that had them in their
-//! effects.
+//! Tests of the file with a sensor's constants, and of scenes of version 0.1 with these constants
+//! in their effects.
 
 use palpate::experiment::Experiment;
 use palpate::experiment::store::resolved;
@@ -17,7 +17,7 @@ fn scene(sets: &[&str]) -> Result<Scene, String> {
     Scene::load(&path("scenes/container_finger.toml"), &sets).map_err(|error| error.to_string())
 }
 
-/// A folder with this sensor's file, and the assignment that names it.
+/// A folder with this sensor's file, and the assignment that selects it.
 fn sensor(text: &str) -> (TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sensor.toml");
@@ -25,7 +25,7 @@ fn sensor(text: &str) -> (TempDir, String) {
     (folder, format!("effects.sensor={}", file.display()))
 }
 
-/// A file changes the constants of the effects that are on, and switches none on.
+/// A file changes the constants of active effects, and activates none.
 #[test]
 fn a_file_gives_the_constants_of_a_scene() {
     let shipped = scene(&[]).unwrap();
@@ -44,7 +44,7 @@ fn a_file_gives_the_constants_of_a_scene() {
     assert_eq!(inline.unwrap(), given);
 }
 
-/// Errors name the sensor's file, its line and key, the value and what is allowed.
+/// Errors give the sensor's file, its line and key, the value and the allowed values.
 #[test]
 fn what_is_wrong_with_a_file_is_said_with_its_place() {
     for (text, said) in [
@@ -71,8 +71,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_place() {
     }
 }
 
-/// Constants in the effects themselves win over the file, with one note; those that change nothing
-/// need none.
+/// Constants in the effects override the file, with one note; unchanged constants need no note.
 #[test]
 fn constants_in_effects_are_still_read() {
     let (_folder, set) = sensor("[skin]\nflatten_pa_m = 1.8e6");
@@ -89,8 +88,8 @@ fn constants_in_effects_are_still_read() {
     assert!(scene(&["effects.skin.flatten_pa_m=3.5e6"]).unwrap().effects.moved_keys.is_empty());
 }
 
-/// `resolved.toml` holds the constants that differ and can be run again without the sensor's file;
-/// that of version 0.1, which had all of them in the effects, is the same experiment.
+/// `resolved.toml` contains the constants that differ and can be run without the sensor's file;
+/// that of version 0.1, with all constants in the effects, is the same experiment.
 #[test]
 fn resolved_experiments_hold_what_differs() {
     let read = |text: &str| {
@@ -116,8 +115,8 @@ fn resolved_experiments_hold_what_differs() {
     assert_ne!(other, plain);
 }
 
-/// Every constant stands in the BioTac's file: one that is missing there would be 0, and would be
-/// written as a setting.
+/// The BioTac's file contains every constant: a missing one would be 0 and would be written as a
+/// setting.
 #[test]
 fn every_constant_stands_in_the_file() {
     let written = toml::Table::try_from(Effects::all()).unwrap();

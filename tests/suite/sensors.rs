@@ -1,4 +1,4 @@
-//! How sensors differ from each other, and what their channels share.
+//! Tests of differences between sensors, and of common noise of their channels.
 
 use crate::common::shapes::square;
 use crate::common::shipped;
@@ -20,7 +20,7 @@ use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
 use palpate::sim::simulated_finger::SimulatedFinger;
 use std::sync::Arc;
 
-/// Frames of a finger that nobody touches.
+/// Frames of an untouched finger.
 fn untouched(effects: &Effects, count: usize) -> Vec<Frame> {
     let tip = Fingertip::new(&Finger::default(), effects);
     let mut feel = FingertipState::new(&tip, &stream(5, 0, "finger"));
@@ -74,7 +74,7 @@ fn correlation(noise_correlation: f64) -> (f64, [f64; ELECTRODES]) {
     (sum / (ELECTRODES * (ELECTRODES - 1) / 2) as f64, sd)
 }
 
-/// Three real sensors: 0.26 to 0.34.
+/// Three real sensors have 0.26 to 0.34.
 #[test]
 fn electrodes_share_a_part_of_their_noise() {
     let (shared, sd) = correlation(ElectrodesEffect::default().noise_correlation);
@@ -112,7 +112,7 @@ fn sensors_vary_as_much_as_is_said() {
     };
     assert!((part(|sensor| sensor.dead.is_some()) - effect.dead).abs() < 0.02);
     assert!((part(|sensor| sensor.noisy.is_some()) - effect.noisy).abs() < 0.02);
-    // Changing one spread leaves what else is drawn as it was.
+    // Changing one spread does not change the other drawn values.
     let stiffer = VariationEffect { gain: 0.0, ..effect.clone() };
     for (one, other) in sensors.iter().zip(drawn(&stiffer, 20)) {
         assert_eq!(other.gain, 1.0);
@@ -120,7 +120,7 @@ fn sensors_vary_as_much_as_is_said() {
     }
 }
 
-/// Baselines of two real sensors against each other.
+/// Baselines of two real sensors, compared.
 #[test]
 fn resistances_vary_as_those_of_real_sensors() {
     let text = include_str!("../data/biotac_flat_plate.json");
@@ -156,7 +156,7 @@ fn a_sensor_is_drawn_for_each_trial_and_nothing_varies_by_nothing() {
     assert_eq!(first(&[], 1), first(&[none], 1));
 }
 
-/// An open electrode neither says where the contact is nor takes part in what the others say.
+/// An open electrode does not affect the location of contact.
 #[test]
 fn an_open_electrode_says_nothing() {
     let mut rest = [2500.0; ELECTRODES];
@@ -181,8 +181,8 @@ fn press(lag: &mut Lag, effect: &CreepEffect, force_n: f64, dt_s: f64) -> f64 {
     load.force_n.z
 }
 
-/// A standard linear solid: a step overshoots by the part and relaxes with the time constant; a
-/// cycle loses energy, one slow enough or fast enough none.
+/// A standard linear solid: a step overshoots by the creep ratio and relaxes with the time
+/// constant; a cycle dissipates energy, except very slow and very fast ones.
 #[test]
 fn silicone_relaxes_and_a_cycle_costs_work() {
     let effect = CreepEffect::default();

@@ -1,4 +1,4 @@
-//! One touch by a body that moves and feels, held to what it promises.
+//! Tests of one touch by a body with motion and sensing.
 
 use crate::common::shipped::{contact, environment};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
@@ -53,7 +53,7 @@ fn an_arm_carries_the_finger_to_the_same_contacts_as_the_stage() {
     for target in stage.task().zone().unwrap().grid(3) {
         let by_stage = contact(touch(&stage, 1, &target).unwrap());
         let by_arm = contact(touch(&arm, 1, &target).unwrap());
-        // The arm is a quarter of a millimetre of approach later or sooner when the frame comes.
+        // The arm is a quarter of a millimetre of approach later or earlier when the frame arrives.
         let apart_m = (by_arm.p_wc - by_stage.p_wc).norm();
         assert!(apart_m < 5e-4, "{target:?}: {apart_m}");
     }
@@ -90,7 +90,7 @@ fn past_the_object_is_a_miss_and_too_much_force_is_broken_off() {
     );
 }
 
-/// A servo with nothing between it and the body.
+/// A servo directly on the body.
 fn bare(environment: &Arc<Environment>, seed: u64) -> Servo {
     let body = Simulator::new(Arc::clone(environment)).unwrap().body().unwrap().unwrap();
     let touch = environment.task().touch().clone();
@@ -115,19 +115,19 @@ fn a_target_that_is_not_a_number_or_out_of_reach_ends_as_a_fault() {
     let near = environment("container_finger.toml", &[]);
     assert!(matches!(touch(&near, 1, &[f64::NAN, 0.5]), Err(Fault::Refused { .. })));
     let arm = environment("container_finger.toml", &["arm.model=\"pa10\"", "zone.x_m=[-0.05, 3]"]);
-    // It strays on the way, and is not let.
+    // It deviates during travel, and is stopped.
     let strayed = touch(&arm, 1, &[2.9, 0.5]);
     assert!(matches!(strayed, Err(Fault::Interlock { .. })), "{strayed:?}");
     let far = bare(&arm, 1).touch(&arm.task().approach(&[2.9, 0.5].into()).unwrap());
     let Err(Fault::OutOfReach { distance_m, .. }) = far else { panic!("{far:?}") };
-    // Nearly as far as the target is from the base, less the arm's length.
+    // Almost the distance of the target from the base, minus the arm's length.
     assert!((1.5..2.5).contains(&distance_m), "{distance_m}");
 }
 
-/// What a broken body does to each of its readings.
+/// Fault in each reading of a broken body.
 type Breaks = fn(u32, &mut Reading);
 
-/// A kinematic body whose readings pass through `breaks` and whose commands are kept.
+/// A kinematic body whose readings pass through `breaks` and whose commands are recorded.
 struct Broken {
     inner: Kinematic,
     breaks: Breaks,
@@ -191,14 +191,14 @@ fn a_sensor_that_falls_silent_and_joints_that_do_not_move_are_faults_with_their_
     assert!(time_s > 0.0 && quantity == "joint positions" && values[1].is_nan());
 }
 
-/// The clock of a real arm goes on while the next touch is thought about: that is no movement that
-/// does not end.
+/// The clock of a real arm runs on during planning; this does not count as a movement that does not
+/// end.
 #[test]
 fn an_arm_that_stood_still_for_a_minute_is_not_late() {
     let environment = environment("container_finger.toml", &[]);
     let (plain, _) = broken(&environment, |_, _| {});
     let (paused, _) = broken(&environment, |_, reading| reading.time_s += 60.0);
-    // A larger clock rounds otherwise, and a tick of rest comes or goes.
+    // A larger clock value rounds differently, so the number of rest ticks may change by one.
     let apart_m = (contact(paused.unwrap()).p_wc - contact(plain.unwrap()).p_wc).norm();
     assert!(apart_m < 1e-4, "{apart_m}");
 }
@@ -212,7 +212,7 @@ fn a_pressure_that_is_not_a_number_is_silence_and_a_frozen_one_ends_inside() {
         }
     });
     assert!(matches!(nan, Err(Fault::Lost { .. })), "{nan:?}");
-    // Without a force sensor nothing else tells of the object until it meets the tip's centre.
+    // Without a force sensor no other signal detects the object until it meets the tip's centre.
     let (frozen, _) = broken(&environment, |_, reading| {
         reading.frames_mut().for_each(|frame| frame.pdc_counts = Some(2000.0));
     });

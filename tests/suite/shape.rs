@@ -1,4 +1,4 @@
-//! How near a believed closed surface is to the true one: laws that the measures obey.
+//! Tests of laws that the measures of closed surfaces obey.
 
 use crate::common::shapes::{box_mesh, point, sphere_mesh, square};
 use nalgebra::{Isometry3, Vector3};
@@ -28,7 +28,7 @@ fn object(name: &str) -> Mesh {
     import(Path::new(&path), 1.0).unwrap().0
 }
 
-/// The same surface with each triangle cut into four.
+/// Returns the surface with each triangle cut into four.
 fn refined(mesh: &Mesh) -> Mesh {
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
@@ -57,8 +57,8 @@ fn the_truth_is_itself() {
     }
 }
 
-/// Concentric spheres are the difference of their radii apart, both ways; the larger one's corners
-/// lie on it and its faces up to 1 - cos(π/48) of its radius below, so do the smaller one's.
+/// Concentric spheres are the difference of their radii apart in both directions; their vertices
+/// lie on them and their faces up to 1 - cos(π/48) of the radius below.
 #[test]
 fn concentric_spheres_are_the_difference_of_their_radii_apart() {
     let (small_m, large_m): (f64, f64) = (0.05, 0.054);
@@ -77,10 +77,10 @@ fn concentric_spheres_are_the_difference_of_their_radii_apart() {
     }
 }
 
-/// A cube of side a, moved along one of them by d: the face left behind is d from the other cube;
-/// the face within it is as far as the nearest of d and its own rim, (a³ - (a - 2d)³) / 6a² in the
-/// mean; of each of the four sides a share d/a sticks out, by d/2 in the mean. In common are a - d
-/// of a + d.
+/// A cube of side a, moved along one of them by d: the exposed face is at distance d from the other
+/// cube; the face within it is at the smaller of d and the distance to its own rim, (a³ - (a -
+/// 2d)³) / 6a² on average; of each of the four sides a share d/a protrudes, by d/2 on average. The
+/// overlap is a - d of a + d.
 #[test]
 fn a_box_moved_sideways_is_as_far_off_as_geometry_says() {
     let (a, d): (f64, f64) = (0.1, 0.01);
@@ -101,7 +101,7 @@ fn no_belief_scores_nothing() {
     assert_eq!((nothing.volume_error, nothing.area_error), (Some(-1.0), -1.0));
 }
 
-/// Half of what is asked lies within two standard deviations, and no number is none.
+/// Half of the values lie within two standard deviations; NaN does not.
 #[test]
 fn coverage_is_the_share_within_two_standard_deviations() {
     let nothing = truth(&ball(0.05)).compare_nothing();
@@ -110,7 +110,7 @@ fn coverage_is_the_share_within_two_standard_deviations() {
     assert_eq!(nothing.with_coverage([]).coverage, None);
 }
 
-/// An open surface has no inside, but distances and an area.
+/// An open surface has no volume, but distances and an area.
 #[test]
 fn an_open_truth_has_no_inside() {
     let open = TrueShape::new(MeshBvh::new(square(0.05, 4)), false).compare(&ball(0.05));
@@ -118,7 +118,7 @@ fn an_open_truth_has_no_inside() {
     assert!(open.chamfer_m.unwrap() > 0.0 && open.area_error > 0.0);
 }
 
-/// What is left out when it is none comes back as none.
+/// Omitted `None` values are read back as `None`.
 #[test]
 fn a_row_reads_what_it_wrote() {
     let reference = truth(&ball(0.05));
@@ -132,7 +132,7 @@ fn a_row_reads_what_it_wrote() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// The distance knows no direction, and neither does what is inside both.
+    /// Distance and overlap are symmetric.
     #[test]
     fn truth_and_belief_may_change_places(by in prop::array::uniform3(-0.02f64..0.02)) {
         let (one, other) = (object("knob"), object("cone"));
@@ -144,7 +144,7 @@ proptest! {
         prop_assert!((volumes - 1.0).abs() < 1e-5);
     }
 
-    /// Lengths grow with both, shares stay.
+    /// Lengths scale with both surfaces, shares stay.
     #[test]
     fn shares_know_no_scale(factor in 0.01f64..100.0, by in prop::array::uniform3(-0.02f64..0.02)) {
         let (truly, believed) = (ball(0.05), object("knob"));

@@ -1,4 +1,4 @@
-//! Where a finger that goes straight at a whole object can touch it.
+//! Tests of the reachable surface of a whole object with straight approaches.
 
 use crate::common::shapes::{box_corners, box_mesh, point, sphere_mesh};
 use nalgebra::{UnitVector3, Vector3};
@@ -10,13 +10,13 @@ use palpate::geometry::spread::{Spot, over_surface};
 use palpate::robot::finger::Finger;
 use std::path::Path;
 
-/// The axis of a finger that comes tip first, its cylinder straight behind its hemisphere.
+/// Axis of a finger that approaches tip first, its cylinder straight behind its hemisphere.
 fn tip_first(finger: &Finger) -> impl Fn(&UnitVector3<f64>) -> Vector3<f64> + Sync + use<> {
     let length_m = finger.length_m;
     move |ahead| ahead.scale(-length_m)
 }
 
-/// Tip first, from anywhere.
+/// Reachability with tip-first approaches from any direction.
 fn touched(mesh: &MeshBvh, spots: &[Spot], radius_m: f64) -> Vec<bool> {
     let axis_w = tip_first(&Finger::default());
     Reach { radius_m, axis_w: &axis_w, lowest_m: None }.touches(mesh, spots)
@@ -52,8 +52,8 @@ fn all_of_a_convex_object_is_reached() {
     }
 }
 
-/// Two plates with a gap between them: a finger thinner than the gap by enough to come in askew
-/// reaches the faces within, a thicker one neither.
+/// Two plates with a gap: a finger thin enough for an oblique approach reaches the inner faces, a
+/// thicker one neither.
 #[test]
 fn a_gap_is_reached_into_by_a_finger_that_fits() {
     for (gap_m, fits) in [(0.013, false), (0.05, true)] {
@@ -71,7 +71,7 @@ fn a_gap_is_reached_into_by_a_finger_that_fits() {
     }
 }
 
-/// The wall of a cavity is surface too, and out of reach.
+/// The wall of a cavity is part of the surface, but unreachable.
 #[test]
 fn nothing_reaches_into_a_closed_cavity() {
     let (out, within) = ([[0.0; 3], [0.1; 3]], [[0.02; 3], [0.08; 3]]);
@@ -82,13 +82,13 @@ fn nothing_reaches_into_a_closed_cavity() {
     let share = truth.reachable_share().unwrap();
     let law = 0.1_f64.powi(2) / (0.1_f64.powi(2) + 0.06_f64.powi(2));
     assert!((share - law).abs() < 2e-3, "{share} {law}");
-    // A belief without the cavity is right wherever it can be.
+    // A belief without the cavity is correct on the reachable surface.
     let metrics = truth.compare(&boxes(&[out]));
     assert!(metrics.reachable_chamfer_m.unwrap() < 1e-12);
     assert!(metrics.chamfer_m.unwrap() > 1e-3, "{metrics:?}");
 }
 
-/// Where a finger fits, a thinner one fits within it.
+/// A thinner finger reaches at least what a thicker one does.
 #[test]
 fn a_thinner_finger_reaches_more() {
     for name in ["gear", "vase", "mug"] {
@@ -113,15 +113,15 @@ fn what_the_object_stands_on_is_in_the_way() {
     let limit = (radius_m - ball_m) / (radius_m + ball_m);
     for (spot, is_touched) in spots.iter().zip(reach.touches(&mesh, &spots)) {
         let up = (spot.point.z - 0.2) / ball_m;
-        // A face leans by up to half of what one of its 40 rings does.
+        // A face tilts by up to half of one of its 40 rings.
         if (up - limit).abs() > 0.05 {
             assert_eq!(is_touched, up > limit, "{up}");
         }
     }
 }
 
-/// The ground of a well 30 mm wide and 60 mm deep is reached by a finger that comes tip first, not
-/// by one that lies across its way.
+/// The bottom of a well 30 mm wide and 60 mm deep is reachable tip first, but not with a finger
+/// across the approach.
 #[test]
 fn the_finger_behind_the_tip_must_fit_too() {
     let well = boxes(&[

@@ -1,4 +1,4 @@
-//! Parts of a run, put together.
+//! Tests of shards and their merging.
 
 use crate::common::counting::peak_bytes;
 use crate::common::program::palpate;
@@ -10,7 +10,7 @@ use std::path::Path;
 const SETS: [&str; 4] =
     ["trials=7", "touches=8", "initial_touches=3", "planners=[\"active\",\"random\"]"];
 
-/// Runs the toy with `more` in `out`; how it ended and what it said.
+/// Runs the toy with `more` in `out`; returns exit code and output.
 fn run(out: &Path, more: &[&str]) -> (Option<i32>, String) {
     let mut arguments =
         vec!["--quiet", "run", "toy", "--no-report", "--out", out.to_str().unwrap()];
@@ -34,7 +34,8 @@ fn a_shard_is_every_nth_trial() {
     }
 }
 
-/// The bytes of a run in one process; and what is no whole is refused, and nothing written.
+/// Merged shards have the bytes of a run in one process; incomplete sets are rejected without
+/// writing.
 #[test]
 fn shards_are_merged_to_the_bytes_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -42,7 +43,7 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     let text = |name: &str| at(name).to_str().unwrap().to_owned();
     assert_eq!(run(&at("whole"), &[]).0, Some(0));
     for shard in ["1", "2", "3"] {
-        // The second is stopped after its first trial and begun again.
+        // The second run is stopped after its first trial and restarted.
         if shard == "2" {
             run(&at(shard), &["--shard", "2/3", "--set", "trials=2"]);
             assert!(
@@ -68,18 +69,18 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     let (code, told) = merge("missing", &["1", "3"]);
     assert!(code == Some(2) && told.contains("4 of 14 trials are missing"), "{told}");
     let (code, told) = merge("twice", &["1", "2", "3", "whole"]);
-    assert!(code == Some(2) && told.contains("stands in"), "{told}");
+    assert!(code == Some(2) && told.contains("is in both"), "{told}");
     run(&at("foreign"), &["--shard", "1/3", "--set", "gp.noise_sd_m=0.01"]);
     let (code, told) = merge("of-two", &["2", "foreign"]);
-    assert!(code == Some(2) && told.contains("another experiment"), "{told}");
+    assert!(code == Some(2) && told.contains("not the experiment of"), "{told}");
     let (code, told) = merge("merged", &["1", "2", "3"]);
-    assert!(code == Some(2) && told.contains("has rows already"), "{told}");
+    assert!(code == Some(2) && told.contains("already has rows"), "{told}");
     assert!(["missing", "twice", "of-two"].iter().all(|name| !at(name).exists()));
     let (code, told) = run(&at("no"), &["--shard", "4/3"]);
     assert!(code == Some(2) && told.contains("from 1 to N"), "{told}");
 }
 
-/// What is kept of a row is which trial it is and where it stands.
+/// Only the trial and the position of each row are kept in memory.
 #[test]
 fn rows_are_merged_without_being_kept() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Shear of the skin: what electrodes, frames and PAC make of friction, against real sensors, and
-//! where the finger says it is touched meanwhile.
+//! Tests of skin shear: response of electrodes, frames and PAC to friction, compared with real
+//! sensors, and the located contact.
 
 use crate::common::quiet::{plane, quiet as ideal};
 use crate::common::shapes::Dice;
@@ -22,13 +22,13 @@ use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 
 const TICK_S: f64 = 1e-3;
 
-/// Friction, and nothing that makes a reading other than ideal.
+/// Effects with friction and without any non-ideal reading.
 fn quiet() -> Effects {
     Effects { friction: Some(FrictionEffect::default()), ..ideal() }
 }
 
-/// Frames of a finger whose pad, flat on the plane, goes through `(seconds, velocity)` one after
-/// another from a height.
+/// Frames of a finger whose pad, flat on the plane, follows `(seconds, velocity)` segments from a
+/// height.
 fn frames(effects: &Effects, height_m: f64, way: &[(f64, Vector3<f64>)]) -> Vec<Frame> {
     let tip = Fingertip::new(&Finger::default(), effects);
     let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
@@ -64,9 +64,10 @@ fn agreements() -> Vec<(String, Agreement, Agreement)> {
     found.collect()
 }
 
-/// The bars: a correlation of 0.8 with what was measured under lateral force on both sensors, and
-/// each of the eight largest slopes within a factor of two. Under axial force, which moves counts
-/// a quarter as far, the measured patterns of the two sensors correlate by 0.75 with each other.
+/// Bounds: a correlation of 0.8 with measurements under lateral force on both sensors, and each of
+/// the eight largest slopes within a factor of two. Under axial force, which changes counts a
+/// quarter as much, the measured patterns of the two sensors have a correlation of 0.75 with each
+/// other.
 #[test]
 fn electrodes_answer_tangential_force_as_real_ones_do() {
     for (sensor, lateral, axial) in agreements() {
@@ -81,14 +82,14 @@ fn electrodes_answer_tangential_force_as_real_ones_do() {
         assert!(lateral.correlation() >= 0.8, "{sensor}: {lateral:?}");
         assert!(least >= 0.5 && most <= 2.0, "{sensor}: {least} to {most}: {lateral:?}");
         assert!(axial.correlation() >= 0.65, "{sensor}: {axial:?}");
-        // The left side comes down under a force to the right, the right side lifts.
+        // The left side is compressed by a force to the right, the right side is unloaded.
         for (left, right) in [(0, 10), (1, 11), (2, 12), (3, 13), (4, 14), (5, 15)] {
             assert!(lateral.model[left] < 0.0 && lateral.model[right] > 0.0, "{lateral:?}");
         }
     }
 }
 
-/// A correlation and ratios of known slopes.
+/// Correlation and ratios of known slopes.
 #[test]
 fn agreement_is_pearsons_correlation_and_least_squares() {
     let measured = std::array::from_fn(|i| (i as f64 - 9.0) * 10.0);
@@ -120,7 +121,7 @@ fn lifted_off_while_stretched_the_skin_is_at_rest_at_once() {
         let entries = frame.electrode_counts.unwrap().into_iter().zip(rest);
         entries.map(|(counts, rest)| (counts - rest).abs()).fold(0.0, f64::max)
     };
-    // The finger went to the right, the skin stays behind to the left: left electrodes rise.
+    // The finger moved right, the skin lags to the left: left electrodes rise.
     let held = felt[12].electrode_counts.unwrap();
     assert!(held[0] > rest[0] + 20.0 && held[10] < rest[10] - 20.0, "{held:?}");
     assert_eq!(felt[12].electrode_counts, felt[14].electrode_counts);
@@ -140,7 +141,7 @@ fn slip_is_told_in_the_frames_in_which_it_happens() {
     assert!(slips[40..60].iter().all(|slips| !slips) && !slips[60], "{slips:?}");
 }
 
-/// The power of PAC above its own noise doubles with the speed of slip and with the roughness.
+/// The PAC signal above its noise doubles with the slip speed and with the roughness.
 #[test]
 fn pac_shakes_with_the_speed_of_slip_and_the_roughness() {
     let shaken = |speed_m_s: f64, roughness_pa2_s_m: f64| {
@@ -158,7 +159,7 @@ fn pac_shakes_with_the_speed_of_slip_and_the_roughness() {
     };
     let (once, held) = shaken(0.02, 5000.0);
     println!("PAC shakes by {:.1} counts at 20 mm/s", once.sqrt());
-    // 10 Pa at 20 mm/s are 27 counts, of which the band takes a little.
+    // 10 Pa at 20 mm/s are 27 counts, slightly reduced by the band-pass.
     assert!((20.0..30.0).contains(&once.sqrt()) && held < 1e-3, "{once} {held}");
     for (speed_m_s, roughness, times) in [(0.08, 5000.0, 4.0), (0.02, 10000.0, 2.0)] {
         let ratio = shaken(speed_m_s, roughness).0 / once;
@@ -167,8 +168,8 @@ fn pac_shakes_with_the_speed_of_slip_and_the_roughness() {
     assert!(shaken(0.02, 0.0).0 < 1e-3);
 }
 
-/// Root mean square distance to the centre of pressure, in mm, and median angle between normal and
-/// force, of a finger pressed on a plane with 1 to 6 N and sheared from not at all to slipping.
+/// RMS distance to the centre of pressure, mm, and median angle between normal and force, of a
+/// finger pressed on a plane with 1 to 6 N and sheared from zero to slip.
 fn located(
     effects: &Effects,
     estimate: &dyn Fn(&Frame, &Frame) -> Option<PointOfContact>,
@@ -201,8 +202,8 @@ fn located(
     (1e3 * f64::sqrt(squares / angles.len() as f64), angles[angles.len() / 2])
 }
 
-/// The bars: Eq. 1 within the 3 mm of real sensors as long as nothing is sheared, the plane that
-/// explains all electrodes within 2 mm whether or not.
+/// Bounds: Eq. 1 within the 3 mm of real sensors without shear, the plane fit of all electrodes
+/// within 2 mm with and without shear.
 #[test]
 fn the_point_of_contact_is_known_under_shear() {
     let finger = Finger::default();
@@ -218,8 +219,8 @@ fn the_point_of_contact_is_known_under_shear() {
     assert!(plane.0 <= 2.0 && plane_sheared.0 <= 2.0, "{plane:?} {plane_sheared:?}");
 }
 
-/// Planes against the pad of fingers of several sizes: what was pressed is found, also if an
-/// electrode is open, and nothing is found where nothing fell.
+/// Planes against the pad of fingers of several sizes: the contact is found, also with an open
+/// electrode; without a signal none is found.
 #[test]
 fn a_plane_is_found_by_a_finger_of_any_size_and_without_an_electrode() {
     for radius_m in [5e-3, 7e-3, 1e-2] {

@@ -1,5 +1,4 @@
-//! The skin as a shell: its presses against the shell solver of others, energy, and everything that
-//! could make it diverge.
+//! Tests of the shell skin: presses against an independent shell solver, energy, and stability.
 
 use crate::common::counting::allocations;
 use crate::common::shapes::{BOX, box_corners, mesh, point, square};
@@ -32,7 +31,7 @@ pub fn shell(cells: [usize; 2], cavity_pa_m3: f64) -> Skin {
     Skin::new(&Profile::biotac(&Finger::default()), &effect, cavity_pa_m3)
 }
 
-/// Something to press on, whose foremost point is the origin of `W`, with normal z.
+/// An object to press on, whose foremost point is the origin of `W`, with normal z.
 pub struct Object {
     pub bvh: MeshBvh,
 }
@@ -57,14 +56,14 @@ pub fn ball() -> Object {
     Object { bvh: MeshBvh::new(mesh(&corners, &triangles)) }
 }
 
-/// The pose in which the skin's foremost point is `depth_m` below the object's.
+/// Pose in which the skin's foremost point is `depth_m` below the object's.
 pub fn at(pitch_deg: f64, depth_m: f64) -> Isometry3<f64> {
     let towards_t = direction_t(FRAC_PI_2 - pitch_deg.to_radians(), 0.0);
     let profile = Profile::biotac(&Finger::default());
     let foremost = |a: &Point3<f64>, b: &Point3<f64>| {
         a.coords.dot(&towards_t).total_cmp(&b.coords.dot(&towards_t))
     };
-    // The skin is symmetric: what is foremost lies in its middle.
+    // The skin is symmetric, so its foremost point lies in its middle.
     let steps = (-2100..=700).map(|i| profile.skin_t(1e-5 * f64::from(i), 0.0));
     let front = steps.max_by(foremost).unwrap();
     let turned = pose(&towards_t, 0.0);
@@ -76,7 +75,7 @@ pub fn press(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>, pressed: &mut 
     skin.press(&object.bvh, x_wt, pressed).unwrap()
 }
 
-/// What one press brings when it is settled again and again.
+/// Result of a press after repeated settling.
 pub fn settled(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>) -> Load {
     let mut pressed = skin.relaxed();
     (0..20).map(|_| press(skin, object, x_wt, &mut pressed)).last().unwrap()
@@ -84,8 +83,8 @@ pub fn settled(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>) -> Load {
 
 const DEPTHS_M: [f64; 2] = [0.5e-3, 1e-3];
 
-/// Forces that another solver of the same shell finds on 36 × 24 triangles of quadratic bending,
-/// with compliance through the thickness.
+/// Forces of an independent solver of the same shell on 36 × 24 triangles with quadratic bending
+/// and compliance through the thickness.
 #[test]
 fn presses_agree_with_another_solver() {
     let skin = shell([36, 24], CAVITY_PA_M3);
@@ -102,9 +101,9 @@ fn presses_agree_with_another_solver() {
     }
 }
 
-/// A shell of MuJoCo's (`flex`) of the same skin stretches like 0.31 E with ν = 0.633 and bends
-/// like half of D: a dry finger of that material takes 0.26 and 0.66 N on a plane, on 24 × 16
-/// cells. Compliance through the thickness, which that shell has not, takes a tenth of it.
+/// A MuJoCo shell (`flex`) of the same skin stretches like 0.31 E with ν = 0.633 and bends like
+/// half of D: a dry finger of that material needs 0.26 and 0.66 N on a plane, on 24 × 16 cells.
+/// Compliance through the thickness, which that shell lacks, reduces it by a tenth.
 #[test]
 fn a_dry_press_agrees_with_mujocos_material() {
     let poisson = 0.633;
@@ -126,7 +125,7 @@ fn a_dry_press_agrees_with_mujocos_material() {
     }
 }
 
-/// The force is minus the gradient of the energy, in core contact too.
+/// The force is minus the gradient of the energy, also in core contact.
 #[test]
 fn work_becomes_energy() {
     const STEP_M: f64 = 2e-6;
@@ -142,8 +141,8 @@ fn work_becomes_energy() {
     }
 }
 
-/// Pressed tick by tick the shell is nowhere far from where it ends if nothing moves any more:
-/// within 1 % up to 1.5 mm; and it comes back along the way on which it went in.
+/// Pressed tick by tick, the shell is close to its equilibrium: within 1 % up to 1.5 mm; it unloads
+/// along its loading path.
 #[test]
 fn it_follows_a_press_and_unloads_along_its_path() {
     let skin = shell([24, 16], CAVITY_PA_M3);
@@ -178,7 +177,7 @@ fn it_follows_a_press_and_unloads_along_its_path() {
     }
 }
 
-/// A press in the middle has no side; presses left and right are mirror images.
+/// A press in the middle is symmetric; presses left and right are mirror images.
 #[test]
 fn left_and_right_are_alike() {
     let skin = shell([24, 16], CAVITY_PA_M3);
@@ -200,7 +199,7 @@ fn is_finite(load: &Load) -> bool {
         && load.pressure_pa.is_finite()
 }
 
-/// The energy never rises, whatever pushes, from wherever the shell is.
+/// A correction never increases the energy, from any state.
 #[test]
 fn a_correction_never_adds_energy() {
     let lattice = Lattice::new(&Profile::biotac(&Finger::default()), [12, 8]);
@@ -227,8 +226,8 @@ fn a_correction_never_adds_energy() {
     }
 }
 
-/// Edges, a needle and a corner 2 mm deep, with moduli at the ends of what is allowed, jumps of a
-/// millimetre, and away again.
+/// Edges, a needle and a corner, 2 mm deep, with moduli at the limits, jumps of a millimetre, and
+/// retraction.
 #[test]
 fn nothing_makes_it_diverge() {
     let blade = box_corners(point(-0.05, -2e-4, -0.05), point(0.05, 2e-4, 0.0));
@@ -294,7 +293,7 @@ fn a_touch_of_a_scene_is_felt_with_it() {
         contact(probe.touch(&environment.task().approach(&[0.0, 0.5].into()).unwrap()).unwrap())
             .p_wc
     });
-    // Electrodes tell the place to some 3 mm (docs/finger.md).
+    // Electrodes locate contact to about 3 mm (docs/finger.md).
     assert!((shell - columns).norm() < 3e-3 && shell != columns, "{shell} {columns}");
 }
 

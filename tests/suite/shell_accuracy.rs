@@ -1,5 +1,5 @@
-//! How near the shell is, tick by tick, to where it ends if nothing moves any more, and how near its
-//! default cells are to finer ones: over shapes and pitches.
+//! Accuracy of the shell over shapes and pitches: of each tick relative to equilibrium, and of its
+//! default cells relative to finer ones.
 
 use crate::common::shapes::{mesh, point};
 use crate::common::shipped::environment;
@@ -37,19 +37,19 @@ fn objects() -> [(&'static str, Object); 4] {
     [("plane", plane()), ("sphere", ball()), ("edge", edge()), ("bird", bird())]
 }
 
-/// Parts by which force and pressure are off.
+/// Relative errors of force and pressure.
 fn apart(found: &Load, right: &Load) -> [f64; 2] {
     [found.force_n.norm() / right.force_n.norm() - 1.0, found.pressure_pa / right.pressure_pa - 1.0]
 }
 
-/// Where the shell ends at a depth from rest, on the same elements.
+/// Equilibrium of the shell at a depth from rest, on the same elements.
 fn ends(skin: &Skin, object: &Object, pitch_deg: f64, depth_m: f64) -> Load {
     let mut pressed = skin.relaxed();
     let x_wt = at(pitch_deg, depth_m);
     (0..40).map(|_| press(skin, object, &x_wt, &mut pressed)).last().unwrap()
 }
 
-/// The bars: 2 % of force and pressure up to 1 mm, 5 % up to 1.5 mm, ticks of 10 µm.
+/// Bounds: 2 % of force and pressure up to 1 mm, 5 % up to 1.5 mm, with ticks of 10 µm.
 #[test]
 fn ticks_stay_near_where_the_shell_ends() {
     let skin = shell([24, 16], CAVITY_PA_M3);
@@ -78,8 +78,8 @@ fn ticks_stay_near_where_the_shell_ends() {
     });
 }
 
-/// Within 8 % of 36 × 24 cells at 1 mm. Of an edge and of a nose the size of a cell the nodes see
-/// more or less as they happen to lie, and at half the depth of anything.
+/// Within 8 % of 36 × 24 cells at 1 mm. The load of an edge or a nose of the size of a cell depends
+/// on the position of the nodes, as do all loads at half the depth.
 #[test]
 fn the_default_cells_are_fine_enough() {
     let [coarse, fine] = [[24, 16], [36, 24]].map(|cells| shell(cells, CAVITY_PA_M3));

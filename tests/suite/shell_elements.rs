@@ -1,4 +1,4 @@
-//! The elements of the skin's shell against closed forms: a strip, a plate, a dome.
+//! Tests of the skin's shell elements against closed forms: a strip, a plate, a dome.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use palpate::math::banded::Banded;
@@ -24,7 +24,7 @@ fn sheet(
     Sheet::new(points, &triangles, &all().map(border).collect::<Vec<_>>(), material)
 }
 
-/// Displacements under `forces_n`, with the directions for which `fixed` holds.
+/// Displacements under `forces_n`, with the directions selected by `fixed` held.
 fn displaced(
     sheet: &Sheet,
     forces_n: &DVector<f64>,
@@ -43,7 +43,7 @@ fn displaced(
     stiffness.cholesky().unwrap().solve(forces_n)
 }
 
-/// Under tension a strip grows by F/(E A) and thins by ν times that.
+/// Under tension a strip lengthens by F/(E A) and narrows by ν times that.
 #[test]
 fn a_strip_shows_its_modulus_and_poissons_ratio() {
     let (length_m, width_m) = (0.04, 0.01);
@@ -63,8 +63,8 @@ fn a_strip_shows_its_modulus_and_poissons_ratio() {
 }
 
 /// A clamped square plate of side a sinks by 0.00126 q a⁴/D in its middle (Timoshenko, Theory of
-/// Plates and Shells, table 35). Constant curvatures are soft, by an error that falls with the
-/// square of the cells.
+/// Plates and Shells, table 35). Constant curvatures are too soft, by an error that decreases with
+/// the square of the cell size.
 #[test]
 fn a_clamped_plate_bends_as_stiffly_as_it_should() {
     let (side_m, material) = (0.02, Material { thickness_m: 4e-4, ..SILICONE });
@@ -89,7 +89,7 @@ fn a_clamped_plate_bends_as_stiffly_as_it_should() {
 }
 
 /// A point load on a hemisphere: w = P R √(3 (1 − ν²)) / (4 E t²) (Reissner 1946). The bound of a
-/// tenth is that of a thick dome for a law of thin shallow ones.
+/// tenth allows for a thick dome in a theory of thin shallow ones.
 #[test]
 fn a_hemisphere_yields_under_a_point_as_reissner_says() {
     let radius_m = 7e-3;

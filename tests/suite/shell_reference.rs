@@ -1,9 +1,9 @@
-//! Why another solver of the skin's shell finds less force on the flat pulp: its own elements on
-//! the same nodes find its figures.
+//! Explains the smaller force of an independent solver of the skin's shell on the flat pulp: its
+//! elements on the same nodes reproduce its results.
 //!
 //! That solver bends about hinges (Bergou et al., A quadratic bending model for inextensible
-//! surfaces, 2006, with a third of its coefficient), in all three directions, and so lets go of the
-//! slope along the nail, where there is no hinge; and its volume is that of small motions.
+//! surfaces, 2006, with a third of its coefficient) in all three directions. It does not constrain
+//! the slope along the nail, where there is no hinge, and its volume is valid for small motions.
 
 use nalgebra::Vector3;
 use palpate::math::banded::{Banded, Factor};
@@ -52,7 +52,7 @@ fn hinges(lattice: &Lattice) -> Vec<Hinge> {
 
 struct Other {
     lattice: Lattice,
-    /// Stretches as the shell and bends not at all.
+    /// Membrane elements of the shell, without bending.
     sheet: Sheet,
     hinges: Vec<Hinge>,
     factor: Factor,
@@ -105,7 +105,7 @@ impl Other {
         moved_m
     }
 
-    /// Forces at depths on a plane that the pulp faces, one after the other.
+    /// Forces at a sequence of depths on a plane that faces the pulp.
     fn press(&self, depths_m: &[f64]) -> Vec<f64> {
         let nodes = self.lattice.nodes();
         let lowest_m = nodes.iter().map(|node| -node.point.z).fold(0.0, f64::max);
@@ -178,11 +178,12 @@ impl Other {
     }
 }
 
-/// Corrections at each depth (chosen: the force then changes by less than a thousandth).
+/// Corrections at each depth.
+// heuristic: the force then changes by less than a thousandth.
 const CORRECTIONS: usize = 8;
 
-/// 0.70 and 2.40 N at 0.5 and 1 mm on 36 × 24 cells, where the shell of the skin, which is clamped
-/// along the nail and whose volume is exact, takes 0.82 and 3.11 N.
+/// 0.70 and 2.40 N at 0.5 and 1 mm on 36 × 24 cells; the skin's shell, which is clamped along the
+/// nail and has an exact volume, needs 0.82 and 3.11 N.
 #[test]
 fn its_elements_find_its_forces_on_the_flat_pulp() {
     let depths_m: Vec<f64> = (1..=10).map(|step| 1e-4 * f64::from(step)).collect();

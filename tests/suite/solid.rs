@@ -1,5 +1,5 @@
-//! Beliefs of whole objects on the page, as figures and as files: what is written is what was
-//! given.
+//! Tests of beliefs of whole objects on the page, as figures and as files: outputs contain the
+//! given data.
 
 use crate::common::solids::{nets, ring, ring_m, sequence};
 use crate::figures::reads_well;
@@ -17,14 +17,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::slice;
 
-/// Edges of the cells of made-up beliefs: some 1300 triangles each.
+/// Cell size of synthetic beliefs: about 1300 triangles each.
 const CELL_M: f64 = 0.008;
 
 fn sequences() -> Vec<Sequence> {
     ["uncertain", "random"].map(|planner| sequence(planner, 12, CELL_M)).to_vec()
 }
 
-/// The data of a section, as its script reads it.
+/// Data of a section, as its script reads it.
 fn data(section: &str) -> Value {
     let json = section.split("id=\"explorer-data\">").nth(1).unwrap();
     serde_json::from_str(json.split("</script>").next().unwrap()).unwrap()
@@ -38,14 +38,14 @@ fn bytes(value: &Value) -> Vec<u8> {
     STANDARD.decode(value.as_str().unwrap()).unwrap()
 }
 
-/// Sixteen bits each as shares from 0 to 1; the highest is none.
+/// Converts sixteen-bit codes to shares from 0 to 1; the highest code means no value.
 fn shares(value: &Value) -> Vec<f64> {
     let bytes = bytes(value);
     let codes = bytes.as_chunks().0.iter().map(|&pair| u16::from_le_bytes(pair));
     codes.map(|code| if code == 65535 { f64::NAN } else { f64::from(code) / 65534.0 }).collect()
 }
 
-/// The vertex at each corner, by the rule of the high-water mark.
+/// Vertex at each corner, decoded with the high-water mark.
 fn corners(value: &Value) -> Vec<usize> {
     let bytes = bytes(value);
     let (mut rest, mut next, mut corners) = (&bytes[..], 0, Vec::new());
@@ -66,8 +66,8 @@ fn corners(value: &Value) -> Vec<usize> {
     corners
 }
 
-/// Positions are off by half a code of a cube around everything at most, σ by half a code of its
-/// logarithm, errors by half a code of their range; triangles are the same ones.
+/// Positions have an error of at most half a code of a cube around everything, σ of half a code of
+/// its logarithm, errors of half a code of their range; triangles are exact.
 #[test]
 fn the_page_holds_what_was_given() {
     let (mut given, truth) = (sequences(), ring());
@@ -79,7 +79,7 @@ fn the_page_holds_what_was_given() {
     let middle = {
         let all = given.iter().flat_map(|it| &it.frames).flat_map(|it| &it.mesh.0);
         let contacts = given.iter().flat_map(|it| &it.touches).filter_map(|it| it.contact_w);
-        // Of the truth what is shown counts.
+        // Only the displayed part of the ground truth counts.
         let shown = coarse(&truth, 8000).0;
         let points: Vec<Point3<f64>> = all.copied().chain(contacts).chain(shown).collect();
         let low = points.iter().fold(points[0], |low, p| low.inf(p));
@@ -134,7 +134,7 @@ fn the_page_holds_what_was_given() {
     }
 }
 
-/// Indices that need two more bytes: each triangle of a fan joins the first vertex.
+/// Indices that need two more bytes: each triangle of a fan uses the first vertex.
 #[test]
 fn a_corner_may_lie_far_back() {
     let rim = 400;
@@ -173,7 +173,7 @@ fn the_same_is_written_every_time_and_no_name_ends_the_script() {
     assert!(png(&svg).unwrap() == png(&svg).unwrap());
 }
 
-/// A frame in 1.6 MB, whatever there is; the first and the last count are kept.
+/// Frames are limited to 1.6 MB; the first and the last count are kept.
 #[test]
 fn counts_fill_the_room_on_a_page() {
     assert_eq!(counts(5, 40, 1, 2000), (5..=40).collect::<Vec<u32>>());
@@ -182,7 +182,7 @@ fn counts_fill_the_room_on_a_page() {
         assert!(counts[0] == 5 && *counts.last().unwrap() == 104);
         assert!(counts.len() == 2 || counts.len() * planners * triangles * 11 <= 1_600_000);
     }
-    // What a triangle is said to take, it does not exceed.
+    // The estimated size per triangle is not exceeded.
     let given = sequences();
     let triangles: usize =
         given.iter().flat_map(|sequence| &sequence.frames).map(|frame| frame.mesh.1.len()).sum();
@@ -198,7 +198,7 @@ fn counts_fill_the_room_on_a_page() {
     assert!((8.0..11.0).contains(&of_triangle), "{of_triangle} bytes, {frames} frames");
 }
 
-/// No belief is no section; a belief without a surface is one.
+/// Without a belief there is no section; with a belief without a surface there is one.
 #[test]
 fn nothing_and_little_can_be_shown() {
     let none = Sequence { frames: Vec::new(), ..sequence("none", 6, 0.02) };
@@ -227,8 +227,8 @@ fn a_figure_reads_well_and_has_a_panel_for_each_count_and_side() {
     }
 }
 
-/// Area, volume and bounds of a mesh as a file and read back, by the tenth of a micrometre that
-/// files hold.
+/// Area, volume and bounds of a mesh written to a file and read back, to the tenth of a micrometre
+/// of the files.
 #[test]
 fn files_hold_the_surface_that_was_given() {
     let folder = tempfile::tempdir().unwrap();
@@ -283,7 +283,7 @@ fn page(folder: &Path, script: &str) -> PathBuf {
     path
 }
 
-/// WebGL by the processor, so that a machine without a graphics card draws.
+/// Software WebGL, for machines without a graphics card.
 const DRAWN: [&str; 3] =
     ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
@@ -305,11 +305,11 @@ fn a_solid_is_turned_zoomed_and_coloured() {
     assert_eq!(acts.len(), 13, "{acts:?}");
     for pair in acts.windows(2) {
         let [_, [name, picture, _]] = pair else { unreachable!() };
-        // It is coloured by σ at first, and seen from above no higher.
+        // It is coloured by σ initially, and the view from above is limited.
         let is_same = pair[0][1] == *picture;
         assert_eq!(is_same, ["deviation", "pole"].contains(&name.as_str()), "{name}: {acts:?}");
     }
-    // Nothing is left of what was seen in between.
+    // No trace remains of the intermediate view.
     assert_eq!(acts[12][1], acts[9][1], "{acts:?}");
     let words = |act: usize| acts[act][2].as_str();
     assert!(words(0).starts_with("uncertain after 12 touches: Chamfer"), "{}", words(0));

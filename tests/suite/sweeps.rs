@@ -1,4 +1,4 @@
-//! Several experiments in one file.
+//! Tests of several experiments in one file.
 
 use crate::common::program::{command, ended, folder};
 use palpate::experiment::store::Run;
@@ -7,7 +7,7 @@ use std::fs;
 
 const SWEEP: &str = "\n[sweep]\ngrid = [5, 7]\nscene = [\"scene.toml\", \"other.toml\"]\n";
 
-/// Every combination is a run of its own, with the same seeds; what is no list is refused.
+/// Every combination is a separate run with the same seeds; values that are not lists are rejected.
 #[test]
 fn a_sweep_is_a_run_for_each_combination() {
     let folder = folder();

@@ -1,4 +1,5 @@
-//! An explorer and a twin in one process: contacts, faults, and how they are cleared.
+//! Tests of an explorer and a simulated robot in one process: contacts, faults, and clearing of
+//! faults.
 
 use crate::common::hub::Hub;
 #[cfg(feature = "mujoco")]
@@ -10,7 +11,7 @@ use palpate::ros::settings::BackendSettings;
 use palpate::ros::topics::{CommandMessage, Service, Side, TactileMessage};
 use palpate::ros::twin::serve::services;
 
-/// The contact by topics and by the body itself, for the same place.
+/// Compares the contact over topics with that of the body itself at the same place.
 fn compare(scene: &str, settings: BackendSettings) {
     let rig = Rig::new(scene, settings, &[]);
     let place = [0.4, 0.55];
@@ -38,7 +39,7 @@ fn an_arm_behind_topics_touches_where_the_body_itself_does() {
     compare(ARM, patient());
 }
 
-/// A Shadow hand, commands without names, joints that the lab calls otherwise.
+/// A Shadow hand, commands without names, and joints with other names.
 #[test]
 fn other_drivers_and_other_names_touch_there_too() {
     let mut settings = patient();
@@ -88,7 +89,7 @@ fn nobody_there_is_said_with_names_and_types() {
     }
 }
 
-/// A fault stays until the operator clears it; what was pressed must be released first.
+/// A fault persists until the operator clears it; a pressed stop must be released first.
 #[test]
 fn the_arm_moves_again_when_the_operator_has_cleared_it() {
     let rig = Rig::new(STAGE, patient(), &[("no_joints", 0.1, Some(0.8))]);

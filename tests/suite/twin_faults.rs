@@ -1,7 +1,8 @@
-//! Failures on either side of the topics: the explorer's message, and how far the tip still moves.
+//! Tests of failures on either side of the topics: the explorer's message, and the distance that
+//! the tip moves.
 //!
-//! The tests of times and paths need the machine for themselves and are ignored without:
-//! `make test-faults` runs them and prints the table of `docs/safety.md`.
+//! The tests of times and paths need an idle machine and are ignored by default: `make test-faults`
+//! runs them and prints the table of `docs/safety.md`.
 
 #[cfg(feature = "mujoco")]
 use crate::common::rig::{ARM, Rest};
@@ -15,7 +16,7 @@ use std::sync::atomic::Ordering;
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Names of failures with what the explorer must say of them.
+/// Names of failures with the required parts of the explorer's message.
 const ENDED: &[(&[&str], &str)] = &[
     (&["nan"], "is NaN"),
     (&["swapped_names"], "beyond its speed limit"),
@@ -42,29 +43,29 @@ const ENDED: &[(&[&str], &str)] = &[
 /// Part of the message about messages dropped for their stamps.
 const BACKWARD: &str = "were dropped because their stamps ran backwards";
 
-/// Joints that repeat themselves are found by whichever of two interlocks is first.
+/// Repeated joint states are detected by the faster of two interlocks.
 const STANDSTILL: &str = "joint standstill of ";
 
-/// Whether the explorer said what it must. Of a fast arm whose joint states are dropped it may see
-/// first that the joints stand still.
+/// Whether the explorer's message is the required one. On a fast arm with dropped joint states, it
+/// may first detect a joint standstill.
 fn is_said(said: &str, says: &str) -> bool {
     said.contains(says)
         || says == BACKWARD && said.contains(STANDSTILL)
         || says == STANDSTILL && said.contains("position tracking error of ")
 }
 
-/// Each failure from some time after the first movement on.
+/// Injects each failure from some time after the first movement on.
 fn injected<'a>(names: &[&'a str], at_s: f64) -> Vec<(&'a str, f64, Option<f64>)> {
     names.iter().map(|&name| (name, at_s, None)).collect()
 }
 
-/// Every failure of the arm's side, and what the explorer says of it.
+/// Every failure of the arm's side, and the explorer's message.
 #[test]
 fn the_explorer_says_what_failed() {
     std::thread::scope(|scope| {
         for (names, says) in ENDED {
             scope.spawn(move || {
-                // Silence and order are found by age limits, which must be the usual ones.
+                // Silence and order are detected by age limits, which must be the default ones.
                 let is_aged = ["no_joints", "no_wrench", "no_tactile", "backward"];
                 let settings = match is_aged.contains(&names[0]) {
                     true => BackendSettings { patience_s: 20.0, ..BackendSettings::default() },
@@ -97,8 +98,8 @@ fn what_does_not_hinder_a_touch_does_not_stop_it() {
     });
 }
 
-/// A failure that is over before the explorer looks again is one all the same: it is not the
-/// explorer's to go on.
+/// A failure that ends before the explorer's next check still ends the run; the explorer must not
+/// continue by itself.
 #[test]
 fn a_hold_or_stop_of_an_instant_ends_the_run() {
     std::thread::scope(|scope| {
@@ -178,29 +179,30 @@ fn a_status_is_read_as_drivers_write_it_and_nothing_unreadable_is_safe() {
         assert!(ArmStatus::read(&status(0, &twice), "pa10").is_err(), "{key}");
     }
     assert!(ArmStatus::read(&status(0, &[]), "pa10").is_err());
-    // Whatever is wrong is an alarm, with or without words.
+    // Any error level is an alarm, with or without a text.
     for level in 2..=255 {
         assert!(read(level, &READY).refusal().is_some(), "{level}");
     }
     let alarm = [&READY[..], &[("alarm", "joint 3 is hot")]].concat();
     let alarmed = read(0, &alarm);
     assert_eq!(alarmed.refusal().unwrap(), "alarm: joint 3 is hot");
-    // What it writes, it reads.
+    // A written status is read back.
     assert_eq!(ArmStatus::read(&alarmed.message(1.0, "pa10"), "pa10"), Ok(Some(alarmed)));
     let mut other = status(0, &READY);
     other.status[0].name = "hand".into();
     assert_eq!(ArmStatus::read(&other, "pa10"), Ok(None));
 }
 
-/// The most that the tip may move from a failure on.
+/// Largest allowed movement of the tip after a failure.
 #[cfg(feature = "mujoco")]
 const PATH_MAX_M: f64 = 0.01;
 
-/// Times that a failure is measured: a machine that wakes a process late adds ticks of movement.
+/// Number of measurements of a failure: a process that wakes late adds ticks of movement.
 #[cfg(feature = "mujoco")]
 const MEASURED: usize = 3;
 
-/// Prints the row of a failure, measured again if the tip went too far; the row if it always did.
+/// Prints the row of a failure and repeats the measurement if the tip moved too far; returns the
+/// row if it always did.
 #[cfg(feature = "mujoco")]
 fn too_far(what: &str, mut measure: impl FnMut() -> (Rest, String)) -> Option<String> {
     let mut row = String::new();

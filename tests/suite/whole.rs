@@ -1,5 +1,4 @@
-//! Whole objects, touched from all sides: laws that a belief over space obeys, hard cases, and what
-//! a trial makes of them.
+//! Tests of whole objects: laws of a belief in space, hard cases, and trials.
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
@@ -34,13 +33,13 @@ fn torus(p: Vector3<f64>) -> f64 {
     (p.x.hypot(p.z) - 0.045).hypot(p.y) - 0.016
 }
 
-/// 100 mm wide and 5 mm thick, its rim rounded.
+/// A plate 100 mm wide and 5 mm thick with a rounded rim.
 fn plate(p: Vector3<f64>) -> f64 {
     let q = Vector3::new(p.x.abs() - 0.0475, p.y.abs(), p.z.abs() - 0.0475);
     q.map(|x| x.max(0.0)).norm() - 0.0025
 }
 
-/// Two balls that touch in a point, joined where they are nearer than a millimetre.
+/// Two balls that touch in a point, blended where they are closer than a millimetre.
 fn touching(p: Vector3<f64>) -> f64 {
     let one = |x: f64| (p - Vector3::x() * x).norm() - 0.03;
     one(-0.0295).min(one(0.0295))
@@ -56,8 +55,8 @@ fn surface(simulation: &Simulation, row: &TrialRow) -> Surface {
     belief.surface().unwrap().clone()
 }
 
-/// A ball is found to a thousandth of its diagonal by twenty touches of anybody, with its volume,
-/// its area and its outside.
+/// Any planner finds a ball to a thousandth of its diagonal with twenty touches, with its volume,
+/// area and outside.
 #[test]
 fn a_sphere_is_found() {
     let simulation = simulation(sphere, "planners = [\"active\", \"sobol\"]\ntouches = 20");
@@ -73,7 +72,7 @@ fn a_sphere_is_found() {
         assert!(report.is_closed());
         let mut field = surface.field();
         assert!(field.value(&Point3::origin()) < -0.01);
-        // On its surface the field grows as a distance does.
+        // On its surface the field grows like a distance.
         for away in [Vector3::x(), Vector3::new(1.0, -1.0, 1.0).normalize()] {
             let gradient = field.at(&Point3::from(away * 0.04)).gradient;
             assert!((gradient - away).norm() < 0.1, "{name}: {gradient}");
@@ -81,7 +80,7 @@ fn a_sphere_is_found() {
     }
 }
 
-/// A ring stays a ring: it is touched from inside its hole, and the hole is left open.
+/// A ring stays a ring: it is touched from inside its hole, and the hole stays open.
 #[test]
 fn a_torus_keeps_its_hole() {
     let simulation = simulation(torus, "planners = [\"active\"]\ntouches = 45");
@@ -90,7 +89,7 @@ fn a_torus_keeps_its_hole() {
     let inside = inside.filter(|[x, _, z]| x.hypot(*z) < 0.038).count();
     assert!(inside >= 3, "{inside} contacts inside the hole");
     let mesh = surface(&simulation, &row).mesh(64).unwrap();
-    // Along its axis nothing is met, and twice the ring across it.
+    // Along its axis there is no intersection, and across it two with the ring.
     let bvh = MeshBvh::new(mesh);
     let at = |x: f64| Point3::new(x, 0.1, 0.0);
     assert!(bvh.ray(&at(0.0), &-Vector3::y_axis(), 1.0).is_none());
@@ -98,7 +97,7 @@ fn a_torus_keeps_its_hole() {
     assert!(last_share(&row) < 7.5e-3, "{}", last_share(&row));
 }
 
-/// The two sides of a plate are thinner apart than the finger is wide, and stay two.
+/// The two sides of a plate thinner than the finger stay separate.
 #[test]
 fn a_thin_plate_keeps_both_sides() {
     let simulation = simulation(plate, "planners = [\"active\"]\ntouches = 45");
@@ -116,7 +115,7 @@ fn a_thin_plate_keeps_both_sides() {
     }
 }
 
-/// Two balls that touch are found, with the waist between them that no finger reaches.
+/// Two touching balls are found, with the unreachable waist between them.
 #[test]
 fn two_touching_bodies_are_found() {
     let simulation = simulation(touching, "planners = [\"active\"]\ntouches = 40");
@@ -135,7 +134,7 @@ fn plan(planner: &mut Box<dyn Planner>, belief: &ImplicitSurface) -> Aim {
     *planner.plan(&Belief::from(belief.clone())).unwrap().target.aim().unwrap()
 }
 
-/// In another size everything is the same but for rounding.
+/// Another size gives the same result up to rounding.
 #[test]
 fn size_does_not_matter() {
     let touched = |scale: f64| {
@@ -144,7 +143,7 @@ fn size_does_not_matter() {
         for _ in 0..25 {
             let aim = plan(&mut sobol, &belief);
             let outward = -aim.ahead_w.into_inner();
-            // An ellipsoid, met where the way through its middle leaves it.
+            // An ellipsoid, hit where the path through its middle leaves it.
             let radii = Vector3::new(0.06, 0.035, 0.045) * scale;
             let reach = 1.0 / outward.component_div(&radii).norm();
             let p_wc = Point3::from(outward * reach);
@@ -167,7 +166,7 @@ fn size_does_not_matter() {
     }
 }
 
-/// Where there is nothing at all there is no surface, every fit succeeds, and planners go on.
+/// Without an object there is no surface, every fit succeeds, and planners continue.
 #[test]
 fn an_object_that_is_not_there_is_not_found() {
     let mut belief = belief(0.1, 0.007);
@@ -184,8 +183,8 @@ fn an_object_that_is_not_there_is_not_found() {
     }
 }
 
-/// Touches on one side leave the other unsure: the deviation on the back is many times that on the
-/// front.
+/// Touches on one side leave the other uncertain: the standard deviation on the back is many times
+/// that on the front.
 #[test]
 fn a_back_that_nobody_touches_is_unsure() {
     let mut belief = belief(0.1, 0.007);
@@ -203,8 +202,8 @@ fn a_back_that_nobody_touches_is_unsure() {
     assert!(sds_m[1] > 5.0 * sds_m[0], "{sds_m:?}");
 }
 
-/// Every planner's targets can be reached, a trial is the same twice, and a belief drawn again from
-/// a row is the one that the row was written of.
+/// Every planner's targets are reachable, a trial is reproducible, and a belief recomputed from a
+/// row is the original one.
 #[test]
 fn rows_are_reproducible() {
     let names = ["active", "random", "sobol", "integrated_variance", "travel", "oracle"];
@@ -230,7 +229,7 @@ fn rows_are_reproducible() {
     }
 }
 
-/// Initial touches are the same of all planners of a trial and others of another trial.
+/// Initial touches are the same for all planners of a trial and differ between trials.
 #[test]
 fn planners_begin_alike() {
     let simulation = simulation(sphere, "planners = [\"active\", \"random\"]\ntouches = 6");
@@ -257,7 +256,7 @@ fn what_cannot_be_asked_for_is_refused() {
     };
     let active = "planners = [\"active\"]";
     refused("planners = [\"active\", \"slope\"]", "around = {}", "planners[1]");
-    refused("planners = [\"silhouette\"]", "around = {}", "goes around an object");
+    refused("planners = [\"silhouette\"]", "around = {}", "a planner for whole objects");
     refused(active, "around = {}\nzone = { x_m = [0, 1] }", "scene.zone");
     refused(active, "", "[around] for a whole object");
     refused(active, "around = { radius_m = -1 }", "scene.around.radius_m");
@@ -269,12 +268,12 @@ fn what_cannot_be_asked_for_is_refused() {
     );
     refused(&format!("{active}\ngp = {{ cells = 4 }}"), "around = {}", "gp.cells");
     refused(&format!("{active}\ngp = {{ mean = \"zero\" }}"), "around = {}", "gp.mean");
-    // As version 0.1 wrote it.
+    // As in version 0.1.
     refused(&format!("{active}\nspace = {{ cells = 4 }}"), "around = {}", "space.cells");
 }
 
-/// One table `[gp]` says how the belief is fitted, in either region: it is written out and read as
-/// it was, and so is what version 0.1 wrote out.
+/// One table `[gp]` configures the belief in either region; it is written and read back unchanged,
+/// as is the output of version 0.1.
 #[test]
 fn one_table_says_how_a_belief_is_fitted() {
     let path = "experiments/around.toml".as_ref();
@@ -288,12 +287,12 @@ fn one_table_says_how_a_belief_is_fitted() {
     let before = toml::to_string(&given).unwrap();
     assert!(before.contains("[gp]") && before.contains("[space]"));
     assert_eq!(read(&before), given);
-    // Left at its defaults, `[space]` was not written.
+    // With default values, `[space]` was not written.
     let plain = Experiment::load(path, &[]).unwrap();
     assert_eq!(read(&toml::to_string(&plain).unwrap()), plain);
 }
 
-/// A ball that the object is nowhere in is refused by name before anything is touched.
+/// A ball that does not contain the object is rejected by name before any touch.
 #[test]
 fn a_ball_beside_the_object_is_refused() {
     let text = "body = \"cast\"\nobject = { mesh = \"none.obj\" }\n\
@@ -306,8 +305,8 @@ fn a_ball_beside_the_object_is_refused() {
     assert!(error.contains("around.centre_m"), "{error}");
 }
 
-/// With a kernel without slopes normals are left out, as over a zone, and a ball is found from its
-/// contacts and what was swept.
+/// With a kernel without derivatives normals are omitted, as over a zone, and a ball is found from
+/// contacts and swept volumes.
 #[test]
 fn a_kernel_without_slopes_does_without_normals() {
     let simulation = simulation(
@@ -320,8 +319,7 @@ fn a_kernel_without_slopes_does_without_normals() {
     assert_eq!(fit.hyperparameters.slope_noise_sd, 0.0);
 }
 
-/// What a run found is told in the error that it was measured by, after the touches after which it
-/// was.
+/// A run's findings use its own error measure, after the touches at which it was computed.
 #[test]
 fn a_run_says_what_it_found() {
     let simulation = simulation(
@@ -350,8 +348,8 @@ fn a_run_says_what_it_found() {
     assert!(found.contains(&format!(": active {touches}.")), "{found}");
 }
 
-/// Verification touches meet what the belief expects, within its own deviations;
-/// and a rigid finger that does the same again meets the same.
+/// Verification touches agree with the belief within its standard deviations; a rigid finger that
+/// repeats a touch has the same contact.
 #[test]
 fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
     let settings = "planners = [\"active\"]\ntouches = 40\nverification_touches = 20\n\
@@ -366,7 +364,7 @@ fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
             let (error_m, sd_m) = (touch.error_m.unwrap(), touch.sd_m.unwrap());
             // The sphere is some centimetres wide.
             assert!(error_m.abs() < 2e-3 && error_m.abs() < 6.0 * sd_m, "{name}: {touch:?}");
-            // Where it was expected and where it was met: nearly the same, seen along the way.
+            // Predicted and actual contact are nearly equal along the approach.
             let aim = touch.target.aim().unwrap();
             let met = Point3::from(touch.contact.unwrap());
             let before_m = -(met - aim.p_w).dot(&aim.ahead_w);

@@ -1,41 +1,40 @@
-//! How near a belief is to the true surface.
+//! Errors of a belief relative to the true surface.
 
 use palpate_gp::math::normal::BAND_95;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Agreement of a belief with the truth on the grid.
+/// Agreement of a belief with the ground truth on the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Metrics {
-    /// Eq. 5 of Yi et al. 2016: Σ f·f̂ / sqrt(Σ f² · Σ f̂²). Not centred: a constant scores
-    /// high wherever the heights' mean outweighs their spread.
+    /// R of Eq. 5, Yi et al. 2016: Σ f·f̂ / sqrt(Σ f² · Σ f̂²). Not centred, so a constant can
+    /// score high.
     pub r: f64,
-    /// The same after subtracting each one's mean; 0 for a constant.
+    /// R of the heights minus their means; 0 for a constant.
     pub centred_r: f64,
     /// Root mean square error.
     pub rmse_m: f64,
-    /// Largest error.
+    /// Largest absolute error.
     pub max_error_m: f64,
-    /// Root mean square error in the outer tenth of the zone; none where no surface is there.
+    /// Root mean square error in the outer tenth of the zone; `None` without a surface there.
     pub edge_rmse_m: Option<f64>,
-    /// Root mean square error where the finger can touch the surface.
+    /// Root mean square error on the reachable surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reachable_rmse_m: Option<f64>,
-    /// Root mean square error where it cannot.
+    /// Root mean square error on the unreachable surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unreachable_rmse_m: Option<f64>,
-    /// Share of the truth that lies within 1.96 standard deviations of the mean. The variance is
-    /// that of a touch, σ² + noise²: the noise stands for what a smooth surface cannot follow,
-    /// and that is part of the truth.
+    /// Share of the truth within 1.96·sqrt(σ² + noise²) of the mean; the noise covers what a smooth
+    /// surface cannot follow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
-    /// Mean negative log density of the true heights (in m) under the same normal distributions,
-    /// ½·ln(2π·s²) + ½·error²/s² with s² = σ² + noise²; lower is better.
+    /// Mean negative log density of the true heights (in m): ½·ln(2π·s²) + ½·error²/s², s² = σ² +
+    /// noise²; lower is better.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nlpd: Option<f64>,
 }
 
-/// Root mean square of some errors; `None` without one.
+/// Root mean square of errors; `None` if there are none.
 pub(in crate::experiment) fn rmse(errors: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (mut count, mut squares) = (0.0, 0.0);
     for error in errors {
@@ -45,28 +44,28 @@ pub(in crate::experiment) fn rmse(errors: impl IntoIterator<Item = f64>) -> Opti
     (count > 0.0).then(|| f64::sqrt(squares / count))
 }
 
-/// [Coverage](Metrics::coverage) and [NLPD](Metrics::nlpd) of some errors, each with its believed
-/// variance; `None` without one.
+/// Returns [coverage](Metrics::coverage) and [NLPD](Metrics::nlpd) of errors with their predicted
+/// variances; `None` if there are none.
 pub(in crate::experiment) fn calibration(
     errors: impl IntoIterator<Item = (f64, f64)>,
 ) -> (Option<f64>, Option<f64>) {
     let (mut count, mut inside, mut nlpd) = (0.0, 0.0, 0.0);
     for (error, variance) in errors {
-        // A belief without any noise may be sure to the last bit.
+        // A belief without noise may have zero variance.
         let variance = f64::max(variance, f64::MIN_POSITIVE);
         count += 1.0;
         inside += f64::from(u8::from(f64::abs(error) <= BAND_95 * variance.sqrt()));
         nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
     }
-    // To four decimals: the rows keep one after every touch.
+    // Rounded to four decimals: each row stores one per touch.
     let mean = |sum: f64| Some((1e4 * sum / count).round() / 1e4).filter(|mean| mean.is_finite());
     (mean(inside), mean(nlpd))
 }
 
 impl Metrics {
-    /// Compares true heights f with believed heights g, without what is of a part of the zone and
-    /// without calibration. The centred sums are updated by Welford's rule: a large common offset
-    /// must not cancel what little the heights vary.
+    /// Compares true heights f with predicted heights g; leaves out calibration and the errors on
+    /// parts of the zone. Welford's rule updates the centred sums, so that a large common offset
+    /// does not cancel small variations of the heights.
     pub(in crate::experiment) fn of(heights: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let (mut count, mut squares, mut max_error_m) = (0.0, 0.0, 0.0_f64);
         let [mut ff, mut gg, mut fg] = [0.0; 3];
@@ -86,7 +85,7 @@ impl Metrics {
             squares += (f - g) * (f - g);
             max_error_m = max_error_m.max((f - g).abs());
         }
-        // A spread of rounding errors is none.
+        // A spread of rounding errors counts as 0.
         let spread = |spread: f64, square: f64| {
             if spread > 1e3 * f64::EPSILON * f64::EPSILON * square { spread } else { 0.0 }
         };
@@ -105,7 +104,8 @@ impl Metrics {
     }
 }
 
-/// Eq. 5 of a constant with the sign of the heights f: |Σf| / sqrt(n · Σf²); none of no heights.
+/// Eq. 5 of a constant with the sign of the heights f: |Σf| / sqrt(n · Σf²); `None` without
+/// heights.
 pub fn constant_r<'a>(heights_m: impl IntoIterator<Item = &'a f64>) -> Option<f64> {
     let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for f in heights_m {
@@ -117,7 +117,8 @@ pub fn constant_r<'a>(heights_m: impl IntoIterator<Item = &'a f64>) -> Option<f6
     r.is_finite().then_some(r)
 }
 
-/// A constant has no direction: its correlation counts as 0.
+/// Returns numerator / denominator, 0 if the denominator is 0: the correlation of a constant counts
+/// as 0.
 fn ratio(numerator: f64, denominator: f64) -> f64 {
     if denominator > 0.0 { numerator / denominator } else { 0.0 }
 }
@@ -130,8 +131,8 @@ mod tests {
         Metrics::of(pairs.iter().copied())
     }
 
-    /// Half of the toy is 1 and the other half has mean 1 and mean square 1.5, so a constant
-    /// scores 1 / sqrt(1.25).
+    /// Half of the toy is 1 and the other half has mean 1 and mean square 1.5, so a constant scores
+    /// 1 / sqrt(1.25).
     #[test]
     fn a_constant_scores_high_in_r_and_zero_when_centred() {
         let toy = |x: f64| {
@@ -175,8 +176,8 @@ mod tests {
         assert_eq!((zero.r, zero.centred_r), (0.0, 0.0));
     }
 
-    /// Errors that are drawn from the believed distribution lie in its band 95 times in a hundred,
-    /// and their mean negative log density is the distribution's entropy ½·ln(2πe·s²).
+    /// Errors drawn from the predictive distribution lie in its band in 95 % of cases, and their
+    /// mean negative log density is the distribution's entropy ½·ln(2πe·s²).
     #[test]
     fn honest_errors_are_covered_and_score_the_entropy() {
         let sd: f64 = 1e-3;

@@ -1,8 +1,8 @@
-//! The table of measures: the numbers by which trials are compared, and how each is reported.
+//! Measures of trials: errors, calibration and effort, and how each is reported.
 //!
-//! A measure is an entry of [`MEASURES`]. The columns of `summary.csv` with their intervals, the
-//! lines of `comparison.csv`, the panels of the convergence figure, the tables of the page and the
-//! names that a claim may use all follow from that entry.
+//! A measure is an entry of [`MEASURES`]. The entry determines the columns of `summary.csv` with
+//! their intervals, the lines of `comparison.csv`, the panels of the convergence figure, the tables
+//! of the page, and the names that a claim may use.
 
 pub mod metrics;
 pub mod outline;
@@ -15,7 +15,7 @@ use self::shape::ShapeMetrics;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use std::fmt;
 
-/// Every measure, in the order of columns and panels; to add one, give it an entry here.
+/// All measures, in the order of columns and panels. Add an entry here to add a measure.
 pub static MEASURES: &[Measure] = &[
     R,
     CENTRED_R,
@@ -97,15 +97,15 @@ pub static MEASURES: &[Measure] = &[
         .untabled(),
 ];
 
-/// The share of the truth that an honest 95 % band holds.
+/// Share of the truth inside a calibrated 95 % band.
 const HONEST: f64 = 0.95;
 
-/// Eq. 5 of Yi et al. 2016.
+/// R of Eq. 5, Yi et al. 2016.
 pub const R: Measure = measure(More, "r", "R (Eq. 5)", CORRELATION)
     .from(Source::Metrics(|it| Some(it.r)))
     .drawn(Scale::UpToOne);
 
-/// The same after subtracting each one's mean.
+/// R after subtracting the means.
 pub const CENTRED_R: Measure = measure(More, "centred_r", "centred R", CORRELATION)
     .from(Source::Metrics(|it| Some(it.centred_r)))
     .drawn(Scale::UpToOne);
@@ -135,14 +135,15 @@ pub const COVERAGE: Measure = measure(Neither, "coverage", "share in the 95 % ba
     .from(Source::Metrics(|it| it.coverage))
     .drawn(Scale::UpToOne);
 
-/// Chamfer distance between the believed and the true surface of a whole object.
+/// Chamfer distance between the estimated and the true surface of a whole object.
 pub const CHAMFER: Measure = measure(Less, "chamfer_m", "Chamfer distance", MM)
     .from(Source::Shape(|it| it.chamfer_m))
     .aggregated(Aggregate::Both)
     .drawn(Scale::Log)
     .error();
 
-/// Root mean square error at touches that the last belief predicted and did not learn from.
+/// Root mean square error at verification touches, which the belief predicted and was not fitted
+/// to.
 pub const VERIFICATION_RMSE: Measure =
     measure(Less, "verification_rmse_m", "RMSE at verification touches", MM)
         .from(Source::Trial(|row, n| rmse(verified(row, n)?.filter_map(|touch| touch.error_m))))
@@ -153,7 +154,7 @@ pub const VERIFICATION_COVERAGE: Measure =
     measure(Neither, "verification_coverage", "verification touches in the 95 % band", SHARE)
         .from(Source::Trial(|row, n| predicted(row, n)?.0));
 
-/// Root mean square difference of a touch from the one it repeats.
+/// Root mean square difference between a touch and the one it repeats.
 pub const REPEATABILITY: Measure =
     measure(Less, "repeatability_m", "difference of repeated touches", MM)
         .from(Source::Trial(|row, n| {
@@ -165,12 +166,12 @@ fn length_scale(touch: &TouchRow, axis: usize) -> Option<f64> {
     touch.fit.as_ref()?.hyperparameters.length_scales.get(axis).copied()
 }
 
-/// The touches after the last of a trial; `None` unless that is number `touches`.
+/// Verification touches of a trial; `None` unless the trial has `touches` touches.
 fn verification(row: &TrialRow, touches: u32) -> Option<&[VerificationRow]> {
     (row.touches.len() == touches as usize).then_some(&row.verification)
 }
 
-/// Those at new places.
+/// Verification touches at new places.
 fn verified(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &VerificationRow>> {
     Some(verification(row, touches)?.iter().filter(|touch| touch.again.is_none()))
 }
@@ -181,7 +182,7 @@ fn predicted(row: &TrialRow, touches: u32) -> Option<(Option<f64>, Option<f64>)>
     Some(calibration(errors.map(|(error, sd)| (error, sd * sd))))
 }
 
-/// The share of verification touches that met nothing or were broken off.
+/// Share of verification touches that missed or were aborted.
 fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
     let (mut count, mut missed) = (0.0, 0.0);
     for touch in verified(row, touches)? {
@@ -191,91 +192,91 @@ fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
     (count > 0.0).then(|| missed / count)
 }
 
-/// The measures that have columns in files about `rows`.
+/// Measures with columns in files about `rows`.
 pub fn in_files(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
     let has_shape = rows.iter().flat_map(|row| &row.touches).any(|touch| touch.shape.is_some());
     MEASURES.iter().filter(move |measure| has_shape || !measure.is_of_shapes())
 }
 
-/// The measure of a name in files.
+/// Finds the measure by its name in files.
 pub fn by_id(id: &str) -> Option<&'static Measure> {
     MEASURES.iter().find(|measure| measure.id == id)
 }
 
-/// A number of a trial after some touches, in SI units.
+/// A measure: a number of a trial after some touches, in SI units.
 #[derive(Clone, Copy)]
 pub struct Measure {
-    /// Its name in files, unit last.
+    /// Name in files, with the unit as suffix.
     pub id: &'static str,
-    /// Its name in words.
+    /// Title for readers.
     pub title: &'static str,
-    /// Its unit, in files and for readers.
+    /// Unit, in files and for readers.
     pub unit: Unit,
-    /// Whether less or more of it is better.
+    /// Direction in which the measure improves.
     pub direction: Direction,
-    /// The statistics reported of it over many trials.
+    /// Statistics reported over many trials.
     pub aggregate: Aggregate,
-    /// How it is drawn over touches.
+    /// Axis on which the measure is drawn over touches.
     pub scale: Scale,
-    /// Whether it stands in the summary on the terminal and on the page.
+    /// Whether the summary on the terminal and the page lists it.
     pub is_tabled: bool,
-    /// Whether it is an error, so that planners are compared in it after every touch, and in the
-    /// touches that they need to bring it down.
+    /// Whether it is an error: planners are compared in it after every touch, and in the touches
+    /// that they need to reduce it.
     pub is_error: bool,
-    /// What it is computed from.
+    /// Part of a row that it is computed from.
     pub source: Source,
 }
 
-/// The part of a row that a measure is computed from; a measure has no value where that is missing.
+/// Part of a row that a measure is computed from. The measure has no value if the part is missing.
 #[derive(Clone, Copy)]
 pub enum Source {
-    /// The agreement of heights with the truth after a touch.
+    /// Agreement of the heights with the ground truth after a touch.
     Metrics(fn(&Metrics) -> Option<f64>),
-    /// The agreement of silhouettes after a touch.
+    /// Agreement of the silhouettes after a touch.
     Outline(fn(&Outline) -> Option<f64>),
-    /// The agreement of closed surfaces after a touch: such a measure has no columns in files of
-    /// runs that explore a zone.
+    /// Agreement of the closed surfaces after a touch. Files of runs over a zone have no column for
+    /// such a measure.
     Shape(fn(&ShapeMetrics) -> Option<f64>),
-    /// A touch.
+    /// Row of one touch.
     Touch(fn(&TouchRow) -> Option<f64>),
-    /// A trial and a count of touches.
+    /// A trial and a number of touches.
     Trial(fn(&TrialRow, u32) -> Option<f64>),
 }
 
 /// A unit in files and for readers.
 #[derive(Clone, Copy, Debug)]
 pub struct Unit {
-    /// How names in files end that are in it.
+    /// Suffix of names in files.
     pub suffix: &'static str,
-    /// The symbol of the unit that readers are shown.
+    /// Symbol shown to readers.
     pub symbol: &'static str,
-    /// How many of that make one of the SI unit.
+    /// Number of these units in one SI unit.
     pub per_si: f64,
     /// Decimals shown.
     pub decimals: usize,
-    /// The smallest and the largest value that a row may have, in the SI unit.
+    /// Smallest and largest value that a row may contain, in the SI unit.
     pub range: [f64; 2],
 }
 
-/// Whether less or more of a measure is better.
+/// Direction in which a measure improves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Less of it.
+    /// Less is better.
     Less,
-    /// More of it.
+    /// More is better.
     More,
-    /// Neither: a fact, in which planners are not compared.
+    /// Neither is better; planners are not compared in it.
     Neither,
 }
 
-/// The statistics reported of many trials.
+/// Statistics reported over many trials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aggregate {
-    /// The mean with its standard error.
+    /// Mean with its standard error.
     Mean,
-    /// The median with its bootstrap interval.
+    /// Median with its bootstrap interval.
     Median,
-    /// Both; where there is room for one, the median.
+    /// Both; the median where only one fits.
     Both,
 }
 
@@ -291,28 +292,28 @@ impl Aggregate {
     }
 }
 
-/// How a measure is drawn over touches, in a panel of its own.
+/// Axis of a measure's panel over touches.
 #[derive(Clone, Copy, Debug)]
 pub enum Scale {
-    /// Not at all.
+    /// Not drawn.
     Undrawn,
-    /// On a linear axis.
+    /// Linear axis.
     Linear,
-    /// On a linear axis that shows 1, the best there is.
+    /// Linear axis that includes 1, the best value.
     UpToOne,
-    /// On a logarithmic axis.
+    /// Logarithmic axis.
     Log,
-    /// The same with another measure dotted beside it; not at all where that has no value.
+    /// Logarithmic axis with another measure dotted; not drawn where that measure has no value.
     LogBeside(&'static Measure),
 }
 
-/// Farthest that a place or an error can be, m.
-// heuristic: no robot reaches a thousandth of it.
+/// Largest distance of a place or an error, m.
+// heuristic: a thousand times any robot's reach.
 pub(super) const FAR_M: f64 = 1e6;
 
-/// Largest number without a unit that a measure can come to, apart from shares and correlations.
-// heuristic: the negative log density of a belief that is far too sure of itself; no larger one has
-// been computed from finite numbers.
+/// Largest value without a unit that a measure can have, apart from shares and correlations.
+// heuristic: bounds the negative log density of an overconfident belief; no finite computation
+// exceeded it.
 const LARGE: f64 = 1e300;
 
 const PLAIN: Unit =
@@ -327,8 +328,8 @@ const SECONDS: Unit =
     Unit { suffix: "_s", symbol: "s", decimals: 1, range: [-LARGE, LARGE], ..PLAIN };
 
 impl Measure {
-    /// The columns of its statistics over many trials: its mean with the standard error, its
-    /// median with the ends of its interval.
+    /// Returns the columns of its statistics over many trials: mean and standard error, median and
+    /// interval bounds.
     pub fn columns(&self) -> Vec<String> {
         let mut statistics = Vec::new();
         if self.aggregate.has_mean() {
@@ -340,17 +341,17 @@ impl Measure {
         statistics.into_iter().map(|statistic| self.column(statistic)).collect()
     }
 
-    /// A column of a file that holds `statistic` of it: the statistic stands before the unit.
+    /// Returns the column name of `statistic`, which comes before the unit.
     pub fn column(&self, statistic: &str) -> String {
         format!("{}_{statistic}{}", self.stem(), self.unit.suffix)
     }
 
-    /// Its name in files without the unit.
+    /// Name in files without the unit.
     pub fn stem(&self) -> &'static str {
         self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
     }
 
-    /// Its value after some touches; `None` where the trial has none.
+    /// Value after some touches; `None` if the trial has none.
     pub fn of(&self, row: &TrialRow, touches: u32) -> Option<f64> {
         match self.source {
             Source::Trial(of) => of(row, touches),
@@ -358,7 +359,7 @@ impl Measure {
         }
     }
 
-    /// Its value after a touch; `None` of a measure of a trial.
+    /// Value after a touch; `None` for a measure of a trial.
     pub fn of_touch(&self, touch: &TouchRow) -> Option<f64> {
         match self.source {
             Source::Metrics(of) => of(touch.metrics.as_ref()?),
@@ -369,32 +370,32 @@ impl Measure {
         }
     }
 
-    /// Whether it is of whole objects.
+    /// Whether it applies to whole objects.
     pub fn is_of_shapes(&self) -> bool {
         matches!(self.source, Source::Shape(_))
     }
 
-    /// Computed from this.
+    /// Sets the source.
     const fn from(self, source: Source) -> Self {
         Self { source, ..self }
     }
 
-    /// With these statistics over many trials.
+    /// Sets the statistics over many trials.
     const fn aggregated(self, aggregate: Aggregate) -> Self {
         Self { aggregate, ..self }
     }
 
-    /// Drawn like this.
+    /// Sets the axis on which it is drawn.
     const fn drawn(self, scale: Scale) -> Self {
         Self { scale, ..self }
     }
 
-    /// In files only.
+    /// Removes it from the tables; it stays in files.
     const fn untabled(self) -> Self {
         Self { is_tabled: false, ..self }
     }
 
-    /// Marks an error, in which planners are compared after every touch.
+    /// Marks it as an error, in which planners are compared after every touch.
     const fn error(self) -> Self {
         Self { is_error: true, ..self }
     }
@@ -406,7 +407,8 @@ impl fmt::Debug for Measure {
     }
 }
 
-/// A measure whose mean is reported and tabled, and which is not drawn; `None` of every trial.
+/// Returns a measure whose mean is reported and listed in tables, that is not drawn, and that has
+/// no value until a source is set.
 const fn measure(
     direction: Direction,
     id: &'static str,
@@ -430,7 +432,7 @@ const fn measure(
 mod tests {
     use super::*;
 
-    /// Names end with their unit and stand once, so that every column does.
+    /// Names are unique and end with their unit, so that column names are unique.
     #[test]
     fn names_are_regular() {
         for (i, measure) in MEASURES.iter().enumerate() {

@@ -1,32 +1,32 @@
-//! How near the believed silhouette is to the object's own.
+//! Errors of the estimated silhouette of an object.
 
 use crate::experiment::truth::Truth;
 use palpate_explore::presence::Presence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Tenths of the probability in which places are counted.
+/// Number of bins of the probability in a reliability diagram.
 pub const TENTHS: usize = 10;
 
-/// Where a surface is believed to be, against where there is one.
+/// Agreement of the estimated presence of a surface with the ground truth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Outline {
-    /// Brier score: the mean squared error of the probability of a surface.
+    /// Brier score: mean squared error of the probability of a surface.
     pub brier: f64,
-    /// Area where a surface is both likelier than not and there, over the area where it is either.
+    /// Intersection over union of the estimated (probability > ½) and the true surface area.
     pub iou: f64,
-    /// Share of the zone's places that are likelier than not to have a surface and have none, or
-    /// the other way round.
+    /// Share of the zone's test points that are classified wrongly at probability ½.
     pub wrong_share: f64,
-    /// Places that were given a probability in each tenth of it, and how many of them have a
-    /// surface; written after the last touch.
+    /// Test points in each tenth of the probability, and those of them with a surface; written
+    /// after the last touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reliability: Option<[[u32; 2]; TENTHS]>,
 }
 
 impl Outline {
-    /// Of what `presence` says at the test places; none where every place has a surface, or it is
-    /// not known which have none, or no finger was seen to pass.
+    /// Compares `presence` with the ground truth at the test points. Returns `None` if every point
+    /// has a surface, if the points without one are unknown, or before any observed sweep of the
+    /// finger.
     pub fn of(presence: &Presence, truth: &Truth) -> Option<Self> {
         let count = truth.places.len();
         if !truth.is_whole || truth.count() == count {

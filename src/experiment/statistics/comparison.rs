@@ -1,4 +1,5 @@
-//! Each planner against a baseline, trial by trial: they share initial touches.
+//! Paired comparison of each planner with a baseline: trials of the same number share initial
+//! touches.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{Direction, MEASURES, Measure};
@@ -6,20 +7,21 @@ use crate::experiment::statistics::Paired;
 use crate::experiment::trial::row::{TrialRow, of_planner};
 use std::collections::HashMap;
 
-/// One measure of one planner against one baseline after the last touch.
+/// One measure of one planner relative to one baseline after the last touch.
 #[derive(Debug)]
 pub struct Comparison<'a> {
-    /// Which planner.
+    /// Name of the planner.
     pub planner: &'a str,
-    /// Against which.
+    /// Name of the baseline.
     pub baseline: &'a str,
-    /// What is compared.
+    /// Compared measure.
     pub measure: &'static Measure,
-    /// How it differs.
+    /// Paired difference.
     pub paired: Paired,
 }
 
-/// Every planner against every baseline in every measure that both have and that can be better.
+/// Compares every planner with every baseline in every measure that both have and that has a
+/// direction.
 pub fn comparisons<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<Comparison<'a>> {
     let mut found = Vec::new();
     for (planner, baseline) in pairs(experiment) {
@@ -31,7 +33,7 @@ pub fn comparisons<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<Com
     found
 }
 
-/// Every planner with every baseline but itself, baseline by baseline.
+/// Returns every planner with every other planner that is a baseline, ordered by baseline.
 pub fn pairs(experiment: &Experiment) -> impl Iterator<Item = (&str, &str)> {
     experiment.baselines().into_iter().flat_map(|baseline| {
         let others = experiment.planners.iter().filter(move |planner| *planner != baseline);
@@ -39,7 +41,7 @@ pub fn pairs(experiment: &Experiment) -> impl Iterator<Item = (&str, &str)> {
     })
 }
 
-/// How a measure of the first planner differs from that of the second after `touches`.
+/// Paired difference of a measure between the first planner and the second after `touches`.
 pub fn paired(
     experiment: &Experiment,
     rows: &[TrialRow],

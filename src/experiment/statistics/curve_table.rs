@@ -1,4 +1,4 @@
-//! The curves as a table with intervals, which `summary.csv` holds.
+//! Curves over touches as a table with intervals, the content of `summary.csv`.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{Measure, in_files};
@@ -9,9 +9,9 @@ use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::trial::row::TrialRow;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-/// The columns of a run's records: of each measure its mean with the standard error, or its median
-/// with the 95 % bootstrap interval; of an error also how it differs from each baseline's in the
-/// same trial (mean, 95 % bootstrap interval, share of trials in which it is less).
+/// Returns the columns of a run's records. A measure has its mean with the standard error, or its
+/// median with the 95 % bootstrap interval. An error also has the difference from each baseline in
+/// the same trial (mean, 95 % bootstrap interval, share of trials with a smaller error).
 pub fn columns(experiment: &Experiment, rows: &[TrialRow]) -> Vec<String> {
     let of_measure = |measure: &'static Measure| {
         let baselines = experiment.baselines().into_iter().filter(|_| measure.is_error);
@@ -25,7 +25,7 @@ pub fn columns(experiment: &Experiment, rows: &[TrialRow]) -> Vec<String> {
     in_files(rows).flat_map(of_measure).collect()
 }
 
-/// A point for each planner and each of its touch counts that `is_wanted`, with its values in the
+/// Returns a point for each planner and each touch count that `is_wanted`, with its values in the
 /// [`columns`] of the run.
 pub fn curve_table(
     experiment: &Experiment,
@@ -48,7 +48,7 @@ fn record(
     point: &CurvePoint,
 ) -> Vec<Option<f64>> {
     let mut values = Vec::new();
-    // Of all trials; measures that fewer of them have draw their own.
+    // Samples of all trials; a measure that fewer trials have draws its own samples.
     let samples = Samples::new(point.trials, experiment.seed);
     for &measure in measures {
         let summary = point.of(measure);
@@ -78,7 +78,7 @@ fn ends(interval: Option<[f64; 2]>) -> [Option<f64>; 2] {
     interval.map_or([None; 2], |ends| ends.map(Some))
 }
 
-/// The 95 % bootstrap interval of the median; none of a single trial.
+/// 95 % bootstrap interval of the median; `None` for a single trial.
 fn interval(
     (experiment, samples): (&Experiment, &Samples),
     rows: &[TrialRow],
@@ -95,8 +95,8 @@ fn interval(
     }
 }
 
-/// How sure what speaks for a measure is: of a median its 95 % bootstrap interval, of a mean one
-/// standard error to either side; none of a single trial.
+/// Uncertainty of a measure's reported value: the 95 % bootstrap interval of a median, one standard
+/// error on either side of a mean; `None` for a single trial.
 pub fn band(
     experiment: &Experiment,
     rows: &[TrialRow],

@@ -1,10 +1,11 @@
-//! How many touches a planner needs for the error that another one has.
+//! Touches to equal error: the touches that a planner needs to reach a baseline's error.
 //!
-//! The goal is the baseline's median error after some touches, the last ones unless the report's
-//! settings say otherwise. A planner has met it from the first count on from which its own median
-//! stays at or below up to the goal's touches, or else from the first one after them at which it
-//! is. All of it, goal, counts, ways and their ratios, is found again in every sample of the
-//! trials, the same sample for both planners: that is what the intervals are of.
+//! The goal is the baseline's median error after the goal's touches: the last touch, or
+//! `report.goal_touches`. A planner reaches it at the first touch count from which its median error
+//! stays at or below the goal up to the goal's touches. If there is none, it reaches it at the
+//! first later count with an error at or below the goal. Goal, counts, path lengths and their
+//! ratios are recomputed in every bootstrap sample of the trials, the same sample for both
+//! planners; the intervals describe that distribution.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{MEASURES, Measure};
@@ -14,45 +15,45 @@ use crate::experiment::trial::row::{TrialRow, of_planner};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 
-/// Errors that are compared.
+/// Errors in which planners are compared.
 pub fn errors() -> impl Iterator<Item = &'static Measure> {
     MEASURES.iter().filter(|measure| measure.is_error)
 }
 
-/// A number with its 95 % bootstrap interval, which a single trial does not have; infinite where
-/// the goal is not met.
+/// A number with its 95 % bootstrap interval, `None` for a single trial; infinite if the goal is
+/// not reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// Of all trials.
+    /// Value over all trials.
     pub value: f64,
-    /// 95 % of the samples lie in it.
+    /// Interval that contains 95 % of the bootstrap samples.
     pub interval: Option<[f64; 2]>,
 }
 
-/// The touches of one planner beside those of a baseline.
+/// Touches of a planner and of a baseline to the same error.
 #[derive(Debug)]
 pub struct EqualError<'a> {
-    /// Which planner.
+    /// Name of the planner.
     pub planner: &'a str,
-    /// Whose error is the goal.
+    /// Name of the baseline, whose error is the goal.
     pub baseline: &'a str,
-    /// Which error.
+    /// Compared error.
     pub measure: &'static Measure,
-    /// Trials that both finished.
+    /// Trials finished by both.
     pub trials: usize,
-    /// The baseline's median error after the goal's touches.
+    /// Baseline's median error after the goal's touches.
     pub goal: f64,
-    /// Touches until the planner has met it.
+    /// Touches of the planner to the goal.
     pub touches: Estimate,
-    /// Touches until the baseline itself has.
+    /// Touches of the baseline to the goal.
     pub baseline_touches: f64,
-    /// Ratio of the two counts.
+    /// Ratio of the two touch counts.
     pub ratio: Estimate,
-    /// Ratio of the median lateral ways after the initial touches until then.
+    /// Ratio of the median lateral path lengths from the initial touches to the goal.
     pub path_ratio: Estimate,
 }
 
-/// Every planner against every baseline in every error that both have.
+/// Compares every planner with every baseline in every error that both have.
 pub fn equal_errors<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<EqualError<'a>> {
     let asked = pairs(experiment);
     let asked: Vec<_> = asked.flat_map(|pair| errors().map(move |error| (pair, error))).collect();
@@ -62,7 +63,7 @@ pub fn equal_errors<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<Eq
     found.collect()
 }
 
-/// One planner against another; none if no trial was finished by both.
+/// Compares one planner with another; `None` if no trial was finished by both.
 pub fn equal_error<'a>(
     experiment: &Experiment,
     rows: &[TrialRow],
@@ -79,7 +80,7 @@ pub fn equal_error<'a>(
     let mut counts = Vec::new();
     let everyone: Vec<usize> = (0..pairs.len()).collect();
     let goal = medians[1].errors.get(goal_index)?.median(&everyone, &mut counts)?;
-    // Of a goal that is not met there is no comparison.
+    // An unreached goal gives no comparison.
     let touches =
         |after: f64| compared.get(after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
     let mut met = |sample: &[usize]| {
@@ -106,17 +107,17 @@ pub fn equal_error<'a>(
     })
 }
 
-/// Touch counts from the last initial one on after which beliefs are compared.
+/// Touch counts, from the last initial touch on, after which beliefs are compared.
 fn compared(experiment: &Experiment) -> Vec<u32> {
     let counts = experiment.initial_touches..=experiment.touches;
     counts.filter(|&count| experiment.is_compared(count)).collect()
 }
 
-/// After every count of touches after which beliefs are compared: the numbers of one trial, or
-/// those of many in ranks, of which medians over samples are asked.
+/// Values at every compared touch count: the numbers of one trial, or those of many trials as
+/// ranks, from which sample medians are computed.
 struct Curve<T> {
     errors: Vec<T>,
-    /// Lateral way since the last initial touch.
+    /// Lateral path length since the last initial touch.
     paths_m: Vec<T>,
 }
 
@@ -134,7 +135,7 @@ impl Curve<Ranked> {
     }
 }
 
-/// The trials that have the error after every count that is compared.
+/// Returns the trials that have the error at every compared count.
 fn curves(
     experiment: &Experiment,
     rows: &[TrialRow],
@@ -152,9 +153,9 @@ fn curves(
     of_planner(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
 }
 
-/// When the two of each pair meet the second's median error at `goal_index` in a sample of the
-/// pairs: comparisons after the first one, which over a zone are touches after the initial ones,
-/// and the median way over them, m.
+/// Returns when the planners of each pair reach the second's median error at `goal_index` in a
+/// sample of the pairs, as the index of the comparison (over a zone, touches after the initial
+/// ones) and the median path length to it, m.
 fn meet(
     medians: &[Curve<Ranked>; 2],
     sample: &[usize],
@@ -179,7 +180,7 @@ fn meet(
 mod tests {
     use super::*;
 
-    /// Trials whose errors and ways are the same functions of the count, but for a factor.
+    /// Trials whose errors and path lengths are the same functions of the count, up to a factor.
     fn trials(error: impl Fn(f64) -> f64, step_m: f64) -> Vec<Curve<f64>> {
         (0..20)
             .map(|trial| Curve {
@@ -197,7 +198,7 @@ mod tests {
         meet(&medians, &sample, goal_index, &mut Vec::new())
     }
 
-    /// Twice the rate is half the touches, whichever trials are sampled.
+    /// Twice the rate takes half the touches for any sample of trials.
     #[test]
     fn twice_as_fast_needs_half_the_touches() {
         let (fast, slow) = (trials(|n| (-0.2 * n).exp(), 3.0), trials(|n| (-0.1 * n).exp(), 1.0));

@@ -1,4 +1,4 @@
-//! What can be said of a few trials.
+//! Statistics over trials.
 
 pub mod analysis;
 pub mod comparison;
@@ -9,7 +9,7 @@ pub mod summary;
 use palpate_gp::math::seed;
 use rand::RngExt;
 
-/// A mean with its standard error, which a single value does not have.
+/// Mean and standard error; the error is `None` for a single value.
 pub fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
     let count = values.len() as f64;
     let mean = mean(values);
@@ -18,12 +18,12 @@ pub fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
     (mean, error)
 }
 
-/// The average; NaN of nothing.
+/// Arithmetic mean; NaN for an empty slice.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The middle value, or the mean of the two middle ones; none of nothing.
+/// Median: the middle value, or the mean of the two middle ones; `None` for an empty slice.
 pub fn median(values: &[f64]) -> Option<f64> {
     if values.is_empty() {
         return None;
@@ -35,11 +35,11 @@ pub fn median(values: &[f64]) -> Option<f64> {
     Some(0.5 * (lower.unwrap_or(upper) + upper))
 }
 
-/// Values and their ranks: the median of a sample of them is found by counting.
+/// Values with their ranks, so that the median of a sample is found by counting.
 #[derive(Clone, Debug)]
 pub(super) struct Ranked {
     sorted: Vec<f64>,
-    /// Where each value stands among the sorted ones.
+    /// Index of each value in the sorted list.
     ranks: Vec<usize>,
 }
 
@@ -52,13 +52,13 @@ impl Ranked {
         Self { sorted: order.iter().map(|&index| values[index]).collect(), ranks }
     }
 
-    /// The median of the values at `sample`, none of nothing. `counts` is room for as many numbers
-    /// as there are values.
+    /// Median of the values at `sample`; `None` for an empty sample. `counts` is a buffer for as
+    /// many numbers as there are values.
     pub(super) fn median(&self, sample: &[usize], counts: &mut Vec<u32>) -> Option<f64> {
         counts.clear();
         counts.resize(self.sorted.len(), 0);
         sample.iter().for_each(|&index| counts[self.ranks[index]] += 1);
-        // The values are seen in order, each as often as it was drawn.
+        // The values are visited in order, each as often as it was drawn.
         let nth = |n: usize| {
             let mut seen = 0;
             let mut ranks = counts.iter().zip(&self.sorted);
@@ -74,11 +74,11 @@ impl Ranked {
     }
 }
 
-/// Samples of the bootstrap; Efron & Tibshirani 1993 ask for a thousand for an interval.
+/// Number of bootstrap samples; Efron & Tibshirani 1993 recommend a thousand for an interval.
 pub const RESAMPLES: usize = 1000;
 
-/// The 95 % interval of the mean of `values` by the percentile bootstrap (Efron & Tibshirani 1993,
-/// ch. 13), the same for the same `seed`; none of fewer than two values.
+/// 95 % interval of the mean of `values` by the percentile bootstrap (Efron & Tibshirani 1993, ch.
+/// 13). Deterministic for a `seed`; `None` for fewer than two values.
 pub fn mean_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
     let mut drawn = vec![0.0; values.len()];
     let mean = |sample: &[usize]| {
@@ -89,21 +89,21 @@ pub fn mean_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
     (values.len() > 1).then(|| percentiles_95(means))
 }
 
-/// As [`mean_interval`], of the median.
+/// 95 % interval of the median, computed as in [`mean_interval`].
 pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
     Samples::new(values.len(), seed).median_interval(values)
 }
 
-/// The bootstrap samples of as many values: for each sample as many indices, drawn with
-/// replacement; none of a single value.
+/// Bootstrap samples: each has as many indices as there are values, drawn with replacement; empty
+/// for a single value.
 pub(super) struct Samples {
-    /// The number of values.
+    /// Number of values.
     pub(super) count: usize,
     indices: Vec<usize>,
 }
 
 impl Samples {
-    /// The same for the same `seed`.
+    /// Draws the samples; deterministic for a `seed`.
     pub(super) fn new(count: usize, seed: u64) -> Self {
         let mut rng = seed::stream(seed, 0, "bootstrap");
         let samples = if count > 1 { RESAMPLES } else { 0 };
@@ -111,12 +111,12 @@ impl Samples {
         Self { count, indices }
     }
 
-    /// A statistic of every sample.
+    /// Computes a statistic of every sample.
     pub(super) fn each<T>(&self, statistic: impl FnMut(&[usize]) -> T) -> Vec<T> {
         self.indices.chunks_exact(self.count.max(1)).map(statistic).collect()
     }
 
-    /// See [`median_interval`]; of as many values.
+    /// Interval of the median of `count` values; see [`median_interval`].
     pub(super) fn median_interval(&self, values: &[f64]) -> Option<[f64; 2]> {
         let (ranked, mut counts) = (Ranked::new(values), Vec::new());
         let medians = self.each(|sample| ranked.median(sample, &mut counts).unwrap_or(f64::NAN));
@@ -124,28 +124,28 @@ impl Samples {
     }
 }
 
-/// The ends of the middle 95 % of `found`, which is not empty.
+/// Returns the bounds of the middle 95 % of `found`, which must not be empty.
 pub fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
     found.sort_by(f64::total_cmp);
     let cut = found.len() / 40;
     [found[cut], found[found.len() - 1 - cut]]
 }
 
-/// How one planner's errors differ from another's in the same trials.
+/// Paired difference between the errors of two planners in the same trials.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Paired {
-    /// How many trials both finished.
+    /// Trials finished by both.
     pub trials: usize,
-    /// Mean of error − the other's error.
+    /// Mean of error − other error.
     pub mean: f64,
-    /// Its 95 % bootstrap interval.
+    /// 95 % bootstrap interval of the mean.
     pub interval: Option<[f64; 2]>,
-    /// Share of the trials in which the error is smaller; a tie is half a win.
+    /// Share of the trials with a smaller error; a tie counts half.
     pub won: f64,
 }
 
 impl Paired {
-    /// From pairs (error, the other's error); none of no pairs.
+    /// Computes the difference from pairs (error, other error); `None` for an empty slice.
     pub fn new(pairs: &[(f64, f64)], seed: u64) -> Option<Self> {
         let differences: Vec<f64> = pairs.iter().map(|(error, other)| error - other).collect();
         let win = |difference: &f64| match *difference {
@@ -181,8 +181,8 @@ mod tests {
         assert_eq!(median(&[]), None);
     }
 
-    /// Of 95 % intervals, nearly 95 % contain the truth; the percentile bootstrap is known to be
-    /// a little narrow on thirty values.
+    /// Nearly 95 % of the 95 % intervals contain the truth; the percentile bootstrap is slightly
+    /// narrow for thirty values.
     #[test]
     fn intervals_contain_what_they_should() {
         let (mut means, mut medians, trials) = (0, 0, 400);
@@ -207,12 +207,12 @@ mod tests {
         assert_eq!(mean_interval(&[2.0; 9], 5), Some([2.0, 2.0]));
     }
 
-    /// The slow twin: the sample's values, sorted.
+    /// The reference implementation sorts the sample's values.
     #[test]
     fn the_median_of_a_sample_is_that_of_its_values() {
         let mut rng = stream(3, 0, "sampled");
         for count in 1..40 {
-            // Few different values, so that many are equal.
+            // Few distinct values, so that many are equal.
             let values: Vec<f64> =
                 (0..count).map(|_| f64::from(rng.random_range(-4..4)) / 3.0).collect();
             let (ranked, mut counts) = (Ranked::new(&values), Vec::new());

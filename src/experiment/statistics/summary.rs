@@ -1,4 +1,4 @@
-//! Curves over touches: what many trials of one planner have in common.
+//! Curves over touches: statistics over the trials of a planner.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{MEASURES, Measure};
@@ -9,27 +9,27 @@ use palpate_explore::planner::Stall;
 use palpate_explore::task::Zone;
 use serde::Serialize;
 
-/// One planner after one number of touches, over its trials.
+/// Statistics of one planner's trials after a number of touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurvePoint {
-    /// Which planner.
+    /// Name of the planner.
     pub planner: String,
-    /// After how many touches.
+    /// Number of touches.
     pub touches: u32,
-    /// Trials that got this far.
+    /// Trials with a belief after this many touches.
     pub trials: usize,
-    /// One for each of [`MEASURES`]; none of a measure that no trial has.
+    /// Statistics of each of [`MEASURES`]; `None` for a measure that no trial has.
     values: Vec<Option<Summary>>,
 }
 
-/// A measure over many trials.
+/// Statistics of a measure over trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
-    /// Its mean.
+    /// Mean.
     pub mean: f64,
-    /// Standard error of that mean; none of a single trial.
+    /// Standard error of the mean; `None` for a single trial.
     pub error: Option<f64>,
-    /// Its median.
+    /// Median.
     pub median: f64,
 }
 
@@ -42,31 +42,31 @@ impl Summary {
 }
 
 impl CurvePoint {
-    /// A measure over the trials; none if no trial has it.
+    /// Statistics of a measure; `None` if no trial has it.
     pub fn of(&self, measure: &Measure) -> Option<&Summary> {
         let index = MEASURES.iter().position(|other| other.id == measure.id)?;
         self.values.get(index)?.as_ref()
     }
 }
 
-/// What happened to one planner's trials besides their errors.
+/// Counts of events in one planner's trials.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Events {
-    /// Trials begun.
+    /// Trials started.
     pub trials: usize,
     /// Trials that ended early.
     pub failures: usize,
-    /// Touches that met nothing.
+    /// Touches without contact.
     pub misses: usize,
-    /// Touches broken off: too much force, or no place in what the finger felt.
+    /// Aborted touches: force limit exceeded, or contact not located.
     pub overloads: usize,
-    /// Plans that fell back because the belief was sure of the best place.
+    /// Plans that fell back because the belief had no variance at the best place.
     pub collapsed: usize,
     /// Plans that fell back because they repeated a target.
     pub repeated: usize,
 }
 
-/// The curve of one planner, from its first fit to its last touch.
+/// Curve of one planner, from its first fit to its last touch.
 pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<CurvePoint> {
     (experiment.initial_touches..=experiment.touches)
         .filter_map(|touches| {
@@ -84,7 +84,7 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<C
         .collect()
 }
 
-/// The trials of a planner that have a belief after some touches.
+/// Returns the trials of a planner that have a belief after some touches.
 pub(in crate::experiment) fn fitted<'a>(
     rows: &'a [TrialRow],
     planner: &'a str,
@@ -96,8 +96,8 @@ pub(in crate::experiment) fn fitted<'a>(
     of_planner(rows, planner).filter(is_fitted).collect()
 }
 
-/// What speaks for a measure of a planner's trials after some touches: the median where one is
-/// told, else the mean; none if no trial has it.
+/// Representative value of a measure over a planner's trials after some touches: the median if it
+/// is reported, otherwise the mean; `None` if no trial has the measure.
 pub fn typical(rows: &[TrialRow], planner: &str, touches: u32, measure: &Measure) -> Option<f64> {
     let values: Vec<f64> =
         of_planner(rows, planner).filter_map(|row| measure.of(row, touches)).collect();
@@ -107,13 +107,13 @@ pub fn typical(rows: &[TrialRow], planner: &str, touches: u32, measure: &Measure
     }
 }
 
-/// The count of touches from which on a curve meets a goal up to its end; none if it does not.
+/// Returns the touch count from which a curve meets a goal up to its end; `None` if it does not.
 pub fn met_from(points: &[CurvePoint], is_met: impl Fn(&CurvePoint) -> bool) -> Option<u32> {
     points.iter().rev().take_while(|point| is_met(point)).last().map(|point| point.touches)
 }
 
-/// Median distance between target and contact in the zone's plane, over all touches that met
-/// something; none if none did.
+/// Median distance between target and contact in the zone's plane over all touches with contact;
+/// `None` if there are none.
 pub fn median_shift_m(zone: &Zone, rows: &[TrialRow]) -> Option<f64> {
     let shifts_m: Vec<f64> = (rows.iter().flat_map(|row| &row.touches))
         .filter_map(|touch| {
@@ -125,7 +125,7 @@ pub fn median_shift_m(zone: &Zone, rows: &[TrialRow]) -> Option<f64> {
     median(&shifts_m)
 }
 
-/// What happened to one planner's trials.
+/// Counts the events in one planner's trials.
 pub fn events(rows: &[TrialRow], planner: &str) -> Events {
     let mut events = Events::default();
     for row in of_planner(rows, planner) {

@@ -1,5 +1,5 @@
-//! `touches.jsonl`: what a real arm has done, touch by touch, so that none is lost with the trial
-//! that it belongs to.
+//! `touches.jsonl`: the touches of a real arm, stored one by one, so that an interrupted trial
+//! loses none.
 
 use super::files::{RunError, io_error};
 use crate::experiment::trial::row::TouchRow;
@@ -12,25 +12,25 @@ use std::path::{Path, PathBuf};
 /// File of a run's finished touches and faults.
 pub const JOURNAL: &str = "touches.jsonl";
 
-/// A line: a touch that is done, or a fault.
+/// A line of the journal: a finished touch, or a fault.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// When, in seconds since 1970.
+    /// Time in seconds since 1970.
     pub time_unix_s: f64,
-    /// In which trial.
+    /// Number of the trial.
     pub trial: u32,
-    /// Of which planner.
+    /// Name of the planner.
     pub planner: String,
-    /// The touch, with the belief after it.
+    /// Finished touch, with the belief after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touch: Option<TouchRow>,
-    /// Why it went no further.
+    /// Fault that stopped the trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
 }
 
-/// A run's journal.
+/// Journal of a run.
 pub struct Journal {
     path: PathBuf,
     file: File,
@@ -38,11 +38,10 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens that of the run in `folder`, with what it holds; a last line cut short by a crash is
-    /// dropped.
+    /// Opens and reads the journal of the run in `folder`; drops a last line cut short by a crash.
     ///
     /// # Errors
-    /// If it cannot be read or written, or a line is damaged.
+    /// If the journal cannot be read or written, or a line is damaged.
     pub fn open(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(JOURNAL);
         let file = files::append(&path).map_err(io_error(&path))?;
@@ -59,21 +58,21 @@ impl Journal {
         Ok(Self { path, file, entries })
     }
 
-    /// The touches that a trial has made, in order.
+    /// Finished touches of a trial, in order.
     pub fn touches(&self, trial: u32, planner: &str) -> Vec<TouchRow> {
         let is_its = |entry: &&Entry| entry.trial == trial && entry.planner == planner;
         self.entries.iter().filter(is_its).filter_map(|entry| entry.touch.clone()).collect()
     }
 
-    /// Why the run went no further, if a fault is the last that it holds.
+    /// Fault that stopped the run, if it is the last entry.
     pub fn halted(&self) -> Option<&str> {
         self.entries.last()?.fault.as_deref()
     }
 
-    /// Adds a line and has it on the disk before it returns.
+    /// Appends an entry and syncs it to disk before returning.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the entry cannot be written.
     pub fn add(&mut self, entry: Entry) -> Result<(), RunError> {
         let mut line = serde_json::to_vec(&entry).map_err(io_error(&self.path))?;
         line.push(b'\n');

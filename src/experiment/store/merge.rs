@@ -1,4 +1,4 @@
-//! Shards of a run, put together: the bytes of one that ran in a single process.
+//! Merging of a run's shards into the same bytes as a run in one process.
 
 use super::files::{RunError, io_error};
 use super::provenance::Content;
@@ -9,12 +9,12 @@ use palpate_input::error::Invalid;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// Puts the rows of the run folders `shards`, which hold each trial of one experiment once, into a
-/// new run in `out`, by a program built from `commit`; returns how many trials there are. Rows are
+/// Merges the run folders `shards`, which together contain each trial of one experiment once, into
+/// a new run in `out`; `commit` is the program's commit. Returns the number of trials. Rows are
 /// copied one at a time.
 ///
 /// # Errors
-/// If they are not each trial of one experiment once, there are rows in `out` already, or a file
+/// If a trial is missing, duplicate or of another experiment, `out` already has rows, or a file
 /// cannot be read or written.
 pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunError> {
     let first = shards.first().ok_or_else(|| Invalid::new("no shards"))?;
@@ -22,7 +22,7 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
     let experiment = resolved::read(first, &[])?;
     let truth = surface::read(&first.join(SURFACE), &experiment)?;
     let mut content = Content::default();
-    // Rows in their order, each with the shard and the bytes where it stands.
+    // Rows in order, each with its shard and its byte range.
     let mut places = Vec::new();
     for path in shards {
         super::require_run(path)?;
@@ -30,7 +30,7 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
             && surface::read(&path.join(SURFACE), &experiment)? == truth;
         if !is_same {
             let problem = format!(
-                "another experiment than {}: settings, planners, trials or the object differ",
+                "not the experiment of {}: settings, planners, trials or the object differ",
                 first.display()
             );
             return Err(RunError::at(path, problem));
@@ -49,14 +49,14 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
     let mut pairs = places.array_windows();
     if let Some([((id, _), a), (_, b)]) = pairs.find(|[((a, _), _), ((b, _), _)]| a == b) {
         let (a, b) = (a.display(), b.display());
-        let problem = format!("trial {} of {} stands in {a} and in {b}", id.trial, id.planner);
+        let problem = format!("trial {} of {} is in both {a} and {b}", id.trial, id.planner);
         return Err(Invalid::new(problem).into());
     }
     let missing = experiment.lacks(places.iter().map(|((id, _), _)| id));
     if let Some((trial, planner)) = missing.first() {
         let problem = format!(
-            "{} of {} trials are missing, the first is trial {trial} of {planner}: run its shard \
-             again, the same command continues",
+            "{} of {} trials are missing, the first is trial {trial} of {planner}: repeat its shard's \
+             command to continue it",
             missing.len(),
             missing.len() + places.len()
         );
@@ -65,13 +65,13 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
     let (mut folder, there) =
         RunFolder::open_as(out, (&experiment, &truth, content), commit, false)?;
     if !there.is_empty() {
-        return Err(RunError::at(out, "has rows already; name a new folder"));
+        return Err(RunError::at(out, "already has rows; use a new folder"));
     }
     let mut line = Vec::new();
     for ((_, bytes), shard) in &places {
         line.clear();
         let path = shard.join(TRIALS);
-        // One at a time: there may be more shards than files that a process may have open.
+        // One file at a time: there may be more shards than a process may open files.
         File::open(&path)
             .and_then(|mut file| rows::copy(&mut file, bytes, &mut line))
             .map_err(io_error(&path))?;

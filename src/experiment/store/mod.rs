@@ -1,16 +1,16 @@
-//! The folder a run's results lie in.
+//! Folder of a run's results.
 //!
-//! `resolved.toml` (the experiment with every default written out), `manifest.json` (what ran it, a
-//! program each), `content.json` (hashes of mesh, scan and of planners written outside of Palpate),
-//! `surface.csv` (the truth on the test grid; of a whole object `surface.obj`), `trials.jsonl` (a
-//! row per finished trial). Everything else in it is drawn from these.
+//! Its files are `resolved.toml` (the experiment with all defaults), `manifest.json` (the programs
+//! that wrote the run), `content.json` (hashes of mesh, scan and external planners), `surface.csv`
+//! (ground truth on the test grid; `surface.obj` for a whole object) and `trials.jsonl` (a row per
+//! finished trial). All other files are generated from these.
 //!
-//! A folder holds the rows of one [identity](Experiment::identity). It may be opened with more
-//! trials, other planners or another report: `resolved.toml` then says so, and what is missing is
-//! run. Rows that are no longer listed stay in `trials.jsonl`, so no change loses a trial.
+//! A folder contains the rows of one [identity](Experiment::identity). It can be opened with more
+//! trials, other planners or another report: `resolved.toml` is updated, and missing trials are
+//! run. Rows that are no longer listed stay in `trials.jsonl`, so a change loses no trial.
 //!
-//! `resolved.toml` is the mark of a run's folder: it is written first and never removed. A folder
-//! that has it and no row yet, or at most the pieces of it that a crash leaves, is begun anew.
+//! `resolved.toml` marks a run's folder: it is written first and never removed. A folder with it
+//! and without a row, or with only the partial files of a crash, is started again.
 
 mod files;
 mod journal;
@@ -44,38 +44,37 @@ pub const RECORDINGS: &str = "recordings";
 /// Folder of a run's figures.
 pub const FIGURES: &str = "figures";
 
-/// A run folder that rows are being added to.
+/// Run folder open for writing.
 pub struct RunFolder {
     path: PathBuf,
     trials: File,
-    /// The program that is about to add its first row.
+    /// Entry of this program for `manifest.json`, written with the first row.
     unsigned: Option<serde_json::Value>,
 }
 
-/// A run folder read back.
+/// Contents of a run folder.
 pub struct Run {
-    /// What was run.
+    /// Experiment that was run.
     pub experiment: Experiment,
-    /// The truth on its test grid.
+    /// Ground truth on the test grid.
     pub truth: Truth,
-    /// The finished trials of those that the experiment lists, by trial and in its order of
-    /// planners.
+    /// Finished trials that the experiment lists, ordered by trial and by its list of planners.
     pub rows: Vec<TrialRow>,
-    /// How many other rows the folder has, of trials or planners that are not listed.
+    /// Number of other rows, of trials or planners that are not listed.
     pub unlisted: usize,
 }
 
 impl RunFolder {
-    /// Opens `path` for the rows of `simulation`, which a program built from `commit` runs: makes
-    /// it, or continues what was begun there, or, if `fresh` or if that has no row yet, throws it
-    /// away.
+    /// Opens `path` for the rows of `simulation`, run by a program built from `commit`. It creates
+    /// the folder or continues an existing run; with `fresh`, or if the run has no row yet, it
+    /// starts again.
     ///
-    /// Returns the trials that are already there of those that the experiment lists. A last line
-    /// cut short by a crash is dropped.
+    /// Returns the finished trials that the experiment lists. A last line cut short by a crash is
+    /// dropped.
     ///
     /// # Errors
-    /// If the folder holds something else or trials made of other files or planners, is being
-    /// written, or cannot be.
+    /// If the folder contains other files or trials of other settings or planners, another process
+    /// is writing it, or it cannot be written.
     pub fn open(
         path: &Path,
         simulation: &Simulation,
@@ -101,7 +100,7 @@ impl RunFolder {
         let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
         if fresh || !(has_touches || rows::has_some(&trials).map_err(io_error(&file))?) {
             trials.set_len(0).map_err(io_error(&file))?;
-            // First of all, as the mark of a run's folder.
+            // Written first, as the mark of a run's folder.
             resolved::write(path, experiment)?;
             clear(path)?;
         }
@@ -123,14 +122,14 @@ impl RunFolder {
         Ok((Self { path: path.into(), trials, unsigned }, done))
     }
 
-    /// Adds a row and hands it to the operating system, so that a later kill cannot lose it.
+    /// Appends a row and passes it to the operating system, so that a later kill cannot lose it.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the row cannot be written.
     pub fn append(&mut self, row: &TrialRow) -> Result<(), RunError> {
         let file = self.path.join(TRIALS);
         let mut line = serde_json::to_vec(row).map_err(io_error(&file))?;
-        // A number that is not finite has no JSON: such a row could not be read back.
+        // JSON has no NaN or infinity, so such a row could not be read back.
         serde_json::from_slice::<TrialRow>(&line)
             .map_err(|error| RunError::bad_row(&file, 0, error))?;
         line.push(b'\n');
@@ -144,13 +143,14 @@ impl RunFolder {
         self.trials.write_all(line).map_err(io_error(&self.path.join(TRIALS)))
     }
 
-    /// The folder.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Puts the rows in order of trial and planner: the same bytes whoever finished first, and
-    /// however often trials and planners were added. What the rows are that the experiment lists.
+    /// Sorts the rows by trial and planner, so that the file's bytes do not depend on the order in
+    /// which trials finished or were added. Returns the counts of the rows that the experiment
+    /// lists.
     ///
     /// # Errors
     /// If the file cannot be read back or replaced.
@@ -178,20 +178,20 @@ impl RunFolder {
     }
 }
 
-/// The rows of a run that its experiment lists.
+/// Counts of a run's rows that its experiment lists.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Their number.
+    /// Number of trials.
     pub trials: usize,
-    /// The trials that failed, in order, and why.
+    /// Failed trials, in order, with the reason.
     pub failed: Vec<(TrialId, String)>,
 }
 
 impl Run {
-    /// Reads a run folder back.
+    /// Reads a run folder.
     ///
     /// # Errors
-    /// If it is not one, or a file in it is damaged.
+    /// If `path` is not a run folder, or a file in it is damaged.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         require_run(path)?;
         let experiment = resolved::read(path, &[])?;
@@ -209,18 +209,18 @@ impl Run {
         Ok(Self { experiment, truth, rows, unlisted })
     }
 
-    /// What makes its numbers mean less than they seem to, a sentence each.
+    /// Notices about what limits the meaning of the numbers.
     pub fn notices(&self) -> Vec<String> {
         notice::of_run(&self.experiment, &self.truth, &self.rows)
     }
 }
 
-/// Changes what the report of the run in `path` shows by `--set` assignments to `report.…` and
+/// Changes the report settings of the run in `path` by `--set` assignments to `report.…` and
 /// `question`.
 ///
 /// # Errors
-/// If an assignment is to something else or wrong, or the folder holds no run, is being written,
-/// or cannot be.
+/// If an assignment is invalid or to another setting, or the folder contains no run, is being
+/// written by another process, or cannot be written.
 pub fn set_report(path: &Path, sets: &[String]) -> Result<(), RunError> {
     require_run(path)?;
     sets.iter().try_for_each(|set| resolved::only_shown(set))?;
@@ -231,7 +231,7 @@ pub fn set_report(path: &Path, sets: &[String]) -> Result<(), RunError> {
     resolved::write(path, &experiment)
 }
 
-/// Keeps every other process from writing the folder while `trials` is open.
+/// Locks the folder against other processes while `trials` is open.
 fn lock(trials: &File, path: &Path) -> Result<(), RunError> {
     match trials.try_lock() {
         Err(TryLockError::WouldBlock) => {
@@ -251,8 +251,8 @@ fn require_run(path: &Path) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Removes what an earlier run wrote but its mark. Figures are drawn again; others' files beside
-/// them are not ours to remove.
+/// Removes the files of an earlier run except its mark. Figures are drawn again; files of other
+/// programs are kept.
 fn clear(path: &Path) -> Result<(), RunError> {
     for recording in fs::read_dir(path.join(RECORDINGS)).into_iter().flatten().flatten() {
         let recording = recording.path();
@@ -265,15 +265,15 @@ fn clear(path: &Path) -> Result<(), RunError> {
     tables.iter().chain(&own).try_for_each(|name| remove(&path.join(name)))
 }
 
-/// A folder that is not empty must hold a run, or at most what a crash leaves of a beginning: no
-/// rows, and of `resolved.toml` nothing or a part.
+/// Checks that a non-empty folder contains a run, or only what a crash at its start leaves: no
+/// rows, and no or a partial `resolved.toml`.
 fn refuse_foreign(path: &Path) -> Result<(), RunError> {
     let length = |name: &str| {
         let found = fs::metadata(path.join(name)).ok();
         found.filter(fs::Metadata::is_file).map(|found| found.len())
     };
     let foreign =
-        || RunError::at(path, "this folder holds something else; choose another with --out");
+        || RunError::at(path, "this folder contains other files; use --out for another folder");
     if path.join(TRIALS).exists() && length(TRIALS).is_none() {
         return Err(foreign());
     }

@@ -1,5 +1,5 @@
-//! `content.json`: hashes of what decides the rows of a run and is not in its `resolved.toml`.
-//! `manifest.json`: the programs that wrote it.
+//! `content.json`: hashes of inputs that decide a run's rows and are not in its `resolved.toml`.
+//! `manifest.json`: the programs that wrote the run.
 
 use super::files::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-/// File with the hashes of a run's files and of planners written outside of Palpate.
+/// File with the hashes of a run's input files and external planners.
 pub(super) const CONTENT: &str = "content.json";
 
 /// File that lists the programs that wrote a run.
@@ -21,20 +21,20 @@ pub const MANIFEST: &str = "manifest.json";
 /// Largest scan that is hashed.
 const SCAN_MAX: u64 = 1 << 30;
 
-/// Keys of planners begin with this; their name follows.
+/// Prefix of the keys of planners; the name follows.
 const PLANNER: &str = "planner ";
 
-/// SHA-256 of the files that a run reads and of the planners written outside of Palpate, by what
-/// they are: `scene.object.mesh`, `scene.arm.model`, `truth.scan`, `planner MODULE:NAME`.
+/// SHA-256 of a run's input files and external planners by key: `scene.object.mesh`,
+/// `scene.arm.model`, `truth.scan`, `planner MODULE:NAME`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Content {
     hashes: BTreeMap<String, String>,
-    /// Files of the keys that have one, as the experiment names them.
+    /// Files of the keys that have one, named as in the experiment.
     files: BTreeMap<String, String>,
 }
 
 impl Content {
-    /// Hashes what `simulation` is made of.
+    /// Hashes the inputs of `simulation`.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -71,7 +71,7 @@ impl Content {
         }
     }
 
-    /// Reads that of the run in `folder`; empty if it has none.
+    /// Reads the hashes of the run in `folder`; empty if it has none.
     pub(super) fn read(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(CONTENT);
         let text = match files::text(&path, files::TEXT_MAX) {
@@ -83,21 +83,21 @@ impl Content {
         Ok(Self { hashes, files: BTreeMap::new() })
     }
 
-    /// Writes it into the run in `folder`.
+    /// Writes the hashes to the run in `folder`.
     pub(super) fn write(&self, folder: &Path) -> Result<(), RunError> {
         let path = folder.join(CONTENT);
         let text = serde_json::to_string_pretty(&self.hashes).map_err(io_error(&path))?;
         write_changed(&path, &(text + "\n"))
     }
 
-    /// Adds what `other` has and this has not.
+    /// Adds the entries of `other` that `self` lacks.
     pub(super) fn extend(&mut self, other: Self) {
         for (key, hash) in other.hashes {
             self.hashes.entry(key).or_insert(hash);
         }
     }
 
-    /// Checks that what both have is the same; planners without a row, by `has_row`, may differ.
+    /// Checks that common entries are equal; planners without a row, by `has_row`, may differ.
     pub(super) fn require_same(
         &self,
         before: &Self,
@@ -111,8 +111,8 @@ impl Content {
         let Some((key, _)) = self.hashes.iter().find(differs) else { return Ok(()) };
         let file = self.files.get(key).map_or(String::new(), |file| format!(" = \"{file}\""));
         let problem = format!(
-            "{key}{file} has changed since the run began, and its trials were made with what it was \
-             before; choose another folder with --out, or start again with --fresh"
+            "{key}{file} has changed since the run began; its trials used the earlier version; use --out \
+             for another folder, or --fresh to start again"
         );
         Err(RunError::at(folder, problem))
     }
@@ -122,9 +122,9 @@ fn sha256(bytes: &[u8]) -> String {
     hex(Sha256::digest(bytes))
 }
 
-/// This program, built from `commit`, on this machine, which runs an experiment with this `seed`:
-/// its versions, its platform, and the processor's vector extensions, on which the last bits of a
-/// factorisation depend.
+/// Returns a description of this program, built from `commit`, and of this machine, for an
+/// experiment with `seed`: versions, platform, and the processor's vector extensions, which affect
+/// the last bits of a factorisation.
 pub(super) fn manifest(commit: &str, seed: u64) -> Value {
     #[cfg(target_arch = "x86_64")]
     let vectors = [
@@ -150,7 +150,7 @@ pub(super) fn manifest(commit: &str, seed: u64) -> Value {
     })
 }
 
-/// Adds `manifest` to the list of programs that wrote a run, unless the last one was the same.
+/// Appends `manifest` to the list of programs that wrote a run, unless the last entry is equal.
 pub(super) fn sign(folder: &Path, manifest: Value) -> Result<(), RunError> {
     let path = folder.join(MANIFEST);
     let to_value = |text: String| serde_json::from_str::<Vec<Value>>(&text).ok();

@@ -1,4 +1,4 @@
-//! `resolved.toml`: the experiment of a run with every default written out.
+//! `resolved.toml`: the experiment of a run with all defaults.
 
 use super::files::{RunError, same, write_changed};
 use crate::experiment::experiment::Experiment;
@@ -7,13 +7,13 @@ use palpate_input::files;
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
 
-/// File of a run's settings, defaults written out.
+/// File of a run's settings with all defaults.
 pub const RESOLVED: &str = "resolved.toml";
 
-/// The experiment with every default written out.
+/// Returns the experiment with all defaults as TOML.
 pub fn resolved(experiment: &Experiment) -> String {
     let mut text = toml::to_string(experiment).unwrap_or_default();
-    // Around an object `[gp]` is the belief's own table.
+    // Around an object, `[gp]` is the table of that belief.
     if experiment.scene.around.is_some()
         && let (Ok(mut whole), Ok(Ok(belief))) = (
             text.parse::<DocumentMut>(),
@@ -42,38 +42,38 @@ pub(super) fn read(folder: &Path, sets: &[String]) -> Result<Experiment, RunErro
     Ok(Experiment::load(&folder.join(RESOLVED), sets)?)
 }
 
-/// Writes the experiment into a run's folder, unless it stands there already.
+/// Writes the experiment to a run's folder, unless the file is unchanged.
 pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     write_changed(&folder.join(RESOLVED), &saved(experiment, folder))
 }
 
-/// Insists that the run in `folder` is one whose rows are `experiment`'s too.
+/// Checks that the run in `folder` has the same identity as `experiment`.
 pub(super) fn same_run(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     let found = read(folder, &[])?;
     let identity = |experiment: &Experiment| saved(&experiment.identity(), folder);
     same(folder, RESOLVED, [&identity(&found), &identity(experiment)])
 }
 
-/// Insists that a `--set` assignment changes only what is shown.
+/// Checks that a `--set` assignment changes only the report.
 pub(super) fn only_shown(set: &str) -> Result<(), RunError> {
     let key = set.split_once('=').map(|(key, _)| key.trim());
     match key.is_none_or(|key| key == "question" || key.starts_with("report.")) {
         true => Ok(()),
         false => Err(Invalid::new(format!(
-            "--set {set}: a run that is there can be shown another way by `report.…` and `question` \
-             only; what else it is must be run (palpate run)"
+            "--set {set}: palpate report changes only `report.…` and `question`; use palpate run for \
+             other settings"
         ))
         .into()),
     }
 }
 
-/// As [`resolved`], with the mesh's path relative to the folder of the file `path`.
+/// Returns [`resolved`] text with the mesh's path relative to the folder of the file `path`.
 pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
     saved(experiment, path.parent().unwrap_or(Path::new("")))
 }
 
-/// As [`resolved`], with the paths of mesh and scan relative to the run's folder, so that both may
-/// move.
+/// Returns [`resolved`] text with the paths of mesh and scan relative to the run's folder, so that
+/// both can be moved together.
 fn saved(experiment: &Experiment, folder: &Path) -> String {
     let mut experiment = experiment.clone();
     if let Ok(folder) = folder.canonicalize() {
@@ -93,7 +93,7 @@ fn saved(experiment: &Experiment, folder: &Path) -> String {
     resolved(&experiment)
 }
 
-/// `path` as seen from `folder`, both absolute.
+/// Returns `path` relative to `folder`, both absolute.
 fn relative(path: &Path, folder: &Path) -> PathBuf {
     let shared = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
     let up = folder.components().skip(shared).map(|_| Component::ParentDir);

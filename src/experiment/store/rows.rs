@@ -1,4 +1,4 @@
-//! The lines of `trials.jsonl`.
+//! Lines of `trials.jsonl`.
 
 use super::files::{RunError, io_error};
 use crate::experiment::experiment::Experiment;
@@ -12,19 +12,18 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::Path;
 
-/// Whether a results file has a whole line.
+/// Whether a results file has a complete line.
 pub(super) fn has_some(trials: &File) -> io::Result<bool> {
     let mut line = Vec::new();
     BufReader::new(trials).read_until(b'\n', &mut line)?;
     Ok(line.ends_with(b"\n"))
 }
 
-/// Reads a results file row by row, none of which stays in memory, and hands each with the bytes
-/// that it fills to `each`; how many bytes all of them fill. A last line without its end was cut
-/// short and is left out.
+/// Reads a results file row by row and passes each row with its byte range to `each`, without
+/// keeping it. Returns the number of bytes of complete lines; an incomplete last line is ignored.
 ///
 /// # Errors
-/// If a line is not a row, or none that `experiment` can have, or the same trial again.
+/// If a line is not a row, does not fit `experiment`, or repeats a trial.
 pub(super) fn scan(
     path: &Path,
     experiment: &Experiment,
@@ -45,7 +44,7 @@ pub(super) fn scan(
             serde_json::from_slice(&line).map_err(|error| bad(in_its_line(&error)))?;
         belongs(&row, experiment).map_err(bad)?;
         if !seen.insert(row.id()) {
-            return Err(bad(format!("trial {} of {} stands there twice", row.trial, row.planner)));
+            return Err(bad(format!("duplicate trial {} of {}", row.trial, row.planner)));
         }
         each(row, good..good + length);
         good += length;
@@ -58,17 +57,19 @@ pub(super) fn copy(from: &mut File, bytes: &Range<u64>, to: &mut impl Write) -> 
     io::copy(&mut from.take(bytes.end - bytes.start), to).map(|_| ())
 }
 
-/// What is wrong with a line: the parser knows no other.
+/// Describes the error in a line; the parser's own line number is always 1.
 fn in_its_line(error: &serde_json::Error) -> String {
     format!("column {}: {}", error.column(), words::json(error))
 }
 
-/// Whether a row can be one of the experiment's, whichever trials and planners it lists; if not,
-/// why.
+/// Checks that a row fits the experiment, regardless of the trials and planners that it lists.
+///
+/// # Errors
+/// The reason why it does not fit.
 fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     let (found, wanted) = (row.touches.len(), experiment.touches as usize);
     if row.failure.is_none() && found != wanted {
-        return Err(format!("{found} touches of {wanted}, and no reason why"));
+        return Err(format!("{found} touches of {wanted} without a failure"));
     }
     if found > wanted {
         return Err(format!("{found} touches of {wanted}"));
@@ -80,13 +81,15 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     })
 }
 
-/// Whether a touch has a target of as many coordinates, with a fit of as many lengths that a belief
-/// can be made of; if not, why.
+/// Checks the number of coordinates of a touch's target, and the fit's length scales and values.
+///
+/// # Errors
+/// The reason why the touch does not fit.
 fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
     let numbers = touch.target.numbers();
     let target = numbers.len();
     if target != coordinates {
-        return Err(format!("a target of {target} coordinates where {coordinates} are needed"));
+        return Err(format!("a target has {target} coordinates; needed are {coordinates}"));
     }
     if let Some((name, value, [low, high])) = impossible(touch) {
         return Err(format!("{name} is {value}; allowed is {low} to {high}"));
@@ -95,16 +98,16 @@ fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), St
     let found = &fit.hyperparameters;
     let lengths = found.length_scales.len();
     if lengths != dimension {
-        return Err(format!("a fit of {lengths} length scales where {dimension} are needed"));
+        return Err(format!("a fit has {lengths} length scales; needed are {dimension}"));
     }
     let positive = found.length_scales.iter().chain([&found.signal_sd]).all(|&size| size > 0.0);
     if !positive || found.noise_sd < 0.0 || found.slope_noise_sd < 0.0 {
-        return Err("a fit with a size that is not positive".into());
+        return Err("a fit has a scale that is not positive".into());
     }
     Ok(())
 }
 
-/// The first number of a touch that no trial can come to, with its name and what is allowed.
+/// Returns the first value of a touch that is out of range, with its name and the range.
 fn impossible(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
     let coordinate = |value: f64| ("a coordinate", value, [-FAR_M, FAR_M]);
     let places = [touch.contact, touch.normal, touch.tip].into_iter().flatten().flatten();
@@ -115,7 +118,7 @@ fn impossible(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
     coordinates.chain(measured).find(|(_, value, [low, high])| !(low..=high).contains(&value))
 }
 
-/// The order of rows: by trial, and the experiment's planners, those not listed last.
+/// Order of rows: by trial, then by the experiment's list of planners, unlisted planners last.
 pub(super) fn order(a: &TrialId, b: &TrialId, experiment: &Experiment) -> Ordering {
     let listed = |id: &TrialId| {
         let found = experiment.planners.iter().position(|planner| *planner == id.planner);
@@ -125,7 +128,7 @@ pub(super) fn order(a: &TrialId, b: &TrialId, experiment: &Experiment) -> Orderi
     a.trial.cmp(&b.trial).then_with(by_planner)
 }
 
-/// Whether the rows that the experiment lists stand in order; the others may stand anywhere.
+/// Whether the rows that the experiment lists are in order; other rows may be anywhere.
 pub(super) fn is_sorted(places: &[(TrialId, Range<u64>)], experiment: &Experiment) -> bool {
     let listed = places.iter().map(|(id, _)| id).filter(|id| experiment.lists(id));
     listed.is_sorted_by(|a, b| order(a, b, experiment).is_le())

@@ -1,4 +1,4 @@
-//! `surface.csv`: the truth of a run on its test grid. `surface.obj`: that of a whole object.
+//! `surface.csv`: ground truth of a run on its test grid. `surface.obj`: that of a whole object.
 
 use super::files::{RunError, io_error, same, write_whole};
 use crate::experiment::experiment::Experiment;
@@ -9,13 +9,13 @@ use palpate_input::files;
 use std::io;
 use std::path::Path;
 
-/// File of the true surface.
+/// File of the true heights.
 pub(super) const SURFACE: &str = "surface.csv";
 
 /// File of the true surface of a whole object.
 pub(super) const MESH: &str = "surface.obj";
 
-/// Writes the truth, or, if the folder has it already, insists that it is the same.
+/// Writes the ground truth, or checks that an existing file is equal.
 pub(super) fn write_or_compare(
     folder: &Path,
     experiment: &Experiment,
@@ -33,7 +33,7 @@ pub(super) fn write_or_compare(
     Ok(())
 }
 
-/// A mesh as Wavefront OBJ, every digit of its vertices written.
+/// Returns a mesh as Wavefront OBJ, with every digit of its vertices.
 fn obj(mesh: &Mesh) -> String {
     let mut text = String::from("# The true surface of the object, in metres in W.\n");
     for vertex in mesh.vertices() {
@@ -46,7 +46,7 @@ fn obj(mesh: &Mesh) -> String {
     text
 }
 
-/// The truth as the file holds it.
+/// Returns the ground truth as CSV.
 fn text(experiment: &Experiment, truth: &Truth) -> String {
     let is_interval = experiment.scene.zone.as_ref().is_some_and(|zone| zone.z_m.is_none());
     let mut text = String::from(if is_interval { "x_m" } else { "x_m,z_m" });
@@ -61,7 +61,7 @@ fn text(experiment: &Experiment, truth: &Truth) -> String {
     text
 }
 
-/// Reads back what [`write_or_compare`] wrote for `experiment`.
+/// Reads what [`write_or_compare`] wrote for `experiment`.
 pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, RunError> {
     let bad = |line: usize, message: String| RunError::bad_row(path, line, message);
     let Some(zone) = &experiment.scene.zone else {
@@ -94,7 +94,7 @@ pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, RunErr
     }
     let wanted = (experiment.grid as usize).pow(zone.dimension() as u32);
     if places.len() != wanted {
-        return Err(bad(places.len() + 1, format!("{} test places of {wanted}", places.len())));
+        return Err(bad(places.len() + 1, format!("{} test points of {wanted}", places.len())));
     }
     Ok(Truth::new(zone, places, heights_m, is_reachable))
 }

@@ -1,4 +1,4 @@
-//! A belief and its contacts as shapes that viewers draw.
+//! Belief and contacts as shapes for viewers.
 
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::task::Zone;
@@ -6,32 +6,37 @@ use palpate_explore::task::zone::grid_triangles;
 use palpate_gp::posterior::Posterior;
 use palpate_ros::recording::{ColorRGBA, Marker, Point, Shape};
 
-/// Places along each side of the zone; chosen: to look at.
+/// Points along each side of the zone.
+// heuristic: sufficient for display.
 const PER_SIDE: usize = 21;
 
-/// Width of a line and of a ball; chosen: below what a fingertip covers.
+/// Width of a line and of a ball.
+// heuristic: smaller than a fingertip.
 const SIZE_M: f64 = 2e-3;
 
-/// Where the belief is sure; chosen.
+/// Colour of the smallest standard deviation.
+// heuristic: blue.
 const SURE: ColorRGBA = ColorRGBA { r: 0.13, g: 0.40, b: 0.67, a: 0.8 };
 
-/// Where it is least sure; chosen.
+/// Colour of the largest standard deviation.
+// heuristic: orange.
 const UNSURE: ColorRGBA = ColorRGBA { r: 0.94, g: 0.54, b: 0.38, a: 0.8 };
 
-/// Of contacts; chosen.
+/// Colour of contacts.
+// heuristic: near black.
 const CONTACT: ColorRGBA = ColorRGBA { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 
-/// Cells along the longest side of the box in which a closed surface is sought.
-// heuristic: to look at; a tenth of the time of a belief's own.
+/// Cells along the longest side of the box in which a closed surface is extracted.
+// heuristic: sufficient for display, in a tenth of the time of a belief's own mesh.
 const CELLS: u32 = 28;
 
-/// The believed surface in `W`, its colour between those of the smallest and the largest standard
-/// deviation, and the contacts as the belief has them. Over a zone it is drawn where there probably
-/// is one, over an interval as a line. Before the first fit both are of no points.
+/// Returns the mean surface in `W`, coloured by standard deviation, and the contacts as the belief
+/// has them. Over a zone it is drawn where a surface is likely, over an interval as a line. Before
+/// the first fit both are empty.
 pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
     let is_line = belief.height_field().is_some_and(|field| field.zone().z_m.is_none());
     let shape = if is_line { Shape::LineStrip } else { Shape::TriangleList };
-    // The corners of triangles are where they are: their scale is none.
+    // Corners of triangles are absolute, so they have no size.
     let size_m = if is_line { SIZE_M } else { 1.0 };
     let mut surface = Marker::new("belief", shape, size_m, SURE);
     let mut contacts = Marker::new("contacts", Shape::SphereList, SIZE_M, CONTACT);
@@ -62,7 +67,7 @@ pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
     [surface, contacts]
 }
 
-/// The colour of each standard deviation.
+/// Returns the colour of each standard deviation.
 fn colours(sds: &[f64]) -> Vec<ColorRGBA> {
     let ends = (f64::INFINITY, f64::MIN_POSITIVE);
     let (least, most) = sds.iter().fold(ends, |(low, high), &sd| (low.min(sd), high.max(sd)));

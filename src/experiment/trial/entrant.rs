@@ -1,18 +1,19 @@
-//! Names that an experiment may list: those of planners, and the oracle's beside them.
+//! Names that an experiment may list: planners, and the oracle.
 
 use palpate_explore::planner::{PLANNERS, is_own};
 
 /// Name of the oracle in an experiment's list of planners.
 pub const ORACLE: &str = "oracle";
 
-/// Each name that an experiment may list, with a line about it.
+/// Names that an experiment may list, each with a description.
 pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
-    let oracle = "what lowers the true error most (looks at the truth: only to measure others by)";
+    let oracle =
+        "reduces the true error most (uses the ground truth: an upper bound for comparison)";
     PLANNERS.iter().map(|entry| (entry.name, entry.about)).chain([(ORACLE, oracle)])
 }
 
-/// The names that may stand where `name` stands: those [`listed`], and `name` itself if it is that
-/// of an [own](is_own) planner.
+/// Names allowed in place of `name`: those [`listed`], and `name` itself if it names an
+/// [external](is_own) planner.
 pub fn allowed(name: &str) -> Vec<&str> {
     listed().map(|(name, _)| name).chain(is_own(name).then_some(name)).collect()
 }

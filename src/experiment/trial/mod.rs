@@ -1,4 +1,4 @@
-//! One trial, Algorithm 1 of Yi et al. 2016: touch, fit, plan, again; and the row that is left.
+//! A trial, Algorithm 1 of Yi et al. 2016: touch, fit and plan in a loop; and its row.
 
 mod belief_shape;
 pub mod entrant;
@@ -21,26 +21,26 @@ use palpate_explore::probe::{Probe, Touch};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 
-/// A touch that is done.
+/// A finished touch.
 pub struct Touched<'a> {
-    /// Which, counted from 1.
+    /// Number of the touch, from 1.
     pub count: u32,
-    /// Its outcome.
+    /// Outcome of the touch.
     pub touch: &'a Touch,
     /// Its part of the trial's row.
     pub row: &'a TouchRow,
-    /// The belief that has taken it in.
+    /// Belief that includes the touch.
     pub belief: &'a Belief,
 }
 
-/// Is called after every touch of a trial, before the next is planned. It changes no row, but a
-/// fault that it returns ends the trial.
+/// Callback after every touch of a trial, before the next is planned. It cannot change the row, but
+/// a fault that it returns ends the trial.
 pub type TrialObserver<'a> = dyn FnMut(&Touched) -> Result<(), Fault> + 'a;
 
 /// Runs one trial of a planner from start to end with the touches of `probe`; calls `observer`
 /// after each.
 ///
-/// Its row depends on the experiment, the trial's number, the planner and the probe only.
+/// The row depends only on the experiment, the trial's number, the planner and the probe.
 pub(in crate::experiment) fn run(
     experiment: &Experiment,
     truth: &GroundTruth,
@@ -53,10 +53,10 @@ pub(in crate::experiment) fn run(
     row
 }
 
-/// Makes the touches of a trial and writes them into its row.
+/// Makes the touches of a trial and writes them to its row.
 ///
 /// # Errors
-/// The reason why it ended before the last touch, in words.
+/// The reason why the trial ended before the last touch.
 fn explore(
     experiment: &Experiment,
     truth: &GroundTruth,
@@ -69,15 +69,15 @@ fn explore(
     let mut belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
     let (is_around, name) = (belief.implicit_surface().is_some(), factory.name());
     if let Some(why) = factory.zone_only().filter(|_| is_around) {
-        return Err(format!("planner `{name}` does not go around an object: {why}"));
+        return Err(format!("planner `{name}` does not support whole objects: {why}"));
     }
-    // The initial touches: random places of a zone, evenly spread directions at an object.
+    // Initial touches: random places in a zone, evenly spread directions around an object.
     let start = planner::by_name(if is_around { "sobol" } else { "random" });
     let start = start.ok_or("no planner for the initial touches")?;
     let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
-    // Contact normals and tips stand in the rows where the belief observes them.
+    // Rows contain contact normals and tips if the belief uses them.
     let writes_normals = experiment.gp.normals || is_around;
     let writes_tips = experiment.gp.free_space || is_around;
     for count in 1..=experiment.touches {
@@ -88,8 +88,8 @@ fn explore(
         let Some(approach) = task.approach(&plan.target).filter(|_| is_inside) else {
             let target = plan.target.numbers();
             let beyond = match task.ball() {
-                None => "not in the zone",
-                Some(_) => "not in the ball, or out of the finger's reach",
+                None => "outside the zone",
+                Some(_) => "outside the ball, or unreachable",
             };
             return Err(format!("touch {count}: planned at {target:?}, {beyond}"));
         };
@@ -129,11 +129,10 @@ fn explore(
     verify(experiment, task, &belief, probe, row)
 }
 
-/// Fits the belief after `count` touches, and writes it into the last one's row with how it
-/// compares with the truth.
+/// Fits the belief after `count` touches and writes it, with its errors, to the last touch's row.
 ///
 /// # Errors
-/// If there is no fit.
+/// If the fit fails.
 fn conclude(
     experiment: &Experiment,
     truth: &GroundTruth,
@@ -146,7 +145,7 @@ fn conclude(
             if fitted.is_ok() {
                 row.metrics = field.surface().and_then(|it| truth.truth.compare(it));
             }
-            // Its reliability stands in the last row only.
+            // Only the last row contains the reliability.
             row.outline = Outline::of(field.presence(), &truth.truth);
             if let Some(outline) = row.outline.as_mut().filter(|_| count < experiment.touches) {
                 outline.reliability = None;

@@ -1,6 +1,6 @@
-//! The oracle, which chooses touches by the ground truth: it shows how much any planner could gain.
+//! The oracle planner, which selects touches by the ground truth: an upper bound for any planner.
 //!
-//! Only the ground truth of a simulation makes one. A planner is given the belief alone.
+//! Only a simulation's ground truth can create it. Other planners get only the belief.
 
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::statistics::mean;
@@ -21,22 +21,22 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// The ground truth that the beliefs of a trial are compared with, and that the oracle sees.
+/// Ground truth that beliefs are compared with and that the oracle uses.
 pub(in crate::experiment) struct GroundTruth {
-    /// The scene, with the object's mesh.
+    /// Scene with the object's mesh.
     pub(in crate::experiment) environment: Arc<Environment>,
     /// True heights over a zone.
     pub(in crate::experiment) truth: Truth,
-    /// The true surface of a whole object; none in a zone.
+    /// True surface of a whole object; `None` for a zone.
     pub(in crate::experiment) shape: Option<TrueShape>,
 }
 
-/// Points of the true surface at which the oracle compares.
-// heuristic: its choice is the same with all of them, and takes eight times as long.
+/// Step between the points of the true surface at which the oracle compares.
+// heuristic: all points give the same choice in eight times the time.
 const LOOKED_AT: usize = 8;
 
 impl GroundTruth {
-    /// The belief with a touch of a rigid finger at `target`, not fitted again.
+    /// Returns the belief with a touch of a rigid finger at `target`, without a new fit.
     fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
         let mut probe = exact(Arc::clone(&self.environment));
         let approach = self.environment.task().approach(target)?;
@@ -46,8 +46,8 @@ impl GroundTruth {
         Some(after)
     }
 
-    /// Error of a belief, m: over a zone root mean square; in space the mean of |f| / |∇f| on the
-    /// true surface.
+    /// Error of a belief, m: the root mean square over a zone; the mean of |f| / |∇f| on the true
+    /// surface of a whole object.
     fn error_m(&self, belief: &Belief) -> Option<f64> {
         match belief {
             Belief::HeightField(field) => self.truth.rmse_m(field.surface()?),
@@ -64,7 +64,7 @@ impl GroundTruth {
     }
 }
 
-/// Makes the oracles of trials with one ground truth.
+/// Factory of the oracles of trials with one ground truth.
 pub(in crate::experiment) struct OracleFactory(pub(in crate::experiment) Arc<GroundTruth>);
 
 impl PlannerFactory for OracleFactory {
@@ -77,7 +77,8 @@ impl PlannerFactory for OracleFactory {
     }
 }
 
-/// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.
+/// Planner that simulates touches on the ground truth and selects the one with the smallest error
+/// after it.
 struct Oracle {
     search: Search,
     truth: Arc<GroundTruth>,
@@ -107,7 +108,7 @@ impl Planner for Oracle {
 }
 
 impl Oracle {
-    /// The target after which `belief` is nearest to the truth.
+    /// Returns the target after which `belief` has the smallest error.
     fn best(&self, belief: &Belief, targets: Vec<Target>) -> Option<Target> {
         let is_refitted = self.search.settings.oracle.refit && belief.height_field().is_some();
         let errors = targets.into_iter().filter_map(|target| {
@@ -121,8 +122,8 @@ impl Oracle {
         errors.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, target)| target)
     }
 
-    /// Random places of the believed surface with a free way, and as many random directions where
-    /// there are not enough.
+    /// Returns random places of the estimated surface with a free path; random directions fill up
+    /// the list.
     fn aims(&mut self, surface: &ImplicitSurface) -> Vec<Aim> {
         let tried = self.search.settings.oracle.candidates;
         let rng = &mut self.search.rng;

@@ -1,4 +1,4 @@
-//! A trial that is recorded while it runs, or goes on where it was broken off.
+//! Recording of running trials, and continuation of interrupted ones.
 
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
@@ -15,19 +15,19 @@ use palpate_ros::recording::{self, About, Ending, Recorder, Recording};
 use std::iter;
 use std::path::{Path, PathBuf};
 
-/// The file of a trial's recording in a run's folder.
+/// Path of a trial's recording in a run's folder.
 pub fn recording_path(run: &Path, planner: &dyn PlannerFactory, trial: u32) -> PathBuf {
     run.join(RECORDINGS).join(format!("{}-{trial:04}.mcap", planner.name()))
 }
 
-/// Files of a trial that was recorded in parts, because it was interrupted and continued: `path`,
-/// the recording of its beginning, and those beside it that continue it, in order.
+/// Returns the files of a trial recorded in parts because it was interrupted: `path`, the first,
+/// and the files beside it that continue it, in order.
 pub fn parts(path: &Path) -> Vec<PathBuf> {
     let later = (2..).map(|number| part(path, number)).take_while(|path| path.exists());
     iter::once(path.to_owned()).chain(later).collect()
 }
 
-/// The file that records what comes next of the trial whose recording begins with `path`.
+/// Path of the next part of the recording that starts with `path`.
 pub fn next_part(path: &Path) -> PathBuf {
     match path.exists() {
         true => part(path, parts(path).len() + 1),
@@ -40,10 +40,9 @@ fn part(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(format!("{stem}-part-{number}.mcap"))
 }
 
-/// Runs a trial that goes on after the touches `made`, and calls `observer` after every touch.
-/// With a `path` it is recorded in that file, which is replaced if it is there; the recording
-/// begins with `made`, so that it can be replayed by itself. A touch that cannot be recorded fails
-/// the trial.
+/// Runs a trial that continues after the touches `made`, and calls `observer` after every touch.
+/// With a `path` it records to that file and replaces an existing one. The recording starts with
+/// `made`, so that it can be replayed alone. A touch that cannot be recorded fails the trial.
 pub fn run(
     simulation: &Simulation,
     (trial, planner): (u32, &dyn PlannerFactory),
@@ -89,7 +88,7 @@ fn record(
     let mut servo = simulation.servo(Box::new(recorder), seed)?;
     let mut is_interrupted = false;
     let mut record = |touched: &Touched| {
-        // A touch that the trial ends after is recorded all the same.
+        // A touch that ends the trial is recorded, too.
         let observed = observer(touched);
         is_interrupted |= observed.is_err();
         if touched.count as usize <= made.len() {
@@ -111,7 +110,7 @@ fn record(
     Ok(row)
 }
 
-/// The message that a touch is recorded as.
+/// Converts a touch to a recording message.
 ///
 /// # Errors
 /// If its row has no JSON.
@@ -135,22 +134,22 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
     })
 }
 
-/// A trial's probe that goes on where it was broken off: it first gives back the touches that were
-/// made before, then touches.
+/// Probe of a continued trial: returns the touches made before, then makes new ones.
 pub struct Resumed<'a> {
     made: std::vec::IntoIter<TouchRow>,
     finger: Finger,
     probe: &'a mut dyn Probe,
-    /// The last touch of before, if it was the last, and where the finger would have turned back.
+    /// The last touch, if it was made before, and the far end of its approach.
     last: Option<(TouchRow, Point3<f64>)>,
-    /// Time of the body when it was broken off.
+    /// Time of the body at the interruption.
     begun_s: f64,
-    /// The fault that ended the last touch.
+    /// Fault that ended the last touch.
     pub fault: Option<Fault>,
 }
 
 impl<'a> Resumed<'a> {
-    /// After the touches `made` of a trial of `simulation`, goes on with `probe`.
+    /// Creates a probe that continues with `probe` after the touches `made` of a trial of
+    /// `simulation`.
     pub fn new(made: Vec<TouchRow>, simulation: &Simulation, probe: &'a mut dyn Probe) -> Self {
         let begun_s = made.last().and_then(|touch| touch.time_s).unwrap_or(0.0);
         let finger = simulation.environment().scene().finger.clone();
@@ -158,11 +157,11 @@ impl<'a> Resumed<'a> {
     }
 }
 
-/// The outcome of a touch, from its row.
+/// Outcome of a touch, read from its row.
 fn touch(row: &TouchRow, approach: &Approach) -> Touch {
     match (row.contact, row.overload) {
         (Some(contact), _) => {
-            // A normal that no belief takes in is not written.
+            // A normal that the belief does not use is not stored.
             let against = -approach.direction_w().into_inner();
             let normal_w = row.normal.map_or(against, Vector3::from);
             Touch::Contact(Contact { p_wc: Point3::from(contact), normal_w })
@@ -187,7 +186,7 @@ impl Probe for Resumed<'_> {
 
     fn swept(&self) -> Option<Swept> {
         match &self.last {
-            // Where a tip is not written, no more counts than that a finger passed.
+            // Without a stored tip, only the passage of the finger is known.
             Some((row, p_far_w)) => {
                 let p_wt = row.tip.map_or(*p_far_w, Point3::from);
                 Some(Swept { finger: self.finger.clone(), p_wt })

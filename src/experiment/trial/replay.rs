@@ -1,4 +1,4 @@
-//! A recorded trial run again by today's code, on what was read then.
+//! Replay of a recorded trial: the current code runs on the recorded readings.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::simulation::Simulation;
@@ -12,62 +12,62 @@ use palpate_ros::recording::{self, Player, Recorded};
 use serde::Serialize;
 use std::path::Path;
 
-/// What came of it.
+/// Result of a replay.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Replay {
-    /// Touches that are the same, decision and belief, byte for byte.
+    /// Touches with identical decision and belief, byte for byte.
     pub touches: u32,
-    /// Whether the recording ends before the trial that it is of.
+    /// Whether the recording ends before its trial.
     pub is_cut: bool,
-    /// What is the first to differ; none if nothing does.
+    /// First difference; `None` if there is none.
     pub difference: Option<Difference>,
 }
 
-/// Where today's code is the first time not what it was.
+/// First difference between the current code and the recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "what")]
 pub enum Difference {
-    /// It commands something else.
+    /// A different command.
     Command {
-        /// In which touch, counted from 1.
+        /// Touch number, from 1.
         touch: u32,
         /// Ticks since the reset.
         tick: u64,
-        /// Of the reading that the command was made of.
+        /// Time of the reading from which the command was computed.
         time_s: f64,
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
-        /// What it was told, rad/s or m/s.
+        /// Recorded command, rad/s or m/s.
         recorded: Option<f64>,
-        /// What it is told.
+        /// Current command.
         now: Option<f64>,
     },
-    /// It makes something else of the same touch.
+    /// A different result of the same touch.
     Row {
-        /// Which, counted from 1.
+        /// Touch number, from 1.
         touch: u32,
-        /// JSON of the touch and the belief after it.
+        /// Recorded JSON of the touch and the belief after it.
         recorded: String,
-        /// The same of now.
+        /// Current JSON of the touch and the belief after it.
         now: String,
     },
-    /// It ends otherwise.
+    /// A different end of the trial.
     End {
-        /// Touches of then.
+        /// Recorded touches.
         recorded_touches: u32,
-        /// Why it ended before its last touch, if it did.
+        /// Recorded reason of an early end.
         recorded: Option<String>,
-        /// Touches of now.
+        /// Current touches.
         now_touches: u32,
-        /// Why it ends before its last touch, if it does.
+        /// Current reason of an early end.
         now: Option<String>,
     },
 }
 
-/// The experiment of a recording that lies at `path`, after `--set` assignments.
+/// Reads the experiment of a recording at `path`, after `--set` assignments.
 ///
 /// # Errors
-/// If it is none of this version's.
+/// If this version cannot read it.
 pub fn experiment(
     recorded: &Recorded,
     path: &Path,
@@ -76,17 +76,17 @@ pub fn experiment(
     Experiment::parse(path, recorded.about.experiment.clone(), sets)
 }
 
-/// Runs the trial of `recorded` again in `simulation`, which is made of its
+/// Runs the trial of `recorded` again in `simulation`, which must be built from its
 /// [`experiment`](experiment()).
 ///
 /// # Errors
-/// If its planner is unknown, a touch in it cannot be read, or the robot cannot be brought to the
+/// If its planner is unknown, a touch in it cannot be read, or the robot cannot be moved to the
 /// recording's start.
 pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Fault> {
     let about = &recorded.about;
     let planner = simulation.planner(&about.planner).ok_or_else(|| {
         let name = &about.planner;
-        Invalid::new(format!("it is of the planner \"{name}\", which this version does not have"))
+        Invalid::new(format!("planner \"{name}\" is not available in this version"))
     })?;
     let player = Box::new(Player::new(recorded.clone()));
     let mut servo = simulation.servo(player, simulation.body_seed(about.trial))?;
@@ -94,7 +94,7 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Fa
     let (mut touches, mut differs) = (0, None);
     let mut compare = |touched: &Touched| {
         let Some(then) = recorded.touches.get(touches as usize) else {
-            // It was cut between a touch's last tick and what was made of it, or it ended there.
+            // The recording was cut between a touch's last tick and its row, or ended there.
             return Ok(());
         };
         let now = serde_json::to_string(touched.row).unwrap_or_default();
@@ -136,12 +136,12 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Fa
     Ok(Replay { touches, is_cut, difference })
 }
 
-/// The rows of the touches that were made before the recording began.
+/// Returns the rows of the touches made before the recording started.
 fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, Invalid> {
     let read = |touch: &recording::Touch| {
         serde_json::from_str(&touch.row).map_err(|error| {
             Invalid::new(format!(
-                "touch {} was made before the recording began, and its row cannot be read: {error}",
+                "touch {}, made before the recording, has an unreadable row: {error}",
                 touch.touch
             ))
         })
@@ -149,8 +149,8 @@ fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, Invalid> {
     recorded.touches.iter().take(recorded.made).map(read).collect()
 }
 
-/// A recorded row as this version writes it: version 0.1 wrote targets without a name. Returns
-/// `None` if it cannot be read.
+/// Returns a recorded row in this version's format: version 0.1 wrote targets without a name.
+/// Returns `None` if it cannot be read.
 fn rewritten(row: &str) -> Option<String> {
     serde_json::to_string(&serde_json::from_str::<TouchRow>(row).ok()?).ok()
 }
@@ -159,7 +159,7 @@ fn rewritten(row: &str) -> Option<String> {
 mod tests {
     use super::rewritten;
 
-    /// Also the numbers of an aim, whose direction is written digit by digit as it was.
+    /// Includes the numbers of an aim, whose direction keeps its digits.
     #[test]
     fn a_row_of_version_0_1_is_rewritten_with_the_name_of_its_target() {
         for (before, now) in [

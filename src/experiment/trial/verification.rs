@@ -1,5 +1,5 @@
-//! Touches that need no truth: after a trial's last touch the belief says what it expects, and is
-//! held against what the finger then meets.
+//! Held-out touches, which need no ground truth: after a trial's last touch the belief predicts
+//! further touches.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
@@ -14,13 +14,13 @@ use palpate_gp::posterior::Scratch;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Makes the verification touches of a trial, then those that repeat an earlier one, and writes
-/// them into its row.
+/// Makes the verification touches of a trial and the touches that repeat earlier ones, and writes
+/// them to its row.
 ///
 /// Their targets depend on the experiment's seed and the trial, not on the planner.
 ///
 /// # Errors
-/// The fault that ended them, in words.
+/// The fault that ended them.
 pub(super) fn verify(
     experiment: &Experiment,
     task: &Task,
@@ -65,7 +65,7 @@ pub(super) fn verify(
     Ok(())
 }
 
-/// Expected height at a place of a zone, with the deviation of a touch; none before the
+/// Predicted height at a place of a zone and the standard deviation of a touch; `None` before the
 /// first fit.
 fn height(field: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
     let surface = field.surface()?;
@@ -75,8 +75,8 @@ fn height(field: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
     Some((surface.mean(place, &mut scratch), variance.max(0.0).sqrt()))
 }
 
-/// How far a point of `W` lies outside of the believed surface, with the deviation of a touch; none
-/// before the first fit.
+/// Distance of a point of `W` outside the estimated surface and the standard deviation of a touch;
+/// `None` before the first fit.
 fn outside(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
     match belief {
         Belief::HeightField(field) => {
@@ -94,9 +94,9 @@ fn outside(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
     }
 }
 
-/// Where the belief expects a touch at `target` to meet the surface: the height at a place; around
-/// an object the distance before the point that is aimed at, 0 with the deviation of the ball's
-/// radius where it expects nothing on the way.
+/// Predicted contact of a touch at `target`, with its standard deviation: the height at a place;
+/// around an object the distance before the aimed point, or 0 with the ball's radius as deviation
+/// if no contact is predicted.
 fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
     match belief {
         Belief::HeightField(field) => height(field, target.place()?),
@@ -114,12 +114,12 @@ fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
     }
 }
 
-/// Steps in which a way is searched for the surface, and halvings of the one where it is found.
+/// Steps of the search for the surface along a path, and bisections of the step that contains it.
 // heuristic: a twentieth of the ball's radius, then a millionth of that.
 const STEPS: usize = 40;
 const HALVINGS: usize = 20;
 
-/// The first argument between two at which a function turns negative.
+/// Returns the first argument between two bounds at which a function becomes negative.
 fn first_zero([from, to]: [f64; 2], mut value: impl FnMut(f64) -> f64) -> Option<f64> {
     let at = |i: usize| from + (to - from) * i as f64 / STEPS as f64;
     let entered = (1..=STEPS).find(|&i| value(at(i)) < 0.0)?;
@@ -131,8 +131,8 @@ fn first_zero([from, to]: [f64; 2], mut value: impl FnMut(f64) -> f64) -> Option
     Some(high)
 }
 
-/// `count` targets of a Halton sequence over the unit square, shifted by `random` (Cranley and
-/// Patterson 1976).
+/// Returns `count` targets of a Halton sequence over the unit square, shifted by `random` (Cranley
+/// and Patterson 1976).
 fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Target> {
     let dimension = belief.height_field().map_or(2, |field| field.zone().dimension());
     let shifts: Vec<f64> = (0..dimension).map(|_| random.random()).collect();
@@ -145,7 +145,7 @@ fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Targ
     (0..count).map(|_| sampled(belief, &mut next)).collect()
 }
 
-/// The digits of `i` in `base`, mirrored behind the point.
+/// Radical inverse of `i` in `base`: its digits mirrored at the radix point.
 fn radical_inverse(mut i: u32, base: u32) -> f64 {
     let (mut inverse, mut digit) = (0.0, 1.0);
     while i > 0 {
@@ -156,8 +156,8 @@ fn radical_inverse(mut i: u32, base: u32) -> f64 {
     inverse
 }
 
-/// `count` of the touches that met something, evenly from the first to the last; all of them, one
-/// after the other, if there are fewer.
+/// Returns `count` touches with contact, evenly spaced from the first to the last; repeats them in
+/// turn if there are fewer.
 fn repeated(touches: &[TouchRow], count: u32) -> Vec<usize> {
     let met: Vec<usize> = (0..touches.len()).filter(|&i| touches[i].contact.is_some()).collect();
     let count = count as usize;

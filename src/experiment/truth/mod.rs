@@ -1,6 +1,6 @@
-//! The true surface on the test grid of an experiment.
+//! Ground truth on the test grid of an experiment.
 //!
-//! A planner cannot ask for it: one that looks at its belief compiles,
+//! A planner cannot access it. This planner, which uses its belief, compiles:
 //!
 //! ```
 //! use palpate::experiment::truth::Truth;
@@ -18,8 +18,8 @@
 //! }
 //! ```
 //!
-//! and one that asks for the truth too is no planner (E0050, another signature); what the oracle
-//! sees cannot be named outside of `experiment` (E0603, private).
+//! A planner that also takes the ground truth does not compile (E0050, another signature), and the
+//! oracle's data cannot be named outside of `experiment` (E0603, private).
 //!
 //! ```compile_fail,E0050
 //! use palpate::experiment::truth::Truth;
@@ -54,37 +54,36 @@ use std::sync::Arc;
 /// True heights on the test grid of an experiment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Truth {
-    /// The test places.
+    /// Test points.
     pub places: Vec<Vec<f64>>,
-    /// The true height at each, above the zone's datum; none where the zone looks past the
-    /// object.
+    /// True height at each point above the zone's datum; `None` outside the object.
     pub heights_m: Vec<Option<f64>>,
-    /// Whether each lies in the outer tenth of the zone.
+    /// Whether each point lies in the outer tenth of the zone.
     pub is_edge: Vec<bool>,
-    /// Whether some touch of the finger, asked for inside the zone, can meet the surface at each.
+    /// Whether a touch with a target inside the zone can reach the surface at each point.
     pub is_reachable: Vec<bool>,
-    /// Whether a place without a height has no surface; otherwise none is known.
+    /// Whether points without a height have no surface; otherwise it is unknown.
     pub is_whole: bool,
-    /// The surface of a whole object in `W`, to be drawn and compared with; none in a zone.
+    /// Surface of a whole object in `W`, for drawing and comparison; `None` for a zone.
     pub mesh: Option<Arc<Mesh>>,
 }
 
-/// Triangles of the surface of a whole object that a run keeps.
+/// Maximum triangles of the surface of a whole object that a run stores.
 // heuristic: a megabyte of text, and finer than any figure shows.
 const TRIANGLES: usize = 20_000;
 
-/// The belief's variance is looked at in every so many places of the grid: it costs the square of
-/// the number of touches where the mean costs that number. Chosen.
+/// Step between the grid points at which the belief's variance is computed.
+// heuristic: the variance costs the square of the number of touches, the mean only that number.
 const CALIBRATED: usize = 4;
 
 impl Truth {
-    /// Reads the environment's surface on a grid of `per_side` places along each side of the zone;
-    /// `tell` is called with the name of each step, as it begins.
+    /// Samples the environment's surface on a grid of `per_side` points along each side of the
+    /// zone; calls `tell` with the name of each step when it starts.
     pub fn sample(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
         let Some(zone) = environment.task().zone() else {
             return Self::around(environment.mesh());
         };
-        tell("looking where the surface is");
+        tell("sampling the surface");
         let places = zone.grid(per_side);
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
@@ -92,8 +91,8 @@ impl Truth {
         Self { is_whole: true, ..Self::new(zone, places, heights_m, is_reachable) }
     }
 
-    /// The truth of a whole object with the surface `mesh`, made coarser if it is large; without a
-    /// test place.
+    /// Ground truth of a whole object with the surface `mesh`, simplified if it is large; it has no
+    /// test points.
     pub fn around(mesh: Option<&Mesh>) -> Self {
         let kept = mesh.map(|mesh| match mesh.triangles().len() > TRIANGLES {
             true => {
@@ -110,7 +109,7 @@ impl Truth {
         self.heights_m.iter().any(Option::is_some)
     }
 
-    /// From what is known of heights and reachabilities.
+    /// Ground truth from known heights and reachabilities.
     pub fn new(
         zone: &Zone,
         places: Vec<Vec<f64>>,
@@ -121,35 +120,35 @@ impl Truth {
         Self { places, heights_m, is_edge, is_reachable, is_whole: false, mesh: None }
     }
 
-    /// How many test places have a surface.
+    /// Number of test points on the surface.
     pub fn count(&self) -> usize {
         self.heights_m.iter().flatten().count()
     }
 
-    /// How many of these the finger can touch.
+    /// Number of reachable test points.
     pub fn reachable_count(&self) -> usize {
         self.is_reachable.iter().filter(|&&is_reachable| is_reachable).count()
     }
 
-    /// The lowest and the highest surface, above the datum; none if there is no surface.
+    /// Lowest and highest surface above the datum; `None` without a surface.
     pub fn span_m(&self) -> Option<[f64; 2]> {
         let heights_m = || self.heights_m.iter().flatten().copied();
         Some([heights_m().reduce(f64::min)?, heights_m().reduce(f64::max)?])
     }
 
-    /// Root mean square error of a belief wherever there is a surface; none if nobody knows of any.
+    /// Root mean square error of a belief over the known surface; `None` without one.
     pub fn rmse_m(&self, belief: &Posterior) -> Option<f64> {
         let means = belief.means(self.places.iter().map(Vec::as_slice));
         rmse(self.errors(&means).map(|(_, error)| error))
     }
 
-    /// Each place with a surface and the error of a belief with these `means`.
+    /// Returns each point on the surface and the error of a belief with these `means`.
     fn errors(&self, means: &[f64]) -> impl Iterator<Item = (usize, f64)> {
         let heights_m = self.heights_m.iter().zip(means).enumerate();
         heights_m.filter_map(|(i, (height_m, mean))| Some((i, (*height_m)? - mean)))
     }
 
-    /// Compares a belief with the truth wherever there is a surface; none if nobody knows of any.
+    /// Compares a belief with the ground truth over the known surface; `None` without one.
     pub fn compare(&self, belief: &Posterior) -> Option<Metrics> {
         if self.count() == 0 {
             return None;

@@ -1,4 +1,4 @@
-//! Touches on a grid of targets: the object's surface as the finger feels it, without a belief.
+//! Scan of an object: touches on a grid of targets, without a belief.
 
 use crate::experiment::runner::pool;
 use crate::sim::simulator::Simulator;
@@ -9,11 +9,11 @@ use palpate_input::error::Invalid;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Steps along the longer side of a zone that a scan makes if none are asked for; chosen as twice
-/// the density of a drawing.
+/// Default number of steps along the longer side of a zone in a scan.
+// heuristic: twice the density of a drawing.
 const STEPS: f64 = 80.0;
 
-/// A grid of about square cells: targets along x and along z.
+/// Returns the columns and rows (targets along x and z) of a grid with about square cells.
 pub fn default_grid(zone: &Zone) -> [usize; 2] {
     let extents_m = zone.extents_m();
     let cell_m = zone.widest_m() / STEPS;
@@ -21,20 +21,21 @@ pub fn default_grid(zone: &Zone) -> [usize; 2] {
     [along(0), along(1)]
 }
 
-/// The places of a grid over the zone, x varying fastest.
+/// Returns the places of a grid over the zone, x varying fastest.
 pub fn targets(zone: &Zone, [columns, rows]: [usize; 2]) -> Vec<Vec<f64>> {
     let share = |i: usize, count: usize| i as f64 / (count.max(2) - 1) as f64;
     let target = |i: usize, j: usize| zone.at(&[share(i, columns), share(j, rows)]);
     (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| target(i, j)).collect()
 }
 
-/// Touches `targets`, of which `columns` are a row; none if `stop` became true before the end.
+/// Touches `targets`, which are rows of `columns` each; returns `None` if `stop` became true before
+/// the end.
 ///
-/// Every row has a probe of its own, so the result does not depend on `threads`, 0 for all cores.
+/// Every row has its own probe, so the result does not depend on `threads` (0 for all cores).
 /// `progress` is called after each row, from any thread.
 ///
 /// # Errors
-/// If threads cannot be started.
+/// If the threads cannot be started.
 pub fn scan(
     simulator: &Simulator,
     (targets, columns): (&[Vec<f64>], usize),

@@ -1,4 +1,4 @@
-//! The truth of an object that nobody has a mesh of: heights taken from a scan of it.
+//! Ground truth of an object without a mesh: heights from a scan.
 
 use crate::experiment::measure::metrics::rmse;
 use crate::experiment::truth::Truth;
@@ -12,27 +12,29 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Table `[truth]`: what beliefs are held against, instead of the object's own surface.
+/// Table `[truth]`: scan used as ground truth, in place of the object's own surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanTruth {
     /// cloud.csv or cloud.ply of `palpate export`, relative to the experiment's file; in `W`.
     pub scan: PathBuf,
-    /// A test place has a height if this many contacts lie within `within_m` of it.
+    /// Minimum number of contacts within `within_m` of a test point that has a height.
     #[serde(default = "neighbours")]
     pub neighbours: usize,
-    /// How far from a test place contacts may lie, in the zone's plane; left out, three times the
-    /// median distance of a contact from its nearest neighbour.
+    /// Search radius around a test point, in the zone's plane (default: three times the median
+    /// nearest-neighbour distance).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within_m: Option<f64>,
 }
 
-/// Contacts that a plane needs, and one more that says whether it fits; chosen.
+/// Default number of neighbours.
+// heuristic: a plane needs three contacts; a fourth shows whether it fits.
 fn neighbours() -> usize {
     4
 }
 
-/// Distances between contacts from one to its nearest that count as near; chosen.
+/// Default search radius in nearest-neighbour distances.
+// heuristic: includes the neighbours on all sides.
 const SPACINGS: f64 = 3.0;
 
 impl Checked for ScanTruth {
@@ -46,16 +48,16 @@ impl Checked for ScanTruth {
 }
 
 impl ScanTruth {
-    /// Heights at the test places of a grid of `per_side` along each side of `zone`: of the plane
-    /// through the contacts near each, near ones weighing more. Where there are too few, or all lie
-    /// to one side, there is none.
+    /// Samples heights at the test points of a grid with `per_side` points along each side of
+    /// `zone`. Each height is that of the plane through the nearby contacts, with weights that
+    /// decrease with distance. A point with too few contacts, or with all of them on one side, has
+    /// no height.
     ///
-    /// Returns also the number of contacts, and the root mean square difference between a contact's
-    /// height and that which the others give at its place; `None` if no contact has neighbours
-    /// enough.
+    /// Also returns the number of contacts and their leave-one-out root mean square error, `None`
+    /// if no contact has enough neighbours.
     ///
     /// # Errors
-    /// If the file is no cloud.
+    /// If the file is not a cloud.
     pub fn sample(
         &self,
         zone: &Zone,
@@ -91,9 +93,9 @@ fn spacing_m(contacts: &[([f64; 2], f64)]) -> f64 {
     nearest.get(nearest.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The height at `place` of the plane through the contacts within `within_m` of it, of which
-/// `least` are needed, without contact `without`. A contact is its place in the zone's plane and
-/// its height above the datum.
+/// Height at `place` of the plane through the contacts within `within_m` of it, without contact
+/// `without`; `None` for fewer than `least` contacts. A contact is its place in the zone's plane
+/// and its height above the datum.
 fn height_m(
     contacts: &[([f64; 2], f64)],
     place: [f64; 2],
@@ -117,21 +119,23 @@ fn height_m(
         right += row * *height_m * weight;
         count += 1;
     }
-    // No plane is drawn out beyond its contacts.
+    // The plane is not extrapolated beyond its contacts.
     let is_inside =
         [0, 1].iter().all(|&axis| around[0][axis] <= BESIDE && around[1][axis] >= -BESIDE);
     if count < least || !is_inside {
         return None;
     }
-    // Contacts on a line, as of a zone that is one, say nothing of the slope across it.
+    // Contacts on a line, as in a one-dimensional zone, do not determine the slope across it.
     let plane = normal.svd(true, true).solve(&right, FLAT * normal.norm()).ok()?;
     plane.x.is_finite().then_some(plane.x)
 }
 
-/// How far beside all of its contacts a place may lie, as a part of how far they may be; chosen.
+/// Allowed distance of a place outside its contacts, as a share of the search radius.
+// heuristic: a tenth is almost no extrapolation.
 const BESIDE: f64 = 0.1;
 
-/// Part of a matrix's size below which a singular value is none; chosen, far above rounding.
+/// Singular values below this share of the matrix norm count as zero.
+// heuristic: far above rounding.
 const FLAT: f64 = 1e-9;
 
 fn flat(place: &[f64]) -> [f64; 2] {
@@ -142,11 +146,11 @@ fn distance_m(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// The points of contact in `cloud.csv` or `cloud.ply`, which a scan writes, in `W`; targets
-/// without contact are passed over.
+/// Reads the contacts of a scan from `cloud.csv` or `cloud.ply`, in `W`; skips targets without
+/// contact.
 ///
 /// # Errors
-/// If it cannot be read, or is none.
+/// If the file cannot be read, or is not a cloud.
 pub fn read_cloud(path: &Path) -> Result<Vec<Point3<f64>>, Invalid> {
     let unreadable = |cause| Invalid::new(format!("cannot be read: {cause}")).at(path.display());
     let text = files::text(path, u64::MAX).map_err(unreadable)?;
@@ -155,20 +159,20 @@ pub fn read_cloud(path: &Path) -> Result<Vec<Point3<f64>>, Invalid> {
         false => of_csv(path, &text)?,
     };
     match cloud.is_empty() {
-        true => Err(Invalid::new("no contact in it").at(path.display())),
+        true => Err(Invalid::new("the file contains no contact").at(path.display())),
         false => Ok(cloud),
     }
 }
 
-/// A file without this column.
+/// Error of a file without this column.
 fn no_column(path: &Path, column: &str) -> Invalid {
     let allowed = "allowed are cloud.csv and cloud.ply of palpate export";
     Invalid::new(format!("no column {column}")).at(path.display()).mend(allowed)
 }
 
-/// A line, counted from 1, that is not one of numbers.
+/// Error of a line, counted from 1, that does not contain three numbers.
 fn no_point(path: &Path, line: usize, found: &str) -> Invalid {
-    Invalid::new(format!("{found:?} where x, y and z in metres are wanted"))
+    Invalid::new(format!("{found:?}: allowed are x, y and z in metres"))
         .at(format!("{}:{line}", path.display()))
 }
 

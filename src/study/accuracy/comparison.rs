@@ -1,4 +1,5 @@
-//! Variants of a scene compared with a reference, and the cheapest of them within a tolerance.
+//! Comparison of a scene's variants with a reference, and selection of the cheapest within a
+//! tolerance.
 
 use super::convergence::{Order, in_contact, in_samples, in_time_step};
 use super::level::converging;
@@ -14,32 +15,32 @@ use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::Rules;
 use serde::Serialize;
 
-/// Seed of held-out targets and trials: no comparison has as many.
+/// Offset to the seeds of held-out targets and trials; larger than any number of them.
 const HELD_OUT: u32 = 1_000_000;
 
-/// The number of measurements of each variant.
+/// Number of measurements per variant.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Touches compared.
     pub touches: usize,
-    /// Touches timed, each beside one of the reference; 0 to time each target once, alone.
+    /// Touches timed, each next to one of the reference; 0 times each target once.
     pub pairs: usize,
-    /// Trials of each planner.
+    /// Trials per planner.
     pub trials: u32,
-    /// Touches of each of these.
+    /// Touches per trial.
     pub trial_touches: u32,
-    /// Seed of the targets and number of the first trial.
+    /// Seed of the targets, and number of the first trial.
     pub seed: u32,
 }
 
 /// A reference and the variants compared with it.
 #[derive(Serialize)]
 pub struct Comparison {
-    /// The reference.
+    /// Reference variant.
     pub reference: Variant,
-    /// The variants.
+    /// Other variants.
     pub variants: Vec<Variant>,
-    /// The criterion, with the margin that is used.
+    /// Criterion, with the margin in use.
     #[serde(skip)]
     pub criterion: Option<Criterion>,
     #[serde(skip)]
@@ -56,26 +57,27 @@ pub struct Comparison {
     advantages_m: Vec<Option<f64>>,
 }
 
-/// The cheapest scene that stays within a tolerance.
+/// Cheapest scene within a tolerance.
 #[derive(Serialize)]
 pub struct Cheapest {
-    /// The scene.
+    /// Scene settings.
     #[serde(skip)]
     pub scene: Scene,
-    /// Its errors on the touches or trials that it was selected on.
+    /// Errors on the touches or trials that selected it.
     pub selected: Variant,
-    /// Its errors on held-out ones.
+    /// Errors on held-out touches or trials.
     pub held_out: Variant,
-    /// Whether it stays within the tolerance there.
+    /// Whether it stays within the tolerance on held-out data.
     pub is_confirmed: bool,
 }
 
 impl Comparison {
-    /// Measures the reference. The default margin of a verdict is the end of its interval nearest
+    /// Measures the reference. The default margin of a verdict is the bound of its interval nearest
     /// to zero: a smaller change cannot reverse it.
     ///
     /// # Errors
-    /// If the scene cannot be built, or its verdict is the criterion and undecided.
+    /// If the scene cannot be built, or if the criterion is a verdict and the scene's verdict is
+    /// undecided.
     pub fn new(
         (reference, scene): (Variant, Scene),
         effort: Effort,
@@ -105,7 +107,7 @@ impl Comparison {
         })
     }
 
-    /// Measures another variant and adds it.
+    /// Measures a variant and adds it.
     ///
     /// # Errors
     /// If its scene cannot be built.
@@ -117,7 +119,7 @@ impl Comparison {
         Ok(())
     }
 
-    /// A scene that is refused is not measured.
+    /// Measures a variant; a variant with invalid settings stays unmeasured.
     fn measured(&self, variant: Variant, scene: &Scene) -> anyhow::Result<Variant> {
         if !Rules::hold(scene) {
             return Ok(variant);
@@ -135,7 +137,7 @@ impl Comparison {
                 .unzip(),
         };
         let advantages_m = advantages(scene, self.effort)?;
-        // Where many trials do not end, the rest are no comparison.
+        // If many trials fail, the remaining ones are not comparable.
         let ended = self.advantages_m.iter().flatten().count() as f64;
         let change = difference(&advantages_m, Some(&self.advantages_m))
             .filter(|change| change.trials as f64 >= (1.0 - ALLOWED) * ended);
@@ -149,7 +151,8 @@ impl Comparison {
         })
     }
 
-    /// Whether the reference needs what the variant lacks; nothing comparable means that it does.
+    /// Whether the reference needs the effect that the variant switches. It does if nothing is
+    /// comparable.
     fn relevance(&self, variant: &Variant) -> Option<Relevance> {
         let needed = Some(Relevance::Needed);
         match self.criterion? {
@@ -164,7 +167,7 @@ impl Comparison {
         }
     }
 
-    /// The cheapest variant of which 95 % of the touches stay within the tolerance.
+    /// Returns the fastest variant with 95 % of its touches within the tolerance.
     pub fn cheapest(&self, tolerance: &Tolerance, origin: Origin) -> Option<(Variant, Scene)> {
         let is_within = |variant: &Variant| variant.stays_within(tolerance, origin);
         let time_s = |variant: &Variant| variant.wall_s.unwrap_or(f64::INFINITY);
@@ -173,14 +176,15 @@ impl Comparison {
         cheapest.map(|(variant, scene)| (variant.clone(), scene.clone()))
     }
 
-    /// The smallest error that 95 % of the touches of a variant stay within.
+    /// Smallest error of any variant that contains 95 % of its touches.
     pub fn error_min(&self, tolerance: &Tolerance, origin: Origin) -> Option<f64> {
         let errors = self.variants.iter().filter_map(|it| it.p95(tolerance.quantity, origin));
         errors.min_by(f64::total_cmp)
     }
 
-    /// The reference without effects that it does not need: the most expensive is left out first,
-    /// as long as all that are left out are together not needed either; `None` if none can be.
+    /// Returns the reference without effects that it does not need. Effects are removed in order of
+    /// their cost, as long as all removed effects together are not needed. `None` if no effect can
+    /// be removed.
     ///
     /// # Errors
     /// If a scene cannot be built.
@@ -204,7 +208,7 @@ impl Comparison {
         Ok(best)
     }
 
-    /// Compares what was selected with the reference on `count` held-out targets or trials.
+    /// Compares the selected scene with the reference on `count` held-out targets or trials.
     ///
     /// # Errors
     /// If a scene cannot be built.
@@ -232,8 +236,8 @@ impl Comparison {
         Ok(Cheapest { scene, selected, held_out, is_confirmed })
     }
 
-    /// The orders in which the errors of the levels of `scene` fall: in the time step, in the
-    /// points of the skin, and in the step of a body with masses.
+    /// Orders of convergence of the levels of `scene`: in the time step, in the number of skin
+    /// points, and in the step of a body with masses.
     ///
     /// # Errors
     /// If a scene cannot be built or simulated.
@@ -245,8 +249,8 @@ impl Comparison {
         Ok(orders.into_iter().flatten().collect())
     }
 
-    /// Whether each of the levels that approach the reference is nearer to it than the one before,
-    /// in the mean force; `None` if one is not measured.
+    /// Whether the mean force error decreases from each converging level to the next; `None` if one
+    /// was not measured.
     pub fn is_converging(&self) -> Option<bool> {
         let error_n = |level| {
             let variant = self.variants.iter().find(|variant| variant.level == Some(level))?;
@@ -263,13 +267,14 @@ fn advantages(scene: &Scene, effort: Effort) -> anyhow::Result<Vec<Option<f64>>>
 
 fn margin_m(stated: Option<f64>, reference: &Variant) -> anyhow::Result<f64> {
     let verdict = reference.verdict_m;
-    let verdict = verdict.context("no trial of active and random ended: nothing is compared")?;
+    let verdict = verdict
+        .context("no trial of active and random finished, so there is nothing to compare")?;
     match (stated, verdict.interval) {
         (Some(margin_m), _) => Ok(margin_m),
         (None, Some([low, high])) if low > 0.0 || high < 0.0 => Ok(low.abs().min(high.abs())),
         _ => bail!(
-            "neither planner wins in {} trials (active less random: {:.3} mm): state the change that \
-             matters, as --tolerance verdict:0.1mm, or take more --trials",
+            "neither planner wins in {} trials (active - random: {:.3} mm): give the change that matters, as in \
+             --tolerance verdict:0.1mm, or use more --trials",
             verdict.trials,
             1e3 * verdict.mean
         ),

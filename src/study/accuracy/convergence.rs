@@ -1,4 +1,4 @@
-//! The order in which the error of the force falls with the resolution, everything else being held.
+//! Order of convergence of the force error with the resolution, all other settings fixed.
 
 use super::level::{Level, Senses};
 use super::touches::{Trials, noise_free};
@@ -13,50 +13,50 @@ use palpate_explore::robot::finger::TipMotion;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Ticks per second compared with the last. A stage takes 20 ms to stop from an approach of 20
-/// mm/s, and longer ticks than a quarter of that do not resolve it.
+/// Ticks per second, compared with the last. A stage takes 20 ms to stop from an approach at 20
+/// mm/s; ticks longer than a quarter of that do not resolve it.
 const TICKS_PER_S: [f64; 5] = [200.0, 500.0, 1000.0, 2000.0, 8000.0];
 
-/// Points of the skins compared with the last.
+/// Number of skin points, compared with the last.
 const SAMPLES: [f64; 8] = [60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 8000.0, 32000.0];
 
-/// Points of the skin in the comparisons of steps, where they cancel.
+/// Number of skin points in the comparisons of steps, where its error cancels.
 const STEPPED_SAMPLES: usize = 250;
 
-/// Steps per second in contact compared with the last: from those of the longest step that is
-/// allowed, doubled again and again, then eightfold.
+/// Steps per second in contact, compared with the last: the longest allowed step, halved
+/// repeatedly, then an eighth.
 const STEPS_PER_S: [f64; 6] = [500.0, 1000.0, 2000.0, 4000.0, 8000.0, 64000.0];
 
-/// Control tick in contact: commands change with it, whatever the step.
+/// Control tick in contact, fixed because commands depend on it.
 const PERIOD_S: f64 = 2e-3;
 
-/// The finger goes on at this speed for this long after its hull would rest on the object.
-// heuristic: 1 mm deep, as a usual touch.
+/// Speed and duration of the press after the hull would rest on the object.
+// heuristic: 1 mm deep, a typical touch.
 const PRESS_M_S: f64 = 5e-3;
 const PRESS_S: f64 = 0.2;
 
-/// Speed until [`NEAR_M`] in front of that place.
+/// Travel speed up to [`NEAR_M`] before the contact.
 const TRAVEL_M_S: f64 = 0.05;
 const NEAR_M: f64 = 3e-3;
 
-/// The fall of the mean error of the force.
+/// Convergence of the mean force error.
 #[derive(Clone, Debug, Serialize)]
 pub struct Order {
-    /// The resolution.
+    /// Name of the resolution.
     pub name: &'static str,
-    /// The unit of the resolution.
+    /// Unit of the resolution.
     pub axis: &'static str,
-    /// Resolution and mean error of the force, N.
+    /// Resolution and mean force error, N.
     pub errors: Vec<(f64, f64)>,
-    /// Minus the slope of the logarithm of the error over that of the resolution.
+    /// Observed order: minus the slope of the log error over the log resolution.
     pub observed: f64,
-    /// The order by theory.
+    /// Theoretical order.
     pub expected: f64,
 }
 
 impl Order {
-    /// Returns the order in which the forces at some resolutions approach those at the last; `None`
-    /// where there are none.
+    /// Computes the order at which the forces at some resolutions converge to those at the last;
+    /// `None` if there are no forces.
     fn new(
         [name, axis]: [&'static str; 2],
         resolutions: &[f64],
@@ -83,8 +83,8 @@ impl Order {
     }
 }
 
-/// In the time step: a dry finger stops up to a tick after the force that is detected as contact,
-/// so the error of the force is of first order.
+/// Order in the time step. A dry finger stops up to one tick after contact detection, so the force
+/// error is of first order.
 ///
 /// # Errors
 /// If the touches cannot be made.
@@ -98,8 +98,8 @@ pub fn in_time_step(scene: &Scene, trials: &Trials) -> anyhow::Result<Option<Ord
     })
 }
 
-/// In the points of the skin, pressed as in `poses`: a midpoint rule over an area has an error of
-/// the order of a cell's area, one over the number of points.
+/// Order in the number of skin points, pressed at `poses`. A midpoint rule over an area has an
+/// error of the order of a cell's area, so it is of first order in the number of points.
 ///
 /// # Errors
 /// If a scene cannot be built.
@@ -120,10 +120,10 @@ pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<O
     })
 }
 
-/// In the step of a dry finger on a stage with masses, pressed 1 mm into the middle of the zone by
-/// the same commands, whatever its force: the force of the skin is that at the step's start and the
-/// joints' speeds those at its end, so the error is of first order. `None` where the middle is no
-/// surface, or in a build without MuJoCo.
+/// Order in the step of a dry finger on a stage with masses. The same commands press it 1 mm into
+/// the middle of the zone, regardless of its force. The skin's force is that at the step's start,
+/// the joint speeds are those at its end, so the error is of first order. `None` without a surface
+/// in the middle, or in a build without MuJoCo.
 ///
 /// # Errors
 /// If the scene cannot be built or simulated.
@@ -140,7 +140,7 @@ pub fn in_contact(scene: &Scene) -> anyhow::Result<Option<Order>> {
     })
 }
 
-/// The force after each tick while the finger is pressed.
+/// Force after each tick of the press.
 fn pressed(environment: &Arc<Environment>) -> anyhow::Result<Option<Vec<f64>>> {
     let Some(zone) = environment.task().zone() else { return Ok(None) };
     let simulator = Simulator::new(Arc::clone(environment))?;

@@ -1,30 +1,30 @@
-//! Deviations of the touches of one scene from those of another, and their statistics.
+//! Deviations between the touches of two scenes, and their statistics.
 
 use super::touches::Touches;
 use crate::experiment::statistics::{mean, mean_interval};
 use serde::Serialize;
 
-/// Half of the probability outside a 95 % interval.
+/// Probability on each side of a 95 % interval.
 const TAIL: f64 = 0.025;
 
-/// A number this close to a whole one is whole: far above rounding errors.
+/// Tolerance for whole numbers, far above rounding errors.
 const ROUNDING: f64 = 1e-9;
 
-/// A quantity of a touch in which scenes are compared.
+/// Quantity of a touch in which scenes are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Distance between the points of contact, m.
+    /// Distance between the contact points, m.
     Contact,
     /// Difference of the forces, N.
     Force,
-    /// Difference of the rises of the static pressure, counts.
+    /// Difference of the rises in static pressure, counts.
     Pressure,
     /// Root mean square difference over the electrodes, counts.
     Electrodes,
 }
 
 impl Quantity {
-    /// The name in sentences.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Contact => "point of contact",
@@ -34,7 +34,7 @@ impl Quantity {
         }
     }
 
-    /// Returns the deviation of each touch, trial by trial: infinite if only one of the two has the
+    /// Returns the deviation of each touch, per trial: infinite if only one of the two has the
     /// quantity, `None` if neither has.
     pub fn deviations(self, a: &[Touches], b: &[Touches]) -> Vec<Vec<Option<f64>>> {
         let of_trial = |(a, b): (&Touches, &Touches)| {
@@ -94,7 +94,7 @@ impl Spread {
     }
 }
 
-/// A share of touches and its 95 % interval.
+/// Share of touches with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Share {
     /// Touches counted.
@@ -106,18 +106,19 @@ pub struct Share {
 }
 
 impl Share {
-    /// Returns the share of the touches of several trials, or `None` without any.
+    /// Returns the share over the touches of several trials; `None` if there are no touches.
     ///
-    /// The interval is that of Clopper and Pearson (1934) for the effective number of touches,
-    /// which are alike within a trial: their number over the ratio of the share's variance between
-    /// trials to that of independent touches (Korn and Graubard 1998).
+    /// The interval is that of Clopper and Pearson 1934 for the effective number of touches,
+    /// because touches of a trial are correlated. That number is the number of touches divided by
+    /// the ratio of the share's variance between trials to the variance of independent touches
+    /// (Korn and Graubard 1998).
     pub fn of(trials: &[Vec<bool>]) -> Option<Self> {
         let of = trials.iter().map(Vec::len).sum::<usize>();
         let count_of = |trial: &[bool]| trial.iter().filter(|is_counted| **is_counted).count();
         let count = trials.iter().map(|trial| count_of(trial)).sum::<usize>();
         let (n, share) = (of as f64, count as f64 / of as f64);
         let independent = share * (1.0 - share) / (n - 1.0);
-        // The variance of a ratio: trials differ in length.
+        // Variance of a ratio, because trials differ in length.
         let squares = trials.iter().map(|trial| {
             let off = count_of(trial) as f64 - share * trial.len() as f64;
             (off / n).powi(2)
@@ -127,7 +128,7 @@ impl Share {
         let ratio = between / independent;
         let alike = if ratio.is_finite() { ratio.max(1.0) } else { 1.0 };
         let counted = n / alike;
-        // Fractions of a touch are rounded so that the interval gets wider.
+        // Fractions of a touch are rounded so that the interval widens.
         let [all, few, many] = [
             (counted + ROUNDING).floor(),
             (share * counted + ROUNDING).floor(),
@@ -138,7 +139,7 @@ impl Share {
     }
 }
 
-/// Returns the share at which `k` or more of `n` have the probability [`TAIL`].
+/// Returns the share at which `k` or more of `n` have probability [`TAIL`].
 fn lower(k: f64, n: f64) -> f64 {
     let (mut low, mut high) = (0.0, if k > 0.0 { k / n } else { 0.0 });
     for _ in 0..60 {
@@ -152,7 +153,7 @@ fn lower(k: f64, n: f64) -> f64 {
     low
 }
 
-/// Returns the probability of `k` or more of `n`, each with probability `p`.
+/// Probability of `k` or more successes in `n` trials with probability `p`.
 fn at_least(k: f64, n: f64, p: f64) -> f64 {
     let odds = p / (1.0 - p);
     let mut log = n * (1.0 - p).ln();

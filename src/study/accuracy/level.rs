@@ -7,43 +7,43 @@ use crate::sim::solver::Collision;
 use crate::sim::solver::Integrator;
 use serde::Serialize;
 
-/// The part of the finger that a level simulates.
+/// Part of the finger that a level simulates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Senses {
-    /// A rigid hull.
+    /// Rigid hull.
     Rigid,
-    /// A soft skin without fluid; the point of contact is exact.
+    /// Soft skin without fluid; the contact point is exact.
     Dry,
-    /// Fluid under it, whose pressure detects contact.
+    /// Skin and fluid, whose pressure detects contact.
     Fluid,
-    /// And electrodes, which locate it.
+    /// Skin, fluid and electrodes, which locate contact.
     Full,
 }
 
 /// A fidelity level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
-    /// The body that carries out a touch.
+    /// Simulated body.
     pub body: Body,
-    /// The part of the finger that is simulated.
+    /// Simulated part of the finger.
     pub senses: Senses,
-    /// Points of the skin's foundation; 0 for another skin.
+    /// Points of the skin's foundation; 0 for another skin model.
     pub samples: usize,
-    /// Cells along and around of a skin that is a thin shell.
+    /// Cells along and around a thin-shell skin.
     pub shell: Option<[usize; 2]>,
     /// Duration of a control tick, and of a step of a body with masses.
     pub period_s: f64,
     /// Integrator of a body with masses.
     pub integrator: Integrator,
-    /// Geometry that a rigid finger with masses collides with.
+    /// Collision geometry of a rigid finger with masses.
     pub collision: Option<Collision>,
-    /// Whether a PA-10 carries the finger; else the scene's arm does.
+    /// Whether a PA-10 carries the finger; otherwise the scene's arm does.
     pub on_pa10: bool,
 }
 
-/// Fastest approach of a rigid finger with masses: stopped at once, it ends in an overload from
-/// about 5 mm/s on (`docs/physics.md`).
+/// Fastest approach of a rigid finger with masses: above about 5 mm/s it ends in an overload even
+/// if stopped at once (`docs/physics.md`).
 const RIGID_M_S: f64 = 0.005;
 
 const fn kinematic(senses: Senses, samples: usize, period_s: f64) -> Level {
@@ -63,9 +63,9 @@ const fn shell(cells: [usize; 2], period_s: f64) -> Level {
     Level { shell: Some(cells), ..kinematic(Senses::Full, 0, period_s) }
 }
 
-/// All levels, one a line. The last six approach the last, the reference, in points and time step
-/// at once: how far each is from it says whether it has converged. They begin with ticks shorter
-/// than a tactile frame: ticks as long as a frame see every frame at the instant it is sampled.
+/// All levels. The last six approach the last, the reference, in points and time step together;
+/// their distances from it show whether they converge. They start with ticks shorter than a tactile
+/// frame, because longer ticks see every frame at the instant of sampling.
 pub const LEVELS: &[Level] = &[
     Level::new(Body::Cast, Senses::Rigid, 0, 0.01),
     rigid(Collision::Hull),
@@ -105,13 +105,13 @@ pub const LEVELS: &[Level] = &[
     kinematic(Senses::Full, 32000, 0.00025),
 ];
 
-/// The levels that approach the reference.
+/// Levels that converge to the reference.
 pub fn converging() -> impl Iterator<Item = Level> {
     LEVELS[LEVELS.len() - 6..LEVELS.len() - 1].iter().copied()
 }
 
 impl Level {
-    /// A level with the settings that every body has.
+    /// Creates a level with the settings that every body has.
     pub const fn new(body: Body, senses: Senses, samples: usize, period_s: f64) -> Self {
         Self {
             body,
@@ -125,12 +125,12 @@ impl Level {
         }
     }
 
-    /// Whether this build can simulate it.
+    /// Whether this build can simulate the level.
     pub fn is_built(&self) -> bool {
         cfg!(feature = "mujoco") || self.body != Body::Dynamic
     }
 
-    /// `scene` with this level's changes; every other setting stays.
+    /// Returns `scene` with this level's changes; other settings are kept.
     pub fn apply(&self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
         scene.body = self.body;
@@ -169,7 +169,7 @@ impl Level {
         scene
     }
 
-    /// The name in tables.
+    /// Name in tables.
     pub fn name(&self) -> String {
         let mut words = vec![self.body.name().to_string()];
         if self.body != Body::Cast {
@@ -191,7 +191,7 @@ impl Level {
 }
 
 impl Senses {
-    /// The name in tables and legends.
+    /// Name in tables and legends.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",

@@ -1,11 +1,11 @@
-//! The cost of accuracy: variants of a scene, each with its error, its time and its verdict on
+//! Accuracy against cost: variants of a scene, each with its error, its time and its verdict on
 //! planners.
 //!
-//! Variants are of two kinds: a `level` is a coarser or finer simulation, and one of the `switches`
-//! turns an effect, the arm or the masses on or off. A `comparison` of levels has the finest as its
-//! reference, one of effects the scene as it is; it compares `touches` by their `deviation`s and
-//! planners by their `verdict`, and finds the cheapest variant within a `tolerance`. `convergence`
-//! is the order in which errors fall with the resolution.
+//! There are two kinds of variants. A `level` is a coarser or finer simulation. One of the
+//! `switches` turns an effect, the arm or the masses on or off. A `comparison` of levels uses the
+//! finest as reference, one of effects uses the unchanged scene. It compares `touches` by their
+//! `deviation`s and planners by their `verdict`, and selects the cheapest variant within a
+//! `tolerance`. `convergence` computes the orders of convergence.
 
 pub mod comparison;
 pub mod convergence;

@@ -1,4 +1,4 @@
-//! Switches of a scene: every effect of the finger, its arm, and the masses.
+//! Switches of a scene: all effects of the finger, the arm, and the masses.
 
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
@@ -6,7 +6,7 @@ use crate::sim::finger::effects::effect::Switch;
 use crate::sim::scene::Body;
 use palpate_input::config::Rules;
 
-/// Every switch of a scene, the effects first, in the order of their table.
+/// Returns all switches of a scene: the effects in the order of their table, then arm and masses.
 pub fn switches() -> Vec<Switch<Scene>> {
     let mut all: Vec<_> = Effects::switches().into_iter().map(of_scene).collect();
     all.push(Switch::table().within("arm", |scene: &Scene| &scene.arm, |scene| &mut scene.arm));
@@ -19,14 +19,16 @@ pub fn switches() -> Vec<Switch<Scene>> {
     all
 }
 
-/// `scene` with one switch the other way round, and without what then has nothing to act on.
+/// Returns `scene` with one switch toggled, and without the effects that then have nothing to act
+/// on.
 pub fn switched(scene: &Scene, switch: &Switch<Scene>) -> Scene {
     let mut scene = scene.clone();
     let (was_soft, was_on) = (scene.effects.skin.is_some(), switch.is_on(&scene));
     let had_masses = scene.body == Body::Dynamic;
     switch.set(&mut scene, !was_on);
     scene.effects.drop_unsupported();
-    // A finger that has lost its skin is a rigid hull, and the simplest touch with one is a cast.
+    // A finger without its skin is a rigid hull; body `cast` is the simplest simulation of its
+    // touches.
     if was_soft && scene.effects.skin.is_none() {
         scene.body = Body::Cast;
     }
@@ -38,7 +40,7 @@ pub fn switched(scene: &Scene, switch: &Switch<Scene>) -> Scene {
     scene
 }
 
-/// `scene` with every effect that its body can have.
+/// Returns `scene` with every effect that its body supports.
 pub fn full(scene: &Scene) -> Scene {
     let effects = || Effects::switches().into_iter().map(of_scene);
     effects().fold(scene.clone(), |scene, switch| {

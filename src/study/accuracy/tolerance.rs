@@ -1,20 +1,20 @@
-//! Tolerances: how far a cheaper scene may deviate, and from what.
+//! Tolerances: allowed deviation of a cheaper scene, and its origin.
 
 use super::deviation::Quantity;
 use std::fmt;
 use std::str::FromStr;
 
-/// The largest error that 95 % of the touches may have.
+/// Largest error allowed for 95 % of the touches.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
-    /// The quantity that it limits.
+    /// Limited quantity.
     pub quantity: Quantity,
     value: f64,
     unit: &'static str,
     si_per_unit: f64,
 }
 
-/// Units of a tolerance, the longest names first, with their size in SI units.
+/// Units of a tolerance, longest names first, with their size in SI units.
 const UNITS: [(&str, f64, Quantity); 4] = [
     ("counts", 1.0, Quantity::Electrodes),
     ("mm", 1e-3, Quantity::Contact),
@@ -49,19 +49,19 @@ impl Tolerance {
         self.value * self.si_per_unit
     }
 
-    /// An error, given in m, N or counts, in the tolerance's unit.
+    /// Formats an error, given in m, N or counts, in the tolerance's unit.
     pub fn shown(&self, error: f64) -> String {
         format!("{:.3} {}", error / self.si_per_unit, self.unit)
     }
 }
 
-/// The criterion by which an effect is needed.
+/// Criterion by which an effect is needed.
 #[derive(Clone, Copy, Debug)]
 pub enum Criterion {
     /// 95 % of the touches stay within a tolerance.
     Touches(Tolerance),
-    /// The comparison of planners changes by less than this margin, m; by default by less than
-    /// could reverse it.
+    /// The comparison of planners changes by less than this margin, m (default: the change that
+    /// could reverse it).
     Verdict(Option<f64>),
 }
 
@@ -71,36 +71,37 @@ impl FromStr for Criterion {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let length = |tolerance: Tolerance| match tolerance.quantity {
             Quantity::Contact => Ok(Self::Verdict(Some(tolerance.size()))),
-            _ => Err("the margin of a verdict is a length".to_owned()),
+            _ => Err("the margin of a verdict is a length, in mm or um".to_owned()),
         };
         let criterion = match text.trim().strip_prefix("verdict") {
             Some("") => Ok(Self::Verdict(None)),
             Some(margin) => {
-                let margin = margin.strip_prefix(':').ok_or_else(|| "a margin has a colon".into());
+                let margin =
+                    margin.strip_prefix(':').ok_or_else(|| "a margin follows a colon".into());
                 margin.and_then(str::parse).and_then(length)
             }
             None => text.parse().map(Self::Touches),
         };
-        criterion.map_err(|cause| format!("{cause}; or verdict, or with a margin verdict:0.1mm"))
+        criterion.map_err(|cause| format!("{cause}; or verdict, or verdict:0.1mm with a margin"))
     }
 }
 
-/// The origin of an error: a model may be near its own finest level and far from the truth.
+/// Origin of an error. A model may be close to its finest level and far from the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Origin {
-    /// The scene as it is: its effects are left out.
+    /// The unchanged scene; its effects are removed.
     Scene,
     /// The reference, the finest level.
     Reference,
-    /// The object's true surface, which gives points of contact alone.
+    /// The object's true surface; it gives contact points only.
     Truth,
 }
 
 impl Origin {
-    /// The name in sentences.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Scene => "the scene as it is",
+            Self::Scene => "the unchanged scene",
             Self::Reference => "the reference",
             Self::Truth => "the true surface",
         }

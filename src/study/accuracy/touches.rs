@@ -21,19 +21,19 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Test places along each side of the zone for the error of a believed surface.
+/// Test points along each side of the zone for the error of an estimated surface.
 // heuristic: 2 mm apart on the scenes of the paper.
 const GRID: usize = 41;
 
-/// Touches of one trial: after so many a finger's heat and drift have shown.
-// heuristic: an experiment's trials have ten touches or more.
+/// Touches per trial: enough to show a finger's heat and drift.
+// heuristic: trials of experiments have ten touches or more.
 const TRIAL: usize = 10;
 
-/// The finger still stands where it was deepest as long as it is within this: far above rounding,
-/// far below a tick of any approach.
+/// Distance from the deepest point within which the finger counts as at rest: far above rounding,
+/// far below one tick of any approach.
 const STILL_M: f64 = 1e-7;
 
-/// Targets in trials of ten.
+/// Targets, grouped in trials of ten.
 #[derive(Clone, Debug)]
 pub struct Trials {
     targets: Vec<Vec<Target>>,
@@ -41,8 +41,8 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// `count` targets of the scene's zone, evenly spread; the first trial has number `first`.
-    /// Another `first` is another sequence of targets.
+    /// Creates `count` evenly spread targets in the scene's zone; the first trial has number
+    /// `first`. Each `first` gives another sequence of targets.
     pub fn new(scene: &Scene, count: usize, first: u64) -> Self {
         let targets = targets(scene, count, first);
         Self { targets: targets.chunks(TRIAL).map(<[_]>::to_vec).collect(), first }
@@ -53,10 +53,10 @@ impl Trials {
         self.targets.concat()
     }
 
-    /// Touches them in a [`noise_free`] scene, trial by trial.
+    /// Touches the targets in a [`noise_free`] scene; returns one result per trial.
     ///
     /// # Errors
-    /// If the body cannot be simulated or brought to its start.
+    /// If the body cannot be simulated or moved to its start.
     pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<Touches>> {
         let simulator = Simulator::new(Arc::clone(environment))?;
         let trials = self.targets.par_iter().enumerate();
@@ -66,7 +66,7 @@ impl Trials {
     }
 }
 
-/// Evenly spread places of the scene's zone.
+/// Returns evenly spread places of the scene's zone.
 pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
     let Some(zone) = scene.zone.clone() else { return Vec::new() };
     let belief = HeightField::new(zone, GpSettings::default()).into();
@@ -79,11 +79,11 @@ pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
 /// Results of the touches of one trial.
 #[derive(Debug, Default)]
 pub struct Touches {
-    /// The contact of each touch; `None` after a miss or a fault.
+    /// Contact of each touch; `None` after a miss or a fault.
     pub contacts: Vec<Option<Contact>>,
-    /// The load on the finger when each contact was read.
+    /// Load on the finger when each contact was read.
     pub loads: Vec<Option<ReferenceLoad>>,
-    /// Simulated time of each touch of a body that moves.
+    /// Simulated time of each touch of a moving body.
     pub simulated_s: Vec<f64>,
     /// Touches that ended in a fault.
     pub faults: usize,
@@ -92,7 +92,7 @@ pub struct Touches {
 /// Touches every target with the simulator of a [`noise_free`] scene.
 ///
 /// # Errors
-/// If the body cannot be brought to its start.
+/// If the body cannot be moved to its start.
 pub fn touch_all(simulator: &Simulator, targets: &[Target], seed: u64) -> Result<Touches, Fault> {
     let environment = simulator.environment();
     let (mut probe, ticks): (Box<dyn Probe>, _) = match (simulator.body()?, environment.chain()) {
@@ -120,20 +120,20 @@ pub fn touch_all(simulator: &Simulator, targets: &[Target], seed: u64) -> Result
     Ok(touches)
 }
 
-/// The load on the finger at the end of its rest on the object.
+/// Load on the finger at the end of its rest on the object.
 #[derive(Clone, Debug)]
 pub struct ReferenceLoad {
     /// Pose and motion of the fingertip.
     pub motion: TipMotion,
     /// Magnitude of the force.
     pub force_n: f64,
-    /// Rise of the static pressure.
+    /// Rise in static pressure.
     pub pdc_counts: Option<f64>,
     /// Change of each electrode.
     pub electrode_counts: Option<[f64; ELECTRODES]>,
 }
 
-/// `scene` with sensors that add no noise, do not drift and do not round.
+/// Returns `scene` with sensors that add no noise, do not drift and do not round.
 pub fn noise_free(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     let effects = &mut scene.effects;
@@ -153,8 +153,8 @@ pub fn noise_free(scene: &Scene) -> Scene {
     scene
 }
 
-/// Leads a fresh finger of a [`noise_free`] scene along the movement in `ticks` once more; returns
-/// its load at the end of its rest on the object, or `None` without a skin or a contact.
+/// Replays the movement in `ticks` with a new finger of a [`noise_free`] scene. Returns its load at
+/// the end of its rest on the object; `None` without a skin or a contact.
 pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
     let environment = simulator.environment();
     let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
@@ -188,11 +188,11 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
     })
 }
 
-/// Wall times of touches of each scene, its sensors as noisy as they are: in turn, so that other
-/// load of the machine falls on all alike.
+/// Wall times of touches of each scene with its sensor noise, interleaved so that other load of the
+/// machine affects all scenes alike.
 ///
 /// # Errors
-/// If a scene cannot be built or its body not be brought to its start.
+/// If a scene cannot be built or its body cannot be moved to its start.
 pub fn wall_times_s<const N: usize>(
     scenes: [&Scene; N],
     targets: &[Target],
@@ -206,7 +206,7 @@ pub fn wall_times_s<const N: usize>(
     let mut times_s = Vec::with_capacity(rounds);
     for (round, target) in targets.iter().cycle().take(rounds).enumerate() {
         let mut walls_s = [f64::NAN; N];
-        // Which goes first alternates: the second finds the caches warm.
+        // The order alternates, because the second scene finds warm caches.
         for k in (0..N).map(|k| (k + round) % N) {
             let (probe, environment) = &mut probes[k];
             let Some(approach) = environment.task().approach(target) else { continue };
@@ -220,15 +220,15 @@ pub fn wall_times_s<const N: usize>(
     Ok(times_s)
 }
 
-/// Bytes of a finger's skin, electrodes and one trial's memory of them; the mesh and its tree,
-/// which all variants of a scene share, are left out.
+/// Bytes of a finger's skin, electrodes and state of one trial; excludes the mesh and its tree,
+/// which all variants share.
 pub fn finger_bytes(environment: &Environment) -> usize {
     let Some(tip) = environment.fingertip() else { return 0 };
     tip.bytes() + FingertipState::new(tip, &seed::stream(0, 0, "finger")).bytes()
 }
 
-/// Root mean square error of the surface believed after these touches; `None` if nothing can be
-/// fitted or the truth is unknown.
+/// Root mean square error of the surface fitted to these touches; `None` if nothing can be fitted
+/// or the truth is unknown.
 pub fn surface_rmse_m(
     environment: &Environment,
     targets: &[Target],

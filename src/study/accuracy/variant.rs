@@ -1,4 +1,4 @@
-//! A variant of a scene: its errors and its price.
+//! A variant of a scene: its errors and its cost.
 
 use super::deviation::{Quantity, Share, Spread};
 use super::level::{LEVELS, Level};
@@ -14,25 +14,25 @@ use palpate_input::config::Rules;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Share of the touches that may be beyond a tolerance.
+/// Share of the touches that may exceed a tolerance.
 pub const ALLOWED: f64 = 0.05;
 
-/// The name of the scene itself among its variants.
-const AS_IT_IS: &str = "the scene as it is";
+/// Name of the unchanged scene among its variants.
+const AS_IT_IS: &str = "the unchanged scene";
 
-/// A variant of a scene, compared with its reference: the finest level for a level, the scene as it
-/// is for a switched effect.
+/// A variant of a scene, compared with its reference: the finest level for a level, the unchanged
+/// scene for a switched effect.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Variant {
-    /// The name in tables.
+    /// Name in tables.
     pub name: String,
-    /// The level, if it is one.
+    /// Fidelity level, if the variant is one.
     pub level: Option<Level>,
-    /// The effect that is switched, if one is.
+    /// Switched effect, if the variant is one.
     pub effect: Option<String>,
-    /// Targets touched.
+    /// Number of targets touched.
     pub touches: usize,
-    /// Touches that found a contact.
+    /// Touches with contact.
     pub contacts: usize,
     /// Touches that ended in a fault.
     pub faults: usize,
@@ -42,35 +42,35 @@ pub struct Variant {
     pub contact_m: Option<Spread>,
     /// Difference of the force.
     pub force_n: Option<Spread>,
-    /// Difference of the rise of the static pressure.
+    /// Difference of the rise in static pressure.
     pub pdc_counts: Option<Spread>,
     /// Root mean square difference over the electrodes.
     pub electrode_counts: Option<Spread>,
-    /// Error of the surface believed after all touches.
+    /// Error of the surface fitted to all touches.
     pub surface_rmse_m: Option<f64>,
     /// Median wall time of a touch.
     pub wall_s: Option<f64>,
-    /// Wall time of a touch over that of the reference: the median of interleaved pairs.
+    /// Wall time of a touch relative to the reference: median of interleaved pairs.
     pub time_ratio: Option<f64>,
     /// 95 % interval of `time_ratio`.
     pub time_ratio_interval: Option<[f64; 2]>,
     /// Median simulated time of a touch.
     pub simulated_s: Option<f64>,
-    /// Bytes of the finger.
+    /// Memory of the finger, bytes.
     pub finger_bytes: usize,
     /// RMSE of `active` minus that of `random`, m.
     pub verdict_m: Option<Paired>,
-    /// The same minus that of the scene as it is, trial by trial.
+    /// `verdict_m` minus that of the unchanged scene, paired by trial.
     pub verdict_change_m: Option<Paired>,
     /// Touches beyond the tolerance.
     pub beyond: Option<Share>,
-    /// Whether the scene needs the effect that is switched.
+    /// Whether the scene needs the switched effect.
     pub relevance: Option<Relevance>,
 }
 
 impl Variant {
-    /// The reference, which is the finest level, then `scene` as it is and every other level that
-    /// this build can simulate.
+    /// Returns the reference (the finest level), then the unchanged `scene` and every other level
+    /// that this build can simulate.
     pub fn levels(scene: &Scene) -> Vec<(Self, Scene)> {
         let of_level = |level: &Level| {
             let variant = Self { level: Some(*level), ..Self::named(level.name()) };
@@ -82,8 +82,8 @@ impl Variant {
         variants
     }
 
-    /// The reference, which is `scene` as it is, then the same with each effect switched alone:
-    /// those that it has, and all others that its body can have.
+    /// Returns the reference (the unchanged `scene`), then the scene with each effect switched
+    /// alone: effects that it has, and others that its body supports.
     pub fn effects(scene: &Scene) -> Vec<(Self, Scene)> {
         let mut variants = vec![(Self::named(AS_IT_IS.into()), scene.clone())];
         for switch in switches() {
@@ -97,13 +97,13 @@ impl Variant {
         variants
     }
 
-    /// A variant that is not measured yet.
+    /// Creates an unmeasured variant.
     pub fn named(name: String) -> Self {
         Self { name, ..Self::default() }
     }
 
     /// Touches the targets with `scene` and compares with the touches of the reference, or with
-    /// themselves where there are none.
+    /// themselves if there is no reference.
     pub(super) fn measured(
         self,
         scene: &Scene,
@@ -146,13 +146,13 @@ impl Variant {
         Ok((variant, touches))
     }
 
-    /// Simulated time over wall time.
+    /// Simulated time divided by wall time.
     pub fn real_time_factor(&self) -> Option<f64> {
         Some(self.simulated_s? / self.wall_s?)
     }
 
-    /// The error that 95 % of the touches stay within, in m, N or counts; `None` where it is not
-    /// known: of the truth only the surface is.
+    /// Error that contains 95 % of the touches, in m, N or counts; `None` if unknown. Relative to
+    /// the truth only the contact point is known.
     pub fn p95(&self, quantity: Quantity, origin: Origin) -> Option<f64> {
         let spread = match (origin, quantity) {
             (Origin::Truth, Quantity::Contact) => self.off_truth_m,
@@ -165,7 +165,7 @@ impl Variant {
         spread.map(|spread| spread.p95)
     }
 
-    /// Whether 95 % of the touches stay within the tolerance; one without a counterpart does not.
+    /// Whether 95 % of the touches are within the tolerance; a touch without a counterpart is not.
     pub fn stays_within(&self, tolerance: &Tolerance, origin: Origin) -> bool {
         let is_within = |error: f64| error <= tolerance.size();
         match self.beyond.filter(|_| origin != Origin::Truth) {
@@ -175,7 +175,8 @@ impl Variant {
     }
 }
 
-/// Distance of a contact from the true surface: the analytic one, or else the mesh.
+/// Distance of a contact from the true surface: the analytic one if there is one, otherwise the
+/// mesh.
 fn off_surface_m(environment: &Environment, contact: &Contact) -> Option<f64> {
     let p_wc = contact.p_wc;
     match (environment.nearest_true_point(&p_wc), environment.shape()) {

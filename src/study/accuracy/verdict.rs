@@ -1,4 +1,4 @@
-//! The comparison of two planners in a scene, and whether a change of it matters.
+//! Comparison of two planners in a scene, and the relevance of a change in it.
 
 use crate::experiment::statistics::Paired;
 use crate::experiment::truth::Truth;
@@ -10,25 +10,25 @@ use serde::Serialize;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Test places along each side of the zone.
-// heuristic: as many as experiments have.
+/// Test points along each side of the zone.
+// heuristic: the default of experiments.
 const GRID: usize = 31;
 
 /// Whether a scene needs an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Relevance {
-    /// Switched, it deviates by more than the tolerance.
+    /// Switching the effect exceeds the tolerance.
     Needed,
-    /// It does not.
+    /// Switching the effect stays within the tolerance.
     NotNeeded,
-    /// More touches or trials are needed.
+    /// More touches or trials are needed to decide.
     Undecided,
 }
 
 impl Relevance {
-    /// Returns the relevance of a change with this 95 % interval: whether it lies within `margin`
-    /// on both sides, or beyond it.
+    /// Returns the relevance of a change with this 95 % interval: not needed if it lies within
+    /// ±`margin`, needed if it lies beyond.
     pub fn of_change(interval: Option<[f64; 2]>, margin: Option<f64>) -> Self {
         match interval.zip(margin) {
             Some(([low, high], margin)) if low > -margin && high < margin => Self::NotNeeded,
@@ -37,18 +37,17 @@ impl Relevance {
         }
     }
 
-    /// The words in tables.
+    /// Text in tables.
     pub fn words(self) -> &'static str {
         match self {
             Self::Needed => "needed",
             Self::NotNeeded => "not needed",
-            Self::Undecided => "undecided: more touches or trials",
+            Self::Undecided => "undecided: use more touches or trials",
         }
     }
 }
 
-/// RMSE of `active` minus that of `random`, m, trial by trial; `None` where one of them did not
-/// end.
+/// RMSE of `active` minus that of `random`, m, per trial; `None` if one of them failed.
 ///
 /// # Errors
 /// If the scene cannot be built.
@@ -79,7 +78,7 @@ pub fn advantages_m(
     Ok(trials.into_par_iter().map(advantage).collect())
 }
 
-/// The mean of `a`, or of how much it is above `b` in those trials in which both are known.
+/// Mean of `a`, or of its excess over `b` in the trials in which both are known.
 pub fn difference(a: &[Option<f64>], b: Option<&[Option<f64>]>) -> Option<Paired> {
     let other = |i: usize| b.map_or(Some(0.0), |b| b[i]);
     let pairs = a.iter().enumerate().filter_map(|(i, a)| (*a).zip(other(i)));

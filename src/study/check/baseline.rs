@@ -1,4 +1,4 @@
-//! What planners were: a file of JSON lines, a header and then a line for each trial.
+//! Stored baseline of a regression test: a file of JSON lines, a header and a line per trial.
 
 use super::judged::JUDGED;
 use crate::experiment::trial::row::TrialRow;
@@ -12,66 +12,66 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The first line.
+/// First line of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
     /// Name of the experiment.
     pub experiment: String,
-    /// Version of Palpate that made it.
+    /// Version of Palpate that wrote it.
     pub palpate: String,
-    /// Why it is as it is: what whoever made it said.
+    /// Reason for this baseline, given by its author.
     pub why: String,
-    /// Planners that differ from the file before, and how.
+    /// Planners that differ from the previous file, with the difference.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub differs: Vec<String>,
-    /// SHA-256 of every setting that decides a row, and of the object's file.
+    /// SHA-256 of all settings that decide a row, and of the object's file.
     pub settings: String,
-    /// Root of all randomness.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Initial touches of a trial.
+    /// Initial touches per trial.
     pub initial_touches: u32,
-    /// Touches of a trial.
+    /// Touches per trial.
     pub touches: u32,
-    /// Test places along each side of the zone.
+    /// Test points along each side of the zone.
     pub grid: u32,
-    /// Trials of each planner.
+    /// Trials per planner.
     pub trials: u32,
-    /// Planners.
+    /// Names of the planners.
     pub planners: Vec<String>,
-    /// Instructions of a trial that version 0.1 counted, ignored.
+    /// Instruction counts that version 0.1 wrote; ignored.
     #[serde(default, skip_serializing)]
     cost: IgnoredAny,
 }
 
-/// A trial.
+/// Results of a trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// Its number.
+    /// Number of the trial.
     pub trial: u32,
-    /// Its planner.
+    /// Name of the planner.
     pub planner: String,
-    /// SHA-256 of its row, the first half.
+    /// First half of the SHA-256 of its row.
     pub row: String,
-    /// Why it failed, if it did.
+    /// Reason of a failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// What it is judged by, by [`Judged::id`](super::judged::Judged::id).
+    /// Values of its measures, by [`Judged::id`](super::judged::Judged::id).
     pub values: BTreeMap<String, f64>,
 }
 
-/// The file.
+/// A stored baseline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baseline {
-    /// Its first line.
+    /// First line of the file.
     pub header: Header,
-    /// A line for each trial.
+    /// One line per trial.
     pub lines: Vec<Line>,
 }
 
 impl Line {
-    /// The line of a finished trial of `experiment`.
+    /// Creates the line of a finished trial of `experiment`.
     pub fn of(row: &TrialRow, experiment: &Experiment) -> Self {
         let values = JUDGED
             .iter()
@@ -87,8 +87,8 @@ impl Line {
     }
 }
 
-/// Half of the SHA-256 of a row's line in `trials.jsonl`: enough that no two are taken for the
-/// same.
+/// Returns half of the SHA-256 of a row's line in `trials.jsonl`, which is enough to avoid
+/// collisions.
 fn hash(row: &TrialRow) -> String {
     let line = serde_json::to_vec(row).unwrap_or_default();
     let mut text = hex(Sha256::digest(line));
@@ -96,8 +96,8 @@ fn hash(row: &TrialRow) -> String {
     text
 }
 
-/// SHA-256 of what decides the rows of `experiment`. Where its files lie does not count, but what
-/// the object's holds.
+/// Returns the SHA-256 of the settings that decide the rows of `experiment`. Paths of files do not
+/// count; the contents of the object's file do.
 pub fn settings(experiment: &Experiment) -> String {
     let mut identity = experiment.identity();
     let mut object = Vec::new();
@@ -110,7 +110,7 @@ pub fn settings(experiment: &Experiment) -> String {
 }
 
 impl Baseline {
-    /// Of all trials of an experiment, made for this reason.
+    /// Creates the baseline of all trials of an experiment, with its reason.
     pub fn new(simulation: &Simulation, rows: &[TrialRow], why: &str) -> Self {
         let experiment = simulation.experiment();
         let header = Header {
@@ -131,10 +131,10 @@ impl Baseline {
         Self { header, lines }
     }
 
-    /// Reads a file.
+    /// Reads a baseline file.
     ///
     /// # Errors
-    /// If it cannot be read, or a line is not what it should be.
+    /// If the file cannot be read, or a line is invalid.
     pub fn read(path: &Path) -> Result<Self, Invalid> {
         let text = files::text(path, files::TEXT_MAX).map_err(|error| Invalid::io(path, error))?;
         let bad = |i: usize| {
@@ -142,17 +142,20 @@ impl Baseline {
             move |error: serde_json::Error| Invalid::new(error.to_string()).at(place)
         };
         let mut lines = text.lines().enumerate();
-        let empty = || Invalid::new("it is empty").at(path.display());
+        let empty = || {
+            Invalid::new("the file is empty; write a baseline with --bless REASON")
+                .at(path.display())
+        };
         let (_, first) = lines.next().ok_or_else(empty)?;
         let header = serde_json::from_str(first).map_err(bad(0))?;
         let lines = lines.map(|(i, line)| serde_json::from_str(line).map_err(bad(i)));
         Ok(Self { header, lines: lines.collect::<Result<_, _>>()? })
     }
 
-    /// As it is written.
+    /// Returns the text of the file.
     ///
     /// # Errors
-    /// If a number of it is none of JSON's.
+    /// If a value is NaN or infinite.
     pub fn text(&self) -> Result<String, serde_json::Error> {
         let mut text = serde_json::to_string(&self.header)? + "\n";
         for line in &self.lines {
@@ -162,10 +165,10 @@ impl Baseline {
         Ok(text)
     }
 
-    /// Whether its trials pair with those of `experiment`.
+    /// Checks that its trials pair with those of `experiment`.
     ///
     /// # Errors
-    /// The first setting that they do not share.
+    /// The first setting that differs.
     pub fn check_pairs(&self, path: &Path, experiment: &Experiment) -> Result<(), Invalid> {
         let header = &self.header;
         for (field, found, wanted) in [
@@ -176,16 +179,16 @@ impl Baseline {
         ] {
             if found != wanted {
                 let problem = format!(
-                    "`{field}` is {found} there and {wanted} in the experiment: their trials do not pair"
+                    "`{field}` is {found} in the baseline and {wanted} in the experiment, so trials do not pair"
                 );
-                let mend = "make a new baseline with --bless WHY";
+                let mend = "write a new baseline with --bless REASON";
                 return Err(Invalid::new(problem).at(path.display()).mend(mend));
             }
         }
         Ok(())
     }
 
-    /// The line of a trial.
+    /// Finds the line of a trial.
     pub fn line(&self, trial: u32, planner: &str) -> Option<&Line> {
         self.lines.iter().find(|line| line.trial == trial && line.planner == planner)
     }

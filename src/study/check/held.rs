@@ -1,4 +1,4 @@
-//! Trials run again until each planner is told from what it was, or is not.
+//! Regression test: repeats trials until each planner's verdict is decided.
 
 use super::baseline::{Baseline, Line, settings};
 use super::judged::{JUDGED, Judged, Verdict};
@@ -8,46 +8,46 @@ use crate::experiment::runner::{self, Progress};
 use palpate_input::error::Invalid;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What came of it.
+/// Result of a regression test.
 #[derive(Debug)]
 pub struct Held {
-    /// One of each planner of experiment or baseline.
+    /// Results of each planner of the experiment or the baseline.
     pub planners: Vec<Planner>,
-    /// Whether settings are those of the baseline.
+    /// Whether the settings equal those of the baseline.
     pub same_settings: bool,
-    /// Whether it was stopped before it had told everything.
+    /// Whether the test was stopped before all verdicts were decided.
     pub is_stopped: bool,
-    /// The trials that were made.
+    /// Lines of the trials run.
     pub rows: Vec<Line>,
 }
 
-/// What is said of a planner.
+/// Result of a planner.
 #[derive(Debug)]
 pub struct Planner {
-    /// Its name.
+    /// Name of the planner.
     pub name: String,
-    /// What is said of it.
+    /// Verdict on the planner.
     pub verdict: Verdict,
-    /// Trials that pair with the baseline's.
+    /// Trials paired with the baseline.
     pub trials: usize,
-    /// Trials that failed and did not in the baseline, with the reason of the first.
+    /// Number of trials that failed but did not in the baseline, and the first reason.
     pub failed: Option<(usize, String)>,
-    /// Measure by measure; none if nothing pairs, or all is the same.
+    /// Result per measure; empty if no trial pairs, or all rows are identical.
     pub judgements: Vec<Judgement>,
 }
 
 impl Held {
-    /// The worst that is said.
+    /// Worst verdict of all planners.
     pub fn verdict(&self) -> Verdict {
         self.planners.iter().map(|planner| planner.verdict).max().unwrap_or(Verdict::Missing)
     }
 }
 
-/// Runs the experiment's planners on the baseline's trials: a few, whether they are the same, then
-/// a batch at a time.
+/// Runs the experiment's planners on the baseline's trials: first a few, to test for identical
+/// rows, then in batches.
 ///
 /// # Errors
-/// If threads cannot be started.
+/// If the threads cannot be started.
 pub fn hold(
     simulation: &Simulation,
     baseline: &Baseline,
@@ -72,7 +72,7 @@ pub fn hold(
             .collect();
         let made = runner::rows(simulation, jobs, threads, stop, progress)?;
         rows.extend(made.iter().map(|row| Line::of(row, experiment)));
-        // The first rows only tell whether anything is other: intervals are looked at by batches.
+        // The first rows only show whether anything differs; intervals are evaluated per batch.
         let is_open = |verdict| match until < batch {
             true => verdict != Verdict::Identical,
             false => verdict == Verdict::Undecided,
@@ -87,7 +87,7 @@ pub fn hold(
     Ok(Held { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
 }
 
-/// Which planners differ in the baseline `new` from those in `old`, and how: a line each.
+/// Returns a line for each planner in `new` that differs from `old`, with the difference.
 pub fn differs(old: &Baseline, new: &Baseline, rules: &Rules) -> Vec<String> {
     let (known, names) = (&old.header.planners, &new.header.planners);
     let told = names.iter().filter_map(|name| {
@@ -100,7 +100,7 @@ pub fn differs(old: &Baseline, new: &Baseline, rules: &Rules) -> Vec<String> {
         Some(format!("{name}: {} {percent:+.2} % in {} trials", first.judged.title, planner.trials))
     });
     let gone = known.iter().filter(|name| !names.contains(name));
-    told.chain(gone.map(|name| format!("{name}: gone"))).collect()
+    told.chain(gone.map(|name| format!("{name}: removed"))).collect()
 }
 
 fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> Planner {
@@ -121,7 +121,7 @@ fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> 
     if trials > 0 && !is_identical {
         let differences = JUDGED.iter().filter_map(|judged| {
             let value = |line: &Line| line.values.get(judged.id).copied();
-            // What neither has is not judged.
+            // Measures without any value are left out.
             let is_known = pairs.iter().any(|(new, old)| value(new).or(value(old)).is_some());
             let difference = |(new, old): &(&Line, &Line)| Some(value(new)? - value(old)?);
             is_known.then(|| (judged, pairs.iter().filter_map(difference).collect()))
@@ -136,30 +136,30 @@ fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> 
     Planner { name: name.into(), verdict, trials, failed, judgements }
 }
 
-/// One measure of one planner, new against old in the same trials.
+/// Result of one measure of one planner, new against old in the same trials.
 #[derive(Clone, Debug)]
 pub struct Judgement {
-    /// The measure.
+    /// Tested measure.
     pub judged: &'static Judged,
-    /// What its differences, new − old, tell.
+    /// Confidence sequence of the differences, new − old.
     pub sequence: Sequence,
-    /// What is said of it.
+    /// Verdict on the measure.
     pub verdict: Verdict,
-    /// How many trials would tell a difference of the tolerance, by their spread so far.
+    /// Trials needed to detect a difference of the tolerance, estimated from the spread so far.
     pub wanted: Option<usize>,
 }
 
-/// How sure to be.
+/// Parameters of the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
-    /// Share of an error that may be lost.
+    /// Largest relative increase in error that still passes.
     pub tolerance: f64,
-    /// Probability of one false word about a planner's first measure, at any time; the other
-    /// measures share as much, divided after Holm (1979).
+    /// Probability of a false verdict on a planner's first measure, at any time. The other measures
+    /// share the same probability, corrected after Holm 1979.
     pub alpha: f64,
-    /// Trials whose rows are looked at first, whether they are the same.
+    /// Number of trials in the first test for identical rows.
     pub first: usize,
-    /// Trials between two looks at an interval.
+    /// Trials between two evaluations of an interval.
     pub batch: usize,
 }
 
@@ -182,7 +182,8 @@ impl Rules {
         }
     }
 
-    /// One planner's measures from the differences of its trials; the first decides.
+    /// Evaluates a planner's measures from the differences of its trials; the first measure
+    /// decides.
     pub fn judge(&self, differences: &[(&'static Judged, Vec<f64>)]) -> Vec<Judgement> {
         let sequences: Vec<Sequence> = differences
             .iter()
@@ -199,7 +200,8 @@ impl Rules {
         .collect()
     }
 
-    /// Of which measures a difference is sure: of the first by itself, of the others after Holm.
+    /// Whether each measure's difference is significant: the first alone, the others with
+    /// Holm's correction (Holm 1979).
     fn sure(&self, sequences: &[Sequence]) -> Vec<bool> {
         let mut order: Vec<usize> = (1..sequences.len()).collect();
         order.sort_by(|&a, &b| sequences[a].p.total_cmp(&sequences[b].p));
@@ -218,7 +220,8 @@ impl Rules {
     }
 }
 
-/// What is said of a planner: its first measure decides, and any that is worse or missing.
+/// Returns the verdict on a planner: that of its first measure, or a worse one if any measure is
+/// worse or missing.
 pub fn of_planner(judgements: &[Judgement]) -> Verdict {
     let first = judgements.first().map_or(Verdict::Missing, |first| first.verdict);
     let is_bad = |judgement: &&Judgement| judgement.verdict >= Verdict::Worse;

@@ -1,34 +1,34 @@
-//! What a planner is judged by when it is held against what it was: one line to add one.
+//! Measures of the regression test.
 
 use crate::experiment::Experiment;
 use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE};
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use serde::Serialize;
 
-/// A number of a trial, less of which is better.
+/// Measure of a trial; smaller is better.
 #[derive(Debug)]
 pub struct Judged {
-    /// Its name in files.
+    /// Name in files.
     pub id: &'static str,
-    /// Its name in words.
+    /// Title for readers.
     pub title: &'static str,
-    /// Whether it is a logarithm, in which a difference of 0.05 is five percent; otherwise it is a
-    /// share of a trial's touches, in which that is five in a hundred.
+    /// Whether it is a logarithm, so that a difference of 0.05 means 5 %; otherwise it is a share
+    /// of a trial's touches.
     pub is_log: bool,
-    /// Its value over the touches after the initial ones, to the last; none where the trial has
-    /// none.
+    /// Computes its value from the touches after the initial ones; `None` if the trial has no
+    /// value.
     pub of: fn(&TrialRow, &Experiment) -> Option<f64>,
 }
 
-/// Errors and ways are not taken to be less; of zero there is no logarithm.
+/// Lower bound on errors and path lengths before taking the logarithm.
 const LEAST: f64 = 1e-12;
 
 fn log(value: f64) -> f64 {
     value.max(LEAST).ln()
 }
 
-/// The error that trials are judged by, in metres: over a zone the RMSE, around a whole object the
-/// Chamfer distance; none where it was not taken.
+/// Error of a trial in metres: the RMSE over a zone, the Chamfer distance around a whole object;
+/// `None` if it was not computed.
 fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
     RMSE.of(row, touches).or_else(|| CHAMFER.of(row, touches))
 }
@@ -39,8 +39,8 @@ fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Optio
     (!planned.is_empty()).then(|| count as f64 / planned.len() as f64)
 }
 
-/// The mean over the touches sees a loss that the last touch hides, and of all measures needs the
-/// fewest trials; so it is the first, which decides.
+/// Measures of the test. The first decides: the mean over the touches detects a loss that the last
+/// touch hides, and needs the fewest trials of all measures.
 pub static JUDGED: &[Judged] = &[
     Judged::log("mean_log_rmse", "mean log error over the touches", |row, of| {
         let after = of.initial_touches.max(1)..=of.touches;
@@ -56,10 +56,10 @@ pub static JUDGED: &[Judged] = &[
         CENTRED_R.of(row, of.touches).map(|r| log(1.0 - r))
     }),
     Judged::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
-    Judged::share("missed", "share of touches that met nothing", |row, of| {
+    Judged::share("missed", "share of touches without contact", |row, of| {
         share(row, of, |touch| touch.contact.is_none())
     }),
-    Judged::share("stalled", "share of plans that fell back", |row, of| {
+    Judged::share("stalled", "share of fallback plans", |row, of| {
         share(row, of, |touch| touch.stall.is_some())
     }),
 ];
@@ -81,31 +81,31 @@ impl Judged {
         Self { is_log: false, ..Self::log(id, title, of) }
     }
 
-    /// The difference that `tolerance`, a share of the error, allows.
+    /// Allowed difference for `tolerance`, a relative error.
     pub fn allowed(&self, tolerance: f64) -> f64 {
         if self.is_log { tolerance.ln_1p() } else { tolerance }
     }
 
-    /// A difference in percent: of the value, or of the touches.
+    /// Converts a difference to percent of the value, or of the touches.
     pub fn percent(&self, difference: f64) -> f64 {
         100.0 * if self.is_log { difference.exp_m1() } else { difference }
     }
 }
 
-/// What is said of one measure of one planner.
+/// Verdict on a measure of a planner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// No difference in any trial.
     Identical,
-    /// Less of what should be little.
+    /// Significantly smaller.
     Better,
-    /// Not more than is tolerated.
+    /// Within the tolerance.
     Ok,
-    /// These trials cannot tell.
+    /// Not decided by these trials.
     Undecided,
-    /// More of it.
+    /// Significantly larger.
     Worse,
-    /// No trial has it, of which the baseline has some.
+    /// No trial has the measure, but the baseline does.
     Missing,
 }

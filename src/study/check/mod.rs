@@ -1,8 +1,8 @@
-//! Are planners what they were? The same trials again, held against a committed file.
+//! Regression test of planners: repeats the trials of a stored baseline and compares the results.
 //!
-//! First the rows themselves are compared; where they are the same bytes, nothing has changed.
-//! Otherwise new and old are paired by trial, which share seeds, and trials are added in batches
-//! until an interval that holds at any time ([`sequence`]) tells. [`judged`] lists by what.
+//! Rows are compared first; identical bytes mean no change. Otherwise new and old trials with the
+//! same seeds are paired, and trials are added in batches until an anytime-valid interval
+//! ([`sequence`]) decides. [`judged`] lists the measures.
 
 pub mod baseline;
 pub mod held;

@@ -1,10 +1,10 @@
-//! An interval of a mean that holds at every moment of a growing sample, so that one may stop
-//! when one has seen enough.
+//! Confidence sequence of a mean: an interval that is valid at every size of a growing sample, so
+//! that sampling may stop at any time.
 //!
-//! Of values with unknown spread: the mixture of t likelihood ratios over effect sizes, a normal
-//! of variance g around none, is a martingale wherever the mean is what it is said to be (Lai 1976;
-//! Wang & Ramdas 2024, "Anytime-valid t-tests and confidence sequences for Gaussian means with
-//! unknown variance"). With n values, x = t²/(n − 1) and k = 1 + n g:
+//! For normal values of unknown variance, the mixture of t likelihood ratios over effect sizes with
+//! a normal prior of mean 0 and variance g is a martingale if the mean is the hypothesised one (Lai
+//! 1976; Wang & Ramdas 2024, "Anytime-valid t-tests and confidence sequences for Gaussian means
+//! with unknown variance"). With n values, x = t²/(n − 1) and k = 1 + n g:
 //!
 //! E = k^(−1/2) ((1 + x) / (1 + x/k))^(n/2)
 //!
@@ -12,33 +12,33 @@
 
 use crate::experiment::statistics::{mean, mean_and_error};
 
-/// Variance of plausible effect sizes, in units of the values' spread; chosen: it costs least where
-/// the mean is about a spread away from none, which five percent of error are.
+/// Prior variance of effect sizes, in units of the values' variance.
+// heuristic: narrowest interval where the mean is about one standard deviation, as for a 5 % error.
 const G: f64 = 1.0;
 
-/// More trials than anybody makes.
+/// Upper bound on the number of trials.
 const MOST: usize = 100_000;
 
-/// What a growing sample has told of its mean.
+/// Confidence sequence of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sequence {
-    /// Values so far.
+    /// Number of values.
     pub count: usize,
-    /// Their mean.
+    /// Mean of the values.
     pub mean: f64,
-    /// Ends of the interval; infinite while there is nothing to say.
+    /// Bounds of the interval; infinite if undetermined.
     pub interval: [f64; 2],
-    /// Their standard deviation, of more than one.
+    /// Standard deviation; `None` for a single value.
     pub sd: Option<f64>,
-    /// Whether all of them are none.
+    /// Whether all values are 0.
     pub is_zero: bool,
-    /// How improbable such values are at any time if the mean were none: 1/E, at most 1.
+    /// Anytime-valid p-value for a mean of 0: 1/E, at most 1.
     pub p: f64,
 }
 
 impl Sequence {
-    /// Of `values` in the order in which they came, with intervals that fail with probability
-    /// `alpha`, looked at whenever there were a multiple of `batch` of them, and at the end.
+    /// Computes the sequence of `values` in order of arrival, with miss probability `alpha`,
+    /// evaluated after every `batch` values and at the end.
     pub fn new(values: &[f64], batch: usize, alpha: f64) -> Self {
         let mut interval = [f64::NEG_INFINITY, f64::INFINITY];
         let mut p = 1.0_f64;
@@ -62,15 +62,15 @@ impl Sequence {
         }
     }
 
-    /// How many values an interval wants that is as wide to each side as `half`; none if their
-    /// spread is not known yet, or more than anybody makes.
+    /// Number of values for an interval with half width `half`; `None` if the spread is unknown or
+    /// the number exceeds 100 000.
     pub fn wanted(&self, half: f64, alpha: f64) -> Option<usize> {
         let sd = self.sd?;
         (2..MOST).find(|&n| sd * width(n, alpha) <= half * (n as f64).sqrt())
     }
 }
 
-/// Half of the interval's width over the standard error.
+/// Half width of the interval divided by the standard error.
 fn width(n: usize, alpha: f64) -> f64 {
     let (n, k) = (n as f64, 1.0 + n as f64 * G);
     let r = (k.sqrt() / alpha).powf(2.0 / n);
@@ -80,7 +80,7 @@ fn width(n: usize, alpha: f64) -> f64 {
     }
 }
 
-/// 1/E for a mean of none.
+/// Returns 1/E for a mean of 0.
 fn probability(n: usize, mean: f64, error: f64) -> f64 {
     if error == 0.0 {
         return if mean == 0.0 { 1.0 } else { 0.0 };

@@ -1,4 +1,4 @@
-//! Trials around made-up solids, and beliefs that are told of touches.
+//! Trials on synthetic solids, and beliefs with given touches.
 
 use super::solids::nets_within;
 use nalgebra::{Point3, Vector3};
@@ -16,7 +16,7 @@ use palpate::task::touch::TouchSettings;
 use palpate::task::{Aim, Approach, Ball, Task};
 use std::sync::Arc;
 
-/// A field of one number per point, negative inside, metres.
+/// A field with one value per point, negative inside, metres.
 pub type Field = fn(Vector3<f64>) -> f64;
 
 pub fn mesh(field: Field) -> Mesh {

@@ -1,9 +1,9 @@
-//! An allocator that counts for each thread what is asked of it.
+//! An allocator that counts each thread's allocations.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// What a thread has asked of the allocator.
+/// Counters of a thread.
 #[derive(Clone, Copy, Default)]
 struct Count {
     allocations: usize,
@@ -26,7 +26,7 @@ fn count(change: impl FnOnce(&mut Count)) {
     });
 }
 
-// SAFETY: everything is passed on to the system's allocator.
+// SAFETY: all calls are passed to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(|count| {
@@ -38,7 +38,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // What another thread allocated may be freed here.
+        // Memory of another thread may be freed here.
         count(|count| count.held_bytes = count.held_bytes.saturating_sub(layout.size()));
         unsafe { System.dealloc(memory, layout) }
     }
@@ -47,14 +47,14 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// How often `work` asks for memory on this thread.
+/// Number of allocations of `work` on this thread.
 pub fn allocations(work: impl FnOnce()) -> usize {
     let before = COUNT.get().allocations;
     work();
     COUNT.get().allocations - before
 }
 
-/// The most bytes that `work` holds at once on this thread, beyond what was held before.
+/// Peak memory of `work` on this thread, bytes above the initial memory.
 pub fn peak_bytes<R>(work: impl FnOnce() -> R) -> usize {
     let before = COUNT.get().held_bytes;
     count(|count| count.peak_bytes = before);

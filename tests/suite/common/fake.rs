@@ -1,4 +1,4 @@
-//! A body of numbers alone, which does what it is told and reads what a test wants.
+//! A fake body: it follows commands exactly and returns readings that a test defines.
 
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample, Wrench};
 use palpate::robot::arm::Chain;
@@ -6,22 +6,22 @@ use palpate::robot::finger::Frame;
 use palpate::robot::finger::frame::ELECTRODES;
 use std::sync::{Arc, Mutex};
 
-/// What it does to the reading of a tick.
+/// Fault in the reading of a tick.
 pub type Break = fn(u64, &mut Reading);
 
-/// What a fake body lives in.
+/// Behaviour of a fake body.
 #[derive(Default)]
 pub struct World {
     pub real_time: bool,
-    /// From which tick on readings go through what.
+    /// First tick of a fault, and the fault.
     pub breaks: Option<(u64, Break)>,
-    /// From which tick on joints read what they read then, but for noise of this amplitude.
+    /// Tick from which joints repeat their reading, with noise of this amplitude.
     pub freezes: Option<(u64, f64)>,
-    /// By how many ticks joints follow their commands later.
+    /// Delay of the joints relative to their commands, ticks.
     pub lag: usize,
     /// Force along y on a stage's tip at y.
     pub wall: Option<Box<dyn Fn(f64) -> f64 + Send>>,
-    /// The tick at which it says that it was stopped.
+    /// Tick at which it reports that it was stopped.
     pub dies_at: Option<u64>,
 }
 
@@ -35,7 +35,7 @@ impl World {
     }
 }
 
-/// What a fake body was told and where it was, from its first reset on.
+/// Commands and positions of a fake body since its first reset.
 #[derive(Clone, Default)]
 pub struct Fake(Arc<Mutex<Log>>);
 
@@ -51,7 +51,7 @@ impl Fake {
         self.0.lock().unwrap().commands.clone()
     }
 
-    /// One more than commands: the start comes first.
+    /// Positions, one more than commands: the start comes first.
     pub fn places(&self) -> Vec<Vec<f64>> {
         self.0.lock().unwrap().places.clone()
     }
@@ -60,7 +60,7 @@ impl Fake {
         self.0.lock().unwrap().places.last().unwrap().clone()
     }
 
-    /// From now on nothing is broken.
+    /// Ends all faults.
     pub fn mend(&self) {
         self.0.lock().unwrap().is_mended = true;
     }
@@ -75,7 +75,7 @@ pub struct FakeBody {
     reading: Reading,
 }
 
-/// A body with ticks of 2 ms.
+/// Creates a body with ticks of 2 ms.
 pub fn body_of(chain: &Chain, world: World) -> (FakeBody, Fake) {
     let log = Fake::default();
     let mut capabilities = Capabilities::of(chain, 0.002);
@@ -88,7 +88,7 @@ impl FakeBody {
     fn report(&mut self) {
         let Self { reading, tick, .. } = self;
         reading.time_s = *tick as f64 * self.capabilities.period_s;
-        // Something that is never twice the same, as noise is.
+        // A sequence that never repeats, like noise.
         let noise = |i: u64| ((*tick * 31 + i * 17) as f64 * 0.7).sin();
         let mut wrench = Wrench::default();
         wrench.force_n.x = 0.02 * noise(1);

@@ -1,4 +1,4 @@
-//! A body whose sensors and joints fail, to test what drives it.
+//! A body with failing sensors and joints, to test its driver.
 
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample};
 use palpate::math::seed;
@@ -8,28 +8,28 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
-/// How it fails, from a given tick on.
+/// Kinds of failure, from a given tick on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Failure {
-    /// Pressure that is not a number.
+    /// NaN pressure.
     NanPressure,
-    /// A joint position that is not a number.
+    /// NaN joint position.
     NanJoint,
-    /// The last frame, again and again.
+    /// The last frame is repeated.
     Frozen,
-    /// Every channel at the end of its range, 4095.
+    /// Every channel is at the end of its range, 4095.
     Saturated,
-    /// This share of the frames never arrives.
+    /// This share of the frames is lost.
     Lost(f64),
     /// Frames arrive this many ticks late.
     Late(usize),
-    /// This share of the pressures is off by up to the full range.
+    /// This share of the pressures is wrong by up to the full range.
     Spikes(f64),
-    /// Joints make only this share of the movement commanded.
+    /// Joints make only this share of the commanded movement.
     Weak(f64),
 }
 
-/// Around another body.
+/// Wrapper around another body.
 pub struct FaultInjector {
     inner: Box<dyn Backend>,
     failure: Failure,
@@ -43,7 +43,7 @@ pub struct FaultInjector {
 }
 
 impl FaultInjector {
-    /// `inner`, which fails after `from_tick` ticks.
+    /// Wraps `inner`, which fails after `from_tick` ticks.
     pub fn new(inner: Box<dyn Backend>, failure: Failure, from_tick: u64) -> Self {
         Self {
             inner,

@@ -1,4 +1,4 @@
-//! A transport inside this process: any number of ends of either side, without a network.
+//! An in-process transport with any number of ends on either side.
 
 use palpate::error::Invalid;
 use palpate::ros::message::TriggerResponse;
@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// Where the ends meet; each is the same hub.
+/// Meeting point of the ends; clones are the same hub.
 #[derive(Clone, Default)]
 pub struct Hub(Arc<Mutex<Ends>>);
 
@@ -21,11 +21,11 @@ struct Ends {
 struct End {
     id: u64,
     side: Side,
-    /// What arrives; `None` only wakes.
+    /// Incoming messages; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
 }
 
-/// One end.
+/// One end of the transport.
 pub struct Memory {
     hub: Hub,
     id: u64,
@@ -35,7 +35,7 @@ pub struct Memory {
 }
 
 impl Hub {
-    /// An end on one side.
+    /// Creates an end on one side.
     pub fn end(&self, side: Side) -> Memory {
         let (inlet, outlet) = channel();
         let mut ends = self.lock();

@@ -1,4 +1,5 @@
-//! An explorer and a twin in processes of their own, over ROS 2 or ROS 1: `PALPATE_ROS` says which.
+//! An explorer and a simulated robot in separate processes, over ROS 2 or ROS 1, selected by
+//! `PALPATE_ROS`.
 
 use palpate::experiment::trial::row::TrialRow;
 use palpate::robot::arm::ArmSettings;
@@ -13,25 +14,25 @@ use std::sync::{Arc, Mutex};
 use std::thread::{JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
-/// The experiment that is run over topics.
+/// Experiment that is run over topics.
 pub const EXPERIMENT: &str = "experiments/container_pa10.toml";
 
-/// Settings that a real arm needs of the container and the cell.
+/// Settings of the container and the cell that a real arm needs.
 pub const CELL: [&str; 3] = [
     "scene.zone.depth_m=[0.59, 0.71]",
     "backend.interlocks.lowest_m=0.0",
     "backend.interlocks.workspace_m=[[-1.0, 1.0], [-1.2, 0.6], [0.0, 1.8]]",
 ];
 
-/// A network that nobody else is on: a domain of ROS 2, or a master of ROS 1.
+/// An isolated network: a ROS 2 domain, or a ROS 1 master.
 pub struct Network {
-    /// What `[backend]` says of it.
+    /// Settings of `[backend]` for this network.
     pub settings: BackendSettings,
     master: Option<Child>,
 }
 
 impl Network {
-    /// Of this number.
+    /// Creates the network with this number.
     pub fn new(number: u16) -> Self {
         let mut settings = BackendSettings { domain: Some(number), ..Default::default() };
         settings.complete(Some(&ArmSettings::default()));
@@ -56,7 +57,7 @@ impl Network {
         Self { settings, master: Some(master) }
     }
 
-    /// `--set` of what it says.
+    /// Settings as `--set` options.
     fn sets(&self) -> [String; 6] {
         let BackendSettings { kind, domain, master, .. } = &self.settings;
         [
@@ -70,15 +71,14 @@ impl Network {
         .map(String::from)
     }
 
-    /// A program of `palpate` on it.
+    /// Command `palpate` on this network.
     pub fn palpate(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
         command.arg("--quiet").args(arguments).args(self.sets());
         command
     }
 
-    /// The shipped experiment with one trial of one planner: nothing else of it is changed but the
-    /// backend.
+    /// The shipped experiment with one trial of one planner; only the backend is changed.
     pub fn run(&self, planner: &str, touches: u32, out: &Path) -> Command {
         let mut command = self.palpate(&["run", EXPERIMENT, "--no-report"]);
         command.arg("--out").arg(out).args(["--set", "trials=1"]);
@@ -89,7 +89,7 @@ impl Network {
         command
     }
 
-    /// A peer of another implementation.
+    /// An independent peer.
     pub fn peer(&self, what: &str, more: &[&str]) -> Command {
         let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
         match self.settings.kind {
@@ -114,17 +114,17 @@ impl Drop for Network {
     }
 }
 
-/// A twin in a process of its own, and what it has told.
+/// A simulated robot in its own process, and its events.
 pub struct TwinProcess {
-    /// It.
+    /// Process of the robot.
     pub child: Child,
-    /// Its events, oldest first.
+    /// Events, oldest first.
     pub events: Arc<Mutex<Vec<Value>>>,
     reader: Option<JoinHandle<()>>,
 }
 
 impl TwinProcess {
-    /// Of a scene or experiment; is heard when this returns.
+    /// Starts the robot of a scene or experiment; it is discovered when this returns.
     pub fn new(network: &Network, path: &str, more: &[&str]) -> Self {
         let mut child =
             network.palpate(&["twin", path]).args(more).stdout(Stdio::piped()).spawn().unwrap();
@@ -140,14 +140,14 @@ impl TwinProcess {
         twin
     }
 
-    /// When an event of this kind was told last, if one was.
+    /// Time of the last event of this kind, if any.
     pub fn last(&self, is_it: impl Fn(&Value) -> bool) -> Option<f64> {
         let events = self.events.lock().unwrap();
         let found = events.iter().rev().find(|line| is_it(&line["event"]));
         found.and_then(|line| line["time_unix_s"].as_f64())
     }
 
-    /// As [`last`](Self::last); waits for it.
+    /// Waits for an event and returns its time, as [`last`](Self::last) does.
     pub fn wait_for(&self, is_it: impl Fn(&Value) -> bool, patience_s: f64) -> f64 {
         let begun = Instant::now();
         loop {
@@ -159,7 +159,7 @@ impl TwinProcess {
         }
     }
 
-    /// When its alarm was first raised after `since_s`; waits for it.
+    /// Waits for the first alarm after `since_s` and returns its time.
     pub fn alarmed_s(&self, since_s: f64) -> f64 {
         let begun = Instant::now();
         loop {
@@ -178,21 +178,21 @@ impl TwinProcess {
         }
     }
 
-    /// When it came to rest at last, if it is at rest.
+    /// Start of the current rest, if it is at rest.
     pub fn rest_s(&self) -> Option<f64> {
         let is_either = |event: &Value| event == "moving" || event == "at_rest";
         let at_s = self.last(is_either)?;
         (self.last(|event| event == "at_rest") == Some(at_s)).then_some(at_s)
     }
 
-    /// Waits until it moves, and has for a while.
+    /// Waits until it has moved for a while.
     pub fn wait_until_it_moves(&self) {
         self.wait_for(|event| event == "moving", 30.0);
         sleep(Duration::from_millis(300));
         assert_eq!(self.rest_s(), None, "{:?}", self.events);
     }
 
-    /// Ends it; what it counted.
+    /// Ends the process; returns its counts.
     pub fn end(mut self) -> Value {
         signal(&self.child, "INT");
         self.child.wait().unwrap();
@@ -215,13 +215,13 @@ pub fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([&format!("-{name}"), &id]).status().unwrap().success());
 }
 
-/// The first row of a run.
+/// First row of a run.
 pub fn row(out: &Path) -> TrialRow {
     let text = fs::read_to_string(out.join("trials.jsonl")).unwrap();
     serde_json::from_str(text.lines().next().unwrap()).unwrap()
 }
 
-/// The lines of a run's journal.
+/// Lines of a run's journal.
 pub fn journal(out: &Path) -> Vec<Value> {
     let text = fs::read_to_string(out.join("touches.jsonl")).unwrap_or_default();
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()

@@ -1,4 +1,4 @@
-//! What several tests need.
+//! Shared test utilities.
 
 pub mod around;
 pub mod counting;

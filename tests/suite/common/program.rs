@@ -34,7 +34,7 @@ noise = [1e-4, 1e-2]
 touch_counts = [3]
 ";
 
-/// A folder with a mesh, a scene and an experiment that work.
+/// A folder with a valid mesh, scene and experiment.
 pub fn folder() -> TempDir {
     let folder = TempDir::new().unwrap();
     for (name, text) in [("mesh.obj", MESH), ("scene.toml", SCENE), ("small.toml", EXPERIMENT)] {
@@ -43,7 +43,7 @@ pub fn folder() -> TempDir {
     folder
 }
 
-/// The program in a folder.
+/// Command `palpate` in a folder.
 pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
     command.args(arguments).current_dir(folder).stdin(Stdio::null());
@@ -54,7 +54,7 @@ pub fn palpate(folder: &Path, arguments: &[&str]) -> Output {
     ended(&mut command(folder, arguments), &arguments.join(" "))
 }
 
-/// How a program that prints little ended; one that does not end is killed, and fails the test.
+/// Runs a program with short output; a program that does not end is killed and fails the test.
 #[track_caller]
 pub fn ended(command: &mut Command, case: &str) -> Output {
     let mut child =
@@ -70,15 +70,14 @@ pub fn ended(command: &mut Command, case: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// What a program said on standard error, without the steps that it named because they took long:
-/// those depend on the machine.
+/// Returns the stderr of a program without the names of slow steps, which depend on the machine.
 pub fn said(output: &Output) -> String {
     let all = String::from_utf8_lossy(&output.stderr);
     let lines = all.lines().filter(|line| !line.ends_with(" ..."));
     lines.map(|line| format!("{line}\n")).collect()
 }
 
-/// Insists on a success.
+/// Requires success; returns stdout.
 #[track_caller]
 pub fn succeeds(folder: &Path, arguments: &[&str]) -> String {
     let output = palpate(folder, arguments);
@@ -86,7 +85,7 @@ pub fn succeeds(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8_lossy(&output.stdout).into()
 }
 
-/// Insists on exit code 2 and an error that holds all of `says`.
+/// Requires exit code 2 and an error that contains all of `says`.
 #[track_caller]
 pub fn fails(folder: &Path, arguments: &[&str], says: &[&str]) -> String {
     let output = palpate(folder, arguments);

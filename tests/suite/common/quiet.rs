@@ -1,4 +1,4 @@
-//! A finger that reads what is ideal, and a plane for it.
+//! A finger with ideal readings, and a plane for it.
 
 use super::shapes::square;
 use palpate::geometry::bvh::MeshBvh;
@@ -11,7 +11,7 @@ pub fn plane() -> MeshBvh {
     MeshBvh::new(square(0.1, 2))
 }
 
-/// Everything that makes a reading other than ideal is off.
+/// Effects without any non-ideal reading.
 pub fn quiet() -> Effects {
     Effects {
         skin: Some(SkinEffect::default()),

@@ -1,5 +1,5 @@
-//! An explorer and a twin in one process, in real time: the same code as over a network, but for the
-//! transport.
+//! An explorer and a simulated robot in one process, in real time: the same code as over a network
+//! except for the transport.
 
 use crate::common::hub::{Hub, Memory};
 use nalgebra::Point3;
@@ -29,10 +29,10 @@ pub const STAGE: &str = "scenes/container_finger.toml";
 #[cfg(feature = "mujoco")]
 pub const ARM: &str = "scenes/container_pa10.toml";
 
-/// Where the twin's fingertip truly was: the time of day and the place.
+/// True positions of the robot's fingertip with the time of day.
 pub type Track = Arc<Mutex<Vec<(f64, Point3<f64>)>>>;
 
-/// A twin in a thread, and how to reach it.
+/// A simulated robot in a thread, and its connection.
 pub struct Rig {
     pub simulator: Simulator,
     pub settings: BackendSettings,
@@ -45,7 +45,7 @@ pub struct Rig {
     thread: Option<JoinHandle<()>>,
 }
 
-/// A body that notes where its tip is.
+/// A body that records the position of its tip.
 struct Tracked {
     body: Box<dyn Backend>,
     chain: Chain,
@@ -129,10 +129,10 @@ impl Transport for Wired {
 }
 
 #[cfg(feature = "mujoco")]
-/// How a movement ended after some time.
+/// End of a movement after some time.
 #[derive(Clone, Copy, Debug)]
 pub struct Rest {
-    /// Time until the tip moved no more.
+    /// Time until the tip was at rest.
     pub time_s: f64,
     /// Length of the tip's path until then.
     pub path_m: f64,
@@ -192,7 +192,7 @@ impl Rig {
         Lab::connect(&self.settings, &self.simulator.environment().chain().unwrap(), connect)
     }
 
-    /// Touches over places at these fractions of the zone, until one fails.
+    /// Touches places at these fractions of the zone, until one fails.
     pub fn touch(&self, lab: &Arc<Lab>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
         let task = self.simulator.environment().task();
         let body = Box::new(lab.body());
@@ -219,7 +219,7 @@ impl Rig {
     }
 
     #[cfg(feature = "mujoco")]
-    /// When the first failure began.
+    /// Time at which the first failure began.
     pub fn failed_s(&self) -> f64 {
         let events = self.events.lock().unwrap();
         let begins = |event: &Event| matches!(event, Event::Failure { is_on: true, .. });
@@ -235,7 +235,7 @@ impl Rig {
     }
 
     #[cfg(feature = "mujoco")]
-    /// Waits until it has moved for `span`; the time then.
+    /// Waits until it has moved for `span`; returns the time then.
     pub fn wait_until_it_moves(&self, span: Duration) -> f64 {
         while !self.saw(|event| *event == Event::Moving) {
             std::thread::sleep(Duration::from_millis(1));
@@ -245,7 +245,7 @@ impl Rig {
     }
 
     #[cfg(feature = "mujoco")]
-    /// How the tip came to rest after `since_s`. It must be at rest now.
+    /// Way in which the tip came to rest after `since_s`. It must be at rest now.
     pub fn rest(&self, since_s: f64) -> Rest {
         let track = self.track.lock().unwrap();
         let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();
@@ -261,7 +261,8 @@ impl Rig {
 }
 
 #[cfg(feature = "mujoco")]
-/// The tip is at rest from when it stays this near to where it ends: the sag of servos is below.
+/// Distance from its final position within which the tip counts as at rest: the servos' sag is
+/// smaller.
 const STILL_M: f64 = 1e-4;
 
 impl Drop for Rig {
@@ -272,7 +273,7 @@ impl Drop for Rig {
     }
 }
 
-/// For machines that run many tests at a time: what is tested is not how old something may be.
+/// Settings for busy machines: age limits are not under test.
 pub fn patient() -> BackendSettings {
     let mut settings = BackendSettings { patience_s: 20.0, ..BackendSettings::default() };
     let topics = &mut settings.topics;

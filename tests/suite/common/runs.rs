@@ -1,4 +1,4 @@
-//! Made-up runs, so that no trial has to be run.
+//! Synthetic runs, so that no trial has to be run.
 
 use palpate::experiment::experiment::Experiment;
 use palpate::experiment::measure::metrics::Metrics;
@@ -38,7 +38,7 @@ zone = { x_m = [-0.05, 0.05], z_m = [-0.07, 0.07], datum_y_m = -0.6 }
 object = { mesh = "none.obj" }
 "#;
 
-/// An elliptic cylinder with a bump, and nothing beyond its sides; in 1-D a wave.
+/// An elliptic cylinder with a bump, and nothing beyond its sides; a wave in 1-D.
 fn height_m(place: &[f64]) -> Option<f64> {
     match place {
         [x, z] => {
@@ -49,7 +49,7 @@ fn height_m(place: &[f64]) -> Option<f64> {
     }
 }
 
-/// A run of an experiment, with touches that no planner chose.
+/// A run of an experiment with synthetic touches.
 pub fn run(text: &str) -> Run {
     let experiment: Experiment = toml::from_str(text).unwrap();
     let zone = experiment.scene.zone.as_ref().unwrap();
@@ -70,7 +70,7 @@ fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
     TrialRow { trial, planner: planner.into(), failure: None, touches, verification: Vec::new() }
 }
 
-/// Where the finger turns back that meets nothing at `target`.
+/// Position at which a finger turns back after a miss at `target`.
 pub fn tip_behind(zone: &Zone, target: &[f64]) -> [f64; 3] {
     zone.point(target, -0.1).coords.into()
 }

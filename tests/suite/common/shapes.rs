@@ -1,4 +1,4 @@
-//! Meshes and slow twins for the geometry tests.
+//! Meshes and reference implementations for the geometry tests.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate::geometry::mesh::Mesh;
@@ -86,7 +86,7 @@ pub fn sphere_mesh(centre: Point3<f64>, radius: f64, cells: u32) -> Mesh {
     })
 }
 
-/// Uniform numbers in -1..1.
+/// Uniform random numbers in -1..1.
 pub struct Dice(pub u64);
 
 impl Dice {
@@ -107,7 +107,7 @@ impl Dice {
     }
 }
 
-/// Möller and Trumbore's test; `slack` widens the triangle in barycentric coordinates.
+/// Test of Möller and Trumbore; `slack` widens the triangle in barycentric coordinates.
 pub fn slow_ray(
     o: &Point3<f64>,
     d: &Vector3<f64>,
@@ -155,8 +155,8 @@ pub fn slow_nearest(p: &Point3<f64>, &[a, b, c]: &Triangle) -> Point3<f64> {
     a + ab * (vb / (va + vb + vc)) + ac * (vc / (va + vb + vc))
 }
 
-/// Distance from the axis of a capsule to a mesh, by ternary search along the axis: the distance
-/// of a moving point to a triangle is convex.
+/// Distance from the axis of a capsule to a mesh, by ternary search along the axis: the distance of
+/// a moving point to a triangle is convex.
 pub fn slow_gap(capsule: &Capsule, mesh: &Mesh) -> f64 {
     let gap = |s: f64, triangle: &Triangle| {
         let p = capsule.p0_w + (capsule.p1_w - capsule.p0_w) * s;
@@ -173,8 +173,8 @@ pub fn slow_gap(capsule: &Capsule, mesh: &Mesh) -> f64 {
     mesh.iter_corners().map(one).fold(f64::INFINITY, f64::min)
 }
 
-/// Travel to first contact by conservative advancement: a capsule may always move by the gap
-/// that is left. Approaches the contact from below.
+/// Travel to first contact by conservative advancement: a capsule may always move by the remaining
+/// gap. Approaches the contact from below.
 pub fn slow_travel(
     capsule: &Capsule,
     direction: &UnitVector3<f64>,

@@ -1,24 +1,23 @@
-//! What ships with the project, loaded with settings changed, and what is asked of it again and
-//! again.
+//! Shipped scenes with changed settings, and common queries of them.
 
 use palpate::explore::probe::{Contact, Touch};
 use palpate::sim::{Environment, Scene};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A file of `scenes/`.
+/// Loads a scene of `scenes/`.
 pub fn scene(name: &str, sets: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
     let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
     Scene::load(&path, &sets).unwrap()
 }
 
-/// The same, built.
+/// Builds the environment of a scene.
 pub fn environment(name: &str, sets: &[&str]) -> Arc<Environment> {
     Arc::new(Environment::build(scene(name, sets)).unwrap())
 }
 
-/// What a touch that must have met the object found.
+/// Returns the contact of a touch, which must have one.
 pub fn contact(touch: Touch) -> Contact {
     match touch {
         Touch::Contact(contact) => contact,
@@ -31,7 +30,7 @@ pub fn toy(x: f64) -> f64 {
     if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
 }
 
-/// Fails with both numbers.
+/// Fails with both numbers unless they agree within `tolerance`.
 #[track_caller]
 pub fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");

@@ -1,4 +1,4 @@
-//! Made-up beliefs of whole objects: balls that become a ring, so that no planner has to be run.
+//! Synthetic beliefs of whole objects: balls that become a ring, so that no planner has to be run.
 
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use nalgebra::{Point3, Vector3};
@@ -7,12 +7,12 @@ use palpate::geometry::mesh::Mesh;
 use palpate::geometry::solids::Triangles;
 use palpate::report::solid::{Frame, Sequence, Touch};
 
-/// Radius of the ring's middle line about y, and of its tube.
+/// Radius of the ring's centre line about y, and of its tube.
 const RING_M: f64 = 0.045;
 const TUBE_M: f64 = 0.018;
-/// Radius of the ball that is believed at first.
+/// Radius of the initial ball.
 const BALL_M: f64 = 0.05;
-/// Where its middle stands in `W`.
+/// Centre in `W`.
 const MIDDLE: Vector3<f64> = Vector3::new(0.1, -0.6, 0.2);
 
 /// Distance from the ring in m, negative inside.
@@ -21,12 +21,12 @@ pub fn ring_m(p_w: &Point3<f64>) -> f64 {
     (p.x.hypot(p.z) - RING_M).hypot(p.y) - TUBE_M
 }
 
-/// The surface where `field` is zero, by surface nets within 0.1 m of the middle.
+/// Zero surface of `field` by surface nets within 0.1 m of the centre.
 pub fn nets(field: impl Fn(&Point3<f64>) -> f64, cell_m: f64) -> Triangles {
     nets_about(MIDDLE, 0.1, field, cell_m)
 }
 
-/// The same of a field about the origin, within `half_m` of it.
+/// Zero surface of a field about the origin, within `half_m` of it.
 pub fn nets_within(field: fn(Vector3<f64>) -> f64, half_m: f64, cell_m: f64) -> Mesh {
     let (vertices, triangles) =
         nets_about(Vector3::zeros(), half_m, |p_w| field(p_w.coords), cell_m);
@@ -59,7 +59,8 @@ pub fn ring() -> Mesh {
     Mesh::new(&vertices, &triangles).unwrap().0
 }
 
-/// A belief after `touches` of `most`: between ball and ring, surest where it was touched.
+/// A belief after `touches` of `most`: between ball and ring, with the smallest deviation near
+/// touches.
 fn frame(touches: &[Touch], most: usize, cell_m: f64) -> Frame {
     let share = touches.len() as f64 / most as f64;
     let blend = |p_w: &Point3<f64>| {
@@ -81,12 +82,12 @@ fn frame(touches: &[Touch], most: usize, cell_m: f64) -> Frame {
     }
 }
 
-/// A planner's touches from all sides, of which every seventh meets nothing, and its beliefs after
-/// each from the fourth on.
+/// A planner's touches from all sides, with a miss every seventh time, and its beliefs after each
+/// from the fourth on.
 pub fn sequence(planner: &str, most: usize, cell_m: f64) -> Sequence {
     let touches: Vec<Touch> = (0..most)
         .map(|i| {
-            // Golden angles spread directions evenly, from another one for another planner.
+            // Golden angles spread directions evenly, from a different start for each planner.
             let height = 1.0 - 2.0 * (i as f64 + 0.5) / most as f64;
             let (sine, cosine) = (2.399_963 * i as f64 + planner.len() as f64).sin_cos();
             let across = (1.0 - height * height).sqrt();

@@ -1,4 +1,4 @@
-//! The PA-10 carrying the finger where arms are weak.
+//! Hard cases of the PA-10 with the finger, in difficult postures.
 
 use super::case::{Case, Outcome, case};
 use super::checked_touch::touch_solid;
@@ -81,7 +81,8 @@ pub const CASES: &[Case] = &[
     .timed(),
 ];
 
-/// The arm touches the middle of a small wall at `place_m`; out of reach, it says so.
+/// Touches the middle of a small wall at `place_m` with the arm; an unreachable wall must give an
+/// error.
 pub fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
     let zone = Zone::new([x - 0.03, x + 0.03], Some([z - 0.03, z + 0.03]));
     let zone = Some(Zone { datum_y_m: Some(y), ..zone });

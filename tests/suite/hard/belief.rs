@@ -1,4 +1,4 @@
-//! The Gaussian process on data that break others.
+//! Hard cases of the Gaussian process, on data that break other implementations.
 
 use super::case::{Case, Outcome, all, case, require};
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
@@ -67,7 +67,8 @@ pub const CASES: &[Case] = &[
         |times, _| {
             let mut touches = smooth(30);
             touches[11].1 += times;
-            // Followed, or smoothed over as noise: more than half of the range would be neither.
+            // The fit follows the data or smooths them as noise; a misfit of more than half of the
+            // range is neither.
             fitted(&touches, 0.5)
         },
     ),
@@ -78,7 +79,7 @@ pub const CASES: &[Case] = &[
         (&[0.0, 1.0, 1e3, 1e6, 1e9], 5),
         |offset, _| {
             let touches: Vec<_> = smooth(40).into_iter().map(|(x, y)| (x, y + offset)).collect();
-            // Heights keep sixteen digits: of a range of one at 1e9, seven.
+            // Heights have sixteen digits: seven for a range of one at 1e9.
             fitted(&touches, 0.01)
         },
     ),
@@ -138,7 +139,7 @@ fn observations(touches: &[(f64, f64)]) -> Observations {
     all
 }
 
-/// Fits and holds the laws of any belief, and that it follows the touches within a share
+/// Fits a belief and checks the laws of any belief, and a misfit at the touches of at most a share
 /// `misfit` of their range.
 fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
     let all_of = observations(touches);
@@ -160,7 +161,7 @@ fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
     laws(fit.hyperparameters, touches, misfit)
 }
 
-/// The same with given hyperparameters.
+/// Checks a belief with given hyperparameters.
 fn given(touches: &[(f64, f64)], length: f64, noise_ratio: f64) -> Outcome {
     let at = Hyperparameters {
         signal_sd: 1.0,
@@ -172,7 +173,8 @@ fn given(touches: &[(f64, f64)], length: f64, noise_ratio: f64) -> Outcome {
     laws(at, touches, f64::INFINITY)
 }
 
-/// Finite; variance within 0 and the prior's; less of it with every touch; heights followed.
+/// Checks that all numbers are finite, the variance lies between 0 and the prior's and decreases
+/// with every touch, and the heights are fitted.
 fn laws(at: Hyperparameters, touches: &[(f64, f64)], misfit: f64) -> Outcome {
     let half = &touches[..touches.len().div_ceil(2)];
     let [fewer, more] =
@@ -183,7 +185,7 @@ fn laws(at: Hyperparameters, touches: &[(f64, f64)], misfit: f64) -> Outcome {
     };
     let mut scratch = Scratch::default();
     let prior = at.signal_sd.powi(2);
-    // What rounding and jitter leave undecided.
+    // Uncertainty from rounding and jitter.
     let slack = prior * (1e-9 + more.jitter().max(fewer.jitter()) * touches.len() as f64);
     let first = touches[0].0;
     for i in 0..=100 {

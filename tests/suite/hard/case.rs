@@ -1,20 +1,20 @@
-//! A hard case: what makes it hard, how hard it gets, and the law it must keep.
+//! A hard case: its difficulty, its severities, and the law that it must obey.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What is varied beside the severity.
+/// Time parameter that is varied in addition to the severity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeAxis {
-    /// Nothing; what moves does so at [`nominal_s`](Self::nominal_s).
+    /// No time parameter; moving bodies use [`nominal_s`](Self::nominal_s).
     Untimed,
-    /// The control period.
+    /// Control period.
     Period,
-    /// The time step of a body with masses.
+    /// Time step of a body with masses.
     Step,
 }
 
 impl TimeAxis {
-    /// Its values.
+    /// Values of the time parameter.
     pub fn values_s(self) -> &'static [f64] {
         match self {
             Self::Untimed => &[0.01],
@@ -23,7 +23,7 @@ impl TimeAxis {
         }
     }
 
-    /// The value of a scene that says nothing, and of every case in the tests.
+    /// Default value in a scene, used by every case in the tests.
     pub fn nominal_s(self) -> f64 {
         match self {
             Self::Untimed | Self::Period => 0.01,
@@ -31,7 +31,7 @@ impl TimeAxis {
         }
     }
 
-    /// As tables name it.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Untimed => "",
@@ -43,49 +43,49 @@ impl TimeAxis {
 
 /// A hard case.
 pub struct Case {
-    /// One or more words.
+    /// Name, one or more words.
     pub name: &'static str,
-    /// Why it is hard.
+    /// Reason for the difficulty.
     pub why: &'static str,
-    /// What its severity is, with its unit.
+    /// Meaning of the severity, with its unit.
     pub severity: &'static str,
-    /// Rising.
+    /// Severities, increasing.
     pub severities: &'static [f64],
-    /// How many of the severities must be stable; a fault beyond is what should happen.
+    /// Number of severities that must be stable; a fault is expected beyond.
     pub holds: usize,
-    /// Why it may be wrong beyond these without a fault; empty if it may not.
+    /// Reason for wrong results without a fault beyond these; empty if there must be none.
     pub known: &'static str,
-    /// What else matters.
+    /// Time parameter that is varied.
     pub axis: TimeAxis,
-    /// Runs it at a severity and a value of the axis.
+    /// Runs the case at a severity and a value of the time parameter.
     pub law: fn(f64, f64) -> Outcome,
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The law was kept.
+    /// The law holds.
     Stable,
-    /// It ended with a fault, which says when and in what state, or was refused at the start.
+    /// The run ended with a fault that gives time and state, or was rejected at the start.
     Faulted(String),
-    /// The law was broken and nothing said so.
+    /// The law was violated without a fault.
     Wrong(String),
 }
 
-/// An outcome beside what was promised.
+/// Outcome of a run, compared with the expected one.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// Index among the case's severities.
+    /// Index of the severity in the case's list.
     pub rank: usize,
-    /// Value on the case's axis.
+    /// Value of the time parameter.
     pub axis_s: f64,
-    /// How it ended.
+    /// Outcome of the run.
     pub outcome: Outcome,
-    /// Whether it had to be so, or may.
+    /// Whether the outcome is required or allowed.
     pub explained: bool,
 }
 
-/// A case that is never wrong without a fault and depends on no time.
+/// Creates a case that is never wrong without a fault and has no time parameter.
 pub const fn case(
     name: &'static str,
     why: &'static str,
@@ -97,23 +97,23 @@ pub const fn case(
 }
 
 impl Case {
-    /// The same, run at every control period.
+    /// Runs the case at every control period.
     pub const fn timed(self) -> Self {
         Self { axis: TimeAxis::Period, ..self }
     }
 
-    /// The same, run at every time step.
+    /// Runs the case at every time step.
     #[cfg(feature = "mujoco")]
     pub const fn stepped(self) -> Self {
         Self { axis: TimeAxis::Step, ..self }
     }
 
-    /// The same, which beyond its severities may be wrong without a fault, and `why`.
+    /// Allows wrong results without a fault beyond the required severities, for the reason `why`.
     pub const fn known(self, why: &'static str) -> Self {
         Self { known: why, ..self }
     }
 
-    /// Runs one severity; a panic breaks every law.
+    /// Runs one severity; a panic violates every law.
     pub fn run(&self, rank: usize, axis_s: f64) -> Verdict {
         let severity = self.severities.get(rank).copied().unwrap_or(f64::NAN);
         let outcome = catch_unwind(AssertUnwindSafe(|| (self.law)(severity, axis_s)))
@@ -127,12 +127,12 @@ impl Case {
     }
 }
 
-/// Stable if `condition` is true, else wrong with `what`.
+/// Returns `Stable` if `condition` is true, otherwise `Wrong` with `what`.
 pub fn require(condition: bool, what: impl FnOnce() -> String) -> Outcome {
     if condition { Outcome::Stable } else { Outcome::Wrong(what()) }
 }
 
-/// The first that is not stable.
+/// Returns the first outcome that is not stable.
 pub fn all(outcomes: impl IntoIterator<Item = Outcome>) -> Outcome {
     let mut outcomes = outcomes.into_iter();
     outcomes.find(|outcome| *outcome != Outcome::Stable).unwrap_or(Outcome::Stable)

@@ -1,4 +1,4 @@
-//! One touch of a solid, and the laws that every touch must keep.
+//! A touch of a solid, and the laws that every touch must obey.
 
 use super::case::{Outcome, all, require};
 use palpate::backend::trace::{Tick, Trace};
@@ -13,23 +13,23 @@ use palpate::sim::{Environment, Scene};
 use palpate::study::accuracy::touches::{ReferenceLoad, reference_load};
 use std::sync::Arc;
 
-/// One touch and what came of it.
+/// A touch and its data.
 pub struct CheckedTouch {
-    /// What it returned.
+    /// Result of the touch.
     pub touch: Result<Touch, Fault>,
     environment: Option<Arc<Environment>>,
-    /// How the finger was loaded when it was read.
+    /// Load on the finger when the contact was read.
     pub load: Option<ReferenceLoad>,
     ticks: Vec<Tick>,
     refused: Option<String>,
 }
 
-/// Touches `target` of `mesh`, with sensors without noise but for what the scene raises.
+/// Touches `target` of `mesh`, with noise-free sensors except for noise set in the scene.
 pub fn touch_solid(scene: Scene, mesh: Mesh, target: &[f64]) -> CheckedTouch {
     touch_solid_with(scene, mesh, target, |body| body)
 }
 
-/// As [`touch_solid`], with the body put into another.
+/// Touches as in [`touch_solid`], with the body wrapped.
 pub fn touch_solid_with(
     scene: Scene,
     mesh: Mesh,
@@ -61,20 +61,20 @@ pub fn touch_solid_with(
     let touch =
         (simulator.servo(wrap(Box::new(trace)), 1)).and_then(|mut servo| servo.touch(&approach));
     let ticks = ticks.take();
-    // The object is not in a file, so its environment cannot be built again without noise; force
-    // and pose need no sensor.
+    // The object is not in a file, so its environment cannot be rebuilt without noise; force and
+    // pose need no sensor.
     let load = reference_load(&simulator, &ticks);
     CheckedTouch { touch, environment: Some(environment), load, ticks, refused: None }
 }
 
-/// `scene` with `mesh` as its object.
+/// Builds the environment of `scene` with `mesh` as its object.
 pub fn environment_of(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, Invalid> {
     let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     Environment::around(scene, shape).map(Arc::new)
 }
 
 impl CheckedTouch {
-    /// Not even begun, and why.
+    /// A touch that was not started, with the reason.
     pub fn not_done(why: &str) -> Self {
         Self {
             touch: Err(Fault::Refused { values: Vec::new() }),
@@ -85,7 +85,7 @@ impl CheckedTouch {
         }
     }
 
-    /// The contact, if there was one.
+    /// Returns the contact, if there was one.
     pub fn contact(&self) -> Option<&Contact> {
         match &self.touch {
             Ok(Touch::Contact(contact)) => Some(contact),
@@ -93,7 +93,7 @@ impl CheckedTouch {
         }
     }
 
-    /// A contact within `tolerance_m` of the mesh.
+    /// Requires a contact within `tolerance_m` of the mesh.
     pub fn on_surface(&self, tolerance_m: f64) -> Outcome {
         match &self.touch {
             Ok(Touch::Miss) => Outcome::Wrong("met nothing".into()),
@@ -102,7 +102,7 @@ impl CheckedTouch {
         }
     }
 
-    /// The same, or no contact; in either case a movement within the laws.
+    /// Requires such a contact or none, and a lawful movement in either case.
     pub fn on_surface_or_missed(&self, tolerance_m: f64) -> Outcome {
         if let Some(why) = &self.refused {
             return Outcome::Faulted(why.clone());
@@ -123,17 +123,17 @@ impl CheckedTouch {
         Some(bvh.closest_point(&self.contact()?.p_wc).distance_m)
     }
 
-    /// The tip is never faster than any speed that was asked for, nor anything else than finite.
+    /// The tip's speed is finite and at most the commanded speed.
     fn keeps_speed(&self) -> Outcome {
         let Some(environment) = &self.environment else { return Outcome::Stable };
         let touch = &environment.scene().touch;
-        // Corrections of the path come on top of travel.
+        // Corrections of the path add to the travel speed.
         let limit_m_s = touch.travel_m_s.max(touch.approach_m_s) + CORRECTION_M_S;
         let fastest = self.ticks.iter().map(|tick| tick.motion.linear_w.norm()).fold(0.0, f64::max);
         require(fastest <= limit_m_s, || format!("{fastest:.3} m/s, allowed {limit_m_s:.3}"))
     }
 
-    /// The tip's centre keeps away from the object by what the core measures.
+    /// The tip's centre keeps a distance from the object of at least the core's radius.
     fn keeps_apart(&self) -> Outcome {
         let Some((environment, load)) = self.environment.as_ref().zip(self.load.as_ref()) else {
             return Outcome::Stable;
@@ -147,8 +147,8 @@ impl CheckedTouch {
         })
     }
 
-    /// Whether `other`, moved by `by_m` along x and y, met the same within `tolerance_m` and a
-    /// thousandth of the force.
+    /// Requires that `other`, moved by `by_m` along x and y, has the same contact within
+    /// `tolerance_m` and the same force within 0.1 %.
     pub fn agrees(&self, other: &Self, by_m: f64, tolerance_m: f64) -> Outcome {
         let (Some(a), Some(b)) = (self.contact(), other.contact()) else { return Outcome::Stable };
         let shift_m = (b.p_wc - a.p_wc - nalgebra::Vector3::new(by_m, by_m, 0.0)).norm();
@@ -163,8 +163,9 @@ impl CheckedTouch {
     }
 }
 
-/// Largest correction of the controller, and a margin for rounding.
+/// Largest correction of the controller, with a margin for rounding.
 const CORRECTION_M_S: f64 = 0.25 + 1e-6;
 
-/// Of the hull's radius: half of it, inside the core (chosen).
+/// Share of the hull's radius that lies inside the core.
+// heuristic: half of it.
 const CORE_SHARE: f64 = 0.5;

@@ -1,7 +1,8 @@
-//! Data that other Gaussian-process libraries answer with a panic, σ = 0, silence, or "all noise".
+//! Data on which other Gaussian-process libraries panic, return σ = 0 or NaN, or treat everything
+//! as noise.
 //!
 //! Measured on such cases elsewhere: one library panics on a single touch and returns σ = 0 on a
-//! flat plate, another explains smooth data away as noise, a third predicts NaN after a NaN touch.
+//! flat plate, another explains smooth data as noise, a third predicts NaN after a NaN touch.
 
 use crate::common::shipped::toy;
 use palpate::gp::covariance::CovarianceError;
@@ -24,7 +25,7 @@ fn data(pairs: impl IntoIterator<Item = (f64, f64)>) -> Observations {
     touches
 }
 
-/// The box that a belief searches, for touches within `side`.
+/// Default search box of a belief for touches within `side`.
 fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
     let squares: f64 = touches.heights().iter().map(|y| y * y).sum();
     let rms = (squares / touches.len().max(1) as f64).sqrt();
@@ -39,12 +40,12 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
     }
 }
 
-/// Fits, and holds the laws that no data set may break: every number finite, σ no larger than the
-/// prior, and nowhere surer than n touches of that very place would make it.
+/// Fits the data and checks the laws for any data set: every number is finite, σ is at most the
+/// prior's, and σ is nowhere smaller than n touches of that very place would make it.
 ///
-/// The last because an estimate Σ wᵢ·yᵢ errs by the noise's ‖w‖² and, each height having the
-/// prior's deviation s, by at least s²·(1 − √n·‖w‖)²; their sum is least at s²·noise² / (noise² +
-/// n·s²).
+/// Reason for the last law: an estimate Σ wᵢ·yᵢ has an error of noise²·‖w‖² and, each height having
+/// the prior's deviation s, of at least s²·(1 − √n·‖w‖)²; the minimum of the sum is s²·noise² /
+/// (noise² + n·s²).
 fn believe(name: &str, touches: &Observations, middle: f64, side: f64) -> (Fit, Posterior) {
     believe_with(name, touches, middle, side, 1e-2)
 }
@@ -63,7 +64,7 @@ fn believe_with(
     let prior = fit.hyperparameters.signal_sd.powi(2);
     let noise2 = fit.hyperparameters.noise_sd.powi(2);
     let surest = prior * noise2 / (noise2 + touches.len() as f64 * prior);
-    // What is left of 1 − |L⁻¹k|² has the rounding of its sum.
+    // The remainder of 1 − |L⁻¹k|² has the rounding error of its sum.
     let range = surest - 1e-12 * prior..=prior * (1.0 + 1e-12);
     for i in 0..=400 {
         let place = [middle + side * (f64::from(i) / 400.0 - 0.5)];
@@ -75,7 +76,7 @@ fn believe_with(
     (fit, posterior)
 }
 
-/// Largest misfit at some touches, as a share of the range of their heights.
+/// Largest misfit at the touches, as a share of the range of their heights.
 fn misfit(posterior: &Posterior, touches: &Observations) -> f64 {
     let mut scratch = Scratch::default();
     let heights = touches.heights();
@@ -86,7 +87,7 @@ fn misfit(posterior: &Posterior, touches: &Observations) -> f64 {
     errors.fold(0.0, f64::max) / (high - low)
 }
 
-/// Where in [-2, 2] σ is largest: the next target of active touch.
+/// Place in [-2, 2] with the largest σ: the next target of active touch.
 fn least_sure(posterior: &Posterior) -> f64 {
     let mut scratch = Scratch::default();
     let places = (0..=1600).map(|i| -2.0 + f64::from(i) / 400.0);
@@ -123,8 +124,8 @@ fn duplicates_and_near_duplicates_are_followed() {
     }
 }
 
-/// Two readings that disagree by 0.2 of a range of 2 cannot both be met: half of that is the
-/// least misfit there is.
+/// Two readings that differ by 0.2 of a range of 2 cannot both be fitted: half of that is the
+/// smallest possible misfit.
 #[test]
 fn duplicates_that_disagree_are_split_between() {
     let touches = data(spread(20).into_iter().flat_map(|x| [(x, toy(x)), (x, toy(x) + 0.2)]));
@@ -132,8 +133,8 @@ fn duplicates_that_disagree_are_split_between() {
     assert!(misfit(&posterior, &touches) < 0.1, "{}", misfit(&posterior, &touches));
 }
 
-/// A plate has no length of its own, so that the longest is believed; what is sure is sure between
-/// the touches only.
+/// A plate has no length scale, so the longest is fitted; the belief is certain between the touches
+/// only.
 #[test]
 fn a_flat_plate_is_believed_where_it_was_touched_and_no_farther() {
     for height in [1.0, 0.0] {
@@ -145,7 +146,7 @@ fn a_flat_plate_is_believed_where_it_was_touched_and_no_farther() {
             let place = [-2.0 + 0.01 * f64::from(i)];
             let error = (posterior.mean(&place, &mut scratch) - height).abs();
             let sd = posterior.variance(&place, &mut scratch).sqrt();
-            // Heights of which none errs: the mean is within one deviation of them, not of most.
+            // Exact heights: the mean is within one standard deviation of all of them.
             assert!(error <= sd.hypot(noise) && error <= 2.0 * noise, "{place:?}: {error:e}");
         }
         for x in touches.column(0) {
@@ -162,9 +163,9 @@ fn a_flat_plate_is_believed_where_it_was_touched_and_no_farther() {
     }
 }
 
-/// The toy's wave is 1 at every quarter: touched there and nowhere else it is a plate, and no
-/// belief could tell. But where it is least sure it must go on touching, and so find the wave
-/// before it has touched as often again.
+/// The toy's wave is 1 at every quarter: touched only there it looks like a plate to any belief.
+/// But active touch continues at the largest variance and must find the wave before it has made as
+/// many touches again.
 #[test]
 fn active_touch_escapes_the_toys_lattice() {
     let lattice = |i: u32| -2.0 + 0.25 * f64::from(i);
@@ -182,7 +183,7 @@ fn active_touch_escapes_the_toys_lattice() {
     let mut scratch = Scratch::default();
     let errors = (0..=400).map(|i| -2.0 + 0.01 * f64::from(i));
     let errors = errors.map(|x| (posterior.mean(&[x], &mut scratch) - toy(x)).powi(2));
-    // The plate errs by the wave's root mean square over the zone, a half.
+    // The plate's error is the wave's RMS over the zone, a half.
     let rms = (errors.sum::<f64>() / 401.0).sqrt();
     assert!(rms < 0.25, "{rms}");
 }
@@ -208,7 +209,7 @@ fn smooth_data_are_followed_whatever_their_unit_offset_or_number() {
     assert!(misfit(&posterior, &far) < 1e-3);
 }
 
-/// With a mean of zero an offset of 1e6 is the signal, and what varies is a millionth of it.
+/// With a mean of zero an offset of 1e6 is the signal, and the variation is a millionth of it.
 #[test]
 fn an_offset_of_a_million_wants_a_mean_and_gets_it() {
     let touches = data(spread(40).into_iter().map(|x| (x, 1e6 + toy(x))));
@@ -228,7 +229,7 @@ fn a_step_is_met() {
     assert!(misfit(&posterior, &step) < 0.01, "{fit:?}");
 }
 
-/// Neither is the outlier smoothed away, nor what the others say lost beside it.
+/// An outlier is not smoothed away, and the other touches are still fitted.
 #[test]
 fn an_outlier_is_met_and_so_are_the_others() {
     let height = |(i, x): (usize, f64)| (x, if i == 11 { 100.0 } else { toy(x) });

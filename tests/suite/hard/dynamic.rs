@@ -1,4 +1,4 @@
-//! Whole touches by a body with masses.
+//! Hard cases of complete touches by a body with masses.
 
 use super::arm::reach;
 use super::case::{Case, Outcome, case};
@@ -92,7 +92,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
 ];
 
-/// Approach of the scenes with masses: the servos of the arm take 0.04 s to stop.
+/// Approach speed of scenes with masses: the arm's servos take 0.04 s to stop.
 pub const APPROACH_M_S: f64 = 0.015;
 
 /// A soft finger on a stage with masses.
@@ -104,7 +104,7 @@ pub fn with_masses(step_s: f64) -> Scene {
     scene
 }
 
-/// The same on a PA-10 that stands as far from the origin as from an object in its own scenes.
+/// The finger on a PA-10 at the same distance from the origin as from an object in its own scenes.
 pub fn on_arm(step_s: f64) -> Scene {
     let arm = ArmSettings { base_position_m: [0.0, 0.65, -0.5], ..ArmSettings::default() };
     Scene { arm: Some(arm), ..with_masses(step_s) }

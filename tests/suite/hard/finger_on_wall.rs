@@ -1,4 +1,4 @@
-//! A finger in front of a wall, put into one pose after another by hand: no servo, no body.
+//! A finger in front of a wall, placed in given poses without servo or body.
 
 use super::case::Outcome;
 use super::solids::{mesh, wall};
@@ -17,19 +17,19 @@ use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
 pub struct FingerOnWall {
     tip: Fingertip,
     wall: MeshBvh,
-    /// Its hull.
+    /// Hull of the finger.
     pub finger: Finger,
-    /// Distance of the tip's centre from the wall at which the skin just touches.
+    /// Distance of the tip's centre from the wall at first contact of the skin.
     touching_m: f64,
 }
 
 impl FingerOnWall {
-    /// With these effects; `size` times a BioTac.
+    /// Creates the finger with these effects, `size` times as large as a BioTac.
     pub fn new(effects: &Effects, size: f64) -> Option<Self> {
         Self::before(mesh(wall(0.05 * size), [0.0; 3])?, effects, size)
     }
 
-    /// The same before another object, whose foremost point is the origin.
+    /// Creates the finger before another object, whose foremost point is the origin.
     pub fn before(object: Mesh, effects: &Effects, size: f64) -> Option<Self> {
         let standard = Finger::default();
         let finger = Finger {
@@ -41,25 +41,25 @@ impl FingerOnWall {
         let mut setup =
             Self { tip: Fingertip::new(&finger, effects), wall, finger, touching_m: 0.0 };
         let rotation = setup.finger.r_at();
-        // From more points than any case has, so that depth means the same for all.
+        // With more points than any case, so that depth has the same meaning for all.
         let fine = spread(&Profile::biotac(&setup.finger), 16_000);
         let lowest = fine.iter().map(|sample| (rotation * sample.point()).y);
         setup.touching_m = -lowest.fold(0.0, f64::min);
         Some(setup)
     }
 
-    /// Standing `depth_m` inside the wall, `x_m` beside its middle.
+    /// Pose `depth_m` inside the wall, `x_m` beside its middle.
     pub fn at(&self, depth_m: f64, x_m: f64) -> TipMotion {
         let p_wt = Vector3::new(x_m, self.touching_m - depth_m, 0.0);
         TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.r_at()))
     }
 
-    /// The state of an untouched finger.
+    /// State of an untouched finger.
     pub fn untouched(&self) -> FingertipState {
         FingertipState::new(&self.tip, &seed::stream(0, 0, "finger"))
     }
 
-    /// What the wall does to it.
+    /// Applies the wall to the finger.
     pub fn press(
         &self,
         state: &mut FingertipState,
@@ -69,13 +69,13 @@ impl FingerOnWall {
         state.step(&self.tip, &self.wall, motion, dt_s)
     }
 
-    /// The force at a depth.
+    /// Force at a depth.
     pub fn force_n(&self, depth_m: f64) -> Result<f64, Fault> {
         Ok(self.press(&mut self.untouched(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
     }
 }
 
-/// Runs `law`; its fault is the outcome.
+/// Runs `law`; a fault is the outcome.
 pub fn with_finger(
     effects: &Effects,
     law: impl FnOnce(&FingerOnWall) -> Result<Outcome, Fault>,
@@ -83,7 +83,7 @@ pub fn with_finger(
     with_finger_of_size(effects, 1.0, law)
 }
 
-/// The same with a finger of another size.
+/// Runs `law` with a finger of another size.
 pub fn with_finger_of_size(
     effects: &Effects,
     size: f64,
@@ -95,7 +95,7 @@ pub fn with_finger_of_size(
     }
 }
 
-/// Whether every number of a load is one.
+/// Whether every number of a load is finite.
 pub fn is_finite(load: &Load) -> bool {
     let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
     vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
@@ -103,7 +103,7 @@ pub fn is_finite(load: &Load) -> bool {
         && load.pressure_pa.is_finite()
 }
 
-/// Multiplies everything that makes the skin resist.
+/// Multiplies all stiffnesses of the skin.
 pub fn stiffen(effects: &mut Effects, times: f64) {
     if let Some(skin) = &mut effects.skin {
         let resists = [

@@ -1,4 +1,4 @@
-//! How force follows from the finger's pose: laws of press, release, slip and rest.
+//! Hard cases of the force for a pose of the finger: laws of press, release, slip and rest.
 
 use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, stiffen, with_finger, with_finger_of_size};
@@ -120,7 +120,7 @@ pub const CASES: &[Case] = &[
     ),
 ];
 
-/// All whose loads follow from the pose alone, and friction.
+/// Effects whose loads depend on the pose alone, and friction.
 pub fn effects() -> Effects {
     Effects { creep: None, timing: None, ..Effects::all() }
 }
@@ -143,8 +143,8 @@ fn deep(depth_mm: f64, _: f64) -> Outcome {
     })
 }
 
-/// The same poses in and out give the same forces to the bit, and the work done is the energy
-/// stored within what the steps can resolve.
+/// The same poses in and out give exactly the same forces, and the work equals the stored energy
+/// within the resolution of the steps.
 fn release(steps: f64, _: f64) -> Outcome {
     with_finger(&Effects { friction: None, ..effects() }, |setup| {
         let steps = steps as u32;
@@ -160,7 +160,7 @@ fn release(steps: f64, _: f64) -> Outcome {
         let work_j: f64 = (forces[..=steps as usize].windows(2))
             .map(|pair| (rotation * (pair[0].force_n + pair[1].force_n)).y / 2.0 * depth_m(1))
             .sum();
-        // The force grows at most with the cube of the depth: the trapezoid errs by less than
+        // The force grows at most with the cube of the depth: the trapezoid's error is less than
         // 1/n of the work.
         let near = (work_j - stored_j).abs() <= stored_j * (0.02 + 1.0 / f64::from(steps));
         Ok(all([
@@ -170,7 +170,8 @@ fn release(steps: f64, _: f64) -> Outcome {
     })
 }
 
-/// Pressed in, dragged aside and back, and released: friction and skin take work, never give it.
+/// Pressed in, dragged aside and back, and released: friction and skin dissipate energy and never
+/// create it.
 fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = effects();
     effects.friction = Some(palpate::sim::finger::effects::friction::FrictionEffect {
@@ -201,13 +202,13 @@ fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
                 }
             }
         }
-        // Taking the force at the end of each step overrates what pressing costs and underrates
-        // what release gives: the sum may not be below minus a rounding.
+        // The force at the end of each step overestimates the work of pressing and underestimates
+        // that of releasing: the sum may be negative only by rounding.
         Ok(require(taken_j >= -1e-3 * scale_j, || format!("gained {} J of {scale_j} J", -taken_j)))
     })
 }
 
-/// Whatever the speed, tangential force stays within Coulomb's limit.
+/// At any speed, tangential force stays within Coulomb's limit.
 fn slip(speed_m_s: f64, period_s: f64) -> Outcome {
     with_finger(&effects(), |setup| {
         let mut state = setup.untouched();
@@ -228,9 +229,8 @@ fn slip(speed_m_s: f64, period_s: f64) -> Outcome {
     })
 }
 
-/// Dragged over the wall for long by the softest of skins, every frame is finite and within the
-/// converter's range; lifted off, the electrodes read what those of a finger read that never
-/// touched.
+/// Dragged over the wall for long with the softest skin, every frame is finite and within the
+/// converter's range; after lift-off, the electrodes equal those of an untouched finger.
 fn slide(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = Effects { thermal: None, ..effects() };
     effects.friction = Some(palpate::sim::finger::effects::friction::FrictionEffect {
@@ -262,7 +262,7 @@ fn slide(coefficient: f64, period_s: f64) -> Outcome {
     })
 }
 
-/// Force, energy and pressure after any number of ticks are those after the first.
+/// Force, energy and pressure after any number of ticks equal those after the first.
 fn held(count: f64, period_s: f64) -> Outcome {
     let mut effects = effects();
     if let Some(skin) = &mut effects.skin {
@@ -303,7 +303,7 @@ fn ticks(tick_s: f64, _: f64) -> Outcome {
     })
 }
 
-/// Poses all around and in the wall: a finite load or a fault that says where.
+/// Poses around and in the wall give a finite load, or a fault with the pose.
 pub fn poses(count: f64, effects: &Effects) -> Outcome {
     with_finger(effects, |setup| {
         let mut rng = seed::stream(0, 0, "poses");
@@ -324,7 +324,7 @@ pub fn poses(count: f64, effects: &Effects) -> Outcome {
     })
 }
 
-/// A pose or velocity with a NaN is refused, and the next good one felt as if nothing had been.
+/// A pose or velocity with a NaN is rejected, and the next valid one is unaffected.
 fn nan(component: f64, _: f64) -> Outcome {
     with_finger(&effects(), |setup| {
         let (mut state, good) = (setup.untouched(), setup.at(1e-3, 0.0));
@@ -344,7 +344,7 @@ fn nan(component: f64, _: f64) -> Outcome {
     })
 }
 
-/// A finger of other constants and size: finite, growing with depth, and repeating itself.
+/// A finger of other constants and size has finite, increasing and reproducible forces.
 pub fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
     let mut effects = effects.clone();
     stiffen(&mut effects, stiffer);

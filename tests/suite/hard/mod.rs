@@ -1,14 +1,14 @@
-//! Hard cases: where does it break, and does it report so? Each case runs at rising severity and has a
-//! law that it must keep.
+//! Hard cases: conditions under which the simulation breaks, and whether it reports so. Each case
+//! runs at increasing severity and has a law that it must obey.
 //!
-//! The tests run every case at the hardest severity that must hold. `make hard-cases` runs all
+//! The tests run every case at the largest severity that must be stable. `make hard-cases` runs all
 //! severities at all control periods or time steps and writes `docs/hard-cases.md`.
 //!
-//! `case` defines a case and how its outcome is judged. The groups of cases: `force_law` presses a
-//! finger pose by pose, `shapes`, `wall`, `arm` and `sensor` touch as a scene does, `belief` fits; with
-//! masses, `dynamic` touches and `stiff_press` presses along a given path; `shell` and `shell_touch`
-//! do the same with a skin that is a shell. `finger_on_wall`, `checked_touch` and `solids` are shared.
-//! `data` fits beliefs to data on which other libraries fail.
+//! `case` defines a case and the evaluation of its outcome. The groups of cases are: `force_law`
+//! presses a finger pose by pose; `shapes`, `wall`, `arm` and `sensor` make touches as in a scene;
+//! `belief` fits; with masses, `dynamic` makes touches and `stiff_press` presses along a given
+//! path; `shell` and `shell_touch` do the same with a shell skin. `finger_on_wall`, `checked_touch`
+//! and `solids` are shared. `data` fits beliefs to data on which other libraries fail.
 
 mod arm;
 mod belief;
@@ -34,7 +34,7 @@ use case::{Case, Outcome, TimeAxis};
 use rayon::prelude::*;
 use std::collections::HashSet;
 
-/// The groups of cases, each with its heading on the page.
+/// Groups of cases, each with its heading on the page.
 const GROUPS: &[(&str, &[Case])] = &[
     ("A finger pressed pose by pose", force_law::CASES),
     ("Objects that are hard to touch", shapes::CASES),
@@ -71,7 +71,7 @@ fn every_case_holds_where_it_must() {
     });
 }
 
-/// A case states why it is hard, what must hold, and why it may be wrong beyond.
+/// A case gives its difficulty, the required severities, and the reason for allowed errors beyond.
 #[test]
 fn the_catalogue_is_complete() {
     let names: HashSet<&str> = cases().map(|case| case.name).collect();
@@ -103,8 +103,8 @@ fn a_panic_is_a_broken_law() {
     assert!(matches!(verdict.outcome, Outcome::Wrong(_)) && !verdict.explained);
 }
 
-/// Measured: 5000 times; at 10 000, the next that is tried, the force at rest is off by 6.2 %, where
-/// 5 are allowed. The bound is a fifth of it.
+/// Measured: 5000 times; at the next value, 10 000, the force at rest has an error of 6.2 %, where
+/// 5 % is allowed. The bound is a fifth of the measured value.
 #[cfg(feature = "mujoco")]
 #[test]
 fn a_skin_a_thousand_times_stiffer_keeps_the_force_at_rest_in_steps_as_given() {
@@ -112,8 +112,8 @@ fn a_skin_a_thousand_times_stiffer_keeps_the_force_at_rest_in_steps_as_given() {
     assert!(times >= 1000.0, "{times}, {beyond:?}");
 }
 
-/// Every severity at every period or step takes ten minutes of processor time, so it is asked for
-/// by `PALPATE_HARD_CASES`: the page is written, and no outcome is unexplained.
+/// All severities at all periods or steps take ten minutes of processor time, so they run only with
+/// `PALPATE_HARD_CASES`: the page is written, and every outcome must be explained.
 #[test]
 fn all_outcomes_are_explained() {
     if std::env::var_os("PALPATE_HARD_CASES").is_none() {

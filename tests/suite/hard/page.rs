@@ -1,11 +1,11 @@
-//! `docs/hard-cases.md`: every case with its severities, periods or steps, and what was found.
+//! `docs/hard-cases.md`: every case with its severities, periods or steps, and outcomes.
 
 use super::case::{Case, Outcome, TimeAxis, Verdict};
 use super::{GROUPS, cases};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// File of the page.
+/// Path of the page.
 pub fn path() -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "docs", "hard-cases.md"].iter().collect()
 }
@@ -27,8 +27,8 @@ The column *outcomes* lists the severities from the easiest to the hardest. Behi
 
 ";
 
-/// Runs all cases at all severities, periods and steps, and writes the page; returns a line for each
-/// outcome that is not explained.
+/// Runs all cases at all severities, periods and steps, and writes the page; returns a line for
+/// each unexplained outcome.
 pub fn write() -> Vec<String> {
     let mut text = HEAD.to_owned();
     for axis in [TimeAxis::Period, TimeAxis::Step] {
@@ -79,13 +79,13 @@ pub fn write() -> Vec<String> {
     unexplained
 }
 
-/// Severities of a case, by rank, and values of its axis.
+/// Severities of a case, by rank, and values of its time parameter.
 fn runs(case: &Case) -> impl Iterator<Item = (usize, f64)> {
     let ranks = 0..case.severities.len();
     ranks.flat_map(|rank| case.axis.values_s().iter().map(move |&axis_s| (rank, axis_s)))
 }
 
-/// The runs of all cases, one after the other.
+/// Runs all cases in sequence.
 fn verdicts() -> Vec<Verdict> {
     let all = cases().flat_map(|case| runs(case).map(move |(rank, axis_s)| (case, rank, axis_s)));
     let all: Vec<_> = all.collect();
@@ -103,7 +103,7 @@ fn rank(verdict: &Verdict) -> usize {
     }
 }
 
-/// A case as a line of its table.
+/// Formats a case as a line of its table.
 fn line(case: &Case, verdicts: &[Verdict]) -> String {
     let at = |rank: usize| verdicts.iter().filter(move |verdict| verdict.rank == rank);
     let ranks = 0..case.severities.len();
@@ -138,7 +138,7 @@ fn line(case: &Case, verdicts: &[Verdict]) -> String {
     )
 }
 
-/// How much stiffer the skin of the nominal scene could be at its time step.
+/// Margins of the nominal scene's stiffness at its time step.
 #[cfg(feature = "mujoco")]
 fn margins() -> String {
     use super::stiff_press::{TOLERANCE, stiffness_margin};
@@ -167,7 +167,7 @@ fn margins() -> String {
     String::new()
 }
 
-/// The start of a message: some hold a whole state.
+/// Returns the start of a message, because some contain a whole state.
 fn cut(words: &str) -> String {
     const MOST: usize = 100;
     match words.chars().count() > MOST {
@@ -176,7 +176,7 @@ fn cut(words: &str) -> String {
     }
 }
 
-/// A number in few characters.
+/// Formats a number with few characters.
 pub fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),

@@ -1,4 +1,4 @@
-//! A sensor or a joint that fails in the middle of a touch.
+//! Hard cases of a sensor or joint that fails in the middle of a touch.
 
 use super::case::{Case, Outcome, case};
 use super::checked_touch::touch_solid_with;
@@ -6,7 +6,7 @@ use super::solids::{mesh, wall};
 use super::wall::scene;
 use crate::common::fault_injector::{Failure, FaultInjector};
 
-/// Ticks after which a sensor fails: at rest, on the way, near contact, after the touch.
+/// Ticks after which a sensor fails: at rest, during travel, near contact, after the touch.
 const FROM: (&[f64], usize) = (&[1e6, 120.0, 60.0, 20.0, 3.0, 0.0], 1);
 
 pub const CASES: &[Case] = &[
@@ -54,12 +54,12 @@ pub const CASES: &[Case] = &[
     ),
 ];
 
-/// A contact on the surface, or a fault: never a contact where there is none.
+/// Requires a contact on the surface or a fault; a contact elsewhere is wrong.
 fn broken(failure: Failure, from_tick: f64, period_s: f64) -> Outcome {
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     let wrap = |body| Box::new(FaultInjector::new(body, failure, from_tick as u64)) as Box<_>;
-    // Electrodes too, so that nothing but the sensor tells of the contact; their centroid lies
-    // within the 3 mm that a real BioTac is good for.
+    // Includes electrodes, so that only the sensor detects the contact; their centroid has the
+    // accuracy of a real BioTac, 3 mm.
     let mut scene = scene(period_s);
     scene.effects.electrodes = Some(Default::default());
     touch_solid_with(scene, mesh, &[0.02, 0.01], wrap).on_surface(3e-3)

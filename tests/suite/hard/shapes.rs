@@ -1,4 +1,4 @@
-//! Objects that are hard to touch, each touched as a scene touches.
+//! Hard cases of objects that are difficult to touch, with touches as in a scene.
 
 use super::case::{Case, Outcome, all, case, require};
 use super::checked_touch::{CheckedTouch, touch_solid};
@@ -129,12 +129,12 @@ pub const CASES: &[Case] = &[
     ),
 ];
 
-/// A contact no farther than `tolerance_mm` from the mesh, within the finger's laws.
+/// Requires a contact within `tolerance_mm` of the mesh that obeys the finger's laws.
 fn on(mesh: Option<Mesh>, target: [f64; 2], period_s: f64, tolerance_mm: f64) -> Outcome {
     on_in(scene(period_s), mesh, target, tolerance_mm)
 }
 
-/// The same in another scene.
+/// The same requirement in another scene.
 fn on_in(scene: Scene, mesh: Option<Mesh>, target: [f64; 2], tolerance_mm: f64) -> Outcome {
     let Some(mesh) = mesh else { return Outcome::Wrong("no mesh".into()) };
     touch_solid(scene, mesh, &target).on_surface(1e-3 * tolerance_mm)
@@ -142,7 +142,7 @@ fn on_in(scene: Scene, mesh: Option<Mesh>, target: [f64; 2], tolerance_mm: f64) 
 
 pub fn graze(overlap_mm: f64, scene: Scene) -> Outcome {
     let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
-    // Whether so little is felt is the sensor's choice; what it must not do is feel it elsewhere.
+    // A contact so weak may be missed, but it must not be located elsewhere.
     touch_solid(scene, mesh, &[0.037 - 1e-3 * overlap_mm, 0.0]).on_surface_or_missed(1e-3)
 }
 
@@ -150,7 +150,7 @@ pub fn slot(width_mm: f64, scene: Scene) -> Outcome {
     let half = 0.5e-3 * width_mm;
     let left = block([-0.03, -0.03, -0.03], [-half, 0.0, 0.03]);
     let right = block([half, -0.03, -0.03], [0.03, 0.0, 0.03]);
-    // Held by both edges, the centre of pressure lies between them.
+    // With both edges in contact, the centre of pressure lies between them.
     on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 1.0 + 0.5 * width_mm)
 }
 
@@ -162,7 +162,7 @@ pub fn twins(lower_mm: f64, scene: Scene) -> Outcome {
 
 fn slivers(aspect: f64, period_s: f64) -> Outcome {
     let columns = (aspect as u32).min(3000);
-    // Beyond, the sheet is narrow instead of its cells more, and stands on a wall.
+    // Beyond this, the sheet becomes narrower instead of having more cells, and stands on a wall.
     let half = 0.04 * (f64::from(columns) / aspect).min(1.0);
     let (mut points, triangles) = sheet(0.04, [columns, 1], |_, _| 0.0);
     points.iter_mut().for_each(|point| point.x *= half / 0.04);
@@ -182,7 +182,7 @@ fn border(inside_mm: f64, period_s: f64) -> Outcome {
 
 fn inverted(share: f64, period_s: f64) -> Outcome {
     let (points, mut triangles) = sheet(0.04, [10; 2], |_, _| 0.0);
-    // Each triangle has corners of its own, so that none can be told from its neighbours.
+    // Each triangle has its own corners, so that triangles have no neighbours.
     let soup: Vec<Point3<f64>> = triangles.iter().flatten().map(|&i| points[i as usize]).collect();
     let count = triangles.len() as f64;
     for (i, triangle) in triangles.iter_mut().enumerate() {
@@ -200,7 +200,7 @@ fn sizes(radius_m: f64, period_s: f64) -> Outcome {
     on(mesh, [0.0; 2], period_s, 1.0)
 }
 
-/// The same contact and force as at the origin, to the digits that are left.
+/// Same contact and force as at the origin, to the remaining digits.
 fn far(distance_m: f64, period_s: f64) -> Outcome {
     let [near, far] = [0.0, distance_m].map(|by_m| {
         let mut scene = scene(period_s);
@@ -215,7 +215,7 @@ fn far(distance_m: f64, period_s: f64) -> Outcome {
     all([far.on_surface(1e-3), near.agrees(&far, distance_m, 1e-4)])
 }
 
-/// The same contact and force as on a plain wall.
+/// Same contact and force as on a plain wall.
 fn same_as_wall(mesh: Option<Mesh>, period_s: f64, tolerance_m: f64) -> Outcome {
     let (Some(mesh), Some(plain)) = (mesh, super::solids::mesh(wall(0.05), [0.0; 3])) else {
         return Outcome::Wrong("no mesh".into());

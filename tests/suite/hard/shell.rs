@@ -1,5 +1,5 @@
-//! Laws of press, release and rest of a skin that is a shell: it is found step by step and not in
-//! closed form, so what it promises is how far it may be from where it ends.
+//! Hard cases of press, release and rest of a shell skin. Its state is found iteratively and not in
+//! closed form, so the laws bound its distance from equilibrium.
 
 use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, with_finger};
@@ -14,13 +14,14 @@ use palpate::sim::finger::effects::skin::SkinModel;
 const STIFF_FLUID: &str =
     "pressed at once, the pressure of a fluid this stiff for its volume is not found in one press";
 
-/// A tick of an approach at 20 mm/s with 2 kHz.
+/// Distance of a tick of an approach at 20 mm/s with 2 kHz.
 const TICK_M: f64 = 1e-5;
 
 /// Speed of an approach.
 const SPEED_M_S: f64 = 0.02;
 
-/// Part by which two ways to the same pose may differ: ten times what is measured (chosen).
+/// Allowed relative difference between two paths to the same pose.
+// heuristic: ten times the measured value.
 const APART: f64 = 0.02;
 
 pub const CASES: &[Case] = &[
@@ -121,7 +122,7 @@ pub const CASES: &[Case] = &[
     .known(STIFF_FLUID),
 ];
 
-/// All whose loads follow from the poses, over a shell.
+/// Effects with a shell whose loads depend on the poses.
 fn shell() -> Effects {
     let mut effects = Effects { friction: None, ..effects() };
     effects.skin.get_or_insert_default().model = SkinModel::Shell;
@@ -145,7 +146,7 @@ fn deep(depth_mm: f64, _: f64) -> Outcome {
     })
 }
 
-/// In and out at 20 mm/s the forces are those of the same depths, and the work comes back.
+/// In and out at 20 mm/s the forces depend on depth only, and the work is recovered.
 fn release(depth_mm: f64, period_s: f64) -> Outcome {
     with_finger(&shell(), |setup| {
         let ticks = (1e-3 * depth_mm / (SPEED_M_S * period_s)).ceil().max(1.0) as u32;
@@ -168,7 +169,7 @@ fn release(depth_mm: f64, period_s: f64) -> Outcome {
     })
 }
 
-/// However often it is corrected, a shell that is held stays where it first was.
+/// A shell at rest keeps its state after any number of corrections.
 fn held(count: f64, period_s: f64) -> Outcome {
     let mut effects = shell();
     if let Some(skin) = &mut effects.skin {
@@ -226,5 +227,6 @@ fn pushed_into(solid: palpate::geometry::solids::Triangles) -> Outcome {
     law().unwrap_or_else(|fault| Outcome::Faulted(fault.to_string()))
 }
 
-/// Presses after which a shell lies still (chosen).
+/// Presses after which a shell is at rest.
+// heuristic: a generous number.
 const SETTLING: usize = 20;

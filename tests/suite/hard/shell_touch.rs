@@ -1,4 +1,4 @@
-//! Whole touches by a body with masses whose skin is a shell.
+//! Hard cases of complete touches by a body with masses and a shell skin.
 
 use super::case::{Case, case};
 use super::dynamic::{on_arm, with_masses};

@@ -1,15 +1,15 @@
-//! Meshes for the hard cases. Unless said otherwise the finger meets them at the plane y = 0.
+//! Meshes for the hard cases. By default the finger meets them at the plane y = 0.
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use palpate::geometry::mesh::Mesh;
 use palpate::geometry::solids::{Triangles, block};
 
-/// A box of `half_m` to each side of the origin and as deep, its face at y = 0.
+/// A box of `half_m` to each side of the origin and of the same depth, its face at y = 0.
 pub fn wall(half_m: f64) -> Triangles {
     block([-half_m, -half_m, -half_m], [half_m, 0.0, half_m])
 }
 
-/// Both of two solids.
+/// Returns the union of two solids.
 pub fn both((mut points, mut triangles): Triangles, other: Triangles) -> Triangles {
     let offset = points.len() as u32;
     points.extend(other.0);
@@ -17,8 +17,7 @@ pub fn both((mut points, mut triangles): Triangles, other: Triangles) -> Triangl
     (points, triangles)
 }
 
-/// A sheet over the square of side 2 `half_m`, `columns` × `rows` cells, at height
-/// `y(x, z)`.
+/// A sheet over the square of side 2 `half_m`, `columns` × `rows` cells, at height `y(x, z)`.
 pub fn sheet(half_m: f64, [columns, rows]: [u32; 2], y: impl Fn(f64, f64) -> f64) -> Triangles {
     let along = |i: u32, count: u32| half_m * (2.0 * f64::from(i) / f64::from(count) - 1.0);
     let points = (0..=columns)
@@ -51,7 +50,7 @@ pub fn needle(half_angle_deg: f64) -> Triangles {
     (points.map(Point3::from).into(), triangles)
 }
 
-/// As a mesh, moved by `by_m`; none if nothing usable is left.
+/// Converts the triangles to a mesh moved by `by_m`; `None` if no usable triangle remains.
 pub fn mesh((points, triangles): Triangles, by_m: [f64; 3]) -> Option<Mesh> {
     let (mesh, _) = Mesh::new(&points, &triangles).ok()?;
     Some(mesh.transformed(&Isometry3::from(Translation3::from(by_m))))

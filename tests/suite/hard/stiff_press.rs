@@ -1,5 +1,6 @@
-//! How stiff a skin may be for the time step: a body with masses presses its finger on a wall along
-//! a path given in time, and its force is held against that of a run with shorter steps.
+//! Hard cases of the skin's stiffness relative to the time step: a body with masses presses its
+//! finger on a wall along a given path, and its force is compared with that of a run with shorter
+//! steps.
 
 use super::case::{Case, Outcome, all, case, require};
 use super::checked_touch::environment_of;
@@ -59,49 +60,49 @@ pub const CASES: &[Case] = &[
     ),
 ];
 
-/// Steps are divided as the skin needs it, so stiffness must not matter until no step is short
-/// enough.
+/// Steps are divided as the skin needs, so stiffness has no effect until no step is short enough.
 const STIFF: (&[f64], usize) = (&[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 1e6], 7);
 
-/// Force that the finger is pressed with; chosen, that of a usual touch.
+/// Force of the press.
+// heuristic: that of a typical touch.
 const FORCE_N: f64 = 3.0;
 
-/// How far a force may be from that of a refined run.
+/// Allowed relative deviation of a force from that of a refined run.
 pub const TOLERANCE: f64 = 0.05;
 
-/// The refined run has this many steps in one; chosen: an oscillation at the limit of
-/// [`StepLimit`](palpate::sim::mujoco::StepLimit) is then within a percent of the exact one.
+/// Steps of the refined run per step.
+// heuristic: an oscillation at the limit of [`StepLimit`](palpate::sim::mujoco::StepLimit) is then
+// within a percent of the exact one.
 const FINER: f64 = 8.0;
 
-/// Time pressed until the force is at rest: four times 0.2 s, in which the controller takes back
-/// all but a third of an error; and the end of it that is looked at (chosen).
+/// Time of the press until the force is at rest, and the evaluated part at its end.
+// heuristic: four times 0.2 s, in which the controller removes two thirds of an error.
 const REST_S: f64 = 0.8;
 const LOOK_S: f64 = 0.1;
 
-/// Time pressed in which the peak has passed: five times the 0.04 s that the servos of the arm take
-/// to stop.
+/// Time of the press that contains the peak: five times the 0.04 s in which the arm's servos stop.
 const PEAK_S: f64 = 0.2;
 
-/// A finger at home in front of a wall, and where to press it.
+/// A finger at home in front of a wall, and its goal.
 struct WallPress {
     environment: Arc<Environment>,
     start: Isometry3<f64>,
-    /// Way until the skin is pressed with [`FORCE_N`].
+    /// Distance until the skin is pressed with [`FORCE_N`].
     way_m: f64,
 }
 
-/// What the wall did to the finger.
+/// Force of the wall on the finger.
 #[derive(Clone, Copy, Debug)]
 struct PressForce {
-    /// Largest.
+    /// Peak force.
     peak_n: f64,
-    /// Mean at the end, and the difference between largest and smallest there.
+    /// Mean at the end, and the range there.
     rest_n: f64,
     ripple_n: f64,
 }
 
 impl WallPress {
-    /// With a skin `times` stiffer; none if it cannot be built.
+    /// Creates the press with a skin `times` stiffer; `None` if it cannot be built.
     fn new(times: f64, step_s: f64, arm: bool) -> Option<Self> {
         let mut scene = with_masses(step_s);
         stiffen(&mut scene.effects, times);
@@ -109,7 +110,7 @@ impl WallPress {
         if arm {
             let chain = ArmSettings::default().chain().ok()?;
             let tip = chain.forward(&chain.home).translation.vector;
-            // As far as a stage keeps from it.
+            // The same distance as in front of a stage.
             face_w = [tip.x, tip.y - 0.01 - scene.finger.radius_m, tip.z];
             scene.arm = Some(ArmSettings::default());
         }
@@ -134,7 +135,8 @@ impl WallPress {
         Goal { x_wt, twist: Vector6::new(0.0, -speed_m_s, 0.0, 0.0, 0.0, 0.0) }
     }
 
-    /// Follows the path to its end and stays there for `pressed_s`; shows every reading.
+    /// Follows the path to its end and stays there for `pressed_s`; passes every reading to a
+    /// callback.
     fn press(
         &self,
         body: &mut dyn Backend,
@@ -158,7 +160,7 @@ impl WallPress {
         Ok(())
     }
 
-    /// The force in steps of `step_s`, pressed for `pressed_s`.
+    /// Force with steps of `step_s`, pressed for `pressed_s`.
     fn force(&self, step_s: f64, pressed_s: f64) -> Result<PressForce, String> {
         let models = Models::at(&self.environment, step_s).map_err(|error| error.to_string())?;
         let mut body = Dynamic::new(&self.environment, &models).map_err(|_| "no body")?;
@@ -182,7 +184,7 @@ fn force_n(reading: &Reading) -> f64 {
     reading.ideal().map_or(0.0, |ideal| ideal.force_n)
 }
 
-/// Where the skin bears [`FORCE_N`].
+/// Depth at which the skin bears [`FORCE_N`].
 fn depth_m(setup: &FingerOnWall) -> Option<f64> {
     let (mut low_m, mut high_m) = (0.0, setup.finger.radius_m / 2.0);
     for _ in 0..50 {
@@ -195,22 +197,22 @@ fn depth_m(setup: &FingerOnWall) -> Option<f64> {
     (setup.force_n(low_m).ok()? > 0.5 * FORCE_N).then_some(low_m)
 }
 
-/// By how much the force is deviation that of a refined run, as shares of its own.
+/// Deviation of the force from that of a refined run, as shares of the latter.
 #[derive(Clone, Copy, Debug)]
 struct ForceDeviation {
-    /// The largest.
+    /// Deviation of the peak.
     peak: f64,
-    /// At rest.
+    /// Deviation at rest.
     rest: f64,
-    /// Up and down at rest, beyond what the refined run has of it.
+    /// Ripple at rest beyond that of the refined run.
     ripple: f64,
 }
 
-/// Presses the finger of a stage or an arm for `pressed_s`, its skin `times` stiffer. `divided`
-/// lets the time step be divided as a scene's is; else it is taken as given.
+/// Presses the finger of a stage or an arm for `pressed_s` with a skin `times` stiffer. With
+/// `divided` the time step is divided as in a scene; otherwise it is used unchanged.
 ///
 /// # Errors
-/// Why it is refused, or the fault with time and state.
+/// The reason of a rejection, or the fault with time and state.
 fn force_deviation(
     times: f64,
     (step_s, divided): (f64, bool),
@@ -246,13 +248,13 @@ impl ForceDeviation {
     }
 }
 
-/// Stiffnesses at which a margin is looked for.
+/// Stiffness factors at which a margin is searched.
 const TIMES: [f64; 15] =
     [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, 1e6];
 
-/// How many times stiffer than a BioTac's the skin of a PA-10 may be in steps of `step_s`, `divided`
-/// as a scene's are or as given: the largest of [`TIMES`] up to which the force at rest is within
-/// [`TOLERANCE`] of a refined run's, 0 if there is none; and the next with its result.
+/// Largest stiffness factor of a PA-10's skin, relative to a BioTac's, with steps of `step_s`,
+/// `divided` as in a scene or unchanged: the largest of [`TIMES`] up to which the force at rest is
+/// within [`TOLERANCE`] of a refined run's, or 0; and the next one with its result.
 pub fn stiffness_margin(step_s: f64, divided: bool) -> (f64, Option<(f64, String)>) {
     let mut margin = 0.0;
     for times in TIMES {
@@ -269,7 +271,7 @@ pub fn stiffness_margin(step_s: f64, divided: bool) -> (f64, Option<(f64, String
     (margin, None)
 }
 
-/// Finite, and at rest within [`TOLERANCE`] of a refined run: force and what it goes up and down.
+/// Requires finite numbers, and force and ripple at rest within [`TOLERANCE`] of a refined run.
 fn at_rest(times: f64, step_s: f64, arm: bool) -> Outcome {
     match force_deviation(times, (step_s, true), arm, REST_S) {
         Ok(deviation) => require(deviation.is_at_rest(), || deviation.words()),
@@ -277,7 +279,7 @@ fn at_rest(times: f64, step_s: f64, arm: bool) -> Outcome {
     }
 }
 
-/// The same of the largest force on the way.
+/// The same requirement for the peak force.
 fn at_peak(times: f64, step_s: f64, arm: bool) -> Outcome {
     match force_deviation(times, (step_s, true), arm, PEAK_S) {
         Ok(deviation) => require(deviation.peak.abs() <= TOLERANCE, || deviation.words()),
@@ -285,8 +287,8 @@ fn at_peak(times: f64, step_s: f64, arm: bool) -> Outcome {
     }
 }
 
-/// Pressed, then told to stand still: where it stood after a second it stands at the end, within a
-/// hundredth of the depth, and nothing moves faster than the last of it would.
+/// Pressed, then commanded to rest: the position at the end is that after a second, within a
+/// hundredth of the depth, and no joint moves faster than that implies.
 fn long(ticks: f64) -> Outcome {
     let Some(press) = WallPress::new(1.0, 0.002, true) else {
         return Outcome::Wrong("nothing to press".into());
@@ -323,6 +325,6 @@ fn long(ticks: f64) -> Outcome {
 /// A hundredth of the depth at which a skin bears 3 N.
 const CREEP_M: f64 = 1e-5;
 
-/// Joints slower than this stand still, rad/s: the tip, a metre away, goes a micrometre in a second
-/// (chosen).
+/// Joint speed below which a joint counts as at rest, rad/s.
+// heuristic: the tip, a metre away, moves a micrometre in a second.
 const STILL: f64 = 1e-6;

@@ -1,4 +1,4 @@
-//! Whole touches of a wall.
+//! Hard cases of complete touches of a wall.
 
 use super::case::{Case, Outcome, case, require};
 use super::checked_touch::{CheckedTouch, environment_of, touch_solid};
@@ -126,8 +126,7 @@ pub const CASES: &[Case] = &[
     ),
 ];
 
-/// A kinematic stage with a soft finger whose point of contact is exact, before an object near
-/// the origin.
+/// A kinematic stage with a soft finger and exact contact points, before an object near the origin.
 pub fn scene(period_s: f64) -> Scene {
     let mut effects = Effects { skin: Some(Default::default()), ..Effects::default() };
     effects.fluid = Some(Default::default());
@@ -162,8 +161,8 @@ pub fn on_wall(scene: Scene) -> Outcome {
     touch_wall(scene).on_surface(1e-3)
 }
 
-/// The same target again and again gives the same contact, but for a tactile frame of approach:
-/// sums of ticks round, and a frame falls to the tick before or after.
+/// Repeated touches of a target give the same contact to within one tactile frame of approach: sums
+/// of ticks are rounded, so a frame may fall on the previous or next tick.
 fn many(count: f64, period_s: f64) -> Outcome {
     let mut scene = noise_free(&scene(period_s));
     scene.effects.skin.get_or_insert_default().samples = 125;
@@ -198,7 +197,7 @@ fn many(count: f64, period_s: f64) -> Outcome {
     Outcome::Stable
 }
 
-/// Within what the finger travels in a tick and a tactile frame of the touch at 0.25 ms.
+/// Within the finger's travel in one tick and one tactile frame of the touch at 0.25 ms.
 fn refined(times: f64, _: f64) -> Outcome {
     let [fine, coarse] =
         [0.00025, 0.0025 * times].map(|period_s| touch_wall(noise_free(&scene(period_s))));

@@ -1,4 +1,4 @@
-//! The true surface of a whole object, and how near a believed one is to it.
+//! True surface of a whole object, and errors of an estimated one.
 
 mod reach;
 
@@ -16,60 +16,57 @@ use palpate_geometry::spread::{Spot, in_square, over_surface};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Agreement of a believed closed surface with the true one.
+/// Agreement of an estimated closed surface with the true one.
 ///
 /// Distances are from a point of one surface to the nearest point of the other, over points spread
-/// evenly by area; shares of a length are of the diagonal of the true surface's bounding box.
+/// evenly by area. Shares of a length refer to the diagonal of the true surface's bounding box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShapeMetrics {
-    /// Chamfer distance, in metres: ½·(mean distance from the true surface to the believed one) +
-    /// ½·(mean distance from the believed surface to the true one). None where no surface is
-    /// believed.
+    /// Chamfer distance, m: mean of the mean distances true → estimated and estimated → true; none
+    /// without an estimated surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chamfer_m: Option<f64>,
-    /// Chamfer distance over the diagonal.
+    /// Chamfer distance divided by the diagonal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chamfer_share: Option<f64>,
-    /// Mean distance to the believed surface of what the finger can touch of the true one, in
-    /// metres; none where that is not asked or is nothing.
+    /// Mean distance from the reachable true surface to the estimated one, m; none without a
+    /// reachable surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reachable_chamfer_m: Option<f64>,
-    /// F-score 2·P·R / (P + R) at 1 % of the diagonal: P is the share of the believed surface no
-    /// farther than that from the true one, R the share of the true surface no farther than that
-    /// from the believed one (Knapitsch et al. 2017, "Tanks and Temples", section 4). 0 where
-    /// no surface is believed.
+    /// F-score 2·P·R / (P + R) at 1 % of the diagonal (Knapitsch et al. 2017, section 4); 0 without
+    /// an estimated surface.
     pub f_1: f64,
-    /// The same at 3 % of the diagonal.
+    /// F-score at 3 % of the diagonal.
     pub f_3: f64,
-    /// Believed volume over the true one, minus 1; none where the true surface is open.
+    /// Estimated volume divided by the true one, minus 1; none for an open true surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volume_error: Option<f64>,
-    /// Believed area over the true one, minus 1.
+    /// Estimated area divided by the true one, minus 1.
     pub area_error: f64,
-    /// Volume inside both surfaces over the volume inside either; none where the true surface is
-    /// open.
+    /// Volume inside both surfaces divided by the volume inside either; none for an open true
+    /// surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub iou: Option<f64>,
-    /// Share of the true surface that lies within two standard deviations of the believed one,
-    /// |mean| ≤ 2·sd of the field there; none of a belief that has none.
+    /// Share of the true surface within two standard deviations of the estimated one: |mean| ≤ 2·sd
+    /// of the field there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
 }
 
-/// Standard deviations from the believed surface within which the truth is covered.
+/// Standard deviations within which the true surface counts as covered.
 const COVERED_SD: f64 = 2.0;
 
 impl ShapeMetrics {
-    /// With the share that is covered, from |mean| / sd of the believed field at the true samples;
-    /// a ratio that is no number is not covered.
+    /// Sets the coverage from |mean| / sd of the field at the true samples; a NaN ratio is not
+    /// covered.
     pub fn with_coverage(self, ratios: impl IntoIterator<Item = f64>) -> Self {
         let coverage = share(ratios, |ratio| ratio.abs() <= COVERED_SD).map(tidy);
         Self { coverage, ..self }
     }
 }
 
-/// F-score of distances in metres from the true surface and from the believed one: the harmonic
-/// mean of the shares within `limit_m`; 0 where both are.
+/// F-score of the distances from the true surface and from the estimated one, m: the harmonic mean
+/// of the shares within `limit_m`; 0 if both are 0.
 fn f_score(from_true_m: &[f64], from_believed_m: &[f64], limit_m: f64) -> f64 {
     let within = |distances_m: &[f64]| {
         share(distances_m.iter().copied(), |distance_m| distance_m <= limit_m).unwrap_or(0.0)
@@ -79,14 +76,14 @@ fn f_score(from_true_m: &[f64], from_believed_m: &[f64], limit_m: f64) -> f64 {
     if sum > 0.0 { tidy(2.0 * precision * recall / sum) } else { 0.0 }
 }
 
-/// Mean of some numbers; none of none.
+/// Mean of numbers; `None` if there are none.
 fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (count, sum) =
         values.into_iter().fold((0_u32, 0.0), |(count, sum), value| (count + 1, sum + value));
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// A share to six decimals, more than samples resolve: the rows keep one after every touch.
+/// Rounds a share to six decimals, finer than the samples resolve: each row stores one per touch.
 fn tidy(share: f64) -> f64 {
     (1e6 * share).round() / 1e6
 }
@@ -95,36 +92,37 @@ fn share(values: impl IntoIterator<Item = f64>, holds: impl Fn(f64) -> bool) -> 
     mean(values.into_iter().map(|value| f64::from(u8::from(holds(value)))))
 }
 
-/// Points spread over each surface. Of ten objects of the suite against each of two wavy copies and
-/// a ball, the Chamfer distance is off from that of 100 000 points by 0.07 % in the median and
-/// 0.4 % at most, F-scores by up to 0.006; half as many points are off by up to 0.9 %, twice as
-/// many by up to 0.3 %.
+/// Points sampled on each surface.
+// heuristic: for ten suite objects, each against two wavy copies and a ball, the Chamfer distance
+// differs from that of 100 000 points by 0.07 % (median) and at most 0.4 %, F-scores by at most
+// 0.006; half as many points differ by up to 0.9 %, twice as many by up to 0.3 %.
 pub const SAMPLES: usize = 4000;
 
-/// Lines along which insides are compared: of the same pairs, intersection over union is off from
-/// that of 100 000 lines by 0.001 in the median and 0.0035 at most.
+/// Lines along which volumes are compared.
+// heuristic: for the same pairs the intersection over union differs from that of 100 000 lines by
+// 0.001 (median) and at most 0.0035.
 const LINES: usize = 1000;
 
-/// The deviation is looked at in every so many samples of the true surface: it costs the square of
-/// what was observed. Chosen.
+/// Step between the true samples whose standard deviation is computed.
+// heuristic: limits a cost that is quadratic in the number of observations.
 const COVERED: usize = 4;
 
-/// The true surface with all that is asked of it again and again.
+/// True surface, with precomputed samples and properties.
 #[derive(Clone)]
 pub struct TrueShape {
     bvh: MeshBvh,
     samples: Vec<Spot>,
-    /// Enclosed volume; none of an open surface.
+    /// Enclosed volume; `None` for an open surface.
     volume_m3: Option<f64>,
     area_m2: f64,
     diagonal_m: f64,
-    /// Whether the finger can touch each sample, if that was asked.
+    /// Whether the finger can touch each sample, if computed.
     is_reachable: Option<Vec<bool>>,
 }
 
 impl TrueShape {
-    /// Of an environment in which a whole object is explored, with what of it the finger can touch
-    /// if it is closed; none of another one.
+    /// Returns the surface of an environment with a whole object, with its reachable part if it is
+    /// closed; `None` for other environments.
     pub fn of(environment: &Environment) -> Option<Self> {
         let ball = environment.task().ball()?;
         let Shape::Mesh { bvh, report } = environment.shape() else { return None };
@@ -138,7 +136,7 @@ impl TrueShape {
         Some(shape.with_reach(&Reach { radius_m, axis_w: &axis_w, lowest_m }))
     }
 
-    /// Of a mesh, of which only a closed one has an inside.
+    /// Returns the surface of a mesh; only a closed mesh has a volume.
     pub fn new(bvh: MeshBvh, is_closed: bool) -> Self {
         let mesh = bvh.mesh();
         let (low, high) = mesh.bounds();
@@ -152,33 +150,33 @@ impl TrueShape {
         }
     }
 
-    /// With what of it a finger can touch.
+    /// Adds the part that a finger can touch.
     pub fn with_reach(self, reach: &Reach) -> Self {
         let is_reachable = Some(reach.touches(&self.bvh, &self.samples));
         Self { is_reachable, ..self }
     }
 
-    /// Share of its area that the finger can touch, if that was asked.
+    /// Share of the area that the finger can touch, if computed.
     pub fn reachable_share(&self) -> Option<f64> {
         let is_reachable = self.is_reachable.as_ref()?;
         let count = is_reachable.iter().filter(|&&is_reachable| is_reachable).count();
         Some(count as f64 / is_reachable.len() as f64)
     }
 
-    /// Points spread evenly over it, and whether the finger can touch each; none if that was not
-    /// asked.
+    /// Points spread evenly over the surface, and whether the finger can touch each; empty if that
+    /// was not computed.
     pub fn reached(&self) -> Vec<(Point3<f64>, bool)> {
         let is_reachable = self.is_reachable.iter().flatten();
         self.samples.iter().map(|spot| spot.point).zip(is_reachable.copied()).collect()
     }
 
-    /// Points spread evenly over it.
+    /// Points spread evenly over the surface.
     pub fn samples(&self) -> &[Spot] {
         &self.samples
     }
 
-    /// How near a believed surface is, made of `cells` along its longest side, with the share of
-    /// the true one that its deviation covers.
+    /// Compares an estimated surface, meshed with `cells` along its longest side, with the true
+    /// one, including the coverage.
     pub fn judge(&self, surface: &Surface, cells: u32) -> ShapeMetrics {
         let looked_at = self.samples.iter().step_by(COVERED).map(|spot| spot.point);
         let points_w: Vec<Point3<f64>> = looked_at.collect();
@@ -192,7 +190,7 @@ impl TrueShape {
         metrics.with_coverage(ratios)
     }
 
-    /// How near `believed` is, which is closed.
+    /// Compares the closed mesh `believed` with the true surface.
     pub fn compare(&self, believed: &Mesh) -> ShapeMetrics {
         let bvh = MeshBvh::new(believed.clone());
         let from_true_m = distances_m(&self.samples, &bvh);
@@ -218,7 +216,8 @@ impl TrueShape {
         }
     }
 
-    /// Of a belief in no surface at all: it has no distance, and scores as an empty inside does.
+    /// Returns the metrics of a belief without a surface: no distance, and the scores of an empty
+    /// volume.
     pub fn compare_nothing(&self) -> ShapeMetrics {
         ShapeMetrics {
             volume_error: self.volume_m3.map(|_| -1.0),
@@ -233,15 +232,15 @@ fn distances_m(from: &[Spot], to: &MeshBvh) -> Vec<f64> {
     from.iter().map(|spot| to.closest_point(&spot.point).distance_m).collect()
 }
 
-/// Volume inside both over the volume inside either, by the lengths of `lines` parallel lines that
-/// are inside: along the longest side of the box around both, spread evenly across it. A line
-/// knows its lengths exactly, so only two of three dimensions are sampled. None where nothing
-/// is inside either.
+/// Volume inside both meshes over the volume inside either, from the lengths inside them of `lines`
+/// parallel lines. The lines follow the longest side of the common bounding box and are spread
+/// evenly across it. Lengths along a line are exact, so only two of three dimensions are sampled.
+/// `None` if both volumes are empty.
 fn intersection_over_union(a: &MeshBvh, b: &MeshBvh, lines: usize) -> Option<f64> {
     let ((low_a, high_a), (low_b, high_b)) = (a.mesh().bounds(), b.mesh().bounds());
     let (low, high) = (low_a.inf(&low_b), high_a.sup(&high_b));
     let sides_m = high - low;
-    // The first of sides that are as long but for rounding.
+    // Selects the first of the sides that are equal except for rounding.
     let longest_m = sides_m.max() * (1.0 - 1e-9);
     let along = (0..3).find(|&side| sides_m[side] >= longest_m).unwrap_or(0);
     let mut axis = Vector3::zeros();
@@ -268,7 +267,7 @@ fn intersection_over_union(a: &MeshBvh, b: &MeshBvh, lines: usize) -> Option<f64
     (either_m > 0.0).then(|| both_m / either_m)
 }
 
-/// Length that is in spans of both, which are in order.
+/// Length in spans of both `a` and `b`, which are sorted.
 fn common_m(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     let (mut i, mut j, mut sum_m) = (0, 0, 0.0);
     while let (Some([from_a, to_a]), Some([from_b, to_b])) = (a.get(i), b.get(j)) {
@@ -283,8 +282,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A recall of a quarter and a precision of one: 2 · ¼ / (5/4). A distance at the limit is
-    /// within.
+    /// A recall of a quarter and a precision of one give 2 · ¼ / (5/4). A distance at the limit
+    /// counts as within.
     #[test]
     fn the_f_score_is_the_harmonic_mean() {
         assert_eq!(f_score(&[0.1, 1.0, 2.0, 3.0], &[0.0, 0.1], 0.1), 0.4);
@@ -294,7 +293,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whole numbers between, asked one by one, are the slow twin.
+        /// The reference implementation tests the points between whole numbers one by one.
         #[test]
         fn spans_have_in_common_what_lies_in_both(
             a in prop::collection::btree_set(0u8..40, 0..8),

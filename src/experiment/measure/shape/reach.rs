@@ -1,4 +1,4 @@
-//! Where a finger that goes straight at a whole object, from any side, can touch it.
+//! Reachable surface of a whole object for a finger that approaches straight from any side.
 
 use nalgebra::{UnitVector3, Vector3};
 use palpate_geometry::bvh::MeshBvh;
@@ -7,35 +7,36 @@ use palpate_geometry::spread::{Spot, directions};
 use palpate_geometry::sweep::Capsule;
 use rayon::prelude::*;
 
-/// Distance between surface and resting finger that still counts as touching, as a share of the
-/// diagonal of the object's box; chosen, a tenth of the errors that a belief reaches.
+/// Distance between surface and resting finger that still counts as contact, as a share of the
+/// diagonal of the object's box.
+// heuristic: a tenth of the errors that a belief reaches.
 const TOLERANCE: f64 = 6e-4;
 
-/// Directions all around from which the finger comes, beside the surface's own normal. Chosen: of
-/// twelve objects of the suite, each with a finger of 7 mm and of 3.5 mm, the reachable share is
-/// below that of 1024 directions by 0.2 % of the area in the median and by 1.8 % at most, between
-/// the teeth of a gear.
+/// Approach directions all around, in addition to the surface normal.
+// heuristic: for twelve suite objects with fingers of 7 mm and 3.5 mm radius, the reachable share
+// is below that of 1024 directions by 0.2 % of the area (median) and at most 1.8 %, between the
+// teeth of a gear.
 const DIRECTIONS: usize = 128;
 
-/// How the finger goes at an object.
+/// Geometry of a finger's approaches to an object.
 #[derive(Clone, Copy)]
 pub struct Reach<'a> {
-    /// Radius of its hemisphere and cylinder.
+    /// Radius of the finger's hemisphere and cylinder.
     pub radius_m: f64,
-    /// From its hemisphere's centre to its cylinder's far end, in `W`, where it comes along a
+    /// Vector from the hemisphere's centre to the cylinder's far end, in `W`, for an approach
     /// direction.
     pub axis_w: &'a (dyn Fn(&UnitVector3<f64>) -> Vector3<f64> + Sync),
-    /// Lowest z in `W` to which it may come; none where nothing is below.
+    /// Lowest allowed z in `W`; `None` if unbounded.
     pub lowest_m: Option<f64>,
 }
 
 impl Reach<'_> {
-    /// Whether it can touch the surface at each of `spots`: on its straight way from outside the
-    /// ball around the mesh, to where its hemisphere would rest on the surface there, it is held up
-    /// by nothing, or so late that it is there all but the tolerance. Ways are tried along the
-    /// normal and along an even spread of directions on its side.
+    /// Whether the finger can touch the surface at each of `spots`: on a straight path from outside
+    /// the ball around the mesh to the pose where its hemisphere rests on the surface there,
+    /// nothing stops it before the tolerance. The normal and an even spread of directions on its
+    /// side are tried.
     ///
-    /// The mesh is closed; what it takes for its outside is what may be touched.
+    /// The mesh must be closed; its outside is the free space.
     pub fn touches(&self, mesh: &MeshBvh, spots: &[Spot]) -> Vec<bool> {
         let spread: Vec<UnitVector3<f64>> = directions(DIRECTIONS).collect();
         let (low, high) = mesh.mesh().bounds();
@@ -44,8 +45,9 @@ impl Reach<'_> {
             let corners = mesh.mesh().corners(spot.triangle as usize);
             let outward = UnitVector3::new_unchecked(normal(&corners));
             let tip_w = spot.point + outward.scale(self.radius_m);
-            // A tip no farther than this from there is within the tolerance of the spot, along the
-            // tangent; so this much of it is free wherever it may rest, and the way beyond too.
+            // A tip within this distance of the ideal one is within the tolerance of the spot,
+            // along the tangent. So a ball of the radius minus this distance must be free wherever
+            // the finger rests, and so must the path beyond.
             let aside_m = (tolerance_m * (2.0 * self.radius_m + tolerance_m)).sqrt();
             if mesh.touches(&tip_w, self.radius_m - aside_m) {
                 return false;
@@ -64,7 +66,8 @@ impl Reach<'_> {
         spots.par_iter().map(touches).collect()
     }
 
-    /// Whether it comes to rest at `spot` if its tip goes to `tip_w` from `back` there.
+    /// Whether the finger comes to rest at `spot` if its tip moves to `tip_w` from the direction
+    /// `back`.
     fn rests_at(
         &self,
         (mesh, tolerance_m): (&MeshBvh, f64),
@@ -76,7 +79,7 @@ impl Reach<'_> {
         let axis_w = (self.axis_w)(&ahead);
         let (low, high) = mesh.mesh().bounds();
         let middle_w = (low.coords + high.coords) / 2.0;
-        // All of it is beyond a plane that the ball around the mesh does not reach.
+        // The whole finger starts beyond a plane outside the ball around the mesh.
         let clear_m = (high - low).norm() / 2.0 + self.radius_m + axis_w.norm() + tolerance_m;
         let way_m = clear_m - (tip_w - middle_w).dot(back);
         let at = |way_m: f64| {
