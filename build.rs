@@ -13,8 +13,8 @@ fn main() {
         println!("cargo::rustc-link-arg-bin=palpate=-Wl,-rpath,$ORIGIN{beside}");
     }
     // Relative first, so that a folder that was moved whole still runs: binaries lie in
-    // target/PROFILE, tests and examples one level deeper. The absolute one is where `cargo install`
-    // leaves the library.
+    // target/PROFILE, tests and examples one level deeper. The absolute one is where `cargo
+    // install` leaves the library.
     for up in ["../..", "../../.."] {
         println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/{up}/.deps/lib");
     }

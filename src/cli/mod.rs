@@ -109,28 +109,25 @@ const GROUPS: [(&str, &[&str]); 4] = [
 
 /// Builds the command parser; the help groups the commands.
 fn command() -> clap::Command {
-    let command = Cli::command().mut_subcommand("run", |run| {
-        let planners = list::indented(&list::planners());
-        run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end()))
-    });
+    let command = Cli::command();
     let header = *command.get_styles().get_header();
-    let named: Vec<[String; 2]> = (command.get_subcommands())
-        .map(|each| {
-            [each.get_name().into(), each.get_about().map(ToString::to_string).unwrap_or_default()]
-        })
-        .collect();
     let is_in = |names: &[&str], name: &str| names.contains(&name);
     let section = |(title, names): &(&str, &[&str])| {
-        let is_last = names.is_empty();
-        let is_here = |name: &str| match is_last {
+        let is_here = |name: &str| match names.is_empty() {
             true => !GROUPS.iter().any(|(_, names)| is_in(names, name)),
             false => is_in(names, name),
         };
-        let own: Vec<_> = named.iter().filter(|[name, _]| is_here(name)).cloned().collect();
-        format!("{header}{title}:{header:#}\n{}\n", list::indented(&own))
+        let own = command.get_subcommands().filter(|each| is_here(each.get_name()));
+        let lines = own.map(|each| {
+            let about = each.get_about().map(ToString::to_string);
+            [each.get_name().into(), about.unwrap_or_default()]
+        });
+        format!("{header}{title}:{header:#}\n{}\n", list::indented(&lines.collect::<Vec<_>>()))
     };
     let commands: String = GROUPS.iter().map(section).collect();
-    command.help_template(format!(
+    let planners = list::indented(&list::planners());
+    let planners = format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end());
+    command.mut_subcommand("run", |run| run.after_help(planners)).help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}{header}Options:{header:#}\n{{options}}{{after-help}}"
     ))
 }

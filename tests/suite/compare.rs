@@ -84,5 +84,8 @@ fn runs_are_compared_from_the_command_line() {
     let (code, said) = compare(&[&at("one"), &at("apart")]);
     assert!(code == Some(2) && said.contains("do not pair"), "{said}");
     let (code, said) = compare(&[&at("one"), "--against", "sobol"]);
-    assert!(code == Some(2) && said.contains("no trials of \"sobol\""), "{said}");
+    assert!(
+        code == Some(2) && said.contains("no trials of the reference planner \"sobol\""),
+        "{said}"
+    );
 }

@@ -166,8 +166,13 @@ impl Tree {
 }
 
 fn is_import(line: &str) -> bool {
-    let line = line.trim_start();
-    line.starts_with("use ") || (line.starts_with("pub") && line.contains("use "))
+    let words: Vec<&str> = line.split_whitespace().collect();
+    match words.first() {
+        // A path in `palpate::`; otherwise it is prose in a text of several lines.
+        Some(&"use") => line.contains("::") || line.trim_end().ends_with(';'),
+        Some(first) => first.starts_with("pub") && words.get(1) == Some(&"use"),
+        None => false,
+    }
 }
 
 /// Expands an import with braces to all paths.

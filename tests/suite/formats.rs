@@ -175,8 +175,8 @@ fn broken_and_hostile_files_are_refused_at_their_place() {
         + "end_header\n1 2 3 4\n1 2 3 4\n1 2 3 4\n1 2 3 4\n1 2 3 4\n";
     let bare = "ply\nformat binary_little_endian 1.0\nelement a 99999999999999999\nend_header\n";
     let cases: [(&str, Vec<u8>, &str); 27] = [
-        ("empty.stl", vec![], "0 bytes"),
-        ("short.stl", b"short".into(), "5 bytes"),
+        ("empty.stl", vec![], "has 84 bytes, not 0"),
+        ("short.stl", b"short".into(), "84 bytes, not 5"),
         ("cut.stl", binary[..200].into(), "200 bytes"),
         ("longer.stl", longer(&binary), "of 6 triangles has 384"),
         ("count.stl", counting, "of 4294967295 triangles has 214748364834"),

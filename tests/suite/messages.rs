@@ -130,7 +130,7 @@ fn a_damaged_row_is_faulted_at_its_line() {
         (
             format!("\"length_scales\":[{length}"),
             "\"length_scales\":[-0.1".into(),
-            "is -0.1; allowed is 0 to 1000000",
+            "is -0.1; allowed is 0.0 to 1000000.0",
         ),
         ("\"trial\":1".into(), "\"trial\":\"x\"".into(), "column 12: allowed is a whole number"),
         ("\"contact\":[".into(), "\"contact\":[1,".into(), "column "),

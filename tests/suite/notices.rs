@@ -97,7 +97,7 @@ fn a_forgotten_unit_is_told_with_the_one_that_fits() {
     let output = palpate(container.path(), &["show", "scene.toml"]);
     let notes = said(&output);
     assert!(notes.contains("1667 times larger than the zone"), "{notes}");
-    assert!(notes.contains("in \"mm\" it would measure 0.2000 m"), "{notes}");
+    assert!(notes.contains("with object.unit = \"mm\" it would measure 0.2000 m"), "{notes}");
     assert!(notes.contains("can reach only 0 of 1681 test points"), "{notes}");
     let bird =
         folder("bird.toml", &[("[zone]", "[zone]"), ("[object]", "[object]\nunit = \"mm\"")]);

@@ -438,7 +438,7 @@ fn a_file_that_was_cut_is_read_up_to_the_cut() {
         assert!(error.to_string().contains("the metadata `palpate` is missing"), "{at}: {error}");
     }
     let error = Recorded::of(b"a text that is something else".to_vec()).unwrap_err();
-    assert!(error.to_string().contains("does not begin like an MCAP file does"), "{error}");
+    assert!(error.to_string().contains("does not begin like an MCAP file"), "{error}");
 }
 
 #[test]

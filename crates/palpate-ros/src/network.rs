@@ -128,7 +128,7 @@ mod tests {
             ("", ("ROS_DOMAIN_ID", "lab"), "allowed are 0 to 232"),
             ("", ("ROS_LOCALHOST_ONLY", "yes"), "ROS_LOCALHOST_ONLY is \"yes\""),
             ("", ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"), "is \"OFF\""),
-            ("interfaces = [\"wlan0\"]", ("A", "b"), "names \"wlan0\""),
+            ("interfaces = [\"wlan0\"]", ("A", "b"), "\"wlan0\" is not an interface"),
             ("interfaces = [\"eth1\"]", ("A", "b"), "allowed are lo, eth0"),
             ("interfaces = [\"10.0.0.9\"]", ("A", "b"), "10.0.0.9"),
         ];

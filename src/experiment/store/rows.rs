@@ -92,7 +92,7 @@ fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), St
         return Err(format!("a target has {target} coordinates; needed are {coordinates}"));
     }
     if let Some((name, value, [low, high])) = impossible(touch) {
-        return Err(format!("{name} is {value}; allowed is {low} to {high}"));
+        return Err(format!("{name} is {value:?}; allowed is {low:?} to {high:?}"));
     }
     let Some(fit) = &touch.fit else { return Ok(()) };
     let found = &fit.hyperparameters;

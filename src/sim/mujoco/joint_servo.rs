@@ -60,8 +60,8 @@ impl JointServo {
 /// Turns the velocity servos of an implicitly integrated `model`, `force = kv (ctrl − qdot)`, into
 /// motors, `force = kv ctrl`, and adds `kv h` to the joints' inertias, where h is the time step.
 ///
-/// With `ctrl = u − qdot` at its start, a step equals that of a servo implicit in its velocity: `(M
-/// + kv h) Δqdot = h (kv (u − qdot) + …)`. MuJoCo makes the same step of its own servos, but
+/// With `ctrl = u − qdot` at its start, a step equals that of a servo implicit in its velocity:
+/// `(M + kv h) Δqdot = h (kv (u − qdot) + …)`. MuJoCo makes the same step of its own servos, but
 /// computes joint friction before, with the inertia `M` alone: at 2 ms a wrist joint then has the
 /// friction of a joint a fourth as heavy as it is for the step. Here both use the same inertia. The
 /// softness of friction (`dof_invweight0`) stays that of `M`, so that it does not depend on the

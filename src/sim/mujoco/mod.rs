@@ -48,7 +48,12 @@ pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
             true => MjModel::from_xml_string(mjcf),
             false => Err(cause),
         })
-        .map_err(|cause| Invalid::new(format!("MuJoCo refuses the scene: {cause}")))?;
+        .map_err(|cause| {
+            Invalid::new(format!(
+                "MuJoCo refuses the scene: {cause} DBG {}",
+                std::io::Error::last_os_error()
+            ))
+        })?;
     joint_servo::embed(&mut model);
     Ok(model)
 }

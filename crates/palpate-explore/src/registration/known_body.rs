@@ -242,8 +242,8 @@ impl Outline {
         (p_t, level_m + missing_m)
     }
 
-    /// Returns the outline's point nearest to `body` for the fingertip pose `x_wt`, and its signed distance;
-    /// negative inside.
+    /// Returns the outline's point nearest to `body` for the fingertip pose `x_wt`, and its signed
+    /// distance; negative inside.
     pub fn nearest(&self, body: &KnownBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
         let far = |p_t: &Point3<f64>| body.distance_m(&(x_wt * p_t));
         let first = |best: ([f64; 2], f64), point: &Sample| {

@@ -18,8 +18,8 @@ pub struct InterlockSettings {
     /// Workspace of tip and elbow in `W`, [smallest, largest] of x, y, z, m; unlimited if omitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace_m: Option<[[f64; 2]; 3]>,
-    /// Height in `W` of table or floor, m, avoided by all links except the foot; required for a real
-    /// robot.
+    /// Height in `W` of table or floor, m, avoided by all links except the foot; required for a
+    /// real robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_m: Option<f64>,
     /// Largest distance of the tip beyond the turning point of a touch, m.
@@ -41,7 +41,8 @@ pub struct InterlockSettings {
     pub wrench_silence_s: f64,
     /// Timeout of tactile frames, s.
     pub frame_silence_s: f64,
-    /// Time after which a constant electrode or position of a commanded joint stops a real robot, s.
+    /// Time after which a constant electrode or position of a commanded joint stops a real robot,
+    /// s.
     // heuristic: seven tactile frames.
     pub frozen_s: f64,
     /// Largest velocity tracking error over 0.2 s, as a fraction of the joint's velocity limit.
