@@ -48,12 +48,7 @@ pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
             true => MjModel::from_xml_string(mjcf),
             false => Err(cause),
         })
-        .map_err(|cause| {
-            Invalid::new(format!(
-                "MuJoCo refuses the scene: {cause} DBG {}",
-                std::io::Error::last_os_error()
-            ))
-        })?;
+        .map_err(|cause| Invalid::new(format!("MuJoCo refuses the scene: {cause}")))?;
     joint_servo::embed(&mut model);
     Ok(model)
 }
