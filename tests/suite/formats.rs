@@ -177,7 +177,7 @@ fn broken_and_hostile_files_are_refused_at_their_place() {
     let cases: [(&str, Vec<u8>, &str); 27] = [
         ("empty.stl", vec![], "has 84 bytes, not 0"),
         ("short.stl", b"short".into(), "84 bytes, not 5"),
-        ("cut.stl", binary[..200].into(), "200 bytes"),
+        ("cut.stl", binary[..200].into(), "384 bytes, not 200"),
         ("longer.stl", longer(&binary), "of 6 triangles has 384"),
         ("count.stl", counting, "of 4294967295 triangles has 214748364834"),
         ("nothing.stl", b"solid\nendsolid\n".into(), "no triangles"),

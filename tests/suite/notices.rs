@@ -103,7 +103,7 @@ fn a_forgotten_unit_is_told_with_the_one_that_fits() {
         folder("bird.toml", &[("[zone]", "[zone]"), ("[object]", "[object]\nunit = \"mm\"")]);
     let notes = said(&palpate(bird.path(), &["show", "scene.toml"]));
     assert!(notes.contains("702 times smaller than the zone"), "{notes}");
-    assert!(notes.contains("in \"m\" it would measure 0.1425 m"), "{notes}");
+    assert!(notes.contains("with object.unit = \"m\" it would measure 0.1425 m"), "{notes}");
 }
 
 #[test]
