@@ -28,6 +28,11 @@ pub fn version() -> &'static str {
     mujoco_rs::mujoco_version()
 }
 
+/// MuJoCo's message if it takes an errno left by its own allocation for that of a number: glibc sets
+/// ENOMEM where the heap of the main arena cannot grow, although it then allocates elsewhere.
+/// Another thread has another arena.
+const SPURIOUS: &str = "unknown error in attribute";
+
 /// Compiles a model; with an implicit integrator, its servos become those of a [`Plant`].
 ///
 /// # Errors
@@ -40,12 +45,10 @@ pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
         // SAFETY: no thread can use MuJoCo yet, because every model is compiled here.
         unsafe { set_log_config(quiet) };
     });
-    // MuJoCo takes an errno that an allocation left behind for the error of a number that it read;
-    // seen with a mesh among many threads. A second attempt shows whether it was one.
-    let spurious = "unknown error in attribute";
-    let mut model = MjModel::from_xml_string(mjcf)
-        .or_else(|cause| match cause.to_string().contains(spurious) {
-            true => MjModel::from_xml_string(mjcf),
+    let read = || MjModel::from_xml_string(mjcf);
+    let mut model = read()
+        .or_else(|cause| match cause.to_string().contains(SPURIOUS) {
+            true => std::thread::scope(|scope| scope.spawn(read).join().unwrap_or(Err(cause))),
             false => Err(cause),
         })
         .map_err(|cause| Invalid::new(format!("MuJoCo refuses the scene: {cause}")))?;
