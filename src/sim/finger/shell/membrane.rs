@@ -1,7 +1,7 @@
 //! Shell of the skin in balance with the fluid under it, the core and an object.
 //!
 //! The shell rests where the energy of sheet, fluid (½ K V²), core and skin under the object is
-//! smallest. This module has that energy; `settle` minimises it. [`Membrane::balance`] minimises it
+//! smallest. This module has that energy; `settle` minimises it. `Membrane::balance` minimises it
 //! with the rays by which the skin meets an object.
 
 use super::sheet::{Material, Sheet, Strained};
