@@ -28,8 +28,8 @@ pub fn version() -> &'static str {
     mujoco_rs::mujoco_version()
 }
 
-/// MuJoCo's message if it takes an errno left by its own allocation for that of a number: glibc sets
-/// ENOMEM where the heap of the main arena cannot grow, although it then allocates elsewhere.
+/// MuJoCo's message if it takes an errno left by its own allocation for that of a number: glibc
+/// sets ENOMEM where the heap of the main arena cannot grow, although it then allocates elsewhere.
 /// Another thread has another arena.
 const SPURIOUS: &str = "unknown error in attribute";
 
