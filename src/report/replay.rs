@@ -1,5 +1,6 @@
 //! Replay of beliefs: a recorded trial's touches and hyperparameters, conditioned again.
 
+use crate::experiment::Experiment;
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
@@ -39,14 +40,25 @@ impl<'a> Replay<'a> {
     /// # Errors
     /// If the recorded touches do not belong to the zone or cannot be conditioned on.
     pub fn new(run: &'a Run, planner: &str, count: u32) -> anyhow::Result<Option<Self>> {
-        let Some(row) = row(run, planner) else { return Ok(None) };
+        row(run, planner).map_or(Ok(None), |row| Self::of(&run.experiment, row, count))
+    }
+
+    /// Replays the belief of a trial's `row` after `count` touches, as [`Replay::new`].
+    ///
+    /// # Errors
+    /// As [`Replay::new`].
+    pub fn of(
+        experiment: &Experiment,
+        row: &'a TrialRow,
+        count: u32,
+    ) -> anyhow::Result<Option<Self>> {
         let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
         let Some(last) = touches.last() else { return Ok(None) };
-        let (Some(fit), Some(zone)) = (&last.fit, &run.experiment.scene.zone) else {
+        let (Some(fit), Some(zone)) = (&last.fit, &experiment.scene.zone) else {
             return Ok(None);
         };
         let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let mut belief = HeightField::new(zone.clone(), run.experiment.gp.clone());
+        let mut belief = HeightField::new(zone.clone(), experiment.gp.clone());
         for touch in touches {
             let target = touch.target.place().filter(|it| it.len() == zone.dimension());
             let target = target.with_context(|| {
@@ -55,7 +67,7 @@ impl<'a> Replay<'a> {
             // A normal that is not recorded was not observed.
             let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
             belief.observe(target, &touched);
-            if let Some(swept) = swept(run.experiment.scene.finger.clone(), touch) {
+            if let Some(swept) = swept(experiment.scene.finger.clone(), touch) {
                 belief.observe_swept(&swept);
             }
         }
@@ -67,7 +79,7 @@ impl<'a> Replay<'a> {
             metrics: last.metrics,
             touches,
             next: row.touches.get(count as usize),
-            initial_touches: run.experiment.initial_touches as usize,
+            initial_touches: experiment.initial_touches as usize,
         }))
     }
 
