@@ -8,13 +8,13 @@
 mod curves;
 
 use curves::{Curve, draw, print, seconds};
-use palpate::explore::around::SpaceSettings;
+use palpate::explore::around::SpatialGpSettings;
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::math::seed::stream;
 use palpate::report::style;
-use palpate::sim::probe::exact;
+use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
@@ -32,11 +32,11 @@ fn main() -> anyhow::Result<()> {
     let environment = Arc::new(Environment::build(scene)?);
     let (task, finger) = (environment.task(), &environment.scene().finger);
     let gp = GpSettings::default();
-    let mut belief = Belief::new(task, (finger, false), &gp, &SpaceSettings::default());
+    let mut belief = Belief::new(task, (finger, false), &gp, &SpatialGpSettings::default());
     let make = |name| planner::by_name(name).ok_or(anyhow::anyhow!("no planner {name}"));
     let mut planner = (make("active")?.make)(&Default::default(), stream(1, 0, "active"));
     let mut begin = (make("sobol")?.make)(&Default::default(), stream(1, 0, "begin"));
-    let mut probe = exact(Arc::clone(&environment));
+    let mut probe = exact_probe(Arc::clone(&environment));
     let curve = |name, colour, expected| Curve { name, colour, expected, values: Vec::new() };
     let mut refit = curve("update with refit", "#0072b2", 3.0);
     let mut choice = curve("choice of the next touch", "#d55e00", 2.0);
@@ -48,7 +48,7 @@ fn main() -> anyhow::Result<()> {
         let touch = probe.touch(&approach)?;
         let before = belief.clone();
         let update = |belief: &mut Belief| {
-            belief.observe(&plan.target, &approach, (&touch, probe.swept().as_ref()));
+            belief.observe(&plan.target, &approach, (&touch, probe.swept_volume().as_ref()));
             belief.refit().map(|_| ())
         };
         update(&mut belief)?;

@@ -11,11 +11,11 @@ use palpate::backend::Command;
 use palpate::experiment::statistics::median;
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::Touch;
-use palpate::sim::mujoco::Models;
-use palpate::sim::probe::rest;
+use palpate::sim::mujoco::CompiledModels;
+use palpate::sim::probe::resting_pose;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::study::accuracy::deviation::Spread;
+use palpate::study::accuracy::deviation::ErrorStatistics;
 use palpate::study::accuracy::touches;
 use std::path::Path;
 use std::sync::Arc;
@@ -98,7 +98,7 @@ fn errors(environment: &Environment, truth: &[Rest], found: &[Rest]) -> String {
         environment.nearest_true_point(&found.p_wc).map(|nearest| (nearest - found.p_wc).norm())
     });
     let cells = |errors_m: Vec<f64>| {
-        let spread = Spread::of(errors_m.iter().copied()).unwrap_or_default();
+        let spread = ErrorStatistics::of(errors_m.iter().copied()).unwrap_or_default();
         let median = median(&errors_m).unwrap_or(f64::NAN);
         [median, spread.p95, spread.max].map(|m| format!("{:.4}", 1e3 * m)).join(" | ")
     };
@@ -136,11 +136,11 @@ fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     let mut probe = Simulator::new(Arc::clone(cast))?.probe(0)?;
     let mut rest = |target: &Vec<f64>| {
         let approach = cast.task().approach(&target[..].into()).unwrap();
-        let y_m = rest(cast, &approach).context("a place without contact")?.p_wt.y;
+        let y_m = resting_pose(cast, &approach).context("a place without contact")?.p_wt.y;
         let Touch::Contact(contact) = probe.touch(&approach)? else { anyhow::bail!("a miss") };
         Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
     };
-    truth.iter().map(|truth| rest(&truth.target)).collect()
+    truth.iter().map(|truth| resting_pose(&truth.target)).collect()
 }
 
 /// Returns the positions at which MuJoCo first reports contact while the finger is lowered along −y
@@ -150,7 +150,7 @@ fn lowered(stage: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>
     const ABOVE_M: f64 = 0.03;
     const BELOW_M: f64 = -0.01;
     const STEP_M: f64 = 2.5e-4;
-    let mut data = MjData::new(Models::new(stage)?.plant);
+    let mut data = MjData::new(CompiledModels::new(stage)?.plant);
     let mut deepest = |target: &[f64], y_m: f64| {
         data.qpos_mut().copy_from_slice(&[target[0], y_m, target[1]]);
         data.forward();
@@ -176,7 +176,7 @@ fn lowered(stage: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>
         let p_wc = deepest(target, low_m).context("contact was lost")?;
         Ok(Rest { target: target.clone(), y_m: low_m, p_wc })
     };
-    truth.iter().map(&mut rest).collect()
+    truth.iter().map(&mut resting_pose).collect()
 }
 
 /// Returns the median over some places of the time of a step, µs, while the PA-10 holds its finger
@@ -195,9 +195,9 @@ fn step(
         let chain = environment.chain().context("no chain")?;
         let mut controller = Controller::new(chain, scene.period_s())?;
         for (gap_m, duration_s) in [(2e-3, 3.0), (-depth_m, 1.0)] {
-            let mut p_wt = scene.zone.as_ref().unwrap().point(&rest.target, 0.0);
-            p_wt.y = rest.y_m + gap_m;
-            let goal = Goal::still(Isometry3::from_parts(p_wt.into(), scene.finger.r_at()));
+            let mut p_wt = scene.zone.as_ref().unwrap().point(&resting_pose.target, 0.0);
+            p_wt.y = resting_pose.y_m + gap_m;
+            let goal = Goal::at_rest(Isometry3::from_parts(p_wt.into(), scene.finger.r_at()));
             let until_s = reading.time_s + duration_s;
             while reading.time_s < until_s {
                 let motion = controller.step(&reading.q, &goal)?;

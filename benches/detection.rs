@@ -8,7 +8,7 @@ mod shapes;
 use nalgebra::Vector3;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
-use palpate::robot::finger::detection::Alarm;
+use palpate::robot::finger::detection::ContactChannels;
 use palpate::robot::finger::frame::FRAME_S;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, TipMotion};
 use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
@@ -34,9 +34,9 @@ fn detections() -> [(&'static str, Detection); 4] {
     let sds = |by| Detection { by, threshold_sds: Some(4.0), frames: 2, ..Detection::default() };
     [
         ("10 counts, 3 frames", Detection::default()),
-        ("pressure", sds(Alarm::Pressure)),
-        ("electrodes", sds(Alarm::Electrodes)),
-        ("both", sds(Alarm::Both)),
+        ("pressure", sds(ContactChannels::Pressure)),
+        ("electrodes", sds(ContactChannels::Electrodes)),
+        ("both", sds(ContactChannels::Both)),
     ]
 }
 
@@ -112,7 +112,7 @@ impl Sensor {
             None => Fingertip::new(&self.finger, &self.effects),
             Some(variation) => {
                 let sensor = variation.sensor(stream(seed, 0, "variation"));
-                Fingertip::varied(&self.finger, &self.effects, &sensor)
+                Fingertip::with_sensor(&self.finger, &self.effects, &sensor)
             }
         }
     }

@@ -15,11 +15,11 @@ mod pieces;
 
 use counting::peak_bytes;
 use curves::{Curve, draw, print, seconds};
-use palpate::gp::inducing::Induced;
+use palpate::gp::inducing::InducingPosterior;
 use palpate::gp::kernel::{Kernel, Matern52};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Posterior};
+use palpate::gp::{MeanModel, Posterior};
 use palpate::report::style;
 use pieces::machine::product;
 use pieces::sample::{KERNEL, hyperparameters, search_box, touches};
@@ -57,7 +57,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
             fit.values.push((n, fitted));
         }
         let bytes = peak_bytes(|| {
-            let mut scorer = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+            let mut scorer = Likelihood::new(&KERNEL, MeanModel::Zero, &touches);
             let mut gradient = [0.0; 4];
             let value = seconds(|| {
                 let _ = black_box(scorer.value_gradient(&at, &mut gradient));
@@ -66,7 +66,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
         });
         exact_mb.values.push((n, bytes as f64 / 1e6));
         // A rough kernel, which keeps the largest number of touches.
-        let induce = || Posterior::through(INDUCING, &Matern52, at.clone(), &touches);
+        let induce = || Posterior::with_inducing_points(INDUCING, &Matern52, at.clone(), &touches);
         through.values.push((
             n,
             seconds(|| {
@@ -79,8 +79,12 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
             [("squared_exponential", &KERNEL), ("matern_52", &Matern52)];
         for (name, kernel) in kernels.into_iter().filter(|_| count >= 1000) {
             let exact = Posterior::new(kernel, at.clone(), posterior.observations().clone());
-            let induced =
-                Posterior::through(INDUCING, kernel, at.clone(), posterior.observations());
+            let induced = Posterior::with_inducing_points(
+                INDUCING,
+                kernel,
+                at.clone(),
+                posterior.observations(),
+            );
             if let (Ok(exact), Ok(induced)) = (exact, induced) {
                 off.push(format!("{name:<22}{}", distance(&exact, &induced, &places)));
             }
@@ -117,7 +121,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
 
 /// Formats the distance of means and deviations from the exact ones, in units of the exact
 /// deviation.
-fn distance(exact: &Posterior, induced: &Induced, places: &[[f64; 2]]) -> String {
+fn distance(exact: &Posterior, induced: &InducingPosterior, places: &[[f64; 2]]) -> String {
     let [exact_at, ours_at] = [exact, &induced.posterior]
         .map(|posterior| posterior.predict(places.iter().map(|place| place.as_slice())));
     let pairs = || ours_at.iter().zip(&exact_at);

@@ -11,11 +11,11 @@ use palpate::backend::Fault;
 use palpate::experiment::measure::RMSE;
 use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::statistics::equal_error::{Estimate, equal_error};
-use palpate::experiment::statistics::{Paired, median};
+use palpate::experiment::statistics::{PairedDifference, median};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, Probe, Swept, Touch};
+use palpate::explore::probe::{Contact, Probe, SweptVolume, Touch};
 use palpate::math::seed;
 use palpate::task::Approach;
 use rand::RngExt;
@@ -63,8 +63,8 @@ impl Probe for Estimating {
         })
     }
 
-    fn swept(&self) -> Option<Swept> {
-        self.exact.swept()
+    fn swept_volume(&self) -> Option<SweptVolume> {
+        self.exact.swept_volume()
     }
 
     fn time_s(&self) -> Option<f64> {
@@ -154,10 +154,11 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
         let covered = after(&rows, experiment.touches, |m| m.coverage.unwrap_or(f64::NAN));
         let pairs: Vec<(f64, f64)> =
             finals.iter().copied().zip(after(heights, experiment.touches, rmse)).collect();
-        let against = Paired::new(&pairs, experiment.seed).map_or(String::new(), |paired| {
-            let [low, high] = paired.interval.unwrap_or([f64::NAN; 2]);
-            format!("{:+.3} [{low:+.3}, {high:+.3}]", paired.mean)
-        });
+        let against =
+            PairedDifference::new(&pairs, experiment.seed).map_or(String::new(), |paired| {
+                let [low, high] = paired.interval.unwrap_or([f64::NAN; 2]);
+                format!("{:+.3} [{low:+.3}, {high:+.3}]", paired.mean)
+            });
         println!(
             "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {equal} | {:.2} | {seconds:.2} |{}",
             match (is_own, experiment.scene.effects.electrodes.is_some()) {

@@ -2,7 +2,7 @@
 
 use palpate::backend::interlock::InterlockSettings;
 use palpate::backend::{Backend, Command};
-use palpate::explore::probe::interlocks::interlocked;
+use palpate::explore::probe::interlocks::with_interlocks;
 use palpate::robot::arm::{Chain, Joints};
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
@@ -24,7 +24,7 @@ fn main() -> anyhow::Result<()> {
         let settings = InterlockSettings { lowest_m, ..InterlockSettings::default() };
         let mut body: Box<dyn Backend> = match name {
             "none" => bare,
-            _ => Box::new(interlocked(bare, &robot, task, None, &settings)?),
+            _ => Box::new(with_interlocks(bare, &robot, task, None, &settings)?),
         };
         let us = tick_us(body.as_mut(), &robot.chain)?;
         println!("interlocks {name}: {us:.2} µs a tick");

@@ -8,7 +8,7 @@ use palpate::backend::Wrench;
 use palpate::explore::control::{Controller, Goal};
 use palpate::robot::arm::ArmSettings;
 use palpate::sim::mjcf;
-use palpate::sim::mjcf::Mode;
+use palpate::sim::mjcf::ModelPurpose;
 use palpate::sim::mujoco::{Plant, compile};
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
@@ -27,7 +27,7 @@ fn microseconds(mut run: impl FnMut()) -> f64 {
 
 fn step(plant: &mut Plant, command: &[f64]) {
     let _ = black_box(plant.step(command, &Wrench::default()));
-    black_box((plant.tip(), plant.tip_twist(), plant.mount()));
+    black_box((plant.tip(), plant.tip_twist(), plant.mount_wrench()));
 }
 
 fn main() -> anyhow::Result<()> {
@@ -36,9 +36,10 @@ fn main() -> anyhow::Result<()> {
         let mut scene = Scene::load(&path, &[])?;
         scene.arm = arm;
         let environment = Environment::build(scene)?;
-        let (Some(chain), Some(text)) =
-            (environment.chain(), mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }))
-        else {
+        let (Some(chain), Some(text)) = (
+            environment.chain(),
+            mjcf::scene(&environment, ModelPurpose::Dynamic { step_s: 0.002 }),
+        ) else {
             anyhow::bail!("the scene has no mesh");
         };
         let model = Arc::new(compile(&text)?);
@@ -53,7 +54,7 @@ fn main() -> anyhow::Result<()> {
             bare.ctrl_mut()[i] = bare.qfrc_bias()[i] / model.actuator_gainprm()[i][0];
         }
         let mut controller = Controller::new(chain.clone(), 0.004)?;
-        let goal = Goal::still(chain.forward(&chain.home));
+        let goal = Goal::at_rest(chain.forward(&chain.home));
         let mut command = vec![0.0; n];
         let mut ticks = 0;
         let mut best = [f64::INFINITY; 4];

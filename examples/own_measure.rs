@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release --example own_measure`
 
-use palpate::experiment::measure::{Aggregate, Direction, METRES, Measure, Scale, Source};
-use palpate::experiment::statistics::summary::typical;
+use palpate::experiment::measure::{Aggregate, Direction, METRES, Measure, PanelAxis, Source};
+use palpate::experiment::statistics::summary::representative_value;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 
@@ -15,8 +15,8 @@ pub const MEAN_RMSE: Measure = Measure {
     unit: METRES,
     direction: Direction::Less,
     aggregate: Aggregate::Median,
-    scale: Scale::Log,
-    is_tabled: true,
+    scale: PanelAxis::Log,
+    in_tables: true,
     is_error: true,
     source: Source::Trial(|row, touches| {
         let so_far = row.touches.get(..touches as usize)?;
@@ -42,7 +42,7 @@ pub fn rows() -> Result<Vec<TrialRow>, Box<dyn std::error::Error>> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rows = rows()?;
     for planner in ["active", "random"] {
-        let value = typical(&rows, planner, 20, &MEAN_RMSE).ok_or("no trial")?;
+        let value = representative_value(&rows, planner, 20, &MEAN_RMSE).ok_or("no trial")?;
         println!("{planner:<8} {} after 20 touches: {value:.4} m", MEAN_RMSE.title);
     }
     Ok(())

@@ -4,7 +4,7 @@
 
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
-use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner, sample};
+use palpate::explore::planner::{self, Plan, PlanError, Planner, PlannerEntry, sample};
 
 /// Planner that takes the random target, of thirty, that is farthest from all earlier ones
 /// (Mitchell 1991).
@@ -21,7 +21,7 @@ impl Planner for FarthestOfSome {
             };
             earlier.iter().map(squares).fold(f64::INFINITY, f64::min)
         };
-        let some = (0..30).map(|_| sample::anywhere(belief, &mut self.rng));
+        let some = (0..30).map(|_| sample::random_target(belief, &mut self.rng));
         let farthest =
             some.max_by(|a, b| distance(&a.numbers()).total_cmp(&distance(&b.numbers())));
         farthest.map(Plan::at).ok_or_else(|| "no target".into())
@@ -29,7 +29,7 @@ impl Planner for FarthestOfSome {
 }
 
 /// Entry with the name for experiments.
-pub static ENTRY: Entry = Entry {
+pub static ENTRY: PlannerEntry = PlannerEntry {
     name: "farthest_of_some",
     about: "of thirty random targets, the farthest from earlier ones",
     zone_only: None,
@@ -38,13 +38,13 @@ pub static ENTRY: Entry = Entry {
 
 /// Returns the error after the last touch of a trial: RMSE over a zone, Chamfer distance around an
 /// object, in m.
-pub fn error(planner: &Entry, experiment: &str) -> Result<f64, Box<dyn std::error::Error>> {
+pub fn error(planner: &PlannerEntry, experiment: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let path = format!("{}/experiments/{experiment}.toml", env!("CARGO_MANIFEST_DIR"));
     let simulation = Simulation::new(Experiment::load(path.as_ref(), &["touches=20".into()])?)?;
     let row = simulation.trial(planner, 0);
     let touches = row.touches.len() as u32;
-    let error = simulation.experiment().error();
-    error.of(&row, touches).ok_or_else(|| row.failure.unwrap_or_default().into())
+    let error = simulation.experiment().error_measure();
+    error.value(&row, touches).ok_or_else(|| row.failure.unwrap_or_default().into())
 }
 
 #[allow(dead_code)]

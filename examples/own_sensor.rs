@@ -18,10 +18,10 @@ pub struct Switch {
 }
 
 impl Sensor for Switch {
-    fn take(&mut self, _: f64, _: &[Sample], wrench: Option<&Wrench>) {
+    fn push(&mut self, _: f64, _: &[Sample], wrench: Option<&Wrench>) {
         self.force_n = wrench.map(|wrench| wrench.force_n);
     }
-    fn forget(&mut self) {}
+    fn clear_samples(&mut self) {}
     fn tare(&mut self) {
         self.rest_n = self.force_n;
     }
@@ -32,7 +32,7 @@ impl Sensor for Switch {
         Some((self.force_n? - self.rest_n?).norm() > 0.5)
     }
     fn locate(&self, finger: &Finger) -> Option<SensedContact> {
-        let ahead_t = finger.ahead_t();
+        let ahead_t = finger.direction_t();
         Some(SensedContact { p_tc: (ahead_t * finger.radius_m).into(), normal_t: -ahead_t })
     }
 }

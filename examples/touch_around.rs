@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use palpate::explore::probe::Touch;
 use palpate::geometry::spread::direction;
-use palpate::sim::environment::Shape;
+use palpate::sim::environment::Surface;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::Aim;
@@ -41,7 +41,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
     }
     let task = environment.task();
     let ball = *task.ball().ok_or("the scene has no [around]")?;
-    let Shape::Mesh { bvh, .. } = environment.shape() else { return Err("no mesh".into()) };
+    let Surface::Mesh { bvh, .. } = environment.shape() else { return Err("no mesh".into()) };
     let mut probe = simulator.probe(1)?;
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();
     let (mut off_mm, mut turned_deg, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
@@ -52,7 +52,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
         let beside_w = direction((7 * i + 3) % count, count).into_inner() * (0.35 * ball.radius_m);
         let p_w = ball.centre_w + if i % 4 == 3 { beside_w } else { Vector3::zeros() };
         let aim = Aim::against(p_w, &outward_w);
-        if !task.reaches(&aim) {
+        if !task.is_reachable(&aim) {
             *ends.entry("out of reach".into()).or_default() += 1;
             continue;
         }
@@ -72,7 +72,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
             Ok(Touch::Miss) => "miss".into(),
             Ok(Touch::Overload) => "overload".into(),
             Err(fault) => {
-                println!("{i}: along {:.2?}: {fault}", aim.ahead_w.as_slice());
+                println!("{i}: along {:.2?}: {fault}", aim.direction_w.as_slice());
                 probe = simulator.probe(1)?;
                 before_s = 0.0;
                 "fault".into()

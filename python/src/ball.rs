@@ -63,7 +63,7 @@ impl Ball {
     }
 
     /// Supports pickling.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, Parts) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, BallArguments) {
         let task::Ball { centre_w, radius_m, lowest_m } = slf.get().0;
         (slf.get_type().into_any(), (centre_w.into(), radius_m, lowest_m))
     }
@@ -75,4 +75,4 @@ impl Ball {
 }
 
 /// Constructor arguments of a ball.
-type Parts = ([f64; 3], f64, Option<f64>);
+type BallArguments = ([f64; 3], f64, Option<f64>);

@@ -60,7 +60,7 @@ impl Belief {
             Some(posterior) => of(posterior, &places.each),
             None => vec![f64::NAN; places.each.len()],
         };
-        places.told(points.py(), values)
+        places.reshape(points.py(), values)
     }
 
     fn gradients<'py>(
@@ -74,7 +74,7 @@ impl Belief {
         if let Some(posterior) = posterior {
             posterior.variances(&places.each, &mut gradients);
         }
-        places.told_vectors(points.py(), &gradients, dimension)
+        places.reshape_vectors(points.py(), &gradients, dimension)
     }
 }
 
@@ -117,12 +117,12 @@ impl Belief {
     /// Variance that a touch with this target can still reduce, square metres: `variance`,
     /// conditioned also on targets without contact or with contact elsewhere. The planner `active`
     /// selects its maximum.
-    fn explorable_variance<'py>(
+    fn reducible_variance<'py>(
         &self,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("explorable_variance")?;
-        self.told(points, (belief, belief.explorable()), variances)
+        self.told(points, (belief, belief.planning_posterior()), variances)
     }
 
     /// Gradient of `explorable_variance`, shape (..., d), metres.
@@ -131,7 +131,7 @@ impl Belief {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("explorable_variance_gradient")?;
-        self.gradients(points, (belief, belief.explorable()))
+        self.gradients(points, (belief, belief.planning_posterior()))
     }
 
     /// Whether a surface is likely at each point: 1 or 0.
@@ -144,7 +144,7 @@ impl Belief {
         let silhouette = belief.presence().silhouette();
         let likely = silhouette.is_likely(places.each.iter().map(Vec::as_slice));
         let values = likely.iter().map(|&is_likely| f64::from(u8::from(is_likely))).collect();
-        places.told(points.py(), values)
+        places.reshape(points.py(), values)
     }
 
     /// All targets so far, shape (n, d), metres; (n, 6) around an object.
@@ -223,7 +223,7 @@ impl Belief {
             }
             None => (vec![f64::NAN; points_w.len()], vec![f64::NAN; points_w.len()]),
         });
-        Ok((places.told(points.py(), means_m)?, places.told(points.py(), sds_m)?))
+        Ok((places.reshape(points.py(), means_m)?, places.reshape(points.py(), sds_m)?))
     }
 
     /// Mean surface from a grid of `cells` along its longest side (whole objects only): vertices

@@ -1,11 +1,11 @@
 //! Rows and curves as columns of data frames.
 
 use numpy::PyArray1;
-use palpate::experiment::measure::in_files;
+use palpate::experiment::measure::measures_with_columns;
 use palpate::experiment::statistics::curve_table::{columns, curve_table};
 use palpate::experiment::store::Run;
 use palpate::experiment::trial::row::{TouchRow, TrialRow};
-use palpate::explore::planner::Stall;
+use palpate::explore::planner::Fallback;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -76,8 +76,8 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     };
     numbers(&told, "signal_sd_m", fit(|found| found.signal_sd))?;
     numbers(&told, "noise_sd_m", fit(|found| found.noise_sd))?;
-    for measure in in_files(&run.rows) {
-        let values = all.iter().map(|(row, count, _)| measure.of(row, *count as u32));
+    for measure in measures_with_columns(&run.rows) {
+        let values = all.iter().map(|(row, count, _)| measure.value(row, *count as u32));
         numbers(&told, measure.id, values)?;
     }
     Ok(told)
@@ -104,10 +104,10 @@ fn outcome(touch: &TouchRow) -> &'static str {
     }
 }
 
-fn stalled(stall: Stall) -> &'static str {
+fn stalled(stall: Fallback) -> &'static str {
     match stall {
-        Stall::Collapsed => "collapsed",
-        Stall::Repeated => "repeated",
-        Stall::Blocked => "blocked",
+        Fallback::Collapsed => "collapsed",
+        Fallback::Repeated => "repeated",
+        Fallback::Blocked => "blocked",
     }
 }

@@ -11,34 +11,34 @@ use std::time::{Duration, Instant};
 
 /// Time of busy waiting before a trial sleeps.
 // heuristic: waking up takes about as long.
-const SOON: Duration = Duration::from_micros(50);
+const BUSY_WAIT: Duration = Duration::from_micros(50);
 
 type Reply = Result<Vec<f64>, String>;
 
 /// Planner's end of the channel.
 #[pyclass(frozen, module = "palpate._palpate")]
-pub(crate) struct Desk {
+pub(crate) struct PlannerChannel {
     requests: Mutex<Receiver<Known>>,
     replies: Sender<Reply>,
     /// Trial's end, until the trial takes it.
-    other: Mutex<Option<Trial>>,
+    other: Mutex<Option<TrialEnd>>,
 }
 
 /// Trial's end of the channel.
-pub(crate) struct Trial {
+pub(crate) struct TrialEnd {
     requests: Sender<Known>,
     replies: Receiver<Reply>,
     limit: Duration,
 }
 
 #[pymethods]
-impl Desk {
+impl PlannerChannel {
     #[new]
     fn new(limit_s: f64) -> PyResult<Self> {
         let limit = Duration::try_from_secs_f64(limit_s)
             .map_err(|error| PyValueError::new_err(format!("limit_s = {limit_s}: {error}")))?;
         let ((requests, theirs), (replies, ours)) = (channel(), channel());
-        let trial = Trial { requests, replies: ours, limit };
+        let trial = TrialEnd { requests, replies: ours, limit };
         Ok(Self { requests: Mutex::new(theirs), replies, other: Mutex::new(Some(trial)) })
     }
 
@@ -62,9 +62,9 @@ impl Desk {
     }
 }
 
-impl Desk {
+impl PlannerChannel {
     /// Takes the trial's end; returns `None` the second time.
-    pub(crate) fn trial(&self) -> Option<Trial> {
+    pub(crate) fn trial(&self) -> Option<TrialEnd> {
         self.other.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
@@ -77,7 +77,7 @@ pub(crate) enum NoTarget {
     Late(Duration),
 }
 
-impl Trial {
+impl TrialEnd {
     /// Sends a belief and waits for the target.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl Trial {
         let gone = || NoTarget::Said("the planner's thread has ended".into());
         self.requests.send(belief).map_err(|_| gone())?;
         let begun = Instant::now();
-        while begun.elapsed() < SOON {
+        while begun.elapsed() < BUSY_WAIT {
             if let Ok(reply) = self.replies.try_recv() {
                 return reply.map_err(NoTarget::Said);
             }

@@ -1,7 +1,7 @@
 //! Parallel explorations that are stepped by actions, the core of the Gymnasium environments.
 
 use crate::errors;
-use crate::exploration::{Exploration, How, Reward, World};
+use crate::exploration::{Episode, EpisodeOptions, ExplorationScene, Reward};
 use numpy::ndarray::{ArrayView2, Axis};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -15,15 +15,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Explorations of one or several objects.
 #[pyclass(frozen, module = "palpate._palpate")]
-pub(crate) struct Envs {
-    worlds: Arc<[Arc<World>]>,
-    how: How,
-    each: Mutex<Vec<Exploration>>,
+pub(crate) struct ParallelExplorations {
+    worlds: Arc<[Arc<ExplorationScene>]>,
+    how: EpisodeOptions,
+    each: Mutex<Vec<Episode>>,
     pool: rayon::ThreadPool,
 }
 
 #[pymethods]
-impl Envs {
+impl ParallelExplorations {
     /// `scenes` are files with their `--set` assignments; `touches` and `initial` are counts per
     /// episode; `grid` is the number of points along each side on which the belief is observed, 0
     /// for no belief.
@@ -49,8 +49,8 @@ impl Envs {
                 return Err(PyValueError::new_err(words));
             }
         };
-        let worlds = scenes.iter().map(|(path, sets)| World::load(py, path, sets, grid));
-        let worlds: Vec<Arc<World>> = worlds.collect::<PyResult<Vec<_>>>()?;
+        let worlds = scenes.iter().map(|(path, sets)| ExplorationScene::load(py, path, sets, grid));
+        let worlds: Vec<Arc<ExplorationScene>> = worlds.collect::<PyResult<Vec<_>>>()?;
         let action = worlds.first().map_or(0, |world| world.action());
         if worlds.iter().any(|world| world.action() != action) || action == 0 {
             return Err(PyValueError::new_err(
@@ -62,9 +62,9 @@ impl Envs {
             return Err(PyValueError::new_err(words));
         }
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let how = How { touches, initial, reward, believes: grid > 0 };
+        let how = EpisodeOptions { touches, initial, reward, believes: grid > 0 };
         let each = (0..count)
-            .map(|_| Exploration::new(&worlds[0], how).map_err(errors::scene))
+            .map(|_| Episode::new(&worlds[0], how).map_err(errors::scene))
             .collect::<PyResult<Vec<_>>>()?;
         let pool = pool.map_err(errors::other)?;
         Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
@@ -87,7 +87,7 @@ impl Envs {
     fn reset<'py>(&self, py: Python<'py>, seeds: Vec<u64>) -> PyResult<Bound<'py, PyDict>> {
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
-            let begin = |(env, seed): (&mut Exploration, u64)| {
+            let begin = |(env, seed): (&mut Episode, u64)| {
                 env.seed(seed);
                 env.begin(&self.worlds);
             };
@@ -111,7 +111,7 @@ impl Envs {
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
             let each = each.as_mut_slice();
-            let go = |(env, action): (&mut Exploration, &Vec<f32>)| match env.is_over {
+            let go = |(env, action): (&mut Episode, &Vec<f32>)| match env.is_over {
                 true => env.begin(&self.worlds),
                 false => env.touch(action),
             };
@@ -121,7 +121,7 @@ impl Envs {
     }
 }
 
-impl Envs {
+impl ParallelExplorations {
     fn check(&self, actions: &ArrayView2<'_, f32>) -> PyResult<()> {
         let count = self.each.lock().unwrap_or_else(PoisonError::into_inner).len();
         let wanted = [count, self.worlds[0].action()];
@@ -139,10 +139,11 @@ impl Envs {
         let count = each.len();
         let told = PyDict::new(py);
         let width = self.worlds[0].row();
-        let touches: Vec<f32> = each.iter().flat_map(|env| env.told.iter().copied()).collect();
+        let touches: Vec<f32> =
+            each.iter().flat_map(|env| env.observations.iter().copied()).collect();
         let touches = touches.into_pyarray(py).reshape([count, self.how.touches, width])?;
         told.set_item("touches", touches)?;
-        let column = |of: fn(&Exploration) -> f64| PyArray1::from_iter(py, each.iter().map(of));
+        let column = |of: fn(&Episode) -> f64| PyArray1::from_iter(py, each.iter().map(of));
         told.set_item("count", PyArray1::from_iter(py, each.iter().map(|env| env.count as i64)))?;
         if self.how.believes {
             let believed: Vec<f32> =

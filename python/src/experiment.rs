@@ -17,7 +17,7 @@ use std::time::Duration;
 
 /// Interval between two checks of Ctrl-C and two progress reports of a run.
 // heuristic: short enough to feel immediate.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// An experiment: planners × trials on one scene.
 #[pyclass(frozen, module = "palpate._palpate")]
@@ -104,8 +104,12 @@ impl Experiment {
             ));
         }
         let simulation = simulation.with_planners(makers);
-        let told =
-            Told { look, stop, done: AtomicUsize::new(0), is_stopped: AtomicBool::new(false) };
+        let told = RunCallbacks {
+            look,
+            stop,
+            done: AtomicUsize::new(0),
+            is_stopped: AtomicBool::new(false),
+        };
         let run = match &out {
             Some(folder) => told.kept(py, &simulation, (folder, fresh), threads),
             None => told.in_memory(py, &simulation, threads),
@@ -117,14 +121,14 @@ impl Experiment {
 }
 
 /// A run with its callbacks.
-struct Told {
+struct RunCallbacks {
     look: Py<PyAny>,
     stop: Py<PyAny>,
     done: AtomicUsize,
     is_stopped: AtomicBool,
 }
 
-impl Told {
+impl RunCallbacks {
     fn kept(
         &self,
         py: Python<'_>,
@@ -135,7 +139,7 @@ impl Told {
         let experiment = simulation.experiment();
         let (mut folder, done) =
             RunFolder::open(path, simulation, COMMIT, fresh).map_err(errors::run)?;
-        let jobs = runner::jobs(simulation, &done).map_err(errors::other)?;
+        let jobs = runner::missing_jobs(simulation, &done).map_err(errors::other)?;
         self.done.store(done.len(), Ordering::Relaxed);
         let total = done.len() + jobs.len();
         let outcome = self.watched(py, total, || {
@@ -151,13 +155,13 @@ impl Told {
     }
 
     fn in_memory(&self, py: Python<'_>, simulation: &Simulation, threads: usize) -> PyResult<Run> {
-        let jobs = runner::jobs(simulation, &[]).map_err(errors::other)?;
+        let jobs = runner::missing_jobs(simulation, &[]).map_err(errors::other)?;
         let rows = self.watched(py, jobs.len(), || {
             let tick = |progress: Progress| {
                 let trials = usize::from(matches!(progress, Progress::Trial(_)));
                 self.done.fetch_add(trials, Ordering::Relaxed);
             };
-            runner::rows(simulation, jobs, threads, &self.is_stopped, &tick)
+            runner::run_in_memory(simulation, jobs, threads, &self.is_stopped, &tick)
         })?;
         Ok(Run(store::Run {
             experiment: simulation.experiment().clone(),
@@ -187,7 +191,7 @@ impl Told {
                     drop(ended);
                     result
                 });
-                while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                while end.recv_timeout(POLL_INTERVAL) == Err(RecvTimeoutError::Timeout) {
                     let looked = Python::attach(|py| {
                         py.check_signals()?;
                         self.look.call1(py, (self.done.load(Ordering::Relaxed), total)).map(|_| ())

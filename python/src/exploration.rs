@@ -1,10 +1,10 @@
 //! One exploration: an episode of touches with observations and rewards.
 
 use crate::errors;
-use crate::known::{self, AIM, Known, Measured, True};
+use crate::known::{self, AIM, BeliefErrors, GroundTruth, Known};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
-use palpate::explore::planner::sample::any_side;
+use palpate::explore::planner::sample::random_aim;
 use palpate::explore::planner::uniform;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::math::seed;
@@ -30,14 +30,14 @@ pub(crate) const TRUTH_PER_SIDE: usize = 31;
 const CELLS: u32 = 32;
 
 /// An object in its zone or ball, with the ground truth.
-pub(crate) struct World {
+pub(crate) struct ExplorationScene {
     simulator: Simulator,
-    truth: True,
+    truth: GroundTruth,
     /// Points on which the belief is observed.
     grid: Vec<Vec<f64>>,
 }
 
-impl World {
+impl ExplorationScene {
     /// Loads a scene's file; `grid` is the number of points along each side.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl World {
         let scene = Scene::load(path, sets).map_err(errors::config)?;
         py.detach(|| {
             let environment = Arc::new(Environment::build(scene).map_err(errors::scene)?);
-            let truth = True::of(&environment, TRUTH_PER_SIDE);
+            let truth = GroundTruth::of(&environment, TRUTH_PER_SIDE);
             let grid = match (grid, environment.task().region()) {
                 (0, _) => Vec::new(),
                 (grid, Region::Zone(zone)) => zone.grid(grid),
@@ -122,10 +122,10 @@ impl World {
     /// Row of a touch: its target, contact and 1, or zeros without contact.
     fn told(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
         let mut row = match (self.task().region(), target) {
-            (Region::Zone(zone), Target::Place(place)) => self.told_over_zone(zone, place, met),
+            (Region::Zone(zone), Target::Place(place)) => self.zone_row(zone, place, met),
             (Region::Ball(ball), Target::Aim(aim)) => {
                 let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
-                let mut row: Vec<f64> = aim.ahead_w.iter().map(|ahead| -ahead).collect();
+                let mut row: Vec<f64> = aim.direction_w.iter().map(|ahead| -ahead).collect();
                 row.extend(within(aim.p_w).iter());
                 if let Some(contact) = met {
                     row.extend(within(contact.p_wc).iter().chain(contact.normal_w.iter()));
@@ -139,7 +139,7 @@ impl World {
         row
     }
 
-    fn told_over_zone(&self, zone: &Zone, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
+    fn zone_row(&self, zone: &Zone, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
         let fraction = |(at, [low, high]): (&f64, [f64; 2])| 2.0 * (at - low) / (high - low) - 1.0;
         let mut row: Vec<f64> = target.iter().zip(zone.sides()).map(fraction).collect();
         if let Some(contact) = met {
@@ -164,7 +164,7 @@ fn cube(ball: &Ball, per_side: usize) -> Vec<Vec<f64>> {
 
 /// Settings of an episode.
 #[derive(Clone, Copy)]
-pub(crate) struct How {
+pub(crate) struct EpisodeOptions {
     /// Touches, initial ones included.
     pub(crate) touches: usize,
     /// Initial random touches.
@@ -187,9 +187,9 @@ pub(crate) enum Reward {
 }
 
 /// A running exploration.
-pub(crate) struct Exploration {
-    how: How,
-    world: Arc<World>,
+pub(crate) struct Episode {
+    how: EpisodeOptions,
+    world: Arc<ExplorationScene>,
     probe: Box<dyn Probe>,
     known: Known,
     random: ChaCha8Rng,
@@ -197,7 +197,7 @@ pub(crate) struct Exploration {
     /// Number of touches made.
     pub(crate) count: usize,
     /// Rows of the touches, from `World::told`.
-    pub(crate) told: Vec<f32>,
+    pub(crate) observations: Vec<f32>,
     /// Means, then standard deviations on the grid, in the unit of heights.
     pub(crate) believed: Vec<f32>,
     /// Values of [`OVER_ZONE`] or [`AROUND`]; NaN without a belief.
@@ -210,21 +210,21 @@ pub(crate) struct Exploration {
     pub(crate) failure: Option<String>,
 }
 
-impl Exploration {
+impl Episode {
     /// Creates an exploration that has not started.
     ///
     /// # Errors
     /// If the body cannot be moved to its start.
-    pub(crate) fn new(world: &Arc<World>, how: How) -> Result<Self, Fault> {
+    pub(crate) fn new(world: &Arc<ExplorationScene>, how: EpisodeOptions) -> Result<Self, Fault> {
         Ok(Self {
             how,
             world: Arc::clone(world),
             probe: world.simulator.probe(0)?,
-            known: known::nothing(world.simulator.environment()),
+            known: known::empty_belief(world.simulator.environment()),
             random: seed::stream(0, 0, "exploration"),
             score: 0.0,
             count: 0,
-            told: Vec::new(),
+            observations: Vec::new(),
             believed: Vec::new(),
             measures: [f64::NAN; 3],
             reward: 0.0,
@@ -239,12 +239,12 @@ impl Exploration {
     }
 
     /// Starts an episode on one of `worlds` with its initial touches.
-    pub(crate) fn begin(&mut self, worlds: &[Arc<World>]) {
+    pub(crate) fn begin(&mut self, worlds: &[Arc<ExplorationScene>]) {
         let world = &worlds[self.random.random_range(0..worlds.len())];
         let probe = world.simulator.probe(self.random.random());
         self.world = Arc::clone(world);
-        self.known = known::nothing(world.simulator.environment());
-        self.told = vec![0.0; self.how.touches * world.row()];
+        self.known = known::empty_belief(world.simulator.environment());
+        self.observations = vec![0.0; self.how.touches * world.row()];
         self.believed = vec![0.0; 2 * world.grid.len()];
         (self.count, self.is_over, self.failure) = (0, false, None);
         let made = probe.and_then(|probe| {
@@ -272,7 +272,7 @@ impl Exploration {
             Known::HeightField(belief) => uniform(belief.zone(), &mut self.random).into(),
             Known::ImplicitSurface(belief) => {
                 let mut random = seed::stream(self.random.random(), 0, "side");
-                any_side(belief.scope(), &mut random).into()
+                random_aim(belief.scope(), &mut random).into()
             }
         }
     }
@@ -284,7 +284,7 @@ impl Exploration {
         if let Some(approach) = task.approach(target) {
             let touch = self.probe.touch(&approach)?;
             if self.how.believes || self.how.reward != Reward::None {
-                let swept = self.probe.swept().filter(|_| self.world.is_around());
+                let swept = self.probe.swept_volume().filter(|_| self.world.is_around());
                 self.known.observe(target, &approach, (&touch, swept.as_ref()));
             }
             met = match touch {
@@ -293,7 +293,7 @@ impl Exploration {
             };
         }
         let told = self.world.told(target, met.as_ref());
-        let row = self.told[self.count * told.len()..].iter_mut();
+        let row = self.observations[self.count * told.len()..].iter_mut();
         row.zip(told).for_each(|(to, from)| *to = from as f32);
         self.count += 1;
         Ok(())
@@ -315,10 +315,10 @@ impl Exploration {
         let (world, known) = (&self.world, &self.known);
         let unit_m = world.unit_m();
         match world.truth.measure(known, CELLS) {
-            Some(Measured::Zone(metrics)) => {
+            Some(BeliefErrors::Zone(metrics)) => {
                 self.measures = [metrics.rmse_m, metrics.centred_r, metrics.max_error_m];
             }
-            Some(Measured::Around(metrics)) => {
+            Some(BeliefErrors::Around(metrics)) => {
                 // Without a surface the Chamfer distance counts as the ball's radius.
                 let chamfer_m = metrics.chamfer_m.unwrap_or(unit_m);
                 self.measures = [chamfer_m, metrics.f_1, metrics.iou.unwrap_or(f64::NAN)];

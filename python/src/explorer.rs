@@ -1,7 +1,7 @@
 //! Interactive exploration: touch by touch, with the belief after each.
 
 use crate::belief::Belief;
-use crate::known::{self, Known, Measured, True};
+use crate::known::{self, BeliefErrors, GroundTruth, Known};
 use crate::scene::{Scene, Touch};
 use crate::{errors, exploration};
 use palpate::task::Target;
@@ -15,7 +15,7 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) struct Exploration {
     scene: Py<Scene>,
     known: Mutex<Known>,
-    truth: True,
+    truth: GroundTruth,
 }
 
 /// Default cells along the longest side of a measured surface.
@@ -27,7 +27,10 @@ impl Exploration {
     fn new(py: Python<'_>, scene: Py<Scene>) -> Self {
         let environment = scene.get().environment();
         let (known, truth) = py.detach(|| {
-            (known::nothing(environment), True::of(environment, exploration::TRUTH_PER_SIDE))
+            (
+                known::empty_belief(environment),
+                GroundTruth::of(environment, exploration::TRUTH_PER_SIDE),
+            )
         });
         Self { known: Mutex::new(known), truth, scene }
     }
@@ -60,8 +63,8 @@ impl Exploration {
             self.truth.measure(&known, CELLS)
         });
         let json = match measured {
-            Some(Measured::Zone(metrics)) => serde_json::to_value(metrics),
-            Some(Measured::Around(metrics)) => serde_json::to_value(metrics),
+            Some(BeliefErrors::Zone(metrics)) => serde_json::to_value(metrics),
+            Some(BeliefErrors::Around(metrics)) => serde_json::to_value(metrics),
             None => return Ok(None),
         };
         let told = PyDict::new(py);

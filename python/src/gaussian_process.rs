@@ -4,7 +4,7 @@ use crate::errors;
 use crate::places::{rows, seen_at};
 use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::gp::kernel::{KERNELS, by_name};
-use palpate::gp::{Fit, Kernel, Mean, Observations, Posterior, SearchBox, TouchNoise};
+use palpate::gp::{Fit, Kernel, MeanModel, Observations, Posterior, SearchBox, TouchNoise};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -17,7 +17,7 @@ pub(crate) struct Fitted {
 }
 
 /// Function and arguments that recreate the object.
-type Reduced<'py> =
+type PickleState<'py> =
     (Bound<'py, PyAny>, (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<f64>>, String, String));
 
 #[pymethods]
@@ -40,9 +40,9 @@ impl Fitted {
     ) -> PyResult<Self> {
         let kernel = kernel_of(name)?;
         let mean = match mean {
-            "zero" => Mean::Zero,
-            "data" => Mean::Data,
-            "constant" => Mean::Constant,
+            "zero" => MeanModel::Zero,
+            "data" => MeanModel::Data,
+            "constant" => MeanModel::Constant,
             _ => {
                 let words = format!("mean {mean:?}: allowed are zero, data, constant");
                 return Err(PyValueError::new_err(words));
@@ -81,7 +81,7 @@ impl Fitted {
         Ok(Self { kernel: name.into(), posterior: posterior.map_err(errors::other)?, fit })
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<PickleState<'py>> {
         let (py, this) = (slf.py(), slf.get());
         let seen = this.posterior.observations();
         let fit = serde_json::to_string(&this.fit).map_err(errors::other)?;

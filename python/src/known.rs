@@ -3,17 +3,17 @@
 use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::measure::shape::{ShapeMetrics, TrueShape};
 use palpate::experiment::truth::Truth;
-use palpate::explore::around::SpaceSettings;
+use palpate::explore::around::SpatialGpSettings;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::sim::Environment;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
 
 /// Returns an empty belief for `environment` with default settings.
-pub(crate) fn nothing(environment: &Environment) -> Known {
+pub(crate) fn empty_belief(environment: &Environment) -> Known {
     let scene = environment.scene();
     let finger = (&scene.finger, scene.effects.skin.is_some());
-    Known::new(environment.task(), finger, &GpSettings::default(), &SpaceSettings::default())
+    Known::new(environment.task(), finger, &GpSettings::default(), &SpatialGpSettings::default())
 }
 
 /// Number of values of a target of `known`.
@@ -25,7 +25,7 @@ pub(crate) fn target_numbers(known: &Known) -> usize {
 pub(crate) const AIM: usize = 6;
 
 /// Ground truth that beliefs are compared with.
-pub(crate) enum True {
+pub(crate) enum GroundTruth {
     /// Heights over a zone.
     Zone(Truth),
     /// Surface of a whole object; `None` without a mesh.
@@ -33,31 +33,31 @@ pub(crate) enum True {
 }
 
 /// Errors of a belief.
-pub(crate) enum Measured {
+pub(crate) enum BeliefErrors {
     /// Errors over a zone.
     Zone(Metrics),
     /// Errors around an object.
     Around(ShapeMetrics),
 }
 
-impl True {
+impl GroundTruth {
     /// Ground truth of an environment; over a zone on `per_side` points along each side.
     pub(crate) fn of(environment: &Environment, per_side: usize) -> Self {
         match environment.task().ball() {
-            Some(_) => Self::Around(TrueShape::of(environment)),
+            Some(_) => Self::Around(TrueShape::from_environment(environment)),
             None => Self::Zone(Truth::sample(environment, per_side, &|_| ())),
         }
     }
 
     /// Errors of `known`; a closed surface is meshed with `cells` along its longest side. `None`
     /// before the first fit, or without ground truth.
-    pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<Measured> {
+    pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<BeliefErrors> {
         match (self, known) {
             (Self::Zone(truth), Known::HeightField(belief)) => {
-                truth.compare(belief.surface()?).map(Measured::Zone)
+                truth.compare(belief.surface()?).map(BeliefErrors::Zone)
             }
             (Self::Around(shape), Known::ImplicitSurface(belief)) => {
-                Some(Measured::Around(shape.as_ref()?.judge(belief.surface()?, cells)))
+                Some(BeliefErrors::Around(shape.as_ref()?.evaluate(belief.surface()?, cells)))
             }
             _ => None,
         }

@@ -29,8 +29,8 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
-    module.add_class::<desk::Desk>()?;
-    module.add_class::<envs::Envs>()?;
+    module.add_class::<desk::PlannerChannel>()?;
+    module.add_class::<envs::ParallelExplorations>()?;
     module.add_class::<experiment::Experiment>()?;
     module.add_class::<explorer::Exploration>()?;
     module.add_class::<gaussian_process::Fitted>()?;

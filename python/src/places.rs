@@ -38,7 +38,7 @@ impl Places {
     ///
     /// # Errors
     /// If memory is exhausted.
-    pub(crate) fn told<'py>(
+    pub(crate) fn reshape<'py>(
         &self,
         py: Python<'py>,
         values: Vec<f64>,
@@ -50,7 +50,7 @@ impl Places {
     ///
     /// # Errors
     /// If memory is exhausted.
-    pub(crate) fn told_vectors<'py>(
+    pub(crate) fn reshape_vectors<'py>(
         &self,
         py: Python<'py>,
         values: &[Vec<f64>],

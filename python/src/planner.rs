@@ -1,7 +1,7 @@
 //! Python planners in experiments.
 
 use crate::belief::Belief;
-use crate::desk::{Desk, NoTarget, Trial};
+use crate::desk::{NoTarget, PlannerChannel, TrialEnd};
 use crate::known::{Known, target_numbers};
 use crate::zone::Zone;
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
@@ -53,24 +53,25 @@ impl PythonFactory {
 struct PythonPlanner {
     start: Py<PyAny>,
     seed: u64,
-    begun: Option<Result<Begun, String>>,
+    begun: Option<Result<StartedPlanner, String>>,
 }
 
-struct Begun {
+struct StartedPlanner {
     planner: Py<PyAny>,
     /// Channel to the planner, if it has its own thread.
-    desk: Option<Trial>,
+    desk: Option<TrialEnd>,
 }
 
 impl PythonPlanner {
-    fn begin(&self, zone: Option<&task::Zone>) -> Result<Begun, String> {
+    fn begin(&self, zone: Option<&task::Zone>) -> Result<StartedPlanner, String> {
         Python::attach(|py| {
             let zone = zone.map(|zone| Zone(zone.clone()));
             let planner = self.start.call1(py, (zone, self.seed));
             let planner = planner.map_err(|error| reason(py, &error))?;
             let desk = planner.getattr(py, "desk").ok();
-            let desk = desk.and_then(|desk| desk.cast_bound::<Desk>(py).ok()?.get().trial());
-            Ok(Begun { planner, desk })
+            let desk =
+                desk.and_then(|desk| desk.cast_bound::<PlannerChannel>(py).ok()?.get().trial());
+            Ok(StartedPlanner { planner, desk })
         })
     }
 
@@ -80,7 +81,7 @@ impl PythonPlanner {
             self.begun = Some(self.begin(zone));
         }
         let Some(begun) = &self.begun else { return Err("the planner was not started".into()) };
-        let Begun { planner, desk } = begun.as_ref().map_err(Clone::clone)?;
+        let StartedPlanner { planner, desk } = begun.as_ref().map_err(Clone::clone)?;
         if let Some(desk) = desk {
             return desk.ask(belief.clone()).map_err(|no_target| match no_target {
                 NoTarget::Said(reason) => reason,
@@ -117,7 +118,7 @@ impl Planner for PythonPlanner {
 
 impl Drop for PythonPlanner {
     fn drop(&mut self) {
-        if let Some(Ok(Begun { planner, desk })) = self.begun.take() {
+        if let Some(Ok(StartedPlanner { planner, desk })) = self.begun.take() {
             // Ends the planner's thread.
             drop(desk);
             // A failure here has no consequence.

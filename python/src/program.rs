@@ -25,7 +25,7 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
         Some(start.map(|made| -> Box<dyn PlannerFactory> { Box::new(made) }))
     };
     py.detach(|| {
-        let host = Host { commit: COMMIT, bring: &brought };
+        let host = Host { commit: COMMIT, load_planner: &brought };
         palpate::cli::main_with(arguments.into_iter().map(Into::into), &host)
     })
 }
@@ -33,5 +33,5 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
 /// Names of the built-in planners.
 #[pyfunction]
 pub(crate) fn planners() -> Vec<&'static str> {
-    entrant::listed().map(|(name, _)| name).collect()
+    entrant::known_planners().map(|(name, _)| name).collect()
 }

@@ -11,7 +11,7 @@ use palpate::explore::probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::sim;
 use palpate::sim::Environment;
-use palpate::sim::environment::Shape;
+use palpate::sim::environment::Surface;
 use palpate::sim::simulator::Simulator;
 use palpate::task::{self, Approach};
 use pyo3::exceptions::PyValueError;
@@ -57,7 +57,7 @@ impl Scene {
     ///
     /// # Errors
     /// `ValueError` for an invalid target, `SimulationError` for a fault of the body.
-    pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, Told)> {
+    pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, TouchData)> {
         let task = self.environment().task();
         let known = task::Target::from_numbers(&target).filter(|at| task.contains(at));
         let Some(approach) = known.and_then(|at| task.approach(&at)) else {
@@ -74,7 +74,7 @@ impl Scene {
                 none => none.insert(self.simulator.probe(self.seed)?),
             };
             let touch = probe.touch(&approach)?;
-            Ok::<_, Fault>((touch, probe.swept(), probe.time_s()))
+            Ok::<_, Fault>((touch, probe.swept_volume(), probe.time_s()))
         });
         let (touch, swept, time_s) = touched.map_err(errors::scene)?;
         let (outcome, contact) = match &touch {
@@ -85,19 +85,19 @@ impl Scene {
         let place = (task.zone())
             .zip(contact.as_ref())
             .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
-        let told = Told { approach, touch, swept };
+        let told = TouchData { approach, touch, swept };
         Ok((Touch { target, outcome, contact, place, time_s }, told))
     }
 }
 
 /// Information about a touch for a belief.
-pub(crate) struct Told {
+pub(crate) struct TouchData {
     /// Approach of the finger.
     pub(crate) approach: Approach,
     /// Outcome of the touch.
     pub(crate) touch: probe::Touch,
     /// Swept free volume, if known.
-    pub(crate) swept: Option<probe::Swept>,
+    pub(crate) swept: Option<probe::SweptVolume>,
 }
 
 #[pymethods]
@@ -154,7 +154,7 @@ impl Scene {
         Self::around(py, seed, || {
             let x_wo = scene.object.as_ref().map(|object| object.x_wo()).unwrap_or_default();
             let bvh = MeshBvh::new(mesh.transformed(&x_wo));
-            Environment::around(scene, Shape::Mesh { bvh, report: report.into() })
+            Environment::with_shape(scene, Surface::Mesh { bvh, report: report.into() })
                 .map_err(errors::scene)
         })
     }
@@ -192,7 +192,7 @@ impl Scene {
         let places = Places::of(points, self.over_zone("true_height")?.dimension())?;
         let height_m = |place: &Vec<f64>| environment.true_height_m(place).unwrap_or(f64::NAN);
         let heights_m = points.py().detach(|| places.each.iter().map(height_m).collect());
-        places.told(points.py(), heights_m)
+        places.reshape(points.py(), heights_m)
     }
 
     /// Object in the world frame: vertices (n, 3), metres, and triangles (m, 3), vertex indices,

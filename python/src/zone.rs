@@ -59,7 +59,7 @@ impl Zone {
         let points: Vec<Vec<f64>> = (places.each.iter().zip(heights_m))
             .map(|(place, height_m)| self.0.point(place, height_m).coords.as_slice().to_vec())
             .collect();
-        places.told_vectors(py, &points, 3)
+        places.reshape_vectors(py, &points, 3)
     }
 
     /// Recreates a zone from JSON, for pickling.

@@ -1,19 +1,19 @@
 //! `palpate accuracy`.
 
-use super::columns::{NONE, aligned_rows, cell, duration, without_empty};
+use super::columns::{EMPTY_CELL, aligned_rows, cell, duration, without_empty};
 use super::find::{SCENES, find};
-use super::output::{Force, make_folder};
+use super::output::{Overwrite, make_folder};
 use super::prepare::needs_zone;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, Talk, print};
-use crate::experiment::statistics::Paired;
+use super::terminal::{Outcome, Verbosity, print};
+use crate::experiment::statistics::PairedDifference;
 use crate::experiment::store::write_whole;
 use crate::report::table::with_interval;
 use crate::report::{accuracy, files};
 use crate::sim::Scene;
-use crate::study::accuracy::comparison::{Cheapest, Comparison, Effort};
-use crate::study::accuracy::deviation::{Quantity, Share, Spread};
-use crate::study::accuracy::switches::full;
+use crate::study::accuracy::comparison::{AccuracyComparison, CheapestScene, MeasurementCounts};
+use crate::study::accuracy::deviation::{ErrorStatistics, Quantity, TouchShare};
+use crate::study::accuracy::switches::with_all_effects;
 use crate::study::accuracy::tolerance::{Criterion, Origin};
 use crate::study::accuracy::variant::Variant;
 use anyhow::{bail, ensure};
@@ -86,7 +86,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
 /// Default touches per level.
@@ -99,14 +99,14 @@ const EFFECT_TOUCHES: u16 = 120;
 
 /// Default held-out targets of the scene without unneeded effects.
 // heuristic: 5 touches beyond the tolerance still pass.
-const FRESH: u16 = 200;
+const HELD_OUT_TARGETS: u16 = 200;
 
 /// Explains what the printed intervals cover.
-const ONE_BUILD: &str = "\
+const INTERVAL_NOTE: &str = "\
 intervals: 95 %, over touches, trials and timings of this build; code placement in another build can change
 times by some percent";
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     needs_zone(&scene, &args.scene)?;
     let path = args.scene.display();
@@ -114,11 +114,11 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let is_verdict = matches!(args.tolerance, Some(Criterion::Verdict(_)));
     let is_of_effects = args.against == Some(Origin::Scene);
     let has_levels = !is_of_effects && !is_verdict;
-    let has_effects = (is_of_effects || args.against.is_none()) && scene.body.moves();
+    let has_effects = (is_of_effects || args.against.is_none()) && scene.body.moves_finger();
     if !has_levels && !has_effects {
         let body = scene.body.name();
         ensure!(
-            scene.body.moves(),
+            scene.body.moves_finger(),
             "{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\""
         );
         bail!("--against: --tolerance verdict compares with the scene; use --against scene");
@@ -133,7 +133,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     );
     let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/accuracy-{name}")));
-    args.force.claim_folder(&out, "accuracy.json")?;
+    args.force.check_folder(&out, "accuracy.json")?;
     make_folder(&out)?;
 
     let stop = stop_on_interrupt("touches")?;
@@ -160,15 +160,16 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         levels = Some(compared);
     }
     if has_effects && !is_stopped() {
-        let scene = if args.full { full(&scene) } else { scene.clone() };
+        let scene = if args.full { with_all_effects(&scene) } else { scene.clone() };
         let effort = effort(args, EFFECT_TOUCHES, true);
         let compared = compare(Variant::effects(&scene), effort, args.tolerance, (talk, &stop))?;
-        let within =
-            compared.criterion.map_or(String::new(), |it| format!(", within {}", words(it)));
+        let within = compared
+            .criterion
+            .map_or(String::new(), |it| format!(", within {}", criterion_text(it)));
         print(&format!(
             "effects{within}; keep an effect that the real finger has if it is needed:"
         ))?;
-        print(&format!("{}{ONE_BUILD}", table(&compared)))?;
+        print(&format!("{}{INTERVAL_NOTE}", table(&compared)))?;
         effects = Some(compared);
     }
     let compared = if origin == Origin::Scene { &effects } else { &levels };
@@ -178,7 +179,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
             print_cheapest_level(levels.as_ref(), tolerance, origin)?;
         }
         let (selected, fresh) = match tolerance {
-            _ if origin == Origin::Scene => (compared.without_unneeded()?, Some(FRESH)),
+            _ if origin == Origin::Scene => {
+                (compared.without_unneeded_effects()?, Some(HELD_OUT_TARGETS))
+            }
             Criterion::Touches(tolerance) => (compared.cheapest(&tolerance, origin), None),
             Criterion::Verdict(_) => (None, None),
         };
@@ -195,18 +198,18 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     }
     print(&format!("results and figure in {}", out.display()))?;
     if is_stopped() {
-        return Ok(Ending::Interrupted);
+        return Ok(Outcome::Interrupted);
     }
     let Some(criterion) = compared.as_ref().and_then(|compared| compared.criterion) else {
-        return Ok(Ending::Done);
+        return Ok(Outcome::Done);
     };
-    let within = format!("{} from {}", words(criterion), origin.name());
+    let within = format!("{} from {}", criterion_text(criterion), origin.name());
     let Some(cheapest) = cheapest else {
         ensure!(origin == Origin::Scene, "no level is within {within}; no scene written");
         print(&format!("no effect of the scene can be removed within {within}"))?;
-        return Ok(Ending::Done);
+        return Ok(Outcome::Done);
     };
-    let described = described(&cheapest, criterion, origin);
+    let described = cheapest_text(&cheapest, criterion, origin);
     let described =
         format!("cheapest within {within}: {name}, {}\n{described}", cheapest.selected.name);
     let head: String = described.lines().map(|line| format!("# {line}\n")).collect();
@@ -214,16 +217,16 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = toml::to_string(&cheapest.scene)?;
     write_whole(&path, format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
     print(&format!("{described}\nscene: {}", path.display()))?;
-    Ok(if cheapest.is_confirmed { Ending::Done } else { Ending::Failed })
+    Ok(if cheapest.is_confirmed { Outcome::Done } else { Outcome::Failed })
 }
 
-fn effort(args: &Args, touches: u16, is_of_effects: bool) -> Effort {
+fn effort(args: &Args, touches: u16, is_of_effects: bool) -> MeasurementCounts {
     let trials = match args.tolerance {
         None => 10,
         Some(Criterion::Touches(_)) => 0,
         Some(Criterion::Verdict(_)) => 40,
     };
-    Effort {
+    MeasurementCounts {
         touches: args.touches.unwrap_or(touches).into(),
         pairs: if is_of_effects { args.pairs.into() } else { 0 },
         trials: if is_of_effects { args.trials.unwrap_or(trials).into() } else { 0 },
@@ -235,16 +238,16 @@ fn effort(args: &Args, touches: u16, is_of_effects: bool) -> Effort {
 /// Measures variants until Ctrl-C; the first variant is the reference.
 fn compare(
     variants: Vec<(Variant, Scene)>,
-    effort: Effort,
+    effort: MeasurementCounts,
     criterion: Option<Criterion>,
-    (talk, stop): (Talk, &AtomicBool),
-) -> anyhow::Result<Comparison> {
+    (talk, stop): (Verbosity, &AtomicBool),
+) -> anyhow::Result<AccuracyComparison> {
     let bar = progress_bar(talk, "accuracy", "variants", variants.len() as u64, 0);
     let mut variants = variants.into_iter();
     let Some(reference) = variants.next() else {
         bail!("no variant of the scene can be simulated")
     };
-    let mut comparison = Comparison::new(reference, effort, criterion)?;
+    let mut comparison = AccuracyComparison::new(reference, effort, criterion)?;
     step(talk, &bar);
     for variant in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
         comparison.add(variant)?;
@@ -254,7 +257,7 @@ fn compare(
     Ok(comparison)
 }
 
-fn words(criterion: Criterion) -> String {
+fn criterion_text(criterion: Criterion) -> String {
     match criterion {
         Criterion::Touches(it) => format!("{it} of the {}", it.quantity.name()),
         Criterion::Verdict(m) => {
@@ -265,7 +268,7 @@ fn words(criterion: Criterion) -> String {
 
 /// Prints the cheapest level within a tolerance of touches, or the smallest error of any level.
 fn print_cheapest_level(
-    levels: Option<&Comparison>,
+    levels: Option<&AccuracyComparison>,
     criterion: Criterion,
     origin: Origin,
 ) -> anyhow::Result<()> {
@@ -278,7 +281,7 @@ fn print_cheapest_level(
             level.name
         ))?;
     } else if let Some(least) = levels.error_min(&tolerance, origin) {
-        let least = tolerance.shown(least);
+        let least = tolerance.format(least);
         print(&format!(
             "no level within {tolerance} of {of}: the best level has 95 % within {least}"
         ))?;
@@ -288,11 +291,11 @@ fn print_cheapest_level(
 
 /// Describes the errors of the cheapest scene on the touches or trials that selected it and on
 /// held-out ones.
-fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> String {
+fn cheapest_text(cheapest: &CheapestScene, criterion: Criterion, origin: Origin) -> String {
     let errors = |variant: &Variant| match criterion {
         Criterion::Touches(tolerance) => {
             let p95 = variant.p95(tolerance.quantity, origin);
-            let p95 = p95.map_or("no comparable value".into(), |p95| tolerance.shown(p95));
+            let p95 = p95.map_or("no comparable value".into(), |p95| tolerance.format(p95));
             format!("95 % of {} touches are within {p95}", variant.touches)
                 + &variant.beyond.map_or(String::new(), |share| format!(", {}", beyond(&share)))
         }
@@ -303,13 +306,13 @@ fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> Strin
             format!("active - random is {verdict} mm in {trials} trials, a change of {change}")
         }
     };
-    let Cheapest { selected, held_out, is_confirmed, .. } = cheapest;
+    let CheapestScene { selected, held_out, is_confirmed, .. } = cheapest;
     let stays = if *is_confirmed { "confirmed" } else { "NOT confirmed" };
     let interval = held_out.time_ratio_interval.map(|[low, high]| [1.0 / high, 1.0 / low]);
     let speedup = held_out.time_ratio.map_or(f64::NAN, |ratio| 1.0 / ratio);
     format!(
         "on the selection set, {}\nheld out, {}: {stays} within the tolerance\n{} times as fast as the \
-         reference\n{ONE_BUILD}",
+         reference\n{INTERVAL_NOTE}",
         errors(selected),
         errors(held_out),
         with_interval(speedup, interval, &|times| format!("{times:.2}")),
@@ -330,39 +333,42 @@ const COLUMNS: [Column; 17] = [
     ("force N", |it| mean(it.force_n, 1.0, 4)),
     ("electrodes counts", |it| mean(it.electrode_counts, 1.0, 2)),
     ("surface RMSE mm", |it| cell(it.surface_rmse_m.map(|m| 1e3 * m), 3)),
-    ("time per touch", |it| it.wall_s.map_or(NONE.into(), duration)),
+    ("time per touch", |it| it.wall_s.map_or(EMPTY_CELL.into(), duration)),
     ("real-time factor", |it| cell(it.real_time_factor(), 1)),
     ("time change", |it| {
-        it.time_ratio.map_or(NONE.into(), |ratio| {
+        it.time_ratio.map_or(EMPTY_CELL.into(), |ratio| {
             with_interval(ratio, it.time_ratio_interval, &|it| {
                 format!("{:+.1} %", 100.0 * (it - 1.0))
             })
         })
     }),
-    ("finger bytes", |it| if it.touches > 0 { it.finger_bytes.to_string() } else { NONE.into() }),
+    (
+        "finger bytes",
+        |it| if it.touches > 0 { it.finger_bytes.to_string() } else { EMPTY_CELL.into() },
+    ),
     ("active - random RMSE mm", |it| paired(it.verdict_m)),
     ("change", |it| paired(it.verdict_change_m)),
-    ("beyond the tolerance", |it| it.beyond.as_ref().map_or(NONE.into(), beyond)),
-    ("relevance", |it| it.relevance.map_or(NONE, |relevance| relevance.words()).into()),
+    ("beyond the tolerance", |it| it.beyond.as_ref().map_or(EMPTY_CELL.into(), beyond)),
+    ("relevance", |it| it.relevance.map_or(EMPTY_CELL, |relevance| relevance.words()).into()),
 ];
 
-fn table(comparison: &Comparison) -> String {
+fn table(comparison: &AccuracyComparison) -> String {
     let mut lines = vec![COLUMNS.map(|(head, _)| head.to_string()).to_vec()];
     let variants = [&comparison.reference].into_iter().chain(&comparison.variants);
     lines.extend(variants.map(|it| COLUMNS.map(|(_, shown)| shown(it)).to_vec()));
     aligned_rows(&without_empty(lines))
 }
 
-fn mean(spread: Option<Spread>, unit: f64, decimals: usize) -> String {
+fn mean(spread: Option<ErrorStatistics>, unit: f64, decimals: usize) -> String {
     cell(spread.map(|spread| spread.mean / unit), decimals)
 }
 
-fn paired(paired: Option<Paired>) -> String {
-    let Some(paired) = paired else { return NONE.into() };
+fn paired(paired: Option<PairedDifference>) -> String {
+    let Some(paired) = paired else { return EMPTY_CELL.into() };
     with_interval(paired.mean, paired.interval, &|m| format!("{:.3}", 1e3 * m))
 }
 
-fn beyond(share: &Share) -> String {
+fn beyond(share: &TouchShare) -> String {
     let [low, high] = share.interval.map(|share| 100.0 * share);
     format!("{} of {} beyond, [{low:.1}, {high:.1}] %", share.count, share.of)
 }

@@ -1,8 +1,8 @@
 //! `palpate register MESH --cloud CLOUD`: registers a contact cloud to a mesh (ICP).
 
 use super::known_body::numbers;
-use super::patience::with_patience;
-use super::terminal::{Ending, Talk, print};
+use super::patience::report_slow_steps;
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan_truth::read_cloud;
 use crate::sim::scene::Unit;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of the registration of a contact cloud to a mesh.
 #[derive(clap::Args)]
-pub(super) struct Cloud {
+pub(super) struct CloudArgs {
     /// Register this contact cloud (cloud.csv or cloud.ply of palpate export) to the mesh FILE by
     /// ICP. The initial pose is --at (the mesh's origin in the cloud's frame) and --rotation; it
     /// must be near the true pose.
@@ -36,14 +36,14 @@ pub(super) struct Cloud {
 pub(super) fn align(
     (mesh, cloud): (&Path, &Path),
     position_m: [f64; 3],
-    args: &Cloud,
+    args: &CloudArgs,
     out: &Path,
-    talk: Talk,
-) -> anyhow::Result<Ending> {
+    talk: Verbosity,
+) -> anyhow::Result<Outcome> {
     let points = read_cloud(cloud)?;
-    let mesh = with_patience(talk, |tell| {
+    let mesh = report_slow_steps(talk, |tell| {
         tell(&format!("reading {}", mesh.display()));
-        import(mesh, args.unit.metres() * args.scale)
+        import(mesh, args.unit.metres_per_unit() * args.scale)
     })?;
     let mesh = MeshBvh::new(mesh.0);
     let aligned = icp::align(&mesh, &points, &pose(position_m, args.rotation))?;
@@ -54,5 +54,5 @@ pub(super) fn align(
     );
     write_whole(out, &text)?;
     print(&format!("{text}\nfile: {}", out.display()))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }

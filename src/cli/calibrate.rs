@@ -1,16 +1,18 @@
 //! `palpate calibrate`.
 
 use super::columns::{aligned, cell};
-use super::terminal::{Ending, print};
-use crate::sim::finger::calibration::constants::Model;
-use crate::sim::finger::calibration::fit::{Fit, Free, fit};
-use crate::sim::finger::calibration::score::{HeldOut, Score, between, leave_one_out};
+use super::terminal::{Outcome, print};
+use crate::sim::finger::calibration::constants::FingerConstants;
+use crate::sim::finger::calibration::fit::{Fit, FreeParameters, fit};
+use crate::sim::finger::calibration::score::{
+    HeldOutResult, Score, jackknife_factor, leave_one_out,
+};
 use crate::sim::finger::calibration::session::Session;
-use crate::sim::finger::calibration::shear::{ShearRecordings, Sheared, compare};
+use crate::sim::finger::calibration::shear::{ShearComparison, ShearRecordings, compare};
 use crate::sim::finger::effects::friction::FrictionEffect;
 use crate::sim::finger::effects::sensor;
 use crate::sim::finger::effects::skin::SkinModel;
-use crate::sim::finger::recording::{Recording, Recordings};
+use crate::sim::finger::recording::{PlateRecording, Recordings};
 use crate::{files, words};
 use anyhow::{Context, anyhow};
 use clap::ValueEnum;
@@ -54,7 +56,7 @@ enum Skin {
     Shell,
 }
 
-pub fn run(args: &Args) -> anyhow::Result<Ending> {
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let name = args.recordings.display();
     let recordings: Recordings = read(&args.recordings)?;
     recordings.check().with_context(|| format!("{name}: not a recording"))?;
@@ -62,7 +64,7 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
         Skin::Columns => SkinModel::Columns,
         Skin::Shell => SkinModel::Shell,
     };
-    let (start, sensors) = (Model::of(model), &recordings.sensors);
+    let (start, sensors) = (FingerConstants::of(model), &recordings.sensors);
     let refused = || format!("{name}: cannot be fitted");
     if let Some(path) = &args.shear {
         let slopes: ShearRecordings = read(path)?;
@@ -72,24 +74,25 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
             let recording = same.with_context(|| format!("{name}: no sensor {}", of.sensor))?;
             let friction = FrictionEffect::default();
             let found = compare(&start, &friction, recording, of).with_context(refused)?;
-            print(&sheared(&found, friction.stiffness_n_m))?;
+            print(&shear_table(&found, friction.stiffness_n_m))?;
         }
-        return Ok(Ending::Done);
+        return Ok(Outcome::Done);
     }
-    let free = if args.attitude_only { Free::Sessions } else { Free::Constants };
+    let free =
+        if args.attitude_only { FreeParameters::Sessions } else { FreeParameters::Constants };
     let held_out = leave_one_out(&start, sensors, free).with_context(refused)?;
     for held in &held_out {
-        print(&told(held))?;
+        print(&held_out_text(held))?;
     }
-    let whole: Vec<Score> = held_out.iter().map(HeldOut::whole).collect();
+    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::whole).collect();
     print(&table(vec![row("all sensors", &Score::of(whole.iter()))]))?;
-    if free == Free::Constants {
-        let all: Vec<&Recording> = sensors.iter().collect();
+    if free == FreeParameters::Constants {
+        let all: Vec<&PlateRecording> = sensors.iter().collect();
         let fit = fit(&start, &all, free).with_context(refused)?;
         print(&format!("constants fitted to {}", names(sensors.iter().map(|s| &s.sensor))))?;
         print(&estimates(&fit, &held_out))?;
         for (session, recording) in fit.sessions.iter().zip(sensors) {
-            print(&format!("  {}: {}", recording.sensor, held_at(session)))?;
+            print(&format!("  {}: {}", recording.sensor, session_text(session)))?;
         }
         let text = format!(
             "# Constants of the sensor for model = \"{}\" of [effects.skin], fitted by palpate calibrate \
@@ -106,7 +109,7 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
             None => print(&format!("\n{text}"))?,
         }
     }
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
@@ -119,8 +122,8 @@ fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
 }
 
 /// Table of the electrodes' responses to tangential force, measured and modelled.
-fn sheared(found: &Sheared, stiffness_n_m: f64) -> String {
-    let Sheared { sensor, lateral, axial } = found;
+fn shear_table(found: &ShearComparison, stiffness_n_m: f64) -> String {
+    let ShearComparison { sensor, lateral, axial } = found;
     let mut rows = vec![["  counts per N", "lateral", "model", "axial", "model"].map(String::from)];
     rows.extend((0..lateral.measured.len()).map(|i| {
         let [a, b, c, d] = [lateral.measured, lateral.model, axial.measured, axial.model]
@@ -140,7 +143,7 @@ fn sheared(found: &Sheared, stiffness_n_m: f64) -> String {
     format!("sensor {sensor}, skin stiffness {stiffness_n_m} N/m\n{table}{}\n", told.join("\n"))
 }
 
-fn told(held: &HeldOut) -> String {
+fn held_out_text(held: &HeldOutResult) -> String {
     let from = match held.others.is_empty() {
         true => "the default constants".into(),
         false => format!("constants fitted to {}", names(held.others.iter())),
@@ -148,7 +151,7 @@ fn told(held: &HeldOut) -> String {
     let mut text = format!("sensor {} with {from}\n", held.sensor);
     text += &estimates(&held.fit, &[]);
     for session in &held.fit.sessions {
-        text += &format!("  session: {}\n", held_at(session));
+        text += &format!("  session: {}\n", session_text(session));
     }
     let mut rows = Vec::new();
     for (force_n, score) in &held.loads {
@@ -159,11 +162,11 @@ fn told(held: &HeldOut) -> String {
 }
 
 /// Lists the constants of a fit; `held_out` are fits without one sensor each.
-fn estimates(fit: &Fit, held_out: &[HeldOut]) -> String {
+fn estimates(fit: &Fit, held_out: &[HeldOutResult]) -> String {
     let mut text = String::new();
     for found in &fit.estimates {
         text += &format!("  {:22} {:.2e} */÷ {:.2}", found.key, found.value, found.factor);
-        if let Some(factor) = between(held_out, found.key) {
+        if let Some(factor) = jackknife_factor(held_out, found.key) {
             text += &format!(", between sensors */÷ {factor:.2}");
         }
         text.push('\n');
@@ -177,7 +180,7 @@ fn estimates(fit: &Fit, held_out: &[HeldOut]) -> String {
     text
 }
 
-fn held_at(session: &Session) -> String {
+fn session_text(session: &Session) -> String {
     let rolls: Vec<String> =
         session.roll_rad.iter().map(|roll| format!("{:.0}", roll.to_degrees())).collect();
     format!(

@@ -1,15 +1,17 @@
 //! `palpate check`.
 
 use super::find::{EXPERIMENTS, find};
-use super::output::Force;
-use super::prepare::{bound_threads, simulation};
+use super::output::Overwrite;
+use super::prepare::{prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
-use super::terminal::{Ending, Talk, print};
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, Simulation};
 use crate::report::check::{draw, junit, markdown, remarks, table, word};
-use crate::study::check::{Baseline, Held, Rules, Verdict, differs, hold};
+use crate::study::check::{
+    CheckOptions, CheckResult, StoredBaseline, Verdict, differences, run_check,
+};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -59,7 +61,7 @@ pub(super) struct Args {
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
@@ -67,7 +69,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
     share.ok_or("allowed is 0.0001 to 10, as in 0.05".into())
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let mut experiment = Experiment::load(&path, &args.set)?;
     experiment.trials = args.max_trials;
@@ -78,39 +80,45 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let old = match &args.bless {
         Some(_) if !args.baseline.exists() => None,
         _ => {
-            let old = Baseline::read(&args.baseline)?;
+            let old = StoredBaseline::read(&args.baseline)?;
             old.check_pairs(&args.baseline, &experiment)?;
             Some(old)
         }
     };
-    bound_threads(args.threads)?;
-    let simulation = simulation(experiment, talk)?;
+    set_thread_count(args.threads)?;
+    let simulation = prepare_simulation(experiment, talk)?;
     if simulation.is_real() {
         bail!("backend.kind: a check runs in simulation; allowed is \"simulated\"");
     }
     let stop = stop_on_interrupt("trials")?;
-    let rules = Rules { tolerance: args.tolerance, ..Rules::default() };
+    let rules = CheckOptions { tolerance: args.tolerance, ..CheckOptions::default() };
     if let Some(why) = &args.bless {
-        return bless(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
+        return accept_baseline(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;
-    let most = runner::jobs(&simulation, &[])?.len();
+    let most = runner::missing_jobs(&simulation, &[])?.len();
     let bar = touches_bar(talk, simulation.experiment(), [most, 0]);
     let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
-    let held = hold(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
+    let held = run_check(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
     bar.finish_and_clear();
-    tell(args, &name, &old, &held, &rules)?;
+    print_results(args, &name, &old, &held, &rules)?;
     Ok(match held.is_stopped {
-        true => Ending::Interrupted,
+        true => Outcome::Interrupted,
         false => match held.verdict() {
-            Verdict::Identical | Verdict::Better | Verdict::Ok => Ending::Done,
-            Verdict::Undecided => Ending::Undecided,
-            Verdict::Worse | Verdict::Missing => Ending::Failed,
+            Verdict::Identical | Verdict::Better | Verdict::Ok => Outcome::Done,
+            Verdict::Undecided => Outcome::Undecided,
+            Verdict::Worse | Verdict::Missing => Outcome::Failed,
         },
     })
 }
 
-fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> anyhow::Result<()> {
+fn print_results(
+    args: &Args,
+    name: &str,
+    old: &StoredBaseline,
+    held: &CheckResult,
+    rules: &CheckOptions,
+) -> anyhow::Result<()> {
     let file = args.baseline.display();
     let mut text = format!("{name} against {file} ({})\n{}", old.header.why, table(held).text());
     for remark in remarks(held, rules, args.max_trials) {
@@ -135,29 +143,29 @@ fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> 
 
 /// Runs all trials and writes them as the baseline; the header lists planners that differ from an
 /// existing baseline.
-fn bless(
+fn accept_baseline(
     args: &Args,
     simulation: &Simulation,
-    old: Option<&Baseline>,
-    (why, rules): (&str, &Rules),
+    old: Option<&StoredBaseline>,
+    (why, rules): (&str, &CheckOptions),
     stop: &AtomicBool,
-    talk: Talk,
-) -> anyhow::Result<Ending> {
+    talk: Verbosity,
+) -> anyhow::Result<Outcome> {
     args.force.claim(&args.baseline)?;
-    let jobs = runner::jobs(simulation, &[])?;
+    let jobs = runner::missing_jobs(simulation, &[])?;
     let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
     let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
     let threads = args.threads.into();
-    let rows = runner::rows(simulation, jobs, threads, stop, &tick)?;
+    let rows = runner::run_in_memory(simulation, jobs, threads, stop, &tick)?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {
-        return Ok(Ending::Interrupted);
+        return Ok(Outcome::Interrupted);
     }
-    let mut new = Baseline::new(simulation, &rows, why);
-    new.header.differs = old.map_or(Vec::new(), |old| differs(old, &new, rules));
+    let mut new = StoredBaseline::new(simulation, &rows, why);
+    new.header.differs = old.map_or(Vec::new(), |old| differences(old, &new, rules));
     write_whole(&args.baseline, &new.text()?)?;
     let mut text = format!("{} trials in {}", rows.len(), args.baseline.display());
     new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
     print(&text)?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }

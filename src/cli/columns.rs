@@ -10,7 +10,7 @@ pub(super) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
 /// Removes the columns that have no value in any line; the first line is the header.
 pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
     for column in (0..lines.first().map_or(0, Vec::len)).rev() {
-        if lines.len() > 1 && lines.iter().skip(1).all(|line| line[column] == NONE) {
+        if lines.len() > 1 && lines.iter().skip(1).all(|line| line[column] == EMPTY_CELL) {
             lines.iter_mut().for_each(|line| drop(line.remove(column)));
         }
     }
@@ -18,11 +18,11 @@ pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
 }
 
 /// Text of a cell without a value.
-pub(super) const NONE: &str = "-";
+pub(super) const EMPTY_CELL: &str = "-";
 
 /// Formats a number; a dash if there is none.
 pub(super) fn cell(value: Option<f64>, decimals: usize) -> String {
-    value.map_or(NONE.into(), |value| format!("{value:.decimals$}"))
+    value.map_or(EMPTY_CELL.into(), |value| format!("{value:.decimals$}"))
 }
 
 /// Formats a duration in us, ms or s.

@@ -1,10 +1,10 @@
 //! `palpate compare`.
 
-use super::output::{Force, make_folder};
-use super::terminal::{Ending, print};
+use super::output::{Overwrite, make_folder};
+use super::terminal::{Outcome, print};
 use crate::experiment::store::{Run, write_whole};
 use crate::report::compare::{each, file, html, interquartiles, overall, profiles};
-use crate::study::compare::{Compared, compare};
+use crate::study::compare::{SuiteComparison, compare};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 
@@ -33,10 +33,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let read = |path: &PathBuf| anyhow::Ok((path.display().to_string(), Run::read(path)?));
     let runs: Vec<(String, Run)> = args.runs.iter().map(read).collect::<Result<_, _>>()?;
     let compared = compare(&runs, &args.against)?;
@@ -53,13 +53,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         text += &format!("\npage: {}\n", write(folder, (&name, ""), &compared)?.display());
     }
     print(text.trim_end())?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 const PAGE: &str = "suite.html";
 
 /// Formats the tables of a comparison for a terminal, per object and overall.
-pub(super) fn text(compared: &Compared) -> String {
+pub(super) fn text(compared: &SuiteComparison) -> String {
     format!("{}\n{}", each(compared).text(), overall(compared).text())
 }
 
@@ -67,7 +67,7 @@ pub(super) fn text(compared: &Compared) -> String {
 pub(super) fn write(
     folder: &Path,
     (name, question): (&str, &str),
-    compared: &Compared,
+    compared: &SuiteComparison,
 ) -> anyhow::Result<PathBuf> {
     let page = folder.join(PAGE);
     write_whole(&page, html(name, question, compared))?;

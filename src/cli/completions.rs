@@ -1,6 +1,6 @@
 //! `palpate completions`.
 
-use super::terminal::{Ending, print};
+use super::terminal::{Outcome, print};
 use clap_complete::{Shell, generate};
 
 #[derive(clap::Args)]
@@ -14,9 +14,9 @@ pub(super) struct Args {
     shell: Shell,
 }
 
-pub(super) fn run(args: &Args, mut command: clap::Command) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, mut command: clap::Command) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
     generate(args.shell, &mut command, "palpate", &mut script);
     print(String::from_utf8_lossy(&script).trim_end())?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }

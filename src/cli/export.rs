@@ -1,13 +1,13 @@
 //! `palpate export`.
 
 use super::find::{SCENES, find};
-use super::output::Force;
-use super::prepare::only_with;
-use super::scan::{Grid, Scan, grid, scan};
-use super::terminal::{Ending, Talk, print};
+use super::output::Overwrite;
+use super::prepare::check_applicable;
+use super::scan::{Grid, ScanArgs, grid, scan};
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
-use crate::report::points::Points;
+use crate::report::points::PointCloud;
 use crate::report::replay::{self, Replay};
 use crate::report::{figures, files, style, whole};
 use anyhow::{Context, bail, ensure};
@@ -54,9 +54,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "N|NxM", value_parser = grid)]
     grid: Option<Grid>,
     #[command(flatten)]
-    scan: Scan,
+    scan: ScanArgs,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
 impl Args {
@@ -74,7 +74,7 @@ impl Args {
 }
 
 /// Exports a run's belief as a mesh, or the contacts of a grid of touches on a scene.
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let is_run = args.path.is_dir();
     let path = if is_run { args.path.clone() } else { find(&args.path, SCENES)? };
     let options = [
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         ("--set", !args.scan.set.is_empty(), !is_run, "a scene (.toml)"),
         ("--threads", args.scan.threads != 0, !is_run, "a scene (.toml)"),
     ];
-    only_with(&path, &options)?;
+    check_applicable(&path, &options)?;
     if is_run {
         return belief(args);
     }
@@ -94,15 +94,15 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
 /// Allowed cells of a belief around an object, as for `gp.cells`.
 const CELLS: std::ops::RangeInclusive<usize> = 8..=256;
 
-fn belief(args: &Args) -> anyhow::Result<Ending> {
+fn belief(args: &Args) -> anyhow::Result<Outcome> {
     let out = args.out.as_ref().context("--out FILE: allowed is a file ending in .ply or .obj")?;
-    let write: fn(&Points) -> String =
+    let write: fn(&PointCloud) -> String =
         match out.extension().and_then(|extension| extension.to_str()) {
-            Some("ply") => Points::ply,
-            Some("obj") => Points::obj,
+            Some("ply") => PointCloud::ply,
+            Some("obj") => PointCloud::obj,
             _ => bail!("--out {}: allowed is a file ending in .ply or .obj", out.display()),
         };
-    args.force.claim_all(out, &files::FORMATS)?;
+    args.force.check_files(out, &files::FORMATS)?;
     let mut run = Run::read(&args.path)?;
     let is_around = run.experiment.scene.around.is_some();
     ensure!(
@@ -110,7 +110,7 @@ fn belief(args: &Args) -> anyhow::Result<Ending> {
         "{} explored a curve, which has no mesh; its figures show it",
         args.path.display()
     );
-    let touches = chosen(&run, args)?;
+    let touches = checked_touches(&run, args)?;
     // Draws the run's figure of beliefs for this planner, trial and touch count only.
     run.experiment.report = ReportSettings {
         touch_counts: vec![touches],
@@ -118,8 +118,11 @@ fn belief(args: &Args) -> anyhow::Result<Ending> {
         planners: args.planner.clone().into_iter().collect(),
         ..ReportSettings::default()
     };
-    let (mesh, score) =
-        if is_around { closed(&mut run, args, touches)? } else { over_zone(&run, args, touches)? };
+    let (mesh, score) = if is_around {
+        closed_surface(&mut run, args, touches)?
+    } else {
+        zone_surface(&run, args, touches)?
+    };
     write_whole(out, write(&mesh))?;
     let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
     if let Some(svg) = (figure.draw)(&run)? {
@@ -135,11 +138,15 @@ fn belief(args: &Args) -> anyhow::Result<Ending> {
         1e3 * largest_m,
         out.with_extension("png").display()
     ))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Closed mean surface of an object, and its error.
-fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
+fn closed_surface(
+    run: &mut Run,
+    args: &Args,
+    touches: u32,
+) -> anyhow::Result<(PointCloud, String)> {
     if let Some(cells) = args.side()? {
         ensure!(
             CELLS.contains(&cells),
@@ -160,7 +167,7 @@ fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, S
         "the belief of {planner} contains no surface after {touches} touches"
     );
     let mut comments = vec![
-        whose(run, args, touches),
+        title(run, args, touches),
         "sigma_m: standard deviation of the surface along its normal".into(),
     ];
     if !frame.error_m.is_empty() {
@@ -170,7 +177,7 @@ fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, S
 }
 
 /// Belief over a zone as a mesh, and its error.
-fn over_zone(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
+fn zone_surface(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(PointCloud, String)> {
     let planner = args.planner();
     let replay = Replay::new(run, planner, touches)?
         .with_context(|| format!("{planner} has no fit after {touches} touches"))?;
@@ -179,7 +186,7 @@ fn over_zone(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(Points, St
 }
 
 /// First comment line of an exported file.
-fn whose(run: &Run, args: &Args, touches: u32) -> String {
+fn title(run: &Run, args: &Args, touches: u32) -> String {
     format!(
         "Palpate {}: belief of {} in trial {} of {} after {touches} touches",
         env!("CARGO_PKG_VERSION"),
@@ -193,7 +200,7 @@ fn whose(run: &Run, args: &Args, touches: u32) -> String {
 ///
 /// # Errors
 /// If the run lacks the planner, the trial or the touch count.
-fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
+fn checked_touches(run: &Run, args: &Args) -> anyhow::Result<u32> {
     let (planner, trial) = (args.planner(), &args.trial);
     let planners = &run.experiment.planners;
     ensure!(
@@ -220,7 +227,7 @@ fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
 }
 
 /// Posterior mean as a surface in `W`, where a surface is more likely than none.
-fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
+fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> PointCloud {
     let zone = replay.belief.zone();
     let places = zone.grid(grid);
     let known = replay.is_drawn(places.iter().map(Vec::as_slice));
@@ -245,15 +252,15 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let colour = |deviation_m: f64| style::deviation_rgb(deviation_m / largest_m);
     let joined = grid_triangles(grid)
         .filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
-    Points {
+    PointCloud {
         comments: vec![
-            whose(run, args, replay.touches.len() as u32),
-            zone.frame_words(),
+            title(run, args, replay.touches.len() as u32),
+            zone.frame_description(),
             "sigma_m: standard deviation of the height along the approach".into(),
         ],
         points,
         deviations: deviations_m.iter().map(|&sd_m| (sd_m, colour(sd_m))).collect(),
         triangles: joined.collect(),
-        ..Points::default()
+        ..PointCloud::default()
     }
 }

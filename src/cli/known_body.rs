@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use nalgebra::{UnitVector3, Vector3};
-use palpate_explore::registration::KnownBody;
+use palpate_explore::registration::CalibrationBody;
 
 #[derive(clap::Args)]
 pub(super) struct KnownBodyArgs {
@@ -35,15 +35,15 @@ pub(super) fn numbers(text: &str) -> Result<[f64; 3], String> {
 
 impl KnownBodyArgs {
     /// Returns the ball or plate of the options, if one is given.
-    pub(super) fn body(&self) -> anyhow::Result<Option<KnownBody>> {
+    pub(super) fn body(&self) -> anyhow::Result<Option<CalibrationBody>> {
         let Some(at) = self.at else { return Ok(None) };
         if let Some(radius_m) = self.ball {
-            return Ok(Some(KnownBody::Ball { centre_w: at.into(), radius_m }));
+            return Ok(Some(CalibrationBody::Ball { centre_w: at.into(), radius_m }));
         }
         let normal =
             Vector3::from(self.plate.context("--at needs --ball RADIUS_M or --plate X,Y,Z")?);
         let normal_w = UnitVector3::try_new(normal, 1e-9)
             .context("--plate: the zero vector has no direction")?;
-        Ok(Some(KnownBody::Plate { point_w: at.into(), normal_w }))
+        Ok(Some(CalibrationBody::Plate { point_w: at.into(), normal_w }))
     }
 }

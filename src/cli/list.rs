@@ -1,7 +1,7 @@
 //! `palpate list`.
 
 use super::find::{EXPERIMENTS, SCENES, find, names};
-use super::terminal::{Ending, print};
+use super::terminal::{Outcome, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::MEASURES;
 use crate::experiment::trial::entrant;
@@ -45,12 +45,12 @@ const KINDS: &[(Kind, &str, Lister)] = &[
     (Kind::Effects, "effects ([effects.NAME])", effects),
 ];
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let wanted = KINDS.iter().filter(|(kind, ..)| args.kind.is_none_or(|wanted| wanted == *kind));
     let sections: Vec<String> =
-        wanted.map(|(_, title, lines)| format!("{title}\n{}", indented(&lines()))).collect();
+        wanted.map(|(_, title, lines)| format!("{title}\n{}", two_columns(&lines()))).collect();
     print(sections.join("\n").trim_end())?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 fn experiments() -> Vec<[String; 2]> {
@@ -75,7 +75,7 @@ fn scenes() -> Vec<[String; 2]> {
 
 /// Names and descriptions of all planners.
 pub(super) fn planners() -> Vec<[String; 2]> {
-    entrant::listed().map(|(name, about)| [name, about].map(String::from)).collect()
+    entrant::known_planners().map(|(name, about)| [name, about].map(String::from)).collect()
 }
 
 fn measures() -> Vec<[String; 2]> {
@@ -94,7 +94,7 @@ fn effects() -> Vec<[String; 2]> {
 }
 
 /// Formats names and descriptions as two indented columns.
-pub(super) fn indented(lines: &[[String; 2]]) -> String {
+pub(super) fn two_columns(lines: &[[String; 2]]) -> String {
     let width = lines.iter().map(|[name, _]| name.chars().count()).max().unwrap_or(0);
     lines.iter().map(|[name, about]| format!("  {name:<width$}  {about}\n")).collect()
 }

@@ -35,14 +35,14 @@ pub use host::Host;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 use std::process::ExitCode;
-use terminal::{Ending, Talk, print};
+use terminal::{Outcome, Verbosity, print};
 
 /// A testbed for active touch: a robot finger explores an object it cannot see.
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES, arg_required_else_help = true)]
 struct Cli {
     #[command(flatten)]
-    talk: Talk,
+    talk: Verbosity,
     #[command(subcommand)]
     command: Command,
 }
@@ -122,10 +122,10 @@ fn command() -> clap::Command {
             let about = each.get_about().map(ToString::to_string);
             [each.get_name().into(), about.unwrap_or_default()]
         });
-        format!("{header}{title}:{header:#}\n{}\n", list::indented(&lines.collect::<Vec<_>>()))
+        format!("{header}{title}:{header:#}\n{}\n", list::two_columns(&lines.collect::<Vec<_>>()))
     };
     let commands: String = GROUPS.iter().map(section).collect();
-    let planners = list::indented(&list::planners());
+    let planners = list::two_columns(&list::planners());
     let planners = format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end());
     command.mut_subcommand("run", |run| run.after_help(planners)).help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}{header}Options:{header:#}\n{{options}}{{after-help}}"
@@ -134,25 +134,26 @@ fn command() -> clap::Command {
 
 /// Runs the program on the process's arguments; `commit` is the commit of the build.
 pub fn main(commit: &str) -> ExitCode {
-    ExitCode::from(main_with(std::env::args_os(), &Host { commit, bring: &|_| None }))
+    ExitCode::from(main_with(std::env::args_os(), &Host { commit, load_planner: &|_| None }))
 }
 
 /// Runs the program for a host on `arguments`, the first of which is the program's name; returns
 /// the exit code.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
-    let outcome = renamed::today(arguments.into_iter().collect()).and_then(|(arguments, note)| {
-        let cli = Cli::from_arg_matches(&command().get_matches_from(arguments))
-            .unwrap_or_else(|error| error.exit());
-        if let Some(note) = note {
-            cli.talk.note(note);
-        }
-        run_command(cli, host)
-    });
+    let outcome =
+        renamed::translate(arguments.into_iter().collect()).and_then(|(arguments, note)| {
+            let cli = Cli::from_arg_matches(&command().get_matches_from(arguments))
+                .unwrap_or_else(|error| error.exit());
+            if let Some(note) = note {
+                cli.talk.note(note);
+            }
+            run_command(cli, host)
+        });
     match outcome {
-        Ok(Ending::Done) => 0,
-        Ok(Ending::Failed) => 1,
-        Ok(Ending::Undecided) => 3,
-        Ok(Ending::Interrupted) => 130,
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::Failed) => 1,
+        Ok(Outcome::Undecided) => 3,
+        Ok(Outcome::Interrupted) => 130,
         Err(error) => {
             terminal::error(format!("{error:#}"));
             2
@@ -160,7 +161,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
     }
 }
 
-fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Ending> {
+fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcome> {
     match command {
         Command::New(args) => new::run(&args),
         Command::Run(args) => run::run(&args, talk, host),
@@ -176,7 +177,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Ending
         Command::Calibrate(args) => calibrate::run(&args),
         Command::List(args) => list::run(&args),
         Command::Completions(args) => completions::run(&args, Cli::command()),
-        Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),
+        Command::Reference(_) => print(reference().trim_end()).map(|()| Outcome::Done),
     }
 }
 

@@ -1,10 +1,10 @@
 //! `palpate new`.
 
-use super::output::{Force, make_folder};
-use super::terminal::{Ending, print};
-use crate::experiment::experiment::is_plain;
+use super::output::{Overwrite, make_folder};
+use super::terminal::{Outcome, print};
+use crate::experiment::experiment::is_name_character;
 use crate::experiment::store::write_whole;
-use crate::sim::placement::{self, Facing, Found, Side, Up};
+use crate::sim::placement::{self, Facing, Side, Up, ZoneProposal};
 use crate::sim::scene::Unit;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
@@ -47,7 +47,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     out: PathBuf,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
 impl Args {
@@ -78,7 +78,7 @@ enum FingerKind {
 }
 
 /// Parts of the files that depend on the finger.
-struct Kit {
+struct FingerTemplate {
     body: &'static str,
     /// Tables of the scene other than object and zone.
     scene: String,
@@ -89,21 +89,24 @@ struct Kit {
 }
 
 impl FingerKind {
-    fn kit(self) -> Kit {
+    fn kit(self) -> FingerTemplate {
         match self {
-            Self::Rigid => {
-                Kit { body: "cast", scene: String::new(), gp: EXACT, takes: "half a minute" }
-            }
-            Self::Soft => Kit {
+            Self::Rigid => FingerTemplate {
+                body: "cast",
+                scene: String::new(),
+                gp: NORMALS_SETTING,
+                takes: "half a minute",
+            },
+            Self::Soft => FingerTemplate {
                 body: "kinematic",
                 scene: biotac(""),
-                gp: LOCATED,
+                gp: NOISE_SETTING,
                 takes: "about ten seconds",
             },
-            Self::Arm => Kit {
+            Self::Arm => FingerTemplate {
                 body: "dynamic",
-                scene: format!("{ARM}{}", biotac(SLOWER)),
-                gp: LOCATED,
+                scene: format!("{ARM_TABLE}{}", biotac(ARM_APPROACH)),
+                gp: NOISE_SETTING,
                 takes: "about a minute",
             },
         }
@@ -119,23 +122,25 @@ fn biotac(motion: &str) -> String {
     )
 }
 
-const ARM: &str = "\n[arm]                       # a Mitsubishi PA-10; its base is the origin\n";
+const ARM_TABLE: &str =
+    "\n[arm]                       # a Mitsubishi PA-10; its base is the origin\n";
 
-const SLOWER: &str = "approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger\n";
+const ARM_APPROACH: &str = "approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger\n";
 
 /// Enables normals: a rigid finger's contacts give the surface's slope. Normals from electrodes
 /// have a common tilt too often (docs/belief.md).
-const EXACT: &str = "normals = true              # each contact also gives the surface's slope\n";
+const NORMALS_SETTING: &str =
+    "normals = true              # each contact also gives the surface's slope\n";
 
 /// RMS distance of contacts located by electrodes from the surface (docs/finger.md).
-const LOCATED: &str = "noise_sd_min_m = 0.0003     # noise of contacts located by electrodes; extra noise is fitted\n";
+const NOISE_SETTING: &str = "noise_sd_min_m = 0.0003     # noise of contacts located by electrodes; extra noise is fitted\n";
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let name = name(&args.mesh)?;
     let [experiment, scene] = ["", "-scene"].map(|what| args.beside(format!("{name}{what}.toml")));
-    args.force.claim_new(&experiment)?;
-    args.force.claim_new(&scene)?;
-    let guess = Guess::of(args)?;
+    args.force.check_new_file(&experiment)?;
+    args.force.check_new_file(&scene)?;
+    let guess = MeshPlacement::of(args)?;
     make_folder(&args.out)?;
     let kit = args.finger.kit();
     write_whole(&scene, &guess.scene(args, &kit)?)?;
@@ -151,44 +156,45 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         experiment.display(),
         kit.takes
     ))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Derives the experiment's name from the mesh's file name.
 fn name(mesh: &Path) -> anyhow::Result<String> {
     let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
-    let name: String = stem.chars().map(|c| if is_plain(c) { c } else { '-' }).take(80).collect();
+    let name: String =
+        stem.chars().map(|c| if is_name_character(c) { c } else { '-' }).take(80).collect();
     let name = name.trim_matches(['-', '.']);
     ensure!(!name.is_empty(), "{}: the file name needs a letter or digit", mesh.display());
     Ok(name.into())
 }
 
 /// Placement of a mesh in a scene, with the guesses that led to it.
-struct Guess {
+struct MeshPlacement {
     up: Up,
     unit: Unit,
     scale: f64,
     size_mm: [f64; 3],
     position_m: [f64; 3],
     rotation_deg: [f64; 3],
-    found: Found,
+    found: ZoneProposal,
 }
 
-impl Guess {
+impl MeshPlacement {
     fn of(args: &Args) -> anyhow::Result<Self> {
         let extension = args.mesh.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
         let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
         // Millimetres are the middle of all units, so that meshes in the largest and the smallest
         // unit can be read.
-        let mesh = args.read(Unit::Mm.metres())?;
+        let mesh = args.read(Unit::Mm.metres_per_unit())?;
         let extent = |mesh: &Mesh| {
             let (low, high) = mesh.bounds();
             high - low
         };
         let unit = args.unit.or(is_gltf.then_some(Unit::M));
-        let (unit, scale) = placement::size(extent(&mesh).max() / Unit::Mm.metres(), unit);
-        let mesh = mesh.scaled(unit.metres() * scale / Unit::Mm.metres());
+        let (unit, scale) = placement::size(extent(&mesh).max() / Unit::Mm.metres_per_unit(), unit);
+        let mesh = mesh.scaled(unit.metres_per_unit() * scale / Unit::Mm.metres_per_unit());
         let size_mm = (extent(&mesh) * 1e3).into();
         let facing = if is_gltf { Facing::of_gltf(up) } else { Facing::of(up) };
         let rotation_deg = placement::rotation_deg(facing, args.side);
@@ -205,9 +211,13 @@ impl Guess {
     }
 
     /// Returns the scene as commented TOML.
-    fn scene(&self, args: &Args, Kit { body, scene, .. }: &Kit) -> anyhow::Result<String> {
+    fn scene(
+        &self,
+        args: &Args,
+        FingerTemplate { body, scene, .. }: &FingerTemplate,
+    ) -> anyhow::Result<String> {
         let Self { unit, scale, position_m, rotation_deg, found, .. } = self;
-        let Found { zone, filled } = found;
+        let ZoneProposal { zone, fill_fraction: filled } = found;
         let mesh = match args.mesh.is_relative() && args.is_here() {
             true => args.mesh.clone(),
             false => std::path::absolute(&args.mesh)?,
@@ -250,16 +260,16 @@ impl Guess {
             "{}: unit {unit}{scaled}: {x:.1} x {y:.1} x {z:.1} mm, {} up; its {} faces the finger\n\
              zone {width:.0} x {height:.0} mm, {:.0} mm deep, {:.0} % of it has a surface",
             args.mesh.display(),
-            named(up),
-            named(&args.side),
+            value_name(up),
+            value_name(&args.side),
             1e3 * (far - near),
-            100.0 * found.filled
+            100.0 * found.fill_fraction
         )
     }
 }
 
 /// Returns the command-line name of a value.
-fn named(value: &impl ValueEnum) -> String {
+fn value_name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or(String::new(), |value| value.get_name().into())
 }
 

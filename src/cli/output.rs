@@ -7,27 +7,27 @@ use std::path::Path;
 
 /// Permission to replace files that Palpate did not write.
 #[derive(Clone, Copy, clap::Args)]
-pub(super) struct Force {
+pub(super) struct Overwrite {
     /// Replace a file that Palpate did not write, or write to a folder with other files.
     #[arg(long)]
     force: bool,
 }
 
 /// Marker near the start or end of every file that Palpate writes.
-const MARK: &[u8] = b"palpate";
+const MARKER: &[u8] = b"palpate";
 
 /// Bytes searched for the marker at each end of a file.
 // heuristic: longer than any header.
-const END: u64 = 1024;
+const SEARCH_BYTES: u64 = 1024;
 
-impl Force {
+impl Overwrite {
     /// Checks that `path` may be written: it does not exist, Palpate wrote it, or it is a file and
     /// `--force` is given.
     ///
     /// # Errors
     /// If it may not be written.
     pub(super) fn claim(self, path: &Path) -> anyhow::Result<()> {
-        if found(path)? == Found::Other && !self.force {
+        if found(path)? == ExistingFile::Other && !self.force {
             bail!(
                 "{} exists and was not written by Palpate; use --force to replace it",
                 path.display()
@@ -41,9 +41,9 @@ impl Force {
     ///
     /// # Errors
     /// If one of the files may not be written.
-    pub(super) fn claim_all(self, path: &Path, extensions: &[&str]) -> anyhow::Result<()> {
+    pub(super) fn check_files(self, path: &Path, extensions: &[&str]) -> anyhow::Result<()> {
         self.claim(path)?;
-        if found(path)? == Found::Ours {
+        if found(path)? == ExistingFile::Ours {
             return Ok(());
         }
         extensions.iter().try_for_each(|extension| self.claim(&path.with_extension(extension)))
@@ -53,7 +53,7 @@ impl Force {
     ///
     /// # Errors
     /// If it exists without `--force`, or is not a file.
-    pub(super) fn claim_new(self, path: &Path) -> anyhow::Result<()> {
+    pub(super) fn check_new_file(self, path: &Path) -> anyhow::Result<()> {
         self.claim(path)?;
         if path.exists() && !self.force {
             bail!("{} exists; use --force to replace it", path.display());
@@ -66,7 +66,7 @@ impl Force {
     ///
     /// # Errors
     /// If the folder may not be used.
-    pub(super) fn claim_folder(self, path: &Path, own: &str) -> anyhow::Result<()> {
+    pub(super) fn check_folder(self, path: &Path, own: &str) -> anyhow::Result<()> {
         let is_empty = match fs::read_dir(path) {
             Err(error) if error.kind() == ErrorKind::NotFound => true,
             entries => entries.with_context(|| path.display().to_string())?.next().is_none(),
@@ -84,16 +84,16 @@ impl Force {
 
 /// Existing file at an output path.
 #[derive(PartialEq)]
-enum Found {
+enum ExistingFile {
     Nothing,
     Ours,
     Other,
 }
 
-fn found(path: &Path) -> anyhow::Result<Found> {
+fn found(path: &Path) -> anyhow::Result<ExistingFile> {
     let name = path.display();
     let kind = match fs::metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ExistingFile::Nothing),
         Err(error) => return Err(error).with_context(|| name.to_string()),
         Ok(kind) => kind,
     };
@@ -101,18 +101,18 @@ fn found(path: &Path) -> anyhow::Result<Found> {
         bail!("{name} is a folder, a device or a pipe; allowed is a file");
     }
     let is_ours = is_marked(path).with_context(|| name.to_string())?;
-    Ok(if is_ours { Found::Ours } else { Found::Other })
+    Ok(if is_ours { ExistingFile::Ours } else { ExistingFile::Other })
 }
 
 fn is_marked(path: &Path) -> io::Result<bool> {
     let mut file = File::open(path)?;
-    let last = file.metadata()?.len().saturating_sub(END);
+    let last = file.metadata()?.len().saturating_sub(SEARCH_BYTES);
     for start in [0, last] {
         file.seek(SeekFrom::Start(start))?;
         let mut bytes = Vec::new();
-        Read::by_ref(&mut file).take(END).read_to_end(&mut bytes)?;
+        Read::by_ref(&mut file).take(SEARCH_BYTES).read_to_end(&mut bytes)?;
         bytes.make_ascii_lowercase();
-        if bytes.windows(MARK.len()).any(|part| part == MARK) {
+        if bytes.windows(MARKER.len()).any(|part| part == MARKER) {
             return Ok(true);
         }
     }

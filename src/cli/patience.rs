@@ -1,22 +1,22 @@
 //! Progress messages for slow steps, on stderr.
 
-use super::terminal::{Talk, tell};
+use super::terminal::{Verbosity, print_stderr};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 /// Time that a step may take before its name is shown.
 // heuristic: a shorter wait needs no message.
-const PATIENCE: Duration = Duration::from_secs(1);
+const SLOW_STEP: Duration = Duration::from_secs(1);
 
 /// Runs `work`, which reports the name of each step at its start, and prints the names of slow
 /// steps to stderr.
-pub(super) fn with_patience<T>(talk: Talk, work: impl FnOnce(&dyn Fn(&str)) -> T) -> T {
+pub(super) fn report_slow_steps<T>(talk: Verbosity, work: impl FnOnce(&dyn Fn(&str)) -> T) -> T {
     let show = |step: &str| {
         if !talk.quiet {
-            tell(&format!("{step} ..."));
+            print_stderr(&format!("{step} ..."));
         }
     };
-    showing_slow(PATIENCE, show, work)
+    showing_slow(SLOW_STEP, show, work)
 }
 
 fn showing_slow<T>(
@@ -42,7 +42,7 @@ fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) 
                 Err(RecvTimeoutError::Timeout) => break,
                 Err(RecvTimeoutError::Disconnected) => return,
             }
-            if shown.elapsed() > SEVERAL * patience {
+            if shown.elapsed() > REPORT_INTERVAL * patience {
                 break;
             }
         }
@@ -52,7 +52,7 @@ fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) 
 }
 
 /// Multiple of the patience after which one of many short steps is shown.
-const SEVERAL: u32 = 3;
+const REPORT_INTERVAL: u32 = 3;
 
 #[cfg(test)]
 mod tests {

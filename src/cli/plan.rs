@@ -1,9 +1,9 @@
 //! `palpate run --plan`: estimates time and memory per shard.
 
 use super::columns::{aligned, duration};
-use super::prepare::simulation;
+use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
-use super::terminal::{Ending, Talk, print};
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::runner::{self, Shard};
 use std::sync::atomic::Ordering;
@@ -11,7 +11,7 @@ use std::time::Instant;
 
 /// Trials per planner and thread in the estimate.
 // heuristic: the first and last trials of a batch leave threads idle; more trials reduce that bias.
-const TRIED: usize = 3;
+const ESTIMATION_TRIALS: usize = 3;
 
 /// Bytes per unit of `/proc`.
 const KIB: f64 = 1024.0;
@@ -22,10 +22,10 @@ pub(super) fn plan(
     experiment: Experiment,
     shards: u32,
     threads: u16,
-    talk: Talk,
-) -> anyhow::Result<Ending> {
+    talk: Verbosity,
+) -> anyhow::Result<Outcome> {
     let begun = Instant::now();
-    let simulation = simulation(experiment, talk)?;
+    let simulation = prepare_simulation(experiment, talk)?;
     let set_up_s = begun.elapsed().as_secs_f64();
     let experiment = simulation.experiment();
     let stop = stop_on_interrupt("trials")?;
@@ -33,20 +33,20 @@ pub(super) fn plan(
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         threads => threads.into(),
     };
-    let all = runner::jobs(&simulation, &[])?;
-    let tried = (TRIED * threads * experiment.planners.len()).min(all.len());
+    let all = runner::missing_jobs(&simulation, &[])?;
+    let tried = (ESTIMATION_TRIALS * threads * experiment.planners.len()).min(all.len());
     let jobs = all.iter().take(tried).copied().collect();
     let begun = Instant::now();
-    runner::rows(&simulation, jobs, threads, &stop, &|_| ())?;
+    runner::run_in_memory(&simulation, jobs, threads, &stop, &|_| ())?;
     if stop.load(Ordering::Relaxed) {
-        return Ok(Ending::Interrupted);
+        return Ok(Outcome::Interrupted);
     }
     let each_s = begun.elapsed().as_secs_f64() / tried as f64;
     let memory = peak_bytes().map_or("–".into(), |bytes| format!("{:.0} MB", 1e-6 * bytes));
     let mut lines = vec![["shard", "trials", "time", "memory"].map(String::from)];
     for index in 1..=shards {
         let mut own = all.clone();
-        Shard { index, count: shards }.keep(&mut own);
+        Shard { index, count: shards }.retain(&mut own);
         let time_s = set_up_s + each_s * own.len() as f64;
         let shard = format!("{index}/{}", shards);
         lines.push([shard, own.len().to_string(), duration(time_s), memory.clone()]);
@@ -57,7 +57,7 @@ pub(super) fn plan(
         duration(each_s),
         duration(set_up_s)
     ))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Peak memory of this process, if the system reports it.

@@ -1,32 +1,39 @@
 //! Preparation of files for a run: invalid input is an error, likely mistakes are notes on stderr.
 
-use super::patience::with_patience;
-use super::terminal::Talk;
+use super::patience::report_slow_steps;
+use super::terminal::Verbosity;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, bail, ensure};
-use palpate_ros::arm::Lab;
+use palpate_ros::arm::RosArm;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Limits the number of threads of the process; 0 means all cores.
-pub(super) fn bound_threads(threads: u16) -> anyhow::Result<()> {
+pub(super) fn set_thread_count(threads: u16) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
     pool.build_global().with_context(|| format!("cannot start {threads} threads"))
 }
 
 /// Prepares an experiment to run.
-pub(super) fn simulation(experiment: Experiment, talk: Talk) -> anyhow::Result<Simulation> {
-    let simulation = with_patience(talk, |tell| Simulation::new_telling(experiment, tell))?;
+pub(super) fn prepare_simulation(
+    experiment: Experiment,
+    talk: Verbosity,
+) -> anyhow::Result<Simulation> {
+    let simulation =
+        report_slow_steps(talk, |tell| Simulation::new_with_progress(experiment, tell))?;
     simulation.simulator().check_reach()?;
     simulation.notices().iter().for_each(|notice| talk.note(notice));
     Ok(simulation)
 }
 
 /// Loads the files that a scene names.
-pub(super) fn environment(scene: Scene, talk: Talk) -> anyhow::Result<Arc<Environment>> {
-    Ok(Arc::new(with_patience(talk, |tell| Environment::build_telling(scene, tell))?))
+pub(super) fn prepare_environment(
+    scene: Scene,
+    talk: Verbosity,
+) -> anyhow::Result<Arc<Environment>> {
+    Ok(Arc::new(report_slow_steps(talk, |tell| Environment::build_with_progress(scene, tell))?))
 }
 
 /// Rejects a scene of a whole object for a command that needs a zone.
@@ -42,7 +49,10 @@ pub(super) fn needs_zone(scene: &Scene, path: &Path) -> anyhow::Result<()> {
 
 /// Rejects an option that does not apply to `path`. Each entry holds the option's name, whether it
 /// is given, whether it applies to this kind of path, and the kind that it applies to.
-pub(super) fn only_with(path: &Path, options: &[(&str, bool, bool, &str)]) -> anyhow::Result<()> {
+pub(super) fn check_applicable(
+    path: &Path,
+    options: &[(&str, bool, bool, &str)],
+) -> anyhow::Result<()> {
     let refused = options.iter().find(|(_, is_given, is_allowed, _)| *is_given && !is_allowed);
     match refused {
         Some((option, _, _, what)) => bail!("{}: {option} applies only to {what}", path.display()),
@@ -51,7 +61,10 @@ pub(super) fn only_with(path: &Path, options: &[(&str, bool, bool, &str)]) -> an
 }
 
 /// Prepares the simulator of an environment.
-pub(super) fn simulator(environment: &Arc<Environment>, talk: Talk) -> anyhow::Result<Simulator> {
+pub(super) fn prepare_simulator(
+    environment: &Arc<Environment>,
+    talk: Verbosity,
+) -> anyhow::Result<Simulator> {
     let simulator = Simulator::new(Arc::clone(environment))?;
     simulator.check_reach()?;
     simulator.notices().iter().for_each(|notice| talk.note(notice));
@@ -59,7 +72,7 @@ pub(super) fn simulator(environment: &Arc<Environment>, talk: Talk) -> anyhow::R
 }
 
 /// Checks that a real arm may be moved; first clears faults latched on the robot if `clear_fault`.
-pub(super) fn ready(lab: &Arc<Lab>, clear_fault: bool) -> anyhow::Result<()> {
+pub(super) fn prepare_arm(lab: &Arc<RosArm>, clear_fault: bool) -> anyhow::Result<()> {
     if clear_fault {
         lab.clear_fault()?;
     }

@@ -1,6 +1,6 @@
 //! Progress bars and interruption of long commands.
 
-use super::terminal::{Talk, tell};
+use super::terminal::{Verbosity, print_stderr};
 use crate::experiment::Experiment;
 use crate::experiment::runner::Progress;
 use anyhow::Context;
@@ -19,7 +19,7 @@ pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<Atom
         if raised.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        tell(&format!("finishing running {pieces}; press Ctrl-C again to stop at once"));
+        print_stderr(&format!("finishing running {pieces}; press Ctrl-C again to stop at once"));
     };
     ctrlc::set_handler(handler).context("cannot handle Ctrl-C")?;
     Ok(stop)
@@ -27,7 +27,7 @@ pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<Atom
 
 /// Progress bar over `total` pieces of work.
 pub(super) fn progress_bar(
-    talk: Talk,
+    talk: Verbosity,
     name: &str,
     pieces: &str,
     total: u64,
@@ -53,7 +53,7 @@ pub(super) fn progress_bar(
 
 /// Progress bar over the touches of `trials` trials to run and `done` finished trials.
 pub(super) fn touches_bar(
-    talk: Talk,
+    talk: Verbosity,
     experiment: &Experiment,
     [trials, done]: [usize; 2],
 ) -> ProgressBar {
@@ -64,7 +64,7 @@ pub(super) fn touches_bar(
 
 /// Advances the bar by a touch; a trial that ended early advances it by its missing touches.
 pub(super) fn touch_step(
-    talk: Talk,
+    talk: Verbosity,
     bar: &ProgressBar,
     experiment: &Experiment,
     progress: Progress,
@@ -79,17 +79,17 @@ pub(super) fn touch_step(
 
 /// Work shorter than this prints no progress lines.
 // heuristic: a short wait needs no message.
-const SOON: Duration = Duration::from_secs(2);
+const SILENT_TIME: Duration = Duration::from_secs(2);
 
 /// Advances the bar. Without a terminal it prints a line per tenth of slow work.
-pub(super) fn step(talk: Talk, bar: &ProgressBar) {
+pub(super) fn step(talk: Verbosity, bar: &ProgressBar) {
     bar.inc(1);
     let (position, total) = (bar.position(), bar.length().unwrap_or(0));
     let tenth = |count: u64| count * 10 / total.max(1);
     let is_due = tenth(position) > tenth(position - 1) && position < total;
-    if is_due && !talk.quiet && bar.elapsed() > SOON && !io::stderr().is_terminal() {
+    if is_due && !talk.quiet && bar.elapsed() > SILENT_TIME && !io::stderr().is_terminal() {
         let (name, pieces) = (bar.prefix(), bar.message());
         let left_s = bar.eta().as_secs().max(1);
-        tell(&format!("{name}: {position} of {total} {pieces}, about {left_s} s left"));
+        print_stderr(&format!("{name}: {position} of {total} {pieces}, about {left_s} s left"));
     }
 }

@@ -3,7 +3,7 @@
 use crate::report::compare;
 use crate::report::reference::{columns, measures, rows, settings};
 use crate::report::tables::comparison::{comparison_file, equal_error_file};
-use crate::study::compare::Compared;
+use crate::study::compare::SuiteComparison;
 use clap::Command;
 
 #[derive(clap::Args)]
@@ -30,7 +30,7 @@ pub(super) fn text(program: &Command) -> String {
         measures(),
         columns(&comparison_file(&[])),
         columns(&equal_error_file(&[])),
-        columns(&compare::file(&Compared::default())),
+        columns(&compare::file(&SuiteComparison::default())),
         rows(),
     )
 }

@@ -1,12 +1,12 @@
 //! `palpate register`.
 
-use super::align::{Cloud, align};
+use super::align::{CloudArgs, align};
 use super::find::{SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;
-use super::output::Force;
-use super::prepare::{ready, simulator};
+use super::output::Overwrite;
+use super::prepare::{prepare_arm, prepare_simulator};
 use super::progress::{progress_bar, step};
-use super::terminal::{Ending, Talk, print};
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
@@ -14,7 +14,7 @@ use anyhow::Context;
 use palpate_explore::probe::Touch;
 use palpate_explore::registration::{Design, register};
 use palpate_gp::math::seed;
-use palpate_ros::arm::Lab;
+use palpate_ros::arm::RosArm;
 use palpate_ros::settings::{BackendKind, BackendSettings};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub(super) struct Args {
     #[command(flatten)]
     body: KnownBodyArgs,
     #[command(flatten)]
-    cloud: Cloud,
+    cloud: CloudArgs,
     /// Number of touches.
     #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u16).range(12..=1000))]
     touches: u16,
@@ -56,10 +56,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let name = if args.cloud.cloud.is_some() { "align.toml" } else { "registration.toml" };
     let out = args.out.clone().unwrap_or_else(|| name.into());
     args.force.claim(&out)?;
@@ -85,12 +85,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let design =
         Design::new(&robot, &scene.touch, &body, of, &mut seed::stream(args.seed, 0, "design"))?;
     design.check()?;
-    let simulator = simulator(&environment, talk)?;
+    let simulator = prepare_simulator(&environment, talk)?;
     let mut probe = match settings.kind {
         BackendKind::Simulated => simulator.probe(args.seed)?,
         _ => {
-            let lab = Lab::join(&settings, &robot.chain)?;
-            ready(&lab, args.clear_fault)?;
+            let lab = RosArm::join(&settings, &robot.chain)?;
+            prepare_arm(&lab, args.clear_fault)?;
             let body = Box::new(lab.body());
             Box::new(simulator.servo_within(body, args.seed, &settings.interlocks)?)
         }
@@ -107,5 +107,5 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     );
     write_whole(&out, &text)?;
     print(&format!("{text}\nfile: {}", out.display()))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }

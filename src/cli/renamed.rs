@@ -8,7 +8,7 @@ use std::ffi::OsString;
 ///
 /// # Errors
 /// If the command was removed, or its arguments cannot be translated.
-pub(super) fn today(
+pub(super) fn translate(
     mut arguments: Vec<OsString>,
 ) -> anyhow::Result<(Vec<OsString>, Option<String>)> {
     let is_option = |argument: &OsString| argument.as_encoded_bytes().starts_with(b"-");

@@ -1,12 +1,12 @@
 //! `palpate replay`.
 
-use super::prepare::simulation;
-use super::terminal::{Ending, Talk, print};
+use super::prepare::prepare_simulation;
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::trial::recorded_trial::parts;
 use crate::experiment::trial::replay::{self, Difference, Replay};
 use anyhow::Context;
 use palpate_input::words::brief;
-use palpate_ros::recording::Recorded;
+use palpate_ros::recording::RecordedTrial;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -31,12 +31,12 @@ pub(super) struct Args {
     json: bool,
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let parts = parts(&args.file).into_iter().map(|file| Part::of(file, args, talk));
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+    let parts = parts(&args.file).into_iter().map(|file| ReplayedPart::of(file, args, talk));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
     match args.json {
         true => {
-            let mut parts = parts.iter().map(Part::json);
+            let mut parts = parts.iter().map(ReplayedPart::json);
             let mut found = parts.next().unwrap_or_default();
             let parts: Vec<_> = parts.collect();
             if !parts.is_empty() {
@@ -44,25 +44,25 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
             }
             print(&format!("{found:#}"))?;
         }
-        false => print(&parts.iter().map(Part::text).collect::<Vec<_>>().join("\n"))?,
+        false => print(&parts.iter().map(ReplayedPart::text).collect::<Vec<_>>().join("\n"))?,
     }
     let is_same = parts.iter().all(|part| part.replay.difference.is_none());
-    Ok(if is_same { Ending::Done } else { Ending::Failed })
+    Ok(if is_same { Outcome::Done } else { Outcome::Failed })
 }
 
 /// Recording file of a trial and its replay.
-struct Part {
+struct ReplayedPart {
     file: PathBuf,
-    recorded: Recorded,
+    recorded: RecordedTrial,
     replay: Replay,
 }
 
-impl Part {
-    fn of(file: PathBuf, args: &Args, talk: Talk) -> anyhow::Result<Self> {
+impl ReplayedPart {
+    fn of(file: PathBuf, args: &Args, talk: Verbosity) -> anyhow::Result<Self> {
         let name = || file.display().to_string();
-        let recorded = Recorded::read(&file).with_context(name)?;
+        let recorded = RecordedTrial::read(&file).with_context(name)?;
         let experiment = replay::experiment(&recorded, &file, &args.set)?;
-        let simulation = simulation(experiment, talk)?;
+        let simulation = prepare_simulation(experiment, talk)?;
         let replay = replay::replay(&simulation, &recorded).with_context(name)?;
         Ok(Self { file, recorded, replay })
     }
@@ -85,7 +85,7 @@ impl Part {
     }
 }
 
-fn text(recorded: &Recorded, replay: &Replay) -> String {
+fn text(recorded: &RecordedTrial, replay: &Replay) -> String {
     let Replay { touches, is_cut, difference } = replay;
     let about = &recorded.about;
     let head =

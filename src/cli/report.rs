@@ -1,7 +1,7 @@
 //! `palpate report`.
 
 use super::host::Host;
-use super::terminal::{Ending, print};
+use super::terminal::{Outcome, print};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;
@@ -28,7 +28,7 @@ pub(super) struct Args {
     set: Vec<String>,
 }
 
-pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
     if !args.merge.is_empty() {
         let count = store::merge(&args.folder, &args.merge, host.commit)?;
         print(&format!("{count} trials in {}", args.folder.display()))?;
@@ -37,7 +37,7 @@ pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Ending> {
         store::set_report(&args.folder, &args.set)?;
     }
     let run = Run::read(&args.folder)?;
-    let analysis = Analysis::of(&run);
+    let analysis = Analysis::new(&run);
     report::write_tables(&run, &analysis, &args.folder)?;
     report::write(&run, &analysis, &args.folder)?;
     print(&format!(
@@ -45,5 +45,5 @@ pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Ending> {
         report::tables::summary::text(&run),
         args.folder.join("report.html").display()
     ))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }

@@ -4,21 +4,21 @@ use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::plan::plan;
-use super::prepare::{bound_threads, ready, simulation};
+use super::prepare::{prepare_arm, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
-use super::terminal::{Ending, Talk, error, print};
+use super::terminal::{Outcome, Verbosity, error, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
-use crate::experiment::store::{Journal, RECORDINGS, Run, RunFolder, Tally};
-use crate::experiment::sweep::cells;
+use crate::experiment::store::{Journal, RECORDINGS, RowCounts, Run, RunFolder};
+use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::row::TrialId;
 use crate::report;
 use crate::study::compare::compare;
 use anyhow::{Context, bail, ensure};
 use palpate_explore::planner;
 use palpate_input::config::ConfigError;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::files;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -92,12 +92,12 @@ impl Args {
     }
 }
 
-pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Outcome> {
     let path = find(&args.experiment, EXPERIMENTS)?;
-    let cells = cells(&path)?;
-    bound_threads(args.threads)?;
+    let cells = sweep_cases(&path)?;
+    set_thread_count(args.threads)?;
     let mut stop = None;
-    if cells.is_empty() {
+    if sweep_cases.is_empty() {
         let out = args.out.clone();
         let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
         if let Some(shards) = args.plan {
@@ -112,23 +112,23 @@ pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending
     );
     // All combinations are loaded before the first is run.
     let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
-    let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let experiments = sweep_cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let first = experiments[0].clone();
-    let name = first.name.strip_suffix(&cells[0].label).unwrap_or(&first.name);
+    let name = first.name.strip_suffix(&sweep_cases[0].label).unwrap_or(&first.name);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(name));
     let mut paths = Vec::new();
     for experiment in experiments {
         let part = if args.out.is_none() { args.suffix() } else { String::new() };
         paths.push(folder.join(format!("{}{part}", experiment.name)));
         match run_one(args, experiment, paths.last().cloned(), &mut stop, (talk, host))? {
-            Ending::Done => (),
+            Outcome::Done => (),
             other => return Ok(other),
         }
     }
     if args.shard.is_none() {
         compare_cells(args, (&first, name), &folder, paths)?;
     }
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Preferred reference planner of a sweep's comparison.
@@ -179,25 +179,25 @@ fn with_planners(
 }
 
 /// Result of a run.
-struct Made {
+struct RunResult {
     path: PathBuf,
     /// Number of trials run and their duration.
     words: String,
-    tally: Tally,
+    tally: RowCounts,
     /// Expected number of trials.
     total: u64,
     /// Place and reason of a real arm's halt, and the results kept.
     halt: Option<String>,
 }
 
-impl Made {
+impl RunResult {
     fn is_finished(&self) -> bool {
         self.tally.trials as u64 == self.total
     }
 
     /// Returns the outcome; prints to stderr the number of failed trials and the first failure.
-    fn ending(&self, talk: Talk) -> Ending {
-        let Tally { trials, failed } = &self.tally;
+    fn ending(&self, talk: Verbosity) -> Outcome {
+        let RowCounts { trials, failed } = &self.tally;
         let all_failed = *trials > 0 && failed.len() == *trials;
         if let Some((TrialId { trial, planner }, reason)) = failed.first() {
             let words = format!(
@@ -210,28 +210,28 @@ impl Made {
             }
         }
         match () {
-            () if !self.is_finished() => Ending::Interrupted,
-            () if all_failed => Ending::Failed,
-            () => Ending::Done,
+            () if !self.is_finished() => Outcome::Interrupted,
+            () if all_failed => Outcome::Failed,
+            () => Outcome::Done,
         }
     }
 }
 
 /// Runs the missing trials.
-fn make(
+fn run_missing(
     args: &Args,
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, host): (Talk, &Host),
-) -> anyhow::Result<Made> {
-    let own = experiment.planners.iter().filter(|name| planner::is_own(name));
+    (talk, host): (Verbosity, &Host),
+) -> anyhow::Result<RunResult> {
+    let own = experiment.planners.iter().filter(|name| planner::is_external(name));
     let (own, lacking): (Vec<_>, Vec<_>) =
-        own.filter_map(|name| (host.bring)(name)).partition(Result::is_ok);
-    let simulation = simulation(experiment, talk)?;
+        own.filter_map(|name| (host.load_planner)(name)).partition(Result::is_ok);
+    let simulation = prepare_simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
     let experiment = simulation.experiment();
-    if args.record && !experiment.scene.body.moves() && !simulation.is_real() {
+    if args.record && !experiment.scene.body.moves_finger() && !simulation.is_real() {
         let body = experiment.scene.body.name();
         bail!(
             "--record: body = \"{body}\" does not move, so there is nothing to record; allowed are \
@@ -248,7 +248,7 @@ fn make(
     // Checked before the connection to an arm: another program may hold the folder, or a fault may
     // need an operator.
     if simulation.is_real() {
-        if let Some(reason) = Journal::open(&path)?.halted().filter(|_| !args.clear_fault) {
+        if let Some(reason) = Journal::open(&path)?.halt_reason().filter(|_| !args.clear_fault) {
             bail!(
                 "{}: a fault halted the run: {reason}\ncheck the arm, then use --clear-fault to continue, \
                  or --fresh to start again",
@@ -256,7 +256,7 @@ fn make(
             );
         }
         if let Some(lab) = simulation.connect()? {
-            ready(&lab, args.clear_fault)?;
+            prepare_arm(&lab, args.clear_fault)?;
         }
     }
     let simulation = simulation;
@@ -272,10 +272,10 @@ fn make(
     };
 
     // A planner that cannot be loaded is an error only if trials of it are missing.
-    let why = |error: Invalid| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
-    let mut jobs = runner::jobs(&simulation, &done).map_err(why)?;
+    let why = |error: InputError| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
+    let mut jobs = runner::missing_jobs(&simulation, &done).map_err(why)?;
     if let Some(shard) = args.shard {
-        shard.keep(&mut jobs);
+        shard.retain(&mut jobs);
     }
     let total = (done.len() + jobs.len()) as u64;
     let bar = touches_bar(talk, experiment, [jobs.len(), done.len()]);
@@ -298,7 +298,7 @@ fn make(
     if !done.is_empty() {
         words += &format!(", {} already done", done.len());
     }
-    Ok(Made { path, words, tally, total, halt })
+    Ok(RunResult { path, words, tally, total, halt })
 }
 
 fn run_one(
@@ -306,10 +306,10 @@ fn run_one(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, host): (Talk, &Host),
-) -> anyhow::Result<Ending> {
-    let made = make(args, experiment, out, stop, (talk, host))?;
-    let Made { path, words, total, halt, .. } = &made;
+    (talk, host): (Verbosity, &Host),
+) -> anyhow::Result<Outcome> {
+    let made = run_missing(args, experiment, out, stop, (talk, host))?;
+    let RunResult { path, words, total, halt, .. } = &made;
     // A shard is not summarised: its rows may not fit in memory.
     if args.shard.is_some() {
         print(&format!("{words}\nrows in {}", path.display()))?;
@@ -318,7 +318,7 @@ fn run_one(
 
     let run = Run::read(path)?;
     let mut text = format!("{}\n{words}", report::tables::summary::text(&run));
-    let analysis = Analysis::of(&run);
+    let analysis = Analysis::new(&run);
     report::write_tables(&run, &analysis, path)?;
     if !made.is_finished() {
         text += &format!(

@@ -1,12 +1,12 @@
 //! `palpate export SCENE`: touches a grid of targets and writes the contact cloud.
 
-use super::output::{Force, make_folder};
-use super::prepare::{environment, needs_zone, simulator};
+use super::output::{Overwrite, make_folder};
+use super::prepare::{needs_zone, prepare_environment, prepare_simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, Talk, print};
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan;
-use crate::report::points::Points;
+use crate::report::points::PointCloud;
 use crate::report::{files, scan as drawing};
 use crate::sim::Scene;
 use anyhow::Context;
@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// Options of a scan.
 #[derive(clap::Args)]
-pub(super) struct Scan {
+pub(super) struct ScanArgs {
     /// Scene only: change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub(super) set: Vec<String>,
@@ -42,13 +42,13 @@ pub(super) fn grid(text: &str) -> Result<Grid, String> {
 /// Touches a grid of targets of the scene at `path` and writes the contacts.
 pub(super) fn scan(
     path: &Path,
-    args: &Scan,
-    (out, grid, force): (Option<&Path>, Option<Grid>, Force),
-    talk: Talk,
-) -> anyhow::Result<Ending> {
+    args: &ScanArgs,
+    (out, grid, force): (Option<&Path>, Option<Grid>, Overwrite),
+    talk: Verbosity,
+) -> anyhow::Result<Outcome> {
     let scene = Scene::load(path, &args.set)?;
     needs_zone(&scene, path)?;
-    let environment = environment(scene, talk)?;
+    let environment = prepare_environment(scene, talk)?;
     let mesh = environment
         .mesh()
         .with_context(|| format!("{}: no object, so no surface to scan", path.display()))?;
@@ -56,32 +56,32 @@ pub(super) fn scan(
     let zone = zone.with_context(|| format!("{}: no [zone] to scan", path.display()))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let folder = out.map_or_else(|| Path::new("runs").join(format!("{name}-scan")), Path::to_owned);
-    force.claim_folder(&folder, "cloud.ply")?;
+    force.check_folder(&folder, "cloud.ply")?;
     let grid = grid.map_or_else(|| scan::default_grid(zone), |grid| grid.0);
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
-    let simulator = simulator(&environment, talk)?;
+    let simulator = prepare_simulator(&environment, talk)?;
     let targets = scan::targets(zone, grid);
     let (rows, threads) = ((targets.as_slice(), grid[0]), args.threads.into());
     let touches = scan::scan(&simulator, rows, threads, &stop, &|| step(talk, &bar))?;
     bar.finish_and_clear();
-    let Some(touches) = touches else { return Ok(Ending::Interrupted) };
+    let Some(touches) = touches else { return Ok(Outcome::Interrupted) };
 
     let points = touches.iter().filter_map(|touch| match touch {
         Ok(Touch::Contact(contact)) => Some((contact.p_wc, contact.normal_w)),
         _ => None,
     });
     let [columns, rows] = grid;
-    let cloud = Points {
+    let cloud = PointCloud {
         comments: vec![
             format!(
                 "Palpate {}: {name} touched on a grid of {columns} x {rows}",
                 env!("CARGO_PKG_VERSION")
             ),
-            zone.frame_words(),
+            zone.frame_description(),
         ],
         points: points.collect(),
-        ..Points::default()
+        ..PointCloud::default()
     };
     make_folder(&folder)?;
     write_whole(&folder.join("cloud.ply"), cloud.ply())?;
@@ -97,7 +97,7 @@ pub(super) fn scan(
         touches.len() - cloud.points.len() - faults,
         folder.display()
     ))?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Returns a CSV line per target: its position, the outcome, the contact point and its normal.

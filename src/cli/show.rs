@@ -1,11 +1,11 @@
 //! `palpate show`.
 
 use super::find::{SCENES, find, is_experiment};
-use super::output::Force;
-use super::patience::with_patience;
-use super::prepare::{environment, only_with, simulator};
-use super::terminal::{Ending, Talk, print};
-use super::watch::{Watch, watch};
+use super::output::Overwrite;
+use super::patience::report_slow_steps;
+use super::prepare::{check_applicable, prepare_environment, prepare_simulator};
+use super::terminal::{Outcome, Verbosity, print};
+use super::watch::{WatchArgs, watch};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
@@ -15,7 +15,7 @@ use crate::experiment::truth::Truth;
 use crate::report;
 use crate::report::files::png;
 use crate::report::solid;
-use crate::sim::environment::Shape;
+use crate::sim::environment::Surface;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
 use anyhow::{Context, bail, ensure};
@@ -64,15 +64,15 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     render: Option<PathBuf>,
     #[command(flatten)]
-    watch: Watch,
+    watch: WatchArgs,
     /// Print the summary of a run's folder as JSON.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    force: Force,
+    force: Overwrite,
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let path = match args.path.exists() {
         true => args.path.clone(),
         false => find(&args.path, SCENES)?,
@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         ),
         ("--unit", args.unit.is_some(), is_mesh, "a mesh; in a scene use object.unit"),
     ];
-    only_with(&path, &options)?;
+    check_applicable(&path, &options)?;
     for file in [&args.mjcf, &args.png, &args.render].into_iter().flatten() {
         args.force.claim(file)?;
     }
@@ -110,9 +110,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         Some("toml") if is_scene => scene(&path, args, talk)?,
         Some("toml") => store::resolved(&Experiment::load(&path, &args.set)?),
         _ => {
-            let metres = args.unit.unwrap_or_default().metres();
+            let metres = args.unit.unwrap_or_default().metres_per_unit();
             let name = path.display();
-            let (_, report) = with_patience(talk, |tell| {
+            let (_, report) = report_slow_steps(talk, |tell| {
                 tell(&format!("reading {name}"));
                 import_with(&path, metres, args.outside_buffers)
             })?;
@@ -120,7 +120,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         }
     };
     print(text.trim_end())?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Test points along each side of the zone, for the summary of a scene's heights.
@@ -133,22 +133,22 @@ fn run_folder(run: &Run, json: bool) -> String {
     }
 }
 
-fn scene(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<String> {
+fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
     let scene = Scene::load(path, &args.set)?;
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
-    let environment = environment(scene, talk)?;
-    simulator(&environment, talk)?;
+    let environment = prepare_environment(scene, talk)?;
+    prepare_simulator(&environment, talk)?;
     let whole_object = environment.task().ball().map(|ball| (ball, shape(&environment, talk)));
     text += &match &whole_object {
-        Some((ball, shape)) => whole(ball, shape.as_ref(), talk),
-        None => one_side(&environment, talk),
+        Some((ball, shape)) => whole_object_summary(ball, shape.as_ref(), talk),
+        None => zone_summary(&environment, talk),
     };
-    if let Shape::Mesh { report, .. } = environment.shape() {
+    if let Surface::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }
     if let Some(path) = &args.png {
         let svg = match &whole_object {
-            Some((ball, shape)) => what_is_reached(ball, shape.as_ref(), &environment),
+            Some((ball, shape)) => reachability_picture(ball, shape.as_ref(), &environment),
             None => environment.mesh().and_then(|mesh| {
                 let height_m = |place: &[f64]| environment.true_height_m(place);
                 report::scan::zone_picture(environment.task().zone()?, mesh, &height_m)
@@ -158,8 +158,8 @@ fn scene(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<String> {
         store::write_whole(path, png(&svg)?)?;
         text += &format!("picture: {}\n", path.display());
     }
-    if let Some(model) = mjcf::scene(&environment, mjcf::Mode::Picture) {
-        text += &with_patience(talk, |tell| {
+    if let Some(model) = mjcf::scene(&environment, mjcf::ModelPurpose::Picture) {
+        text += &report_slow_steps(talk, |tell| {
             tell("compiling the scene");
             compiled(&model)
         });
@@ -183,13 +183,15 @@ fn scene(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<String> {
 }
 
 /// Describes the reachable surface of one side of the object.
-fn one_side(environment: &Environment, talk: Talk) -> String {
-    let truth = with_patience(talk, |tell| {
+fn zone_summary(environment: &Environment, talk: Verbosity) -> String {
+    let truth = report_slow_steps(talk, |tell| {
         tell("finding the reachable surface");
         Truth::sample(environment, GRID, &|_| ())
     });
-    notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
-    let (count, places) = (truth.count(), truth.places.len());
+    notice::truth_notices(environment.task().zone(), &truth)
+        .iter()
+        .for_each(|notice| talk.note(notice));
+    let (count, places) = (truth.surface_count(), truth.places.len());
     let mut text = format!("\nsurface in the zone: {count} of {places} test points");
     if let Some([low, high]) = truth.span_m() {
         text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
@@ -198,27 +200,27 @@ fn one_side(environment: &Environment, talk: Talk) -> String {
 }
 
 /// True surface of a whole object, with its reachable part.
-fn shape(environment: &Environment, talk: Talk) -> Option<TrueShape> {
-    with_patience(talk, |tell| {
+fn shape(environment: &Environment, talk: Verbosity) -> Option<TrueShape> {
+    report_slow_steps(talk, |tell| {
         tell("finding the reachable surface");
-        TrueShape::of(environment)
+        TrueShape::from_environment(environment)
     })
 }
 
 /// Describes the reachable surface of a whole object.
-fn whole(ball: &Ball, shape: Option<&TrueShape>, talk: Talk) -> String {
+fn whole_object_summary(ball: &Ball, shape: Option<&TrueShape>, talk: Verbosity) -> String {
     let [x, y, z]: [f64; 3] = ball.centre_w.into();
     let radius_mm = 1e3 * ball.radius_m;
     let mut text = format!("\nball: {radius_mm:.2} mm about [{x:.4}, {y:.4}, {z:.4}] m");
     if let Some(share) = shape.and_then(TrueShape::reachable_share) {
         text += &format!("; the finger can touch {:.1} % of the surface", 100.0 * share);
     }
-    shape.and_then(notice::of_shape).iter().for_each(|notice| talk.note(notice));
+    shape.and_then(notice::shape_notice).iter().for_each(|notice| talk.note(notice));
     text + "\n"
 }
 
 /// Picture of a whole object with its reachable surface; `None` without a mesh or a true surface.
-fn what_is_reached(
+fn reachability_picture(
     ball: &Ball,
     shape: Option<&TrueShape>,
     environment: &Environment,
@@ -228,7 +230,7 @@ fn what_is_reached(
         (ball.centre_w + outward_w.scale(ball.radius_m), !missed.contains(&outward_w))
     };
     let sides: Vec<(Point3<f64>, bool)> = directions(DIRECTIONS).map(side).collect();
-    let spots = shape?.reached();
+    let spots = shape?.reachable_samples();
     Some(solid::picture(environment.mesh()?, &spots, &sides))
 }
 

@@ -6,7 +6,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 /// Outcome of a command that did not fail with an error.
-pub(super) enum Ending {
+pub(super) enum Outcome {
     /// The command completed.
     Done,
     /// A test failed.
@@ -19,28 +19,28 @@ pub(super) enum Ending {
 
 /// Verbosity of a command.
 #[derive(Clone, Copy, clap::Args)]
-pub(super) struct Talk {
+pub(super) struct Verbosity {
     /// Print only errors to stderr: no notes, no progress.
     #[arg(long, short, global = true)]
     pub(super) quiet: bool,
 }
 
-impl Talk {
+impl Verbosity {
     /// Prints a note to stderr, unless quiet.
     pub(super) fn note(self, text: impl fmt::Display) {
         if !self.quiet {
-            say(AnsiColor::Yellow.on_default().bold(), "note", text);
+            write_line(AnsiColor::Yellow.on_default().bold(), "note", text);
         }
     }
 }
 
 /// Prints an error to stderr.
 pub(super) fn error(text: impl fmt::Display) {
-    say(AnsiColor::Red.on_default().bold(), "error", text);
+    write_line(AnsiColor::Red.on_default().bold(), "error", text);
 }
 
 /// Writes a line to stderr, coloured on a terminal; write errors are ignored.
-fn say(style: Style, kind: &str, text: impl fmt::Display) {
+fn write_line(style: Style, kind: &str, text: impl fmt::Display) {
     let _ = writeln!(anstream::stderr(), "{style}{kind}:{style:#} {text}");
 }
 
@@ -55,6 +55,6 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
 }
 
 /// Prints to stderr; write errors are ignored.
-pub(super) fn tell(text: &str) {
+pub(super) fn print_stderr(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }

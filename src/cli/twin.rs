@@ -2,9 +2,9 @@
 
 use super::find::{EXPERIMENTS, SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;
-use super::prepare::{environment, simulator};
+use super::prepare::{prepare_environment, prepare_simulator};
 use super::progress::stop_on_interrupt;
-use super::terminal::{Ending, Talk, print};
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use crate::sim::{Scene, known_body};
@@ -82,7 +82,7 @@ fn injection(text: &str) -> Result<Injection, String> {
     Ok(Injection { failure, at_s: seconds(at)?, for_s: span.map(seconds).transpose()? })
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut experiment = experiment(args)?;
     let scene = &mut experiment.scene;
     if scene.effects.wrench.is_none() {
@@ -93,9 +93,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = experiment.scene;
     let environment = match args.body.body()? {
         Some(body) => Arc::new(known_body::environment(&scene, &body)?),
-        None => environment(scene, talk)?,
+        None => prepare_environment(scene, talk)?,
     };
-    let simulator = simulator(&environment, talk)?;
+    let simulator = prepare_simulator(&environment, talk)?;
     let scene = environment.scene();
     let (Some(body), Some(robot)) = (simulator.body()?, environment.robot()) else {
         bail!(
@@ -125,7 +125,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     written?;
     let counts = json!({ "overruns": twin.overruns(), "refused": twin.refused() });
     print(&json!({ "ended": counts }).to_string())?;
-    Ok(Ending::Done)
+    Ok(Outcome::Done)
 }
 
 /// Touches of the experiment for a scene; the server makes no touches itself.
@@ -135,7 +135,9 @@ fn experiment(args: &Args) -> anyhow::Result<Experiment> {
     let path = find(&args.path, EXPERIMENTS).or_else(|_| find(&args.path, SCENES))?;
     let mut experiment = match is_experiment(&path) {
         true => Experiment::load(&path, &args.set)?,
-        false => Experiment::on(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES),
+        false => {
+            Experiment::with_defaults(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES)
+        }
     };
     let backend = &mut experiment.backend;
     backend.domain = args.domain.or(backend.domain);

@@ -1,25 +1,25 @@
 //! `palpate show --watch`: shows a running trial in a window.
 
 use super::find::is_experiment;
-use super::prepare::simulation;
-use super::terminal::{Ending, Talk, print};
+use super::prepare::prepare_simulation;
+use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::trial::row::TrialRow;
 use crate::sim::Scene;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
-use palpate_explore::backend::watched::{Sight, Watched};
+use palpate_explore::backend::watched::{LiveView, Watched};
 use palpate_explore::planner;
 use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::servo::Servo;
-use palpate_explore::probe::{Probe, Swept, Touch};
+use palpate_explore::probe::{Probe, SweptVolume, Touch};
 use palpate_explore::task::Approach;
 use std::path::Path;
 
 /// Options of the watched trial.
 #[derive(clap::Args)]
-pub(super) struct Watch {
+pub(super) struct WatchArgs {
     /// Open MuJoCo's viewer on a trial while it runs (needs a build with `--features viewer`).
     #[arg(long)]
     pub(super) watch: bool,
@@ -50,12 +50,12 @@ fn speed(text: &str) -> Result<f64, String> {
 pub(super) fn watch(
     path: &Path,
     sets: &[String],
-    args: &Watch,
-    talk: Talk,
-) -> anyhow::Result<Ending> {
+    args: &WatchArgs,
+    talk: Verbosity,
+) -> anyhow::Result<Outcome> {
     let experiment = experiment(path, sets, args)?;
     let planner = planner(args, &experiment)?;
-    let simulation = simulation(experiment, talk)?;
+    let simulation = prepare_simulation(experiment, talk)?;
     let Some(body) = simulation.simulator().body()? else {
         let (path, body) = (path.display(), simulation.experiment().scene.body.name());
         bail!(
@@ -66,7 +66,7 @@ pub(super) fn watch(
     let window = Window::open(simulation.environment(), &format!("Palpate: {}", path.display()))?;
     let (body, sight) = Watched::new(body, args.speed);
     let servo = simulation.servo(Box::new(body), simulation.body_seed(args.trial))?;
-    let mut probe = Told { servo, sight: sight.clone(), count: 0 };
+    let mut probe = ReportingProbe { servo, sight: sight.clone(), count: 0 };
     let number = args.trial;
     // The main thread must draw the window.
     let worker = std::thread::spawn(move || {
@@ -78,13 +78,13 @@ pub(super) fn watch(
     if worker.join().is_err() {
         bail!("the trial panicked");
     }
-    drawn.map(|()| Ending::Done)
+    drawn.map(|()| Outcome::Done)
 }
 
-fn experiment(path: &Path, sets: &[String], args: &Watch) -> anyhow::Result<Experiment> {
+fn experiment(path: &Path, sets: &[String], args: &WatchArgs) -> anyhow::Result<Experiment> {
     let mut experiment = match is_experiment(path) {
         true => Experiment::load(path, sets)?,
-        false => Experiment::on(&Scene::load(path, sets)?, &["active"], 1, TOUCHES),
+        false => Experiment::with_defaults(&Scene::load(path, sets)?, &["active"], 1, TOUCHES),
     };
     if let Some(touches) = args.touches {
         experiment.touches = touches;
@@ -93,7 +93,10 @@ fn experiment(path: &Path, sets: &[String], args: &Watch) -> anyhow::Result<Expe
     Ok(experiment)
 }
 
-fn planner(args: &Watch, experiment: &Experiment) -> anyhow::Result<&'static planner::Entry> {
+fn planner(
+    args: &WatchArgs,
+    experiment: &Experiment,
+) -> anyhow::Result<&'static planner::PlannerEntry> {
     let name = args.planner.as_ref().or(experiment.planners.first()).map_or("", String::as_str);
     planner::by_name(name).with_context(|| {
         let known: Vec<_> = PLANNERS.iter().map(|planner| planner.name).collect();
@@ -102,13 +105,13 @@ fn planner(args: &Watch, experiment: &Experiment) -> anyhow::Result<&'static pla
 }
 
 /// Servo that prints the result of each touch.
-struct Told {
+struct ReportingProbe {
     servo: Servo,
-    sight: Sight,
+    sight: LiveView,
     count: u32,
 }
 
-impl Probe for Told {
+impl Probe for ReportingProbe {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         let touch = self.servo.touch(approach)?;
         self.count += 1;
@@ -129,8 +132,8 @@ impl Probe for Told {
         Ok(touch)
     }
 
-    fn swept(&self) -> Option<Swept> {
-        self.servo.swept()
+    fn swept_volume(&self) -> Option<SweptVolume> {
+        self.servo.swept_volume()
     }
 
     fn time_s(&self) -> Option<f64> {
@@ -139,7 +142,8 @@ impl Probe for Told {
 }
 
 fn ending(row: &TrialRow) -> String {
-    let of = |measure: Measure| Some((measure.title, measure.of(row, row.touches.len() as u32)?));
+    let of =
+        |measure: Measure| Some((measure.title, measure.value(row, row.touches.len() as u32)?));
     let error = of(RMSE).or_else(|| of(CHAMFER));
     let error = error.map_or(String::new(), |(name, m)| format!(", {name} {:.2} mm", 1e3 * m));
     match &row.failure {
@@ -153,7 +157,7 @@ use crate::sim::mujoco::window::Window;
 
 /// Draws until the window is closed.
 #[cfg(feature = "viewer")]
-fn show(mut window: Window, sight: &Sight) -> anyhow::Result<()> {
+fn show(mut window: Window, sight: &LiveView) -> anyhow::Result<()> {
     // Frame time of a 60 Hz display.
     const FRAME: std::time::Duration = std::time::Duration::from_millis(16);
     while window.is_open() {
@@ -175,6 +179,6 @@ impl Window {
 }
 
 #[cfg(not(feature = "viewer"))]
-fn show(window: Window, _: &Sight) -> anyhow::Result<()> {
+fn show(window: Window, _: &LiveView) -> anyhow::Result<()> {
     match window {}
 }

@@ -10,12 +10,12 @@ use crate::experiment::trial::entrant::{self, ORACLE};
 use crate::experiment::trial::row::TrialId;
 use crate::experiment::truth::scan_truth::ScanTruth;
 use crate::sim::Scene;
-use palpate_explore::around::SpaceSettings;
+use palpate_explore::around::SpatialGpSettings;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
 use palpate_explore::robot::arm::ArmSettings;
-use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,7 @@ pub struct Experiment {
     pub gp: GpSettings,
     /// Belief around a whole object; in an experiment file it is the table `[gp]`.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub space: SpaceSettings,
+    pub space: SpatialGpSettings,
     /// Search settings of the planners.
     #[serde(default)]
     pub planning: PlanningSettings,
@@ -97,7 +97,7 @@ const GRID: u32 = 31;
 impl Experiment {
     /// Returns an experiment of `trials` trials of `touches` touches with each planner on `scene`,
     /// with default settings.
-    pub fn on(scene: &Scene, planners: &[&str], trials: u32, touches: u32) -> Self {
+    pub fn with_defaults(scene: &Scene, planners: &[&str], trials: u32, touches: u32) -> Self {
         Self {
             name: "scene".into(),
             question: String::new(),
@@ -110,7 +110,7 @@ impl Experiment {
             repeat_touches: 0,
             grid: GRID,
             gp: GpSettings::default(),
-            space: SpaceSettings::default(),
+            space: SpatialGpSettings::default(),
             planning: PlanningSettings::default(),
             report: ReportSettings::default(),
             backend: BackendSettings::default(),
@@ -133,16 +133,16 @@ impl Experiment {
     /// # Errors
     /// See [`load`](Self::load).
     pub fn parse(path: &Path, text: String, sets: &[String]) -> Result<Self, ConfigError> {
-        Self::finish(Loader::of(path, text)?, sets)
+        Self::finish(Loader::from_text(path, text)?, sets)
     }
 
     pub(super) fn finish(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
         if loader.has(SWEEP) {
             let remedy = "use palpate run, or one of its combinations: runs/NAME/resolved.toml";
-            return Err(loader.other("a sweep of experiments", remedy));
+            return Err(loader.wrong_kind("a sweep of experiments", remedy));
         }
         if !loader.has("scene") && !loader.has("planners") && loader.has("zone") {
-            return Err(loader.other(
+            return Err(loader.wrong_kind(
                 "a scene",
                 "use palpate show or export on it; to run it, name it in an experiment: \
                  scene = \"FILE\" (palpate new MESH writes both)",
@@ -157,7 +157,7 @@ impl Experiment {
         files.iter().try_for_each(|set| loader.set(set))?;
         INCLUDED.iter().try_for_each(|key| loader.include(key))?;
         others.iter().try_for_each(|set| loader.set(set))?;
-        let moved_keys = Scene::resolve(&mut loader, "scene.")?;
+        let legacy_keys = Scene::resolve(&mut loader, "scene.")?;
         loader.resolve_path("truth.scan");
         if loader.has_value("scene.around") {
             // Version 0.1 also wrote the settings of a zone's belief here, all of them.
@@ -171,7 +171,7 @@ impl Experiment {
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
         take_former_keys(&mut loader)?;
         let mut experiment: Self = loader.finish()?;
-        experiment.scene.effects.moved_keys = moved_keys;
+        experiment.scene.effects.legacy_keys = legacy_keys;
         if experiment.backend.kind != BackendKind::Simulated {
             experiment.backend.complete(experiment.scene.arm.as_ref());
         }
@@ -182,7 +182,7 @@ impl Experiment {
     /// Returns the settings that decide a run's rows; all others are left blank. A row depends on
     /// the name of its planner and the number of its trial, not on the other planners and trials,
     /// and not on the report.
-    pub fn identity(&self) -> Self {
+    pub fn row_settings(&self) -> Self {
         Self {
             question: String::new(),
             planners: Vec::new(),
@@ -193,12 +193,15 @@ impl Experiment {
     }
 
     /// Whether the experiment lists a trial.
-    pub fn lists(&self, id: &TrialId) -> bool {
+    pub fn contains_trial(&self, id: &TrialId) -> bool {
         id.trial < self.trials && self.planners.contains(&id.planner)
     }
 
     /// Returns every trial of every planner that is not in `done`, ordered by trial.
-    pub fn lacks<'a>(&self, done: impl IntoIterator<Item = &'a TrialId>) -> Vec<(u32, &str)> {
+    pub fn missing_trials<'a>(
+        &self,
+        done: impl IntoIterator<Item = &'a TrialId>,
+    ) -> Vec<(u32, &str)> {
         let there: HashSet<_> =
             done.into_iter().map(|id| (id.trial, id.planner.as_str())).collect();
         (0..self.trials)
@@ -229,7 +232,7 @@ impl Experiment {
     }
 
     /// Error measure that ranks the planners.
-    pub fn error(&self) -> &'static Measure {
+    pub fn error_measure(&self) -> &'static Measure {
         match self.scene.around {
             None => &RMSE,
             Some(_) => &CHAMFER,
@@ -243,7 +246,7 @@ impl Experiment {
     }
 
     /// Touch counts in tables: those drawn, and the last.
-    pub fn tabled_touch_counts(&self) -> Vec<u32> {
+    pub fn table_touch_counts(&self) -> Vec<u32> {
         let mut counts = self.drawn_touch_counts();
         if counts.last() != Some(&self.touches) {
             counts.push(self.touches);
@@ -254,7 +257,7 @@ impl Experiment {
     /// Whether the belief after `count` touches is compared with the ground truth. Around a whole
     /// object a comparison takes longer than a touch, so only every `compared_every` touches and
     /// the last are compared.
-    pub fn is_compared(&self, count: u32) -> bool {
+    pub fn is_evaluated(&self, count: u32) -> bool {
         let every = self.scene.around.as_ref().map_or(1, |_| self.space.compared_every);
         count >= self.initial_touches && (count == self.touches || count.is_multiple_of(every))
     }
@@ -268,7 +271,7 @@ impl Experiment {
             let planned = self.touches - self.initial_touches;
             let compared = |third: u32| {
                 let count = self.initial_touches + planned * third / 3;
-                (count..self.touches).find(|&count| self.is_compared(count))
+                (count..self.touches).find(|&count| self.is_evaluated(count))
             };
             counts = (1..=3).map(|third| compared(third).unwrap_or(self.touches)).collect();
         }
@@ -286,13 +289,13 @@ fn is_zero(count: &u32) -> bool {
 }
 
 /// Whether a character is allowed in the name of an experiment, which is also a folder's name.
-pub fn is_plain(c: char) -> bool {
+pub fn is_name_character(c: char) -> bool {
     c.is_ascii_alphanumeric() || "-_.".contains(c)
 }
 
 impl Experiment {
     /// Checks the settings that do not apply around a whole object.
-    fn check_around(&self, rules: &mut Rules) {
+    fn check_whole_object(&self, rules: &mut Rules) {
         if self.scene.around.is_none() {
             return;
         }
@@ -319,26 +322,26 @@ impl Experiment {
 /// Maximum touches around an object; each adds seven values to the Gaussian process.
 const AROUND_TOUCHES_MAX: u32 = 500;
 
-impl Checked for Experiment {
+impl Validate for Experiment {
     fn check(&self, rules: &mut Rules) {
         let named = !self.name.is_empty()
             && !self.name.starts_with(['.', '-'])
             && self.name.len() <= 100
-            && self.name.chars().all(is_plain);
+            && self.name.chars().all(is_name_character);
         rules.require("name", format!("\"{}\"", self.name), named, || {
             "1 to 100 letters, digits, - _ . that do not begin with - or . (it names a folder)"
                 .into()
         });
         rules.require("planners", "[]", !self.planners.is_empty(), || {
-            entrant::allowed("").join(", ")
+            entrant::allowed_names("").join(", ")
         });
         for (i, name) in self.planners.iter().enumerate() {
             let is_removed = REMOVED.contains(&name.as_str());
             rules.require(&format!("planners[{i}]"), format!("\"{name}\""), !is_removed, || {
-                let names = entrant::allowed(name).join(", ");
+                let names = entrant::allowed_names(name).join(", ");
                 format!("one of {names}; pi and ei were removed")
             });
-            rules.one_of(&format!("planners[{i}]"), name, &entrant::allowed(name));
+            rules.one_of(&format!("planners[{i}]"), name, &entrant::allowed_names(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
             let is_seen = name != ORACLE || self.backend.kind == BackendKind::Simulated;
@@ -361,7 +364,7 @@ impl Checked for Experiment {
         });
         rules.table("gp", &self.gp);
         rules.table("space", &self.space);
-        self.check_around(rules);
+        self.check_whole_object(rules);
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
         rules.table("backend", &self.backend);

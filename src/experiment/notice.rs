@@ -4,17 +4,17 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::measure::{CENTRED_R, Measure, R};
 use crate::experiment::statistics::summary;
-use crate::experiment::trial::row::{TrialRow, of_planner};
+use crate::experiment::trial::row::{TrialRow, planner_rows};
 use crate::experiment::truth::Truth;
 use palpate_explore::task::Zone;
 
 /// Share of points or touches below which a notice is given.
 // heuristic: a quarter.
-const FEW: f64 = 0.25;
+const FEW_SHARE: f64 = 0.25;
 
 /// Share of a surface that counts as all of it.
 // heuristic: the missing part is invisible in a figure.
-const ALMOST_ALL: f64 = 0.99;
+const FULL_SHARE: f64 = 0.99;
 
 /// A notice is given for an R above the first with a centred R below the second.
 // heuristic: a constant height reaches the first on most objects.
@@ -22,13 +22,13 @@ const HIGH_R: f64 = 0.999;
 const LOW_CENTRED_R: f64 = 0.9;
 
 fn is_few(part: usize, of: usize) -> bool {
-    (part as f64) < FEW * of as f64
+    (part as f64) < FEW_SHARE * of as f64
 }
 
 /// Returns notices about the ground truth of an experiment in `zone`, before it runs.
-pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
+pub fn truth_notices(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
     let Some(zone) = zone else { return Vec::new() };
-    let (count, of) = (truth.count(), truth.places.len());
+    let (count, of) = (truth.surface_count(), truth.places.len());
     if count == 0 {
         return vec![
             "no ground truth: only truth-free measures are reported \
@@ -55,7 +55,7 @@ pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<String> {
 }
 
 /// Notice about a ground truth that is a scan, which itself has errors.
-pub fn of_scan(contacts: usize, rmse_m: Option<f64>) -> String {
+pub fn scan_notice(contacts: usize, rmse_m: Option<f64>) -> String {
     let off = match rmse_m {
         Some(rmse_m) => format!(
             ": its leave-one-out error is {:.2} mm RMS, so smaller errors are \
@@ -68,8 +68,8 @@ pub fn of_scan(contacts: usize, rmse_m: Option<f64>) -> String {
 }
 
 /// Notice about a whole object with an unreachable part.
-pub fn of_shape(shape: &TrueShape) -> Option<String> {
-    let reachable = shape.reachable_share().filter(|reachable| *reachable < ALMOST_ALL)?;
+pub fn shape_notice(shape: &TrueShape) -> Option<String> {
+    let reachable = shape.reachable_share().filter(|reachable| *reachable < FULL_SHARE)?;
     Some(format!(
         "the finger can touch {:.0} % of the object's surface by straight paths from all sides; the \
          rest is extrapolated",
@@ -78,10 +78,14 @@ pub fn of_shape(shape: &TrueShape) -> Option<String> {
 }
 
 /// Returns notices about the ground truth and the rows of a finished experiment.
-pub(super) fn of_run(experiment: &Experiment, truth: &Truth, rows: &[TrialRow]) -> Vec<String> {
-    let mut notices = of_truth(experiment.scene.zone.as_ref(), truth);
+pub(super) fn run_notices(
+    experiment: &Experiment,
+    truth: &Truth,
+    rows: &[TrialRow],
+) -> Vec<String> {
+    let mut notices = truth_notices(experiment.scene.zone.as_ref(), truth);
     notices.extend(experiment.planners.iter().filter_map(|planner| few_contacts(rows, planner)));
-    notices.extend(blind_r(experiment, rows));
+    notices.extend(uninformative_r(experiment, rows));
     notices
 }
 
@@ -103,14 +107,14 @@ fn far_datum(zone: &Zone, truth: &Truth) -> Option<String> {
 }
 
 fn few_contacts(rows: &[TrialRow], planner: &str) -> Option<String> {
-    let touches = || of_planner(rows, planner).flat_map(|row| &row.touches);
+    let touches = || planner_rows(rows, planner).flat_map(|row| &row.touches);
     let (contacts, of) =
         (touches().filter(|touch| touch.contact.is_some()).count(), touches().count());
     is_few(contacts, of)
         .then(|| format!("{planner}: only {contacts} of {of} touches made a usable contact"))
 }
 
-fn blind_r(experiment: &Experiment, rows: &[TrialRow]) -> Option<String> {
+fn uninformative_r(experiment: &Experiment, rows: &[TrialRow]) -> Option<String> {
     let last = |planner: &String| {
         let curve = summary::curve(experiment, rows, planner);
         let mean = |measure: &Measure| Some(curve.last()?.of(measure)?.mean);

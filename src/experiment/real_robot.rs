@@ -1,7 +1,7 @@
 //! Settings that a real robot needs and that a simulation takes from the mesh.
 
 use crate::experiment::experiment::Experiment;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_ros::settings::BackendKind;
 
 /// Checks that `experiment` has the settings that a real robot needs; a simulation needs none. With
@@ -9,7 +9,7 @@ use palpate_ros::settings::BackendKind;
 ///
 /// # Errors
 /// The missing settings, with an example of each.
-pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), Invalid> {
+pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> {
     let (kind, interlocks) = (experiment.backend.kind, &experiment.backend.interlocks);
     let scene = &experiment.scene;
     let mut needed = match &scene.around {
@@ -41,7 +41,7 @@ pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), Invalid> {
     let names: Vec<&str> = needed.iter().map(|(key, ..)| *key).collect();
     let line = |(key, example, _): &(&str, &str, bool)| format!("    {key} = {example}");
     let lines: Vec<String> = needed.iter().map(line).collect();
-    Err(Invalid::new(format!(
+    Err(InputError::new(format!(
         "backend.kind = \"{}\" moves a real robot, which needs {}: only a simulation takes depths from \
          the mesh. Give the values of your cell by --set, or in the files of the scene and the \
          experiment (experiments/real_arm.toml), in metres in the frame of the robot's base, as \

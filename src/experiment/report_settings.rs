@@ -2,7 +2,7 @@
 
 use crate::experiment::measure::MEASURES;
 use crate::experiment::trial::entrant;
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +49,7 @@ pub(super) const TOUCHES_MAX: f64 = 20_000.0;
 /// Maximum number of beliefs drawn side by side.
 const DRAWN_MAX: usize = 8;
 
-impl Checked for ReportSettings {
+impl Validate for ReportSettings {
     fn check(&self, rules: &mut Rules) {
         let drawn = self.touch_counts.len();
         rules.require("touch_counts", drawn, drawn <= DRAWN_MAX, || {
@@ -60,10 +60,10 @@ impl Checked for ReportSettings {
         }
         for (key, names) in [("planners", &self.planners), ("baselines", &self.baselines)] {
             for (i, name) in names.iter().enumerate() {
-                rules.one_of(&format!("{key}[{i}]"), name, &entrant::allowed(name));
+                rules.one_of(&format!("{key}[{i}]"), name, &entrant::allowed_names(name));
             }
         }
-        rules.given("goal_touches", self.goal_touches.map(f64::from), 1.0..=TOUCHES_MAX);
+        rules.optional_number("goal_touches", self.goal_touches.map(f64::from), 1.0..=TOUCHES_MAX);
         let measures: Vec<&str> = MEASURES.iter().map(|measure| measure.id).collect();
         for (i, claim) in self.claims.iter().enumerate() {
             let key = |field: &str| format!("claims[{i}].{field}");

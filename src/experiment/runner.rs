@@ -1,14 +1,14 @@
 //! Execution of trials × planners: simulated trials in parallel, those of a real arm in sequence.
 
 use crate::experiment::simulation::Simulation;
-use crate::experiment::store::{Entry, JOURNAL, Journal, RunError, RunFolder};
-use crate::experiment::trial::Touched;
+use crate::experiment::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
+use crate::experiment::trial::FinishedTouch;
 use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
 use crate::experiment::trial::row::{TrialId, TrialRow};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::pace;
 use palpate_explore::planner::PlannerFactory;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };
@@ -34,15 +34,18 @@ pub type Job<'a> = (u32, &'a dyn PlannerFactory);
 ///
 /// # Errors
 /// If the experiment lists a planner that is not available.
-pub fn jobs<'a>(simulation: &'a Simulation, done: &[TrialId]) -> Result<Vec<Job<'a>>, Invalid> {
+pub fn missing_jobs<'a>(
+    simulation: &'a Simulation,
+    done: &[TrialId],
+) -> Result<Vec<Job<'a>>, InputError> {
     let known = |(trial, name): (u32, &str)| {
         let planner = simulation.planner(name);
         let problem = format!("planner `{name}` is not available in this program");
         let mend = "run it with the palpate of the Python package, or from Rust with \
                          Simulation::with_planners";
-        Ok((trial, planner.ok_or_else(|| Invalid::new(problem).mend(mend))?))
+        Ok((trial, planner.ok_or_else(|| InputError::new(problem).remedy(mend))?))
     };
-    simulation.experiment().lacks(done).into_iter().map(known).collect()
+    simulation.experiment().missing_trials(done).into_iter().map(known).collect()
 }
 
 /// A part of an experiment's trials for one machine or task: every `count`-th trial, with all
@@ -56,10 +59,10 @@ pub struct Shard {
 }
 
 impl FromStr for Shard {
-    type Err = Invalid;
+    type Err = InputError;
 
-    fn from_str(text: &str) -> Result<Self, Invalid> {
-        let wrong = || Invalid::new("allowed is I/N with I from 1 to N, as in 3/8");
+    fn from_str(text: &str) -> Result<Self, InputError> {
+        let wrong = || InputError::new("allowed is I/N with I from 1 to N, as in 3/8");
         let (index, count) = text.split_once('/').ok_or_else(wrong)?;
         let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
         let (index, count) = (number(index)?, number(count)?);
@@ -72,13 +75,13 @@ impl FromStr for Shard {
 
 impl Shard {
     /// Whether the shard contains a trial.
-    pub fn has(self, trial: u32) -> bool {
+    pub fn contains(self, trial: u32) -> bool {
         trial % self.count == self.index - 1
     }
 
     /// Removes the jobs of other shards.
-    pub fn keep(self, jobs: &mut Vec<Job>) {
-        jobs.retain(|(trial, _)| self.has(*trial));
+    pub fn retain(self, jobs: &mut Vec<Job>) {
+        missing_jobs.retain(|(trial, _)| self.contains(*trial));
     }
 }
 
@@ -97,12 +100,12 @@ pub fn run(
     recorded: Option<&Path>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<usize, RunError> {
-    let pool = pool(threads)?;
+    let pool = thread_pool(threads)?;
     let finished = Mutex::new((folder, 0));
     // Jobs are handed out one by one, so that rows finish roughly in order and an interrupted run
     // has complete pairs.
     pool.install(|| {
-        jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
+        missing_jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
@@ -127,21 +130,21 @@ pub fn run(
 ///
 /// # Errors
 /// If threads cannot be started.
-pub fn rows(
+pub fn run_in_memory(
     simulation: &Simulation,
     jobs: Vec<Job>,
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Vec<TrialRow>, Invalid> {
+) -> Result<Vec<TrialRow>, InputError> {
     let run = |(trial, planner): Job| {
         let row = (!stop.load(Ordering::Relaxed))
             .then(|| run_caught(simulation, (trial, planner), None, progress))?;
         progress(Progress::Trial(&row));
         Some(row)
     };
-    let found: Vec<Option<TrialRow>> =
-        pool(threads)?.install(|| jobs.into_par_iter().with_max_len(1).map(run).collect());
+    let found: Vec<Option<TrialRow>> = thread_pool(threads)?
+        .install(|| missing_jobs.into_par_iter().with_max_len(1).map(run).collect());
     Ok(found.into_iter().flatten().collect())
 }
 
@@ -149,11 +152,11 @@ pub fn rows(
 ///
 /// # Errors
 /// If the threads cannot be started.
-pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, Invalid> {
+pub(super) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, InputError> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|error| Invalid::new(format!("cannot start {threads} threads: {error}")))
+        .map_err(|error| InputError::new(format!("cannot start {threads} threads: {error}")))
 }
 
 /// Runs one trial. A panic of a planner or probe becomes the trial's failure, so that it does not
@@ -165,7 +168,7 @@ fn run_caught(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> TrialRow {
     let path = recorded.map(|run| recording_path(run, planner, trial));
-    let mut count = |_: &Touched| {
+    let mut count = |_: &FinishedTouch| {
         progress(Progress::Touch);
         Ok(())
     };
@@ -174,7 +177,7 @@ fn run_caught(
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-        TrialRow::ended(trial, planner.name(), Some(format!("panicked: {words}")))
+        TrialRow::without_touches(trial, planner.name(), Some(format!("panicked: {words}")))
     })
 }
 
@@ -196,25 +199,25 @@ pub fn run_real(
 ) -> Result<(usize, Option<String>), RunError> {
     let mut journal = Journal::open(folder.path())?;
     let mut finished = 0;
-    for (trial, planner) in jobs(simulation, done)? {
+    for (trial, planner) in missing_jobs(simulation, done)? {
         if stop.load(Ordering::Relaxed) {
             break;
         }
         let name = planner.name();
         let entry = |touch, fault| {
             let (time_unix_s, planner) = (pace::now_s(), name.to_owned());
-            Entry { time_unix_s, trial, planner, touch, fault }
+            JournalEntry { time_unix_s, trial, planner, touch, fault }
         };
         let made = journal.touches(trial, name);
         let (mut is_asked, mut unstored) = (false, None);
-        let mut keep = |touched: &Touched| {
+        let mut keep = |touched: &FinishedTouch| {
             let time_s = touched.row.time_s.unwrap_or_default();
             progress(Progress::Touch);
             if let Some(made) = made.get(touched.count as usize - 1) {
                 let (touch, target) = (touched.count, made.target.numbers());
                 return match made.target == touched.row.target {
                     true => Ok(()),
-                    false => Err(Fault::from(Invalid::new(format!(
+                    false => Err(Fault::from(InputError::new(format!(
                         "touch {touch}: recorded target {target:?} differs from the current plan; program or \
                          experiment changed, use --fresh to start again"
                     )))),

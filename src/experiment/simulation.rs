@@ -15,8 +15,8 @@ use palpate_explore::probe::Probe;
 use palpate_explore::probe::servo::Servo;
 use palpate_explore::task::Task;
 use palpate_gp::math::seed;
-use palpate_input::error::Invalid;
-use palpate_ros::arm::Lab;
+use palpate_input::error::InputError;
+use palpate_ros::arm::RosArm;
 use palpate_ros::settings::BackendKind;
 use rand::RngExt;
 use std::sync::Arc;
@@ -28,11 +28,11 @@ pub struct Simulation {
     simulator: Simulator,
     truth: Arc<GroundTruth>,
     /// Connected arm that replaces the simulated body.
-    lab: Option<Arc<Lab>>,
+    arm: Option<Arc<RosArm>>,
     /// Notice about a scanned ground truth.
-    scanned: Option<String>,
+    scan_notice: Option<String>,
     /// Planners that are not built in: the oracle, and added ones.
-    own_planners: Vec<Box<dyn PlannerFactory>>,
+    external_planners: Vec<Box<dyn PlannerFactory>>,
 }
 
 impl Simulation {
@@ -40,8 +40,8 @@ impl Simulation {
     ///
     /// # Errors
     /// If the scene cannot be built or simulated, or the zone has no surface.
-    pub fn new(experiment: Experiment) -> Result<Self, Invalid> {
-        Self::new_telling(experiment, &|_| ())
+    pub fn new(experiment: Experiment) -> Result<Self, InputError> {
+        Self::new_with_progress(experiment, &|_| ())
     }
 
     /// Builds the simulation as [`new`](Self::new) does, and calls `tell` with the name of each
@@ -49,7 +49,10 @@ impl Simulation {
     ///
     /// # Errors
     /// See [`new`](Self::new).
-    pub fn new_telling(mut experiment: Experiment, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
+    pub fn new_with_progress(
+        mut experiment: Experiment,
+        tell: &dyn Fn(&str),
+    ) -> Result<Self, InputError> {
         real_robot::check(&experiment, false)?;
         if experiment.backend.kind != BackendKind::Simulated {
             // A simulation takes this from the mesh.
@@ -57,8 +60,8 @@ impl Simulation {
                 zone.datum_y_m.get_or_insert(0.0);
             }
         }
-        let environment = Environment::build_telling(experiment.scene.clone(), tell);
-        let environment = environment.map_err(|error| Invalid::new(error.to_string()))?;
+        let environment = Environment::build_with_progress(experiment.scene.clone(), tell);
+        let environment = environment.map_err(|error| InputError::new(error.to_string()))?;
         Self::sampled(experiment, Arc::new(environment), tell)
     }
 
@@ -66,7 +69,10 @@ impl Simulation {
     ///
     /// # Errors
     /// If the scene cannot be simulated, or the zone has no surface.
-    pub fn within(experiment: Experiment, environment: Arc<Environment>) -> Result<Self, Invalid> {
+    pub fn in_environment(
+        experiment: Experiment,
+        environment: Arc<Environment>,
+    ) -> Result<Self, InputError> {
         Self::sampled(experiment, environment, &|_| ())
     }
 
@@ -76,24 +82,24 @@ impl Simulation {
         experiment: Experiment,
         environment: Arc<Environment>,
         tell: &dyn Fn(&str),
-    ) -> Result<Self, Invalid> {
+    ) -> Result<Self, InputError> {
         let per_side = experiment.grid as usize;
         let (truth, scanned) = match (environment.task().zone(), &experiment.truth) {
             (Some(zone), Some(scan)) => {
                 let (truth, contacts, rmse_m) = scan.sample(zone, per_side)?;
-                (truth, Some(notice::of_scan(contacts, rmse_m)))
+                (truth, Some(notice::scan_notice(contacts, rmse_m)))
             }
             _ => (Truth::sample(&environment, per_side, tell), None),
         };
         if environment.task().zone().is_some() && !truth.is_known() {
-            return Err(Invalid::new(
+            return Err(InputError::new(
                 "no surface in the zone along the approach; check scene.zone and object.position_m",
             ));
         }
-        let shape = TrueShape::of(&environment);
+        let shape = TrueShape::from_environment(&environment);
         tell("compiling the model");
         let truth = GroundTruth { environment, truth, shape };
-        Ok(Self { scanned, ..Self::made(experiment, truth)? })
+        Ok(Self { scan_notice: scanned, ..Self::made(experiment, truth)? })
     }
 
     /// Builds the simulation as [`within`](Self::within) does, with a ground truth sampled before.
@@ -101,34 +107,41 @@ impl Simulation {
     ///
     /// # Errors
     /// If the scene cannot be simulated.
-    pub fn against(
+    pub fn with_truth(
         experiment: Experiment,
         environment: Arc<Environment>,
         truth: Truth,
-    ) -> Result<Self, Invalid> {
+    ) -> Result<Self, InputError> {
         Self::made(experiment, GroundTruth { environment, truth, shape: None })
     }
 
-    fn made(mut experiment: Experiment, truth: GroundTruth) -> Result<Self, Invalid> {
+    fn made(mut experiment: Experiment, truth: GroundTruth) -> Result<Self, InputError> {
         experiment.scene = truth.environment.scene().clone();
         let simulator = Simulator::new(Arc::clone(&truth.environment));
-        let simulator = simulator.map_err(|error| Invalid::new(error.to_string()))?;
+        let simulator = simulator.map_err(|error| InputError::new(error.to_string()))?;
         let truth = Arc::new(truth);
         let own_planners: Vec<Box<dyn PlannerFactory>> =
             vec![Box::new(OracleFactory(truth.clone()))];
-        Ok(Self { experiment, simulator, truth, lab: None, scanned: None, own_planners })
+        Ok(Self {
+            experiment,
+            simulator,
+            truth,
+            arm: None,
+            scan_notice: None,
+            external_planners: own_planners,
+        })
     }
 
     /// Adds planners that are not built in, under the names that the experiment lists.
     pub fn with_planners(mut self, planners: Vec<Box<dyn PlannerFactory>>) -> Self {
-        self.own_planners.extend(planners);
+        self.external_planners.extend(planners);
         self
     }
 
     /// Finds a planner by name: built in, [added](Self::with_planners), or the oracle.
     pub fn planner(&self, name: &str) -> Option<&dyn PlannerFactory> {
         let built_in = planner::by_name(name).map(|entry| entry as &dyn PlannerFactory);
-        let mut own = self.own_planners.iter().map(|planner| &**planner);
+        let mut own = self.external_planners.iter().map(|planner| &**planner);
         built_in.or_else(|| own.find(|planner| planner.name() == name))
     }
 
@@ -150,9 +163,9 @@ impl Simulation {
     /// Warnings about likely configuration mistakes.
     pub fn notices(&self) -> Vec<String> {
         let mut notices: Vec<String> = self.simulator.notices();
-        notices.extend(notice::of_truth(self.task().zone(), self.truth()));
-        notices.extend(self.scanned.clone());
-        notices.extend(self.shape().and_then(notice::of_shape));
+        notices.extend(notice::truth_notices(self.task().zone(), self.truth()));
+        notices.extend(self.scan_notice.clone());
+        notices.extend(self.shape().and_then(notice::shape_notice));
         notices
     }
 
@@ -185,13 +198,13 @@ impl Simulation {
     ///
     /// # Errors
     /// If the arm cannot be reached, or is not ready to be moved.
-    pub fn connect(&mut self) -> Result<Option<Arc<Lab>>, LinkFault> {
+    pub fn connect(&mut self) -> Result<Option<Arc<RosArm>>, LinkFault> {
         if self.is_real() {
             let lacks = || LinkFault::Arm("the scene has no object to touch".into());
             let chain = self.environment().chain().ok_or_else(lacks)?;
-            self.lab = Some(Lab::join(&self.experiment.backend, &chain)?);
+            self.arm = Some(RosArm::join(&self.experiment.backend, &chain)?);
         }
-        Ok(self.lab.clone())
+        Ok(self.arm.clone())
     }
 
     /// Returns the backend of a trial: the connected arm or the simulated body; `None` if touches
@@ -199,8 +212,8 @@ impl Simulation {
     ///
     /// # Errors
     /// If no arm is connected, or memory for the body's state is missing.
-    pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
-        match &self.lab {
+    pub fn backend(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
+        match &self.arm {
             Some(lab) => Ok(Some(Box::new(lab.body()))),
             None if self.is_real() => Err(Fault::lacks("a connection to the arm")),
             None => self.simulator.body(),
@@ -221,7 +234,7 @@ impl Simulation {
     /// If the body cannot be moved to its start, or no arm is connected.
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
         let seed = self.body_seed(trial);
-        match self.body()? {
+        match self.backend()? {
             Some(body) => Ok(Box::new(self.servo(body, seed)?)),
             None => self.simulator.probe(seed),
         }
@@ -231,7 +244,7 @@ impl Simulation {
     pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
         match self.probe(trial) {
             Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(())),
-            Err(fault) => TrialRow::unstarted(trial, planner.name(), &fault),
+            Err(fault) => TrialRow::not_started(trial, planner.name(), &fault),
         }
     }
 

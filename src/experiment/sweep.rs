@@ -1,21 +1,21 @@
 //! Sweeps: several experiments in one file, one per combination of the values in the table
 //! `[sweep]`.
 
-use crate::experiment::experiment::{Experiment, SWEEP, is_plain};
+use crate::experiment::experiment::{Experiment, SWEEP, is_name_character};
 use palpate_input::config::{ConfigError, Loader};
 use std::path::Path;
 use toml::Value;
 
 /// Maximum number of combinations.
 // heuristic: more are probably a mistake.
-const MOST: usize = 10_000;
+const CASES_MAX: usize = 10_000;
 
 /// Settings whose values are file names, relative to the experiment's file.
 const FILES: [&str; 4] = ["scene", "backend", "scene.object.mesh", "truth.scan"];
 
 /// One combination of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cell {
+pub struct SweepCase {
     /// Label that distinguishes it from the others, usable in a folder's name.
     pub label: String,
     /// Assignments, in the form of `--set`.
@@ -33,20 +33,20 @@ fn is_file(key: &str, value: &str) -> bool {
 ///
 /// # Errors
 /// If the file cannot be read, or the table does not consist of keys with lists.
-pub fn cells(path: &Path) -> Result<Vec<Cell>, ConfigError> {
+pub fn sweep_cases(path: &Path) -> Result<Vec<SweepCase>, ConfigError> {
     let mut loader = Loader::read(path)?;
     let Some(sweep) = loader.take(SWEEP) else { return Ok(Vec::new()) };
     let mut axes = Vec::new();
     let is_whole = flatten("", &sweep, &mut axes);
     let count = axes.iter().map(|(_, values)| values.len()).product::<usize>();
-    if !is_whole || axes.is_empty() || !(1..=MOST).contains(&count) {
+    if !is_whole || axes.is_empty() || !(1..=CASES_MAX).contains(&count) {
         let allowed = "keys with lists of values, as in \"gp.noise_sd_m\" = [1e-4, 1e-3]";
         return Err(loader.not_allowed(SWEEP, &sweep.to_string(), allowed));
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut cells = vec![Cell { label: String::new(), sets: Vec::new() }];
+    let mut cells = vec![SweepCase { label: String::new(), sets: Vec::new() }];
     for (key, values) in &axes {
-        let longer = |cell: &Cell| -> Vec<Cell> {
+        let longer = |cell: &SweepCase| -> Vec<SweepCase> {
             let with = |(i, value): (usize, &Value)| {
                 let set = match value {
                     Value::String(name) if is_file(key, name) => {
@@ -58,13 +58,13 @@ pub fn cells(path: &Path) -> Result<Vec<Cell>, ConfigError> {
                     value => format!("{key}={value}"),
                 };
                 let label = format!("{}-{}", cell.label, label(key, value, i));
-                Cell { label, sets: [&cell.sets[..], &[set]].concat() }
+                SweepCase { label, sets: [&cell.sets[..], &[set]].concat() }
             };
             values.iter().enumerate().map(with).collect()
         };
-        cells = cells.iter().flat_map(longer).collect();
+        sweep_cases = sweep_cases.iter().flat_map(longer).collect();
     }
-    Ok(cells)
+    Ok(sweep_cases)
 }
 
 /// Collects dotted keys and their lists; returns whether the table contains nothing else.
@@ -94,7 +94,7 @@ fn label(key: &str, value: &Value, place: usize) -> String {
         Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => value.to_string(),
         _ => String::new(),
     };
-    match !text.is_empty() && text.chars().all(is_plain) {
+    match !text.is_empty() && text.chars().all(is_name_character) {
         true => format!("{key}-{text}"),
         false => format!("{key}-{}", place + 1),
     }
@@ -105,7 +105,7 @@ impl Experiment {
     ///
     /// # Errors
     /// See [`load`](Self::load).
-    pub fn load_cell(path: &Path, cell: &Cell, sets: &[String]) -> Result<Self, ConfigError> {
+    pub fn load_cell(path: &Path, cell: &SweepCase, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
         loader.take(SWEEP);
         let sets = [sets, &cell.sets].concat();

@@ -6,10 +6,10 @@ use super::canvas::{Anchor, Area, Canvas};
 use super::legend::{Sheet, Swatch};
 use super::style::{self, FAINT_INK, INK, SMALL_PX, dot};
 use crate::experiment::statistics::mean;
-use crate::study::accuracy::comparison::Comparison;
-use crate::study::accuracy::convergence::Order;
-use crate::study::accuracy::deviation::Spread;
-use crate::study::accuracy::level::Level;
+use crate::study::accuracy::comparison::AccuracyComparison;
+use crate::study::accuracy::convergence::ConvergenceOrder;
+use crate::study::accuracy::deviation::ErrorStatistics;
+use crate::study::accuracy::level::FidelityLevel;
 use crate::study::accuracy::variant::Variant;
 
 /// Colours (Okabe and Ito 2008) and names of the sensing levels of a model, and of a thin shell.
@@ -34,7 +34,7 @@ const LINE_PX: f64 = 18.0;
 const NAME_PX: f64 = 140.0;
 
 /// Error of a variant, with its unit and name.
-type Measure = (fn(&Variant) -> Option<Spread>, f64, &'static str);
+type Measure = (fn(&Variant) -> Option<ErrorStatistics>, f64, &'static str);
 
 const ERRORS: [Measure; 3] = [
     (|it| it.contact_m, 1e-3, "contact error against reference (mm)"),
@@ -45,9 +45,9 @@ const ERRORS: [Measure; 3] = [
 /// Draws the levels and effects that were compared; `None` if no variant differs from its
 /// reference.
 pub fn draw(
-    levels: Option<&Comparison>,
-    orders: &[Order],
-    effects: Option<&Comparison>,
+    levels: Option<&AccuracyComparison>,
+    orders: &[ConvergenceOrder],
+    effects: Option<&AccuracyComparison>,
 ) -> Option<String> {
     let top_px = if levels.is_some() { TOP_PX + 2.0 * ROW_PX } else { TOP_PX };
     let lines_px = effects.map_or(0.0, |effects| effects.variants.len() as f64 * LINE_PX);
@@ -79,7 +79,7 @@ pub fn draw(
     Some(sheet.canvas.finish())
 }
 
-fn colour(level: &Level) -> &'static str {
+fn colour(level: &FidelityLevel) -> &'static str {
     let family = if level.shell.is_some() { 4 } else { level.senses as usize };
     FAMILIES[family].0
 }
@@ -88,7 +88,7 @@ fn colour(level: &Level) -> &'static str {
 fn draw_cost(
     canvas: &mut Canvas,
     area: Area,
-    levels: &Comparison,
+    levels: &AccuracyComparison,
     (measure, unit, words): Measure,
 ) -> Option<()> {
     let mut points: Vec<(f64, Bar, &Variant)> = (levels.variants.iter())
@@ -124,7 +124,7 @@ fn draw_cost(
     Some(())
 }
 
-fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
+fn draw_order(canvas: &mut Canvas, order: &ConvergenceOrder, area: Area) {
     let (x, y): (Vec<f64>, Vec<f64>) = order.errors.iter().copied().unzip();
     let (Some(x_axis), Some(y_axis)) = (Axis::log(x), Axis::log(y)) else { return };
     let panel = Panel { area, x: x_axis, y: y_axis };
@@ -190,7 +190,7 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
     Some(())
 }
 
-fn bar(spread: Spread, unit: f64) -> Bar {
+fn bar(spread: ErrorStatistics, unit: f64) -> Bar {
     (spread.mean / unit, spread.interval.map(|value| value / unit))
 }
 

@@ -4,7 +4,7 @@
 use super::canvas::{Anchor, Area, Canvas};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use super::table::{Cell, Column, Table};
-use crate::study::check::{Held, Judgement, Planner, Rules, Verdict};
+use crate::study::check::{CheckOptions, CheckResult, MeasureResult, PlannerResult, Verdict};
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 /// Returns the name of a verdict.
@@ -21,7 +21,7 @@ pub fn word(verdict: Verdict) -> &'static str {
 
 /// Returns a table with a row for each measure of each planner, or one row for a planner without
 /// measures.
-pub fn table(held: &Held) -> Table {
+pub fn table(held: &CheckResult) -> Table {
     let heads = ["planner", "measure", "change", "95 % interval, any time", "verdict", "trials"];
     let mut table = Table::new(heads.map(Column::new));
     table.rows =
@@ -29,9 +29,9 @@ pub fn table(held: &Held) -> Table {
     table
 }
 
-fn rows(planner: &Planner) -> Vec<[String; 6]> {
+fn rows(planner: &PlannerResult) -> Vec<[String; 6]> {
     let trials = planner.trials.to_string();
-    let row = |judgement: &Judgement| {
+    let row = |judgement: &MeasureResult| {
         let [low, high] = judgement.sequence.interval.map(|end| percent(judgement, end));
         let change = percent(judgement, judgement.sequence.mean);
         let interval = format!("{low} to {high}");
@@ -46,13 +46,13 @@ fn rows(planner: &Planner) -> Vec<[String; 6]> {
     }
 }
 
-fn percent(judgement: &Judgement, difference: f64) -> String {
+fn percent(judgement: &MeasureResult, difference: f64) -> String {
     let percent = judgement.judged.percent(difference);
     if percent.is_finite() { format!("{percent:+.1} %") } else { "–".into() }
 }
 
 /// Returns remarks on a check, a sentence each.
-pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
+pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<String> {
     let settings = "settings or the object's file differ from the baseline";
     let mut remarks: Vec<String> =
         (!held.same_settings).then(|| settings.into()).into_iter().collect();
@@ -65,7 +65,8 @@ pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
         }));
         remarks.extend(planner.judgements.first().map(|first| {
             let percent = 100.0 * rules.tolerance;
-            let wanted = first.wanted.map_or("more than 100000".into(), |count| count.to_string());
+            let wanted =
+                first.trials_needed.map_or("more than 100000".into(), |count| count.to_string());
             let is_open = first.verdict == Verdict::Undecided;
             let then = if is_open {
                 format!("; the limit was {most} (--max-trials)")
@@ -82,7 +83,7 @@ pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
 }
 
 /// Formats the whole check as Markdown.
-pub fn markdown(name: &str, held: &Held, rules: &Rules, most: u32) -> String {
+pub fn markdown(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) -> String {
     let mut text = format!("### {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
     remarks(held, rules, most).iter().for_each(|remark| text += &format!("\n* {remark}"));
     text + "\n"
@@ -93,7 +94,12 @@ pub fn markdown(name: &str, held: &Held, rules: &Rules, most: u32) -> String {
 ///
 /// # Errors
 /// If a name contains a character that XML does not allow.
-pub fn junit(name: &str, held: &Held, rules: &Rules, most: u32) -> Result<String, SerializeError> {
+pub fn junit(
+    name: &str,
+    held: &CheckResult,
+    rules: &CheckOptions,
+    most: u32,
+) -> Result<String, SerializeError> {
     let mut report = Report::new("palpate check");
     let mut suite = TestSuite::new(name);
     for planner in &held.planners {
@@ -108,7 +114,7 @@ pub fn junit(name: &str, held: &Held, rules: &Rules, most: u32) -> Result<String
     report.to_string()
 }
 
-fn status(planner: &Planner) -> TestCaseStatus {
+fn status(planner: &PlannerResult) -> TestCaseStatus {
     let kind = match planner.verdict {
         Verdict::Identical | Verdict::Better | Verdict::Ok => return TestCaseStatus::success(),
         Verdict::Worse | Verdict::Missing => NonSuccessKind::Failure,
@@ -129,7 +135,7 @@ const LINE_PX: f64 = 22.0;
 const REACH: f64 = 4.0;
 
 /// Draws each measure's change with its interval, and the tolerance.
-pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
+pub fn draw(name: &str, held: &CheckResult, rules: &CheckOptions) -> String {
     let lines: usize = held.planners.iter().map(|planner| planner.judgements.len().max(1)).sum();
     let bottom = TOP_PX + lines as f64 * LINE_PX + 6.0;
     let mut canvas = Canvas::new(LEFT_PX + WIDTH_PX + RIGHT_PX, bottom + 34.0);

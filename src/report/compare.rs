@@ -3,7 +3,7 @@
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
-use super::findings::{HONEST, by_verdict, clauses};
+use super::findings::{CALIBRATED, by_verdict, clauses};
 use super::glossary::explained;
 use super::html::{figure, fold, page, tables};
 use super::legend::{Sheet, Swatch};
@@ -15,25 +15,25 @@ use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::statistics::mean;
 use crate::experiment::trial::entrant::ORACLE;
 use crate::study::compare::{
-    Compared, Contender, FLOOR, ObjectResult, gap_closed, geometric, improvement, interquartile,
-    profile,
+    BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric, interquartile,
+    profile, win_probability,
 };
 
 /// Seed of all bootstraps.
 const SEED: u64 = 0;
 
 /// Returns a planner's error on one object, relative to the reference.
-fn error_on(contender: &Contender, object: usize) -> Option<Estimate> {
+fn error_on(contender: &Entrant, object: usize) -> Option<Estimate> {
     geometric(&[&contender.results[object].scores], SEED)
 }
 
 fn judged(error: Option<Estimate>) -> Cell {
     let interval = error.and_then(|error| error.interval);
-    Cell::estimate(error).judged(interval, 1.0, Direction::Less)
+    Cell::estimate(error).with_verdict(interval, 1.0, Direction::Less)
 }
 
 /// Returns a table with a row for each planner, over all objects.
-pub fn overall(compared: &Compared) -> Table {
+pub fn overall(compared: &SuiteComparison) -> Table {
     let count = compared.objects.len();
     let mut table = Table::new([
         Column::new("planner"),
@@ -76,37 +76,37 @@ pub fn overall(compared: &Compared) -> Table {
             Cell::from((!values.is_empty()).then(|| mean(&values)))
         };
         let coverages = contender.results.iter().filter_map(|result| result.coverage);
-        let honest = coverages.filter(|share| HONEST.contains(share)).count();
+        let honest = coverages.filter(|share| CALIBRATED.contains(share)).count();
         table.rows.push(vec![
             contender.name.as_str().into(),
             judged(geometric(&contender.scores(), SEED)),
             on("better"),
             on("worse"),
             Cell::estimate(gap_closed(compared, contender, &all, SEED)),
-            mean_of(|result| result.missed),
-            mean_of(|result| result.stalled),
+            mean_of(|result| result.miss_share),
+            mean_of(|result| result.fallback_share),
             mean_of(|result| result.travel_m),
             format!("{honest} of {count}").into(),
             mean_of(|result| result.brier),
             mean_of(|result| result.iou),
-            reference.and_then(|reference| improvement(contender, reference)).into(),
+            reference.and_then(|reference| win_probability(contender, reference)).into(),
         ]);
     }
     table.without_empty()
 }
 
 /// Returns a table of geometric means, with a row for each object and a column for each planner.
-pub fn each(compared: &Compared) -> Table {
+pub fn each(compared: &SuiteComparison) -> Table {
     let rows = compared.objects.iter().enumerate().map(|(object, name)| (name.clone(), object));
     let columns = compared.contenders.iter().map(|it| (Column::new(&it.name), it)).collect();
     let cell =
-        |object: &usize, contender: &&Contender| Some(judged(Some(error_on(contender, *object)?)));
+        |object: &usize, contender: &&Entrant| Some(judged(Some(error_on(contender, *object)?)));
     Table::cross("object", rows, columns, cell)
 }
 
 /// Returns a table of interquartile means, with a row for each planner, a column for each object
 /// and one for all.
-pub fn interquartiles(compared: &Compared) -> Table {
+pub fn interquartiles(compared: &SuiteComparison) -> Table {
     let rows = compared.contenders.iter().map(|it| (it.name.clone(), it.scores()));
     let objects = compared.objects.iter().enumerate();
     let mut columns: Vec<(Column, Option<usize>)> =
@@ -127,7 +127,7 @@ pub fn note(against: &str) -> String {
         "Error: exp(mean log error over the touches after the initial ones), relative to {against} in \
          the same trial; geometric mean over trials and objects, with the 95 % interval of a bootstrap \
          over trials. Less is better; better and worse mean that the interval excludes 1. Gap closed: \
-         fraction of the way from {FLOOR} to {ORACLE}, which uses the ground truth, in mean log error. \
+         fraction of the way from {BASELINE_PLANNER} to {ORACLE}, which uses the ground truth, in mean log error. \
          Missed: touches without contact. Stalled: plans for which the planner's own rule found no \
          target. In the band: objects with 90 to 98 % of the truth in the 95 % band after the last \
          touch. Brier and IoU, for objects that do not fill their zone: mean squared error of the \
@@ -137,7 +137,7 @@ pub fn note(against: &str) -> String {
 }
 
 /// Returns the verdict as a sentence; `None` without other planners than the reference.
-fn sentence(compared: &Compared) -> Option<String> {
+fn sentence(compared: &SuiteComparison) -> Option<String> {
     let against = &compared.against;
     let others = compared.contenders.iter().filter(|it| it.name != *against);
     let verdicts = others.map(|it| {
@@ -154,13 +154,13 @@ fn sentence(compared: &Compared) -> Option<String> {
 }
 
 /// Returns the page: the verdict, the table over all objects, the figures, then each object.
-pub fn html(name: &str, question: &str, compared: &Compared) -> String {
+pub fn html(name: &str, question: &str, compared: &SuiteComparison) -> String {
     let note = note(&compared.against);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
     let each = tables("", &[each(compared)], "named", "");
     let each = fold("Object by object", &each);
     let objects = compared.objects.len();
-    let trials = compared.contenders.iter().flat_map(Contender::scores).map(<[f64]>::len).max();
+    let trials = compared.contenders.iter().flat_map(Entrant::scores).map(<[f64]>::len).max();
     let profiles = format!(
         "Performance profiles: fraction of the trials whose error is at most the value on the x axis, \
          averaged over {objects} objects with up to {} trials each. A curve farther left is better.",
@@ -184,7 +184,7 @@ pub fn html(name: &str, question: &str, compared: &Compared) -> String {
 }
 
 /// Returns the table of `suite.csv`, with a row per object and planner.
-pub fn file(compared: &Compared) -> Table {
+pub fn file(compared: &SuiteComparison) -> Table {
     let mut table = Table::new([
         Column::new("object").note("Name of the object."),
         Column::new("planner").note("Name of the planner."),
@@ -216,8 +216,8 @@ pub fn file(compared: &Compared) -> Table {
                 result.scores.len().into(),
                 Cell::estimate(error_on(contender, object)),
                 gap.map(|gap| gap.value).into(),
-                result.missed.into(),
-                result.stalled.into(),
+                result.miss_share.into(),
+                result.fallback_share.into(),
                 result.travel_m.into(),
                 result.coverage.into(),
                 result.brier.into(),
@@ -230,10 +230,10 @@ pub fn file(compared: &Compared) -> Table {
 
 /// Draws performance profiles: the fraction of trials with an error below each value; `None`
 /// without a score.
-pub fn profiles(compared: &Compared) -> Option<String> {
+pub fn profiles(compared: &SuiteComparison) -> Option<String> {
     // Finer than visible.
     const STEPS: u32 = 300;
-    let scores = compared.contenders.iter().flat_map(Contender::scores).flatten().copied();
+    let scores = compared.contenders.iter().flat_map(Entrant::scores).flatten().copied();
     let x = Axis::log(scores.chain([1.0]))?;
     let (low, high) = x.range();
     let at = |i: u32| low * (high / low).powf(f64::from(i) / f64::from(STEPS));
@@ -248,12 +248,12 @@ pub fn profiles(compared: &Compared) -> Option<String> {
 
 /// Draws the reliability over all objects: the fraction of places with a surface, over its
 /// predicted probability; `None` if every object fills its zone.
-fn reliability(compared: &Compared) -> Option<String> {
+fn reliability(compared: &SuiteComparison) -> Option<String> {
     /// Smallest number of places of a point, over all objects and trials, a heuristic: 50 determine
     /// a fraction to 7 %.
     const PLACES_MIN: u32 = 50;
     // Middle of each tenth, and the fraction of its places that have a surface.
-    let curve = |contender: &Contender| -> Vec<(f64, f64)> {
+    let curve = |contender: &Entrant| -> Vec<(f64, f64)> {
         let share = |tenth: usize| {
             let counts = contender.results.iter().map(|result| result.reliability[tenth]);
             let [all, there] =
@@ -273,7 +273,7 @@ fn reliability(compared: &Compared) -> Option<String> {
 
 /// Draws one panel with a curve for each planner, a legend above, and a dashed reference line.
 fn draw(
-    compared: &Compared,
+    compared: &SuiteComparison,
     (area, x, [x_name, y_name]): (Area, Axis, [&str; 2]),
     curves: Vec<Vec<(f64, f64)>>,
     reference: [[f64; 2]; 2],

@@ -36,7 +36,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
         vec![shapes(run, &curves), against_baseline(run, &curves)]
     } else if run.truth.is_known() {
         let (needed, against) = (r_needed(run, &curves), against_baseline(run, &curves));
-        vec![scores(run, &curves), needed, against, honesty(&curves)]
+        vec![scores(run, &curves), needed, against, band_coverage(&curves)]
     } else {
         Vec::new()
     };
@@ -137,7 +137,7 @@ fn needed(
     goal: &str,
     is_met: impl Fn(&CurvePoint) -> bool,
 ) -> Option<String> {
-    let words = |points: &[CurvePoint]| match summary::met_from(points, &is_met) {
+    let words = |points: &[CurvePoint]| match summary::goal_touches(points, &is_met) {
         Some(touches) => Some(touches.to_string()),
         None => Some(format!("not within {}", run.experiment.touches)),
     };
@@ -147,7 +147,7 @@ fn needed(
 /// Returns the touches that the other planners need for the first baseline's final error.
 fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     let name = *run.experiment.baselines().first()?;
-    let error = run.experiment.error();
+    let error = run.experiment.error_measure();
     let compared = curves.iter().map(|(planner, points)| {
         let points = points.iter().filter(|point| point.of(error).is_some());
         (*planner, points.cloned().collect::<Vec<_>>())
@@ -166,7 +166,7 @@ fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
 }
 
 /// Fractions of the truth inside a 95 % band that count as calibrated, a heuristic: close to 95 %.
-pub(super) const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
+pub(super) const CALIBRATED: std::ops::RangeInclusive<f64> = 0.9..=0.98;
 
 /// Returns the fraction of the truth inside the 95 % band of a curve's last belief.
 pub(super) fn share_in_band(points: &[CurvePoint]) -> Option<f64> {
@@ -174,7 +174,7 @@ pub(super) fn share_in_band(points: &[CurvePoint]) -> Option<f64> {
 }
 
 /// Returns the fractions of the truth inside the bands of the last beliefs.
-fn honesty(curves: &[Curve]) -> Option<String> {
+fn band_coverage(curves: &[Curve]) -> Option<String> {
     let words = |points: &[CurvePoint]| Some(format!("{:.0} %", 100.0 * share_in_band(points)?));
     let shares = each(curves, words)?.join(", ");
     Some(format!("Fraction of the truth inside the 95 % band of the last belief: {shares}."))
@@ -185,22 +185,22 @@ fn honesty(curves: &[Curve]) -> Option<String> {
 pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
     let baselines = run.experiment.baselines();
     let baseline = baselines.first().copied().unwrap_or_default();
-    nearness(run, analysis, baseline)
+    error_verdict(run, analysis, baseline)
         .into_iter()
-        .chain(effort(run, analysis, baseline))
-        .chain(trust(run))
+        .chain(touches_verdict(run, analysis, baseline))
+        .chain(calibration(run))
         .collect()
 }
 
 /// Returns which planners have a smaller error after the last touch than the first baseline.
-fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
-    let id = run.experiment.error().id;
+fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let id = run.experiment.error_measure().id;
     let found = analysis.comparisons.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
     let trials = found.clone().map(|it| it.paired.trials).max()?;
     let verdicts =
         found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));
-    let error = run.experiment.error().title;
+    let error = run.experiment.error_measure().title;
     let words = [
         format!("a smaller {error} than {baseline}"),
         format!("a larger {error} than {baseline}"),
@@ -212,8 +212,8 @@ fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
 }
 
 /// Returns which planners need fewer touches than the first baseline for its final error.
-fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
-    let id = run.experiment.error().id;
+fn touches_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let id = run.experiment.error_measure().id;
     let found = analysis.equal_errors.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
     let verdicts = found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Less)));
@@ -224,12 +224,12 @@ fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
 }
 
 /// Returns which planners have calibrated bands after the last touch.
-fn trust(run: &Run) -> Option<String> {
+fn calibration(run: &Run) -> Option<String> {
     let groups = run.experiment.planners.iter().filter_map(|name| {
         let points = summary::curve(&run.experiment, &run.rows, name);
         let group = match share_in_band(&points)? {
-            share if HONEST.contains(&share) => 0,
-            share if share < *HONEST.start() => 1,
+            share if CALIBRATED.contains(&share) => 0,
+            share if share < *CALIBRATED.start() => 1,
             _ => 2,
         };
         Some((name.as_str(), group))

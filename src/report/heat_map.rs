@@ -10,19 +10,19 @@ const CELL_PX: f64 = 4.0;
 const LEVELS: usize = 64;
 
 /// Place, the value there, and whether it is drawn.
-pub type Reading = (Vec<f64>, f64, bool);
+pub type MapValue = (Vec<f64>, f64, bool);
 
 /// Values over a zone, x varying fastest.
 pub struct HeatMap {
     columns: usize,
     rows: usize,
     /// Readings at the middles of the cells.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<MapValue>,
 }
 
 impl HeatMap {
     /// Creates a map of the size of `area`; `read` gets the middles of its cells.
-    pub fn new(zone: &Zone, area: Area, read: impl FnOnce(Vec<Vec<f64>>) -> Vec<Reading>) -> Self {
+    pub fn new(zone: &Zone, area: Area, read: impl FnOnce(Vec<Vec<f64>>) -> Vec<MapValue>) -> Self {
         let cells = |side_px: f64| (side_px / CELL_PX).round().max(1.0) as usize;
         let (columns, rows) = (cells(area.width), cells(area.height));
         let middle = |i: usize, count: usize| (i as f64 + 0.5) / count as f64;
@@ -39,7 +39,7 @@ impl HeatMap {
     /// Fills `area`, z upwards.
     pub fn draw(&self, canvas: &mut Canvas, area: Area, colour: impl Fn(f64) -> String) {
         let largest = self.largest();
-        let level = |(_, value, is_drawn): &Reading| {
+        let level = |(_, value, is_drawn): &MapValue| {
             let share = if largest > 0.0 { value / largest } else { 0.0 };
             is_drawn.then(|| ((share * LEVELS as f64) as usize).min(LEVELS - 1))
         };

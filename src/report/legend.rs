@@ -1,7 +1,7 @@
 //! Legend of a drawing: swatches with their labels, in as many rows as they need.
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
-use super::style::{self, INITIAL, LATER, TEXT_PX};
+use super::style::{self, INITIAL, PLANNED, TEXT_PX};
 use crate::experiment::store::Run;
 
 /// Height of a row.
@@ -95,14 +95,14 @@ pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
 }
 
 /// Legend entry of missed touches.
-pub const MISS: (Swatch, &str) = (Swatch::Diamond(LATER), "touch without contact");
+pub const MISS: (Swatch, &str) = (Swatch::Diamond(PLANNED), "touch without contact");
 
 /// Returns the legend entries of touches that a surface may hide.
 pub fn touch_entries() -> [(Swatch, &'static str); 3] {
     [
         (Swatch::Circle(style::visible(INITIAL)), "initial touch"),
-        (Swatch::Circle(style::visible(LATER)), "later touch"),
-        (Swatch::Circle(style::hidden(LATER)), "behind the surface"),
+        (Swatch::Circle(style::visible(PLANNED)), "later touch"),
+        (Swatch::Circle(style::hidden(PLANNED)), "behind the surface"),
     ]
 }
 

@@ -30,7 +30,7 @@ pub mod tables {
 }
 pub mod whole;
 
-pub use figures::Figure;
+pub use figures::ReportFigure;
 
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
@@ -38,7 +38,7 @@ use anyhow::Context;
 use std::path::Path;
 
 /// Figures in the order of the page; one line adds a figure.
-pub const FIGURES: &[Figure] = &[
+pub const FIGURES: &[ReportFigure] = &[
     figures::convergence::FIGURE,
     figures::curves::FIGURE,
     figures::SURFACES,

@@ -1,7 +1,7 @@
 //! Page of a run: one self-contained HTML file.
 
 use super::canvas::escape;
-use super::figures::Figure;
+use super::figures::ReportFigure;
 use super::files::FORMATS;
 use super::findings;
 use super::glossary::explained;
@@ -30,7 +30,7 @@ const FAILURES_LISTED: usize = 10;
 pub fn html(
     run: &Run,
     analysis: &Analysis,
-    drawings: &[(&Figure, String)],
+    drawings: &[(&ReportFigure, String)],
     explorer: &str,
     [settings, manifest]: [Option<&str>; 2],
 ) -> String {
@@ -84,7 +84,7 @@ fn verdict(run: &Run, analysis: &Analysis) -> String {
 }
 
 fn events(run: &Run) -> String {
-    let mut items = summary::happened(run);
+    let mut items = summary::event_lines(run);
     let failures = run.rows.iter().filter_map(|row| {
         Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
     });
@@ -92,7 +92,7 @@ fn events(run: &Run) -> String {
     list("", &items)
 }
 
-fn figure(run: &Run, figure: &Figure, svg: &str) -> String {
+fn figure(run: &Run, figure: &ReportFigure, svg: &str) -> String {
     let name = figure.name;
     let links = FORMATS
         .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
@@ -105,7 +105,7 @@ fn preformatted(text: Option<&str>) -> String {
     text.map_or(String::new(), |text| format!("<pre>{}</pre>\n", escape(text)))
 }
 
-fn raw_files(drawings: &[(&Figure, String)]) -> String {
+fn raw_files(drawings: &[(&ReportFigure, String)]) -> String {
     let mut items: String = RAW
         .iter()
         .map(|(file, what)| format!("<li><a href=\"{file}\">{file}</a>: {what}</li>\n"))

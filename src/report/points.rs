@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 /// Points in `W`, in metres, optionally joined to a surface.
 #[derive(Default)]
-pub struct Points {
+pub struct PointCloud {
     /// Comments at the top of the file, a line each.
     pub comments: Vec<String>,
     /// Points with their unit normals.
@@ -19,7 +19,7 @@ pub struct Points {
     pub triangles: Vec<[usize; 3]>,
 }
 
-impl Points {
+impl PointCloud {
     /// Formats the points as PLY: `x y z nx ny nz`, with deviations `red green blue sigma_m`, with
     /// errors `error_m`.
     pub fn ply(&self) -> String {

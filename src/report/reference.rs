@@ -29,7 +29,7 @@ const AROUND: &str = "space";
 fn allowed() -> BTreeMap<String, String> {
     let Ok(complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
     let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
-    let rules = Rules::of(&complete).into_iter();
+    let rules = Rules::allowed_values(&complete).into_iter();
     // A check that all entries share is listed once.
     rules.map(|(key, allowed)| (whole(&key), allowed)).collect()
 }
@@ -73,7 +73,7 @@ fn add_table(
         };
         let allowed = allowed.get(&key).cloned().or_else(|| names(inner)).unwrap_or_default();
         let key = format!("`{shown}{dot}{name}`");
-        let cells = [key, kind(inner, entries), default, allowed, words(property, inner)];
+        let cells = [key, kind(inner, entries), default, allowed, description(property, inner)];
         table.rows.push(cells.map(Cell::from).into());
     }
     if !table.rows.is_empty() {
@@ -126,7 +126,7 @@ fn names(schema: &Value) -> Option<String> {
 }
 
 /// Returns the first paragraph of a documentation, without line breaks.
-fn words(property: &Value, inner: &Value) -> String {
+fn description(property: &Value, inner: &Value) -> String {
     let text = property["description"].as_str().or(inner["description"].as_str()).unwrap_or("");
     plain(text.split("\n\n").next().unwrap_or(""))
 }
@@ -173,7 +173,7 @@ pub fn columns(table: &Table) -> String {
 fn record<T: JsonSchema>() -> String {
     let schema = schema_for!(T).to_value();
     let properties = schema["properties"].as_object().into_iter().flatten();
-    fields(properties.map(|(name, property)| (name, words(property, &Value::Null))))
+    fields(properties.map(|(name, property)| (name, description(property, &Value::Null))))
 }
 
 /// Returns the fields of a line of `trials.jsonl`, of each of its touches and of their parts.

@@ -37,7 +37,7 @@ pub struct Camera {
 impl Camera {
     /// Creates a camera turned about z from y towards x, with one pixel a metre about the drawing's
     /// corner.
-    pub fn toward(azimuth_deg: f64, stretch: f64) -> Self {
+    pub fn from_azimuth(azimuth_deg: f64, stretch: f64) -> Self {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
         let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
         let toward = Vector3::new(sin_a * cos_e, cos_a * cos_e, sin_e);
@@ -141,7 +141,7 @@ impl ReliefPanel {
         let Space { x_m, z_m, height_m } = space;
         let corner = |i: usize| Vector3::new(x_m[i & 1], height_m[(i >> 1) & 1], z_m[(i >> 2) & 1]);
         let corners: Vec<_> = (0..8).map(corner).collect();
-        let camera = Camera::toward(AZIMUTH_DEG, space.stretch());
+        let camera = Camera::from_azimuth(AZIMUTH_DEG, space.stretch());
         let px_per_m = camera.scale(&corners, inner);
         Self { space, camera: camera.scaled(px_per_m, &corners, inner), area, unit }
     }

@@ -10,13 +10,13 @@ use crate::report::table::digits;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::HeightField;
-use palpate_explore::probe::{Contact, Swept, Touch};
+use palpate_explore::probe::{Contact, SweptVolume, Touch};
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 
 /// Score of a missing belief.
-pub const NOT_REACHED: &str = "not reached in this trial";
+pub const NO_BELIEF: &str = "not reached in this trial";
 
 /// Belief of one planner after some touches of the drawn trial.
 pub struct Replay<'a> {
@@ -125,8 +125,8 @@ impl<'a> Replay<'a> {
 }
 
 /// Returns a sentence of a caption on where beliefs are drawn; empty if the surface is everywhere.
-pub fn drawn_words(run: &Run) -> &'static str {
-    match run.truth.count() < run.truth.places.len() {
+pub fn drawn_caption(run: &Run) -> &'static str {
+    match run.truth.surface_count() < run.truth.places.len() {
         true => {
             " A belief is drawn where a surface is more probable than none; all of it as long as every \
              touch has made contact."
@@ -220,6 +220,6 @@ pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyho
 }
 
 /// Returns the volume that the finger swept in a recorded touch, if it is known.
-pub(super) fn swept(finger: Finger, touch: &TouchRow) -> Option<Swept> {
-    Some(Swept { finger, p_wt: Point3::from(touch.tip?) })
+pub(super) fn swept(finger: Finger, touch: &TouchRow) -> Option<SweptVolume> {
+    Some(SweptVolume { finger, p_wt: Point3::from(touch.tip?) })
 }

@@ -4,7 +4,7 @@
 use super::axes::{Axis, Length, height_bar};
 use super::canvas::{Area, Canvas};
 use super::relief::{Relief, ReliefPanel, Space, height_colour};
-use super::style::{self, LATER};
+use super::style::{self, PLANNED};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
 use palpate_geometry::mesh::Mesh;
@@ -111,11 +111,11 @@ fn draw_object(
     for side in rim(zone) {
         // Where the zone reaches past the object, its outline is at the height of the datum.
         let at_datum = side.iter().map(|place| at(place[0], 0.0, place[1]));
-        canvas.line(at_datum, &style::stroke(LATER, 0.6));
+        canvas.line(at_datum, &style::stroke(PLANNED, 0.6));
         let on_surface = side.iter().map(|place| Some(at(place[0], height_m(place)?, place[1])));
         let on_surface: Vec<_> = on_surface.collect();
         for part in on_surface.split(Option::is_none) {
-            canvas.line(part.iter().flatten().copied(), &style::stroke(LATER, 2.0));
+            canvas.line(part.iter().flatten().copied(), &style::stroke(PLANNED, 2.0));
         }
     }
 }

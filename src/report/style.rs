@@ -26,10 +26,10 @@ pub const TRUTH: &str = "#009e73";
 /// Colour of the initial touches, which all planners share.
 pub const INITIAL: &str = "#0046c8";
 /// Colour of touches chosen by a planner.
-pub const LATER: &str = "#d00000";
+pub const PLANNED: &str = "#d00000";
 /// Returns the colour of a touch.
 pub fn touch(is_initial: bool) -> &'static str {
-    if is_initial { INITIAL } else { LATER }
+    if is_initial { INITIAL } else { PLANNED }
 }
 
 /// Colour of the place with the largest deviation.
@@ -64,7 +64,7 @@ pub const ON_DARK: [(&str, &str); 19] = [
     (FRAME, "#878e96"),
     (TRUTH, "#2fc497"),
     (INITIAL, "#6ea8fe"),
-    (LATER, "#ff6b5e"),
+    (PLANNED, "#ff6b5e"),
     (MAXIMUM, "#ffffff"),
     ("#0072b2", "#4c93e0"),
     ("#d55e00", "#f08a3c"),
@@ -91,7 +91,7 @@ pub fn touch_colours() -> Value {
         "error": ERROR.map(rgb),
         "truth": rgb(0x009e73),
         "initial": on_both(INITIAL),
-        "later": on_both(LATER),
+        "later": on_both(PLANNED),
         "height": HEIGHT.map(rgb),
     })
 }

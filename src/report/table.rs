@@ -108,7 +108,7 @@ impl Cell {
 
     /// Sets the verdict that the interval of an estimate establishes; `direction` is better, and
     /// both are equal at `even`.
-    pub fn judged(self, interval: Option<[f64; 2]>, even: f64, direction: Direction) -> Self {
+    pub fn with_verdict(self, interval: Option<[f64; 2]>, even: f64, direction: Direction) -> Self {
         Self { verdict: verdict(interval, even, direction), ..self }
     }
 

@@ -1,9 +1,9 @@
 //! Replay of beliefs of whole objects: recorded touches and hyperparameters, conditioned again and
 //! converted to surfaces.
 
-use super::figures::Figure;
+use super::figures::ReportFigure;
 use super::replay::{self, swept, touched};
-use super::solid::{self, Frame, Sequence, Touch, counts};
+use super::solid::{self, Frame, PlannerSurfaces, Touch, counts};
 use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
@@ -43,7 +43,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
 }
 
 /// Figure of believed whole objects, by planner and touch count; none for a run over a zone.
-pub const FIGURE: Figure = Figure {
+pub const FIGURE: ReportFigure = ReportFigure {
     name: "solids",
     caption: |run| {
         format!(
@@ -73,17 +73,18 @@ fn sequences(
     planners: &[&str],
     counts: &[u32],
     truth: Option<&MeshBvh>,
-) -> anyhow::Result<Vec<Sequence>> {
+) -> anyhow::Result<Vec<PlannerSurfaces>> {
     let initial_touches = run.experiment.initial_touches as usize;
-    let sequence = |row: &TrialRow| -> anyhow::Result<Sequence> {
+    let sequence = |row: &TrialRow| -> anyhow::Result<PlannerSurfaces> {
         let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
+        let mut sequence =
+            PlannerSurfaces { planner: row.planner.clone(), ..PlannerSurfaces::default() };
         for (i, touch) in row.touches.iter().enumerate() {
             let no_aim = || format!("{}: target is not an aim at a whole object", place(i + 1));
             let aim = touch.target.aim().with_context(no_aim)?;
             sequence.touches.push(Touch {
                 aim_w: aim.p_w,
-                along_w: *aim.ahead_w,
+                along_w: *aim.direction_w,
                 contact_w: touch.contact.map(Point3::from),
                 is_initial: i < initial_touches,
             });
@@ -123,7 +124,7 @@ pub fn frame(
     let shape = touches.last().and_then(|touch| touch.shape.as_ref());
     let error = |bvh: &MeshBvh, p_w: &Point3<f64>| {
         let distance_m = bvh.closest_point(p_w).distance_m;
-        if bvh.surrounds(p_w) { -distance_m } else { distance_m }
+        if bvh.is_enclosed(p_w) { -distance_m } else { distance_m }
     };
     Ok(Some(Frame {
         touches: count,

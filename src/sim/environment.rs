@@ -1,7 +1,7 @@
 //! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
 use super::notice;
-use super::scene::{Body, Function, Object, Scene, Unit};
+use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::sim::finger::Fingertip;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
@@ -9,20 +9,20 @@ use palpate_explore::robot::Robot;
 use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
 use palpate_explore::robot::arm::{ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
-use palpate_explore::task::{Approach, Around, Ball, RADIUS_M, Region, Task, Zone};
+use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::implicit::Implicit;
 use palpate_geometry::import::import_with;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::report::MeshReport;
 use palpate_geometry::surfaces;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::borrow::Cow;
 
 /// Scene with its mesh loaded and its search tree built.
 pub struct Environment {
     scene: Scene,
-    shape: Shape,
+    shape: Surface,
     task: Task,
     arm: Option<Chain>,
     arm_mjcf: Option<String>,
@@ -31,9 +31,9 @@ pub struct Environment {
 }
 
 /// Surface to touch.
-pub enum Shape {
+pub enum Surface {
     /// An analytic curve.
-    Function(Function),
+    Function(AnalyticCurve),
     /// A mesh in `W`.
     Mesh {
         /// The mesh with its search tree.
@@ -44,13 +44,13 @@ pub enum Shape {
 }
 
 /// Returns the error of a scene that lacks `part`.
-pub(super) fn missing(part: &str) -> Invalid {
-    Invalid::new(format!("the scene has no {part}, which its body needs"))
+pub(super) fn missing_part(part: &str) -> InputError {
+    InputError::new(format!("the scene has no {part}, which its body needs"))
 }
 
 /// Returns an [`Invalid`] with the message of another error.
-pub(super) fn invalid(error: impl std::fmt::Display) -> Invalid {
-    Invalid::new(error.to_string())
+pub(super) fn invalid(error: impl std::fmt::Display) -> InputError {
+    InputError::new(error.to_string())
 }
 
 impl Environment {
@@ -58,8 +58,8 @@ impl Environment {
     ///
     /// # Errors
     /// If the mesh is unusable or lies wholly outside the zone.
-    pub fn build(scene: Scene) -> Result<Self, Invalid> {
-        Self::build_telling(scene, &|_| ())
+    pub fn build(scene: Scene) -> Result<Self, InputError> {
+        Self::build_with_progress(scene, &|_| ())
     }
 
     /// Builds an environment like [`build`](Self::build), and calls `tell` with the name of each
@@ -67,46 +67,49 @@ impl Environment {
     ///
     /// # Errors
     /// The errors of [`build`](Self::build).
-    pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
-        if scene.body == Body::Function {
-            let function = scene.function.ok_or_else(|| missing("function"))?;
-            return Self::around(scene, Shape::Function(function));
+    pub fn build_with_progress(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, InputError> {
+        if scene.body == SimulatorKind::Function {
+            let function = scene.function.ok_or_else(|| missing_part("function"))?;
+            return Self::with_shape(scene, Surface::Function(function));
         }
-        let object = scene.object.as_ref().ok_or_else(|| missing("object"))?;
+        let object = scene.object.as_ref().ok_or_else(|| missing_part("object"))?;
         tell(&format!("reading {}", object.mesh.display()));
-        let (mesh, report) =
-            import_with(&object.mesh, object.unit.metres() * object.scale, object.outside_buffers)?;
+        let (mesh, report) = import_with(
+            &object.mesh,
+            object.unit.metres_per_unit() * object.scale,
+            object.outside_buffers,
+        )?;
         tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
-        Self::around(scene, Shape::Mesh { bvh, report: report.into() })
+        Self::with_shape(scene, Surface::Mesh { bvh, report: report.into() })
     }
 
     /// Builds an environment around a shape in memory, in place of the object that the scene names.
     ///
     /// # Errors
     /// If the shape lies wholly outside the zone.
-    pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, Invalid> {
+    pub fn with_shape(mut scene: Scene, shape: Surface) -> Result<Self, InputError> {
         let mut notices = Vec::new();
         let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
-        if let Cow::Owned(effects) = scene.felt_effects() {
+        if let Cow::Owned(effects) = scene.effective_effects() {
             scene.effects = effects;
             notices.push(notice::DEFAULT_FINGER.into());
         }
-        if !scene.effects.moved_keys.is_empty() {
-            notices.push(notice::moved_keys(&scene.effects.moved_keys));
+        if !scene.effects.legacy_keys.is_empty() {
+            notices.push(notice::legacy_keys(&scene.effects.legacy_keys));
         }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
-        if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
+        if scene.body.moves_finger() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
-        let task = if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
-            let ball = ball_around(around, bvh.mesh())?;
-            task_around(&scene, arm.as_ref(), ball, bvh.mesh())?
+        let task = if let (Some(around), Surface::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
+            let ball = bounding_ball(around, bvh.mesh())?;
+            whole_object_task(&scene, arm.as_ref(), ball, bvh.mesh())?
         } else {
-            let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
+            let zone = scene.zone.as_mut().ok_or_else(|| missing_part("zone"))?;
             let extent = extent(zone, &shape);
             let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
-            if let Shape::Mesh { bvh, .. } = &shape {
+            if let Surface::Mesh { bvh, .. } = &shape {
                 let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
                 let size = notice::size_mismatch(zone, unit, &extent);
                 check_overlap(zone, depth_m, &extent, size.as_deref())?;
@@ -123,8 +126,8 @@ impl Environment {
             Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,
         };
-        if scene.body == Body::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
-            return Err(missing("`mjcf` in its arm's model"));
+        if scene.body == SimulatorKind::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
+            return Err(missing_part("`mjcf` in its arm's model"));
         }
         let fingertip =
             scene.effects.skin.is_some().then(|| Fingertip::new(&scene.finger, &scene.effects));
@@ -142,15 +145,15 @@ impl Environment {
     }
 
     /// Returns the surface to touch.
-    pub fn shape(&self) -> &Shape {
+    pub fn shape(&self) -> &Surface {
         &self.shape
     }
 
     /// Returns the object in `W`, or `None` for a function.
     pub fn mesh(&self) -> Option<&Mesh> {
         match &self.shape {
-            Shape::Function(_) => None,
-            Shape::Mesh { bvh, .. } => Some(bvh.mesh()),
+            Surface::Function(_) => None,
+            Surface::Mesh { bvh, .. } => Some(bvh.mesh()),
         }
     }
 
@@ -204,17 +207,19 @@ impl Environment {
     /// `None` if there is no surface.
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
-            Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
-            Shape::Mesh { .. } => {
+            Surface::Function(function) => place.first().map(|&x| function.height_m(x)),
+            Surface::Mesh { .. } => {
                 let datum_y_m = self.task.zone()?.datum_y_m();
                 let y_m = match self.analytic() {
-                    Some((surface, object)) => self.met_y_m(place, |start_w, ahead_w, reach_m| {
-                        let x_wo = object.x_wo();
-                        let local = x_wo.inverse_transform_point(&start_w) / object.scale;
-                        let along = x_wo.inverse_transform_vector(&ahead_w);
-                        let distance = surface.ray(local, along, reach_m / object.scale)?;
-                        Some(distance * object.scale)
-                    }),
+                    Some((surface, object)) => {
+                        self.first_surface_y_m(place, |start_w, ahead_w, reach_m| {
+                            let x_wo = object.x_wo();
+                            let local = x_wo.inverse_transform_point(&start_w) / object.scale;
+                            let along = x_wo.inverse_transform_vector(&ahead_w);
+                            let distance = surface.ray(local, along, reach_m / object.scale)?;
+                            Some(distance * object.scale)
+                        })
+                    }
                     None => self.mesh_y_m(place),
                 };
                 y_m.map(|y_m| y_m - datum_y_m)
@@ -225,15 +230,15 @@ impl Environment {
     /// Returns y, in the zone's frame, of the first point of the mesh along the approach to
     /// `place`.
     pub(super) fn mesh_y_m(&self, place: &[f64]) -> Option<f64> {
-        let Shape::Mesh { bvh, .. } = &self.shape else { return None };
-        self.met_y_m(place, |start_w, ahead_w, reach_m| {
+        let Surface::Mesh { bvh, .. } = &self.shape else { return None };
+        self.first_surface_y_m(place, |start_w, ahead_w, reach_m| {
             Some(bvh.ray(&start_w, &ahead_w, reach_m)?.distance_m)
         })
     }
 
     /// Returns y, in the zone's frame, of the first surface along the approach to `place`; `ray`
     /// gives the distance from a start along a direction.
-    fn met_y_m(
+    fn first_surface_y_m(
         &self,
         place: &[f64],
         ray: impl FnOnce(Point3<f64>, UnitVector3<f64>, f64) -> Option<f64>,
@@ -254,7 +259,7 @@ impl Environment {
         surface.project(local).map(|nearest| x_wo * (nearest * object.scale))
     }
 
-    fn analytic(&self) -> Option<(&'static dyn Implicit, &Object)> {
+    fn analytic(&self) -> Option<(&'static dyn Implicit, &ObjectSettings)> {
         let object = self.scene.object.as_ref()?;
         let surface = surfaces::by_name(object.truth.as_deref()?)?;
         Some((surface, object))
@@ -262,14 +267,14 @@ impl Environment {
 }
 
 /// Returns the smallest and largest coordinates of a shape in the frame of `zone`.
-fn extent(zone: &Zone, shape: &Shape) -> [Point3<f64>; 2] {
+fn extent(zone: &Zone, shape: &Surface) -> [Point3<f64>; 2] {
     match shape {
-        Shape::Function(function) => {
+        Surface::Function(function) => {
             let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m() + height_m);
             let [at_low, at_high] = [0.0, 1.0].map(|end| zone.at(&[end, end]));
             [zone.local(&at_low, low), zone.local(&at_high, high)]
         }
-        Shape::Mesh { bvh, .. } => {
+        Surface::Mesh { bvh, .. } => {
             let x_zw = zone.x_wz().inverse();
             let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(|end| Point3::from([end; 3]));
             bvh.mesh().vertices().iter().fold(nothing, |[low, high], p_w| {
@@ -285,12 +290,12 @@ fn check_overlap(
     [near_m, far_m]: [f64; 2],
     [low, high]: &[Point3<f64>; 2],
     size: Option<&str>,
-) -> Result<(), Invalid> {
+) -> Result<(), InputError> {
     let [x, z] = [zone.x_m, zone.z_m.unwrap_or([0.0; 2])];
     let is_beside = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;
     let is_before_or_behind = -high.y > far_m || -low.y < near_m;
     match is_beside || is_before_or_behind {
-        true => Err(Invalid::new(format!(
+        true => Err(InputError::new(format!(
             "the object has no surface in the zone: in the zone's frame its bounds are x {} to {} m, z {} \
              to {} m and depth {} to {} m{}",
             low.x,
@@ -307,13 +312,17 @@ fn check_overlap(
 
 // heuristic: samples along each side of the zone to find the object, as many as in the test grid of
 // a shipped experiment.
-const LOOKED_FOR_PER_SIDE: usize = 41;
+const SAMPLES_PER_SIDE: usize = 41;
 
 /// Returns the depths, between two limits, of the first surface over the samples of the zone that
 /// have one.
-fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f64> {
+fn first_surface_depths_m(
+    zone: &Zone,
+    bvh: &MeshBvh,
+    [from_m, to_m]: [f64; 2],
+) -> impl Iterator<Item = f64> {
     let (x_wz, ahead_w) = (zone.x_wz(), zone.ahead_w());
-    zone.grid(LOOKED_FOR_PER_SIDE).into_iter().filter_map(move |place| {
+    zone.grid(SAMPLES_PER_SIDE).into_iter().filter_map(move |place| {
         let start_w = x_wz * zone.local(&place, -from_m);
         Some(from_m + bvh.ray(&start_w, &ahead_w, to_m - from_m)?.distance_m)
     })
@@ -321,12 +330,12 @@ fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<
 
 /// Checks that, over the zone, no part of the object (which begins at depth `object_m`) lies in
 /// front of the nearest depth.
-fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result<(), Invalid> {
+fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result<(), InputError> {
     if near_m <= object_m {
         return Ok(());
     }
-    match met_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
-        Some(front_m) if front_m < near_m => Err(Invalid::new(format!(
+    match first_surface_depths_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
+        Some(front_m) if front_m < near_m => Err(InputError::new(format!(
             "zone.depth_m begins at {near_m} m, behind the front of the object at {front_m} m: \
              allowed is a nearest depth of at most that"
         ))),
@@ -337,7 +346,8 @@ fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result
 /// Returns the middle of the range of y that the surface spans over the zone; the middle of the
 /// depth range if there is no surface.
 fn middle_y_m(zone: &Zone, bvh: &MeshBvh, depth_m @ [near_m, far_m]: [f64; 2]) -> f64 {
-    let met_m: Vec<f64> = met_m(zone, bvh, [near_m - CLEARANCE_M, far_m + CLEARANCE_M]).collect();
+    let met_m: Vec<f64> =
+        first_surface_depths_m(zone, bvh, [near_m - CLEARANCE_M, far_m + CLEARANCE_M]).collect();
     let [near_m, far_m] = match met_m.is_empty() {
         true => depth_m,
         false => [
@@ -355,14 +365,14 @@ pub const CLEARANCE_M: f64 = 0.01;
 ///
 /// # Errors
 /// If the radius is missing, and the object's size gives none that is allowed.
-fn ball_around(around: &mut Around, mesh: &Mesh) -> Result<Ball, Invalid> {
+fn bounding_ball(around: &mut WholeObject, mesh: &Mesh) -> Result<Ball, InputError> {
     let (low, high) = mesh.bounds();
-    let own = Ball::about([low, high], around.lowest_m);
+    let own = Ball::around_box([low, high], around.lowest_m);
     let centre_m = *around.centre_m.get_or_insert(own.centre_w.coords.into());
     let radius_m = *around.radius_m.get_or_insert(own.radius_m);
     match RADIUS_M.contains(&radius_m) {
         true => Ok(Ball { centre_w: centre_m.into(), radius_m, ..own }),
-        false => Err(Invalid::new(format!(
+        false => Err(InputError::new(format!(
             "the object's size is {:.3e} m, and the ball around it has a radius of {radius_m:.3e} m; \
              allowed is {} to {} m: are object.unit and object.scale right?",
             (high - low).norm(),
@@ -373,17 +383,17 @@ fn ball_around(around: &mut Around, mesh: &Mesh) -> Result<Ball, Invalid> {
 }
 
 /// Returns the task of exploring `ball`, restricted to approaches that the arm can reach.
-fn task_around(
+fn whole_object_task(
     scene: &Scene,
     arm: Option<&Chain>,
     ball: Ball,
     mesh: &Mesh,
-) -> Result<Task, Invalid> {
+) -> Result<Task, InputError> {
     let Scene { touch, finger, .. } = scene;
     let away_m = |p_w: &Point3<f64>| (p_w - ball.centre_w).norm();
     let farthest_m = mesh.vertices().iter().map(away_m).fold(0.0, f64::max);
     if farthest_m > ball.radius_m {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "around.radius_m is {} m, but the object reaches {farthest_m:.4} m from \
              around.centre_m: choose a larger radius, or the finger collides with it on its way around",
             ball.radius_m
@@ -391,13 +401,13 @@ fn task_around(
     }
     let around = ball.keep_out(finger, touch.standoff_m);
     let task = Task::new(ball, touch.clone(), finger).map_err(invalid)?;
-    let Some(arm) = arm.filter(|_| scene.body.moves()) else { return Ok(task) };
+    let Some(arm) = arm.filter(|_| scene.body.moves_finger()) else { return Ok(task) };
     let robot =
         Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.skin.is_some() };
     let home_w: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let inside_m = around.depth_m(&home_w);
     if inside_m > 0.0 {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too close to the object to go around \
              it: move object.position_m or arm.base_position_m, or choose another arm.home_deg",
             home_w.coords.map(|x| (1e3 * x).round() / 1e3).data.0[0]

@@ -8,7 +8,7 @@ use palpate_explore::robot::finger::TipMotion;
 use std::sync::Arc;
 
 /// Backend without masses or servos: joint positions are the integral of the commanded velocities.
-pub struct Kinematic {
+pub struct KinematicBackend {
     chain: Chain,
     capabilities: Capabilities,
     finger: SimulatedFinger,
@@ -17,7 +17,7 @@ pub struct Kinematic {
     reading: Reading,
 }
 
-impl Kinematic {
+impl KinematicBackend {
     /// Creates the backend at the chain's home.
     ///
     /// # Errors
@@ -26,7 +26,7 @@ impl Kinematic {
         let chain = environment.chain().ok_or_else(|| Fault::lacks("an object"))?;
         let finger = SimulatedFinger::new(Arc::clone(environment), 0);
         let finger = finger.ok_or_else(|| Fault::lacks("a soft finger"))?;
-        let capabilities = Capabilities::of(&chain, environment.scene().period_s());
+        let capabilities = Capabilities::simulated(&chain, environment.scene().period_s());
         let q = chain.home;
         let mut body =
             Self { chain, capabilities, finger, q, tick: 0, reading: Reading::default() };
@@ -44,11 +44,11 @@ impl Kinematic {
         copy(&mut self.reading.q, &self.q);
         copy(&mut self.reading.qdot, qdot);
         copy(&mut self.reading.applied.qdot, qdot);
-        self.finger.report(load, self.capabilities.period_s, &mut self.reading);
+        self.finger.write_reading(load, self.capabilities.period_s, &mut self.reading);
     }
 }
 
-impl Backend for Kinematic {
+impl Backend for KinematicBackend {
     fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }

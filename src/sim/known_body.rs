@@ -1,15 +1,15 @@
 //! Registration target, a ball or a plate, in place of a scene's object.
 
-use super::environment::{Environment, Shape, missing};
-use super::scene::{Body, Object, Scene, Unit};
+use super::environment::{Environment, Surface, missing_part};
+use super::scene::{ObjectSettings, Scene, SimulatorKind, Unit};
 use nalgebra::Point3;
-use palpate_explore::registration::{KnownBody, design};
+use palpate_explore::registration::{CalibrationBody, design};
 use palpate_explore::task::Zone;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::mesh::Mesh;
-use palpate_geometry::solids::{ball, block};
+use palpate_geometry::solids::{box_mesh, sphere_mesh};
 use palpate_gp::math::pose::parts;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 
 // heuristic: 180 rings, so that the facets lie within 2 µm of a ball of 20 mm.
 const RINGS: u32 = 180;
@@ -22,16 +22,18 @@ const PLATE_M: [f64; 2] = [0.1, 0.02];
 ///
 /// # Errors
 /// If the scene's body touches no object.
-pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Invalid> {
-    if scene.body == Body::Function {
-        return Err(missing("object"));
+pub fn environment(scene: &Scene, body: &CalibrationBody) -> Result<Environment, InputError> {
+    if scene.body == SimulatorKind::Function {
+        return Err(missing_part("object"));
     }
     // The frame's +y is the plate's normal; `half_m` is the half side of the zone explored.
     let ((points, triangles), half_m) = match *body {
-        KnownBody::Ball { radius_m, .. } => (ball(Point3::origin(), radius_m, RINGS), radius_m),
-        KnownBody::Plate { .. } => {
+        CalibrationBody::Ball { radius_m, .. } => {
+            (sphere_mesh(Point3::origin(), radius_m, RINGS), radius_m)
+        }
+        CalibrationBody::Plate { .. } => {
             let [half_m, thick_m] = PLATE_M;
-            (block([-half_m, -thick_m, -half_m], [half_m, 0.0, half_m]), half_m)
+            (box_mesh([-half_m, -thick_m, -half_m], [half_m, 0.0, half_m]), half_m)
         }
     };
     let x_wo = body.x_wo();
@@ -39,7 +41,7 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Inval
     let (position_m, rotation_deg) = parts(&x_wo);
     let sides_m = [-half_m, half_m];
     let zone = Zone { position_m, rotation_deg, ..Zone::new(sides_m, Some(sides_m)) };
-    let object = Object {
+    let object = ObjectSettings {
         mesh: NAME.into(),
         outside_buffers: false,
         unit: Unit::M,
@@ -52,7 +54,7 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Inval
     let scene =
         Scene { zone: Some(zone), around: None, object: Some(object), touch, ..scene.clone() };
     let bvh = MeshBvh::new(mesh.transformed(&x_wo));
-    Environment::around(scene, Shape::Mesh { bvh, report: report.into() })
+    Environment::with_shape(scene, Surface::Mesh { bvh, report: report.into() })
 }
 
 /// Placeholder for the file name of the mesh.

@@ -13,7 +13,7 @@ pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger 
     [effects.skin], [effects.fluid] and [effects.electrodes]";
 
 /// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
-pub(super) fn moved_keys(keys: &[String]) -> String {
+pub(super) fn legacy_keys(keys: &[String]) -> String {
     format!(
         "{}: constants of the sensor, which will no longer be read here in the next version; move them \
          to the table [effects.sensor], or to a file (written by `palpate calibrate`) and set \
@@ -37,7 +37,7 @@ const SIDES: [&str; 6] = ["behind", "the robot's side", "the left", "the right",
 
 /// Returns a notice of the directions from which a robot with its foot at `foot_w` cannot reach the
 /// middle of a whole object; `None` if it reaches it from everywhere.
-pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> {
+pub(super) fn unreachable_directions(task: &Task, foot_w: &Point3<f64>) -> Option<String> {
     let away_w = (task.ball()?.centre_w - foot_w).xy().try_normalize(1e-6);
     let away_w = away_w.unwrap_or_else(Vector2::x);
     // Seen from the foot, the left is a quarter of a turn counter-clockwise.
@@ -69,11 +69,11 @@ pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> 
 
 // Ratio of the sizes of object and zone above which there is a notice.
 // heuristic: below the ratio of a metre to an inch.
-const MISMATCH: f64 = 20.0;
+const MISMATCH_RATIO: f64 = 20.0;
 
 // Largest ratio of sizes at which an object fits its zone.
 // heuristic: far below `MISMATCH`.
-const FITS: f64 = 5.0;
+const FIT_RATIO_MAX: f64 = 5.0;
 
 /// Returns a notice if the object, which spans `low` to `high` in the frame of `zone`, is far
 /// larger or smaller than the zone (a sign of a wrong unit); otherwise `None`.
@@ -85,15 +85,15 @@ pub(super) fn size_mismatch(
     let object_m = (high.x - low.x).max(high.z - low.z);
     let zone_m = zone.widest_m();
     let off = |size_m: f64| (size_m / zone_m).ln().abs();
-    if off(object_m) < MISMATCH.ln() {
+    if off(object_m) < MISMATCH_RATIO.ln() {
         return None;
     }
-    let off_in = |other: &Unit| off(object_m / unit.metres() * other.metres());
+    let off_in = |other: &Unit| off(object_m / unit.metres_per_unit() * other.metres_per_unit());
     let fitting = Unit::value_variants().iter().copied();
     let fitting = fitting.min_by(|a, b| off_in(a).total_cmp(&off_in(b)));
-    let remedy = match fitting.filter(|fitting| off_in(fitting) < FITS.ln()) {
+    let remedy = match fitting.filter(|fitting| off_in(fitting) < FIT_RATIO_MAX.ln()) {
         Some(fitting) => {
-            let would_m = object_m / unit.metres() * fitting.metres();
+            let would_m = object_m / unit.metres_per_unit() * fitting.metres_per_unit();
             format!("; with object.unit = \"{fitting}\" it would measure {would_m:.4} m")
         }
         None => "; correct object.unit or object.scale".into(),

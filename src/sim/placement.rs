@@ -46,7 +46,7 @@ const SIZE_M: f64 = 0.15;
 /// with a scale of 1; if none fits, metres with another scale.
 pub fn size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
     let fits = |unit: &Unit| {
-        let size_m = extent * unit.metres();
+        let size_m = extent * unit.metres_per_unit();
         (EXPLORABLE_M[0]..=EXPLORABLE_M[1]).contains(&size_m)
     };
     let usual = [Unit::Mm, Unit::M, Unit::Cm];
@@ -54,7 +54,7 @@ pub fn size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
         Some(unit) if fits(&unit) => (unit, 1.0),
         unit => {
             let unit = unit.unwrap_or_default();
-            (unit, two_digits(SIZE_M / (extent * unit.metres())))
+            (unit, two_digits(SIZE_M / (extent * unit.metres_per_unit())))
         }
     }
 }
@@ -141,17 +141,17 @@ const BEHIND_M: f64 = 0.005;
 
 /// Zone on an object, with the share of it that the object fills.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct ZoneProposal {
     /// The zone, with datum and depth.
     pub zone: Zone,
     /// Share of the zone's places with a surface.
-    pub filled: f64,
+    pub fill_fraction: f64,
 }
 
 /// Returns the largest rectangle of the silhouette, seen along −y, in which almost every place has
 /// a surface. Its datum is the middle of that surface; its depth reaches from the object's front to
 /// a little behind the farthest surface. Returns `None` if there is no surface along the approach.
-pub fn zone(bvh: &MeshBvh) -> Option<Found> {
+pub fn zone(bvh: &MeshBvh) -> Option<ZoneProposal> {
     let (low, high) = bvh.mesh().bounds();
     let whole = Zone::new([low.x, high.x], Some([low.z, high.z]));
     let [width_m, height_m] = [high.x - low.x, high.z - low.z];
@@ -180,7 +180,7 @@ pub fn zone(bvh: &MeshBvh) -> Option<Found> {
     );
     zone.datum_y_m = Some(tenth_mm(0.5 * (lowest + highest)));
     zone.depth_m = Some([tenth_mm(-high.y - 1e-4), tenth_mm(-lowest + BEHIND_M)]);
-    Some(Found { zone, filled: met().count() as f64 / inside().count() as f64 })
+    Some(ZoneProposal { zone, fill_fraction: met().count() as f64 / inside().count() as f64 })
 }
 
 /// Returns the columns and rows (first, and one past the last) of the filled rectangle with the

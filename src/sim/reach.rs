@@ -5,9 +5,9 @@
 //! the surface by the finger's hull. A point is reachable if the surface touches that envelope
 //! there.
 
-use super::probe::rest;
+use super::probe::resting_pose;
 use crate::sim::Environment;
-use crate::sim::scene::Body;
+use crate::sim::scene::SimulatorKind;
 use palpate_explore::robot::finger::shape::Front;
 use palpate_explore::task::Zone;
 use rayon::prelude::*;
@@ -27,34 +27,34 @@ const ROUNDING_M: f64 = 1e-9;
 /// Returns whether the finger, sent to some target in the zone, can touch the surface at each of
 /// `places`, whose true heights above the datum are `heights_m`. A place without a surface is not
 /// reachable. `tell` is called with the progress.
-pub fn is_reachable(
+pub fn reachable(
     environment: &Environment,
     places: &[Vec<f64>],
     heights_m: &[Option<f64>],
     tell: &dyn Fn(&str),
 ) -> Vec<bool> {
-    if environment.scene().body == Body::Function {
+    if environment.scene().body == SimulatorKind::Function {
         return heights_m.iter().map(Option::is_some).collect();
     }
-    let Some(fingers) = Fingers::new(environment) else { return vec![false; places.len()] };
-    let lowest_y_m = fingers.lowest_y_m();
+    let Some(fingers) = FingerGrid::new(environment) else { return vec![false; places.len()] };
+    let lowest_y_m = fingers.tip_lower_bounds_y_m();
     let part = places.len().div_ceil(PARTS).max(1);
     let mut is_reachable = Vec::with_capacity(places.len());
     for (places, heights_m) in places.chunks(part).zip(heights_m.chunks(part)) {
-        let percent = 100 * is_reachable.len() / (PARTS * part);
+        let percent = 100 * reachable.len() / (PARTS * part);
         tell(&format!("computing where the finger can touch the surface: {percent} %"));
-        is_reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
+        reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
             height_m.is_some_and(|height_m| fingers.touch(place, height_m, &lowest_y_m))
         }));
     }
-    is_reachable
+    reachable
 }
 
 /// Number of chunks after which progress is reported.
 const PARTS: usize = 20;
 
 /// Fingers on a grid over the zone, each lowered onto the object on first use.
-struct Fingers<'a> {
+struct FingerGrid<'a> {
     environment: &'a Environment,
     zone: &'a Zone,
     front: Front,
@@ -67,14 +67,14 @@ struct Fingers<'a> {
 }
 
 /// Row of targets near a finger, with the y of its front over each relative to its tip.
-struct Strip {
+struct TargetRow {
     /// Rows and columns from the finger's own target to the first.
     row: isize,
     column: isize,
     front_m: Vec<f64>,
 }
 
-impl<'a> Fingers<'a> {
+impl<'a> FingerGrid<'a> {
     /// Returns `None` without a zone.
     fn new(environment: &'a Environment) -> Option<Self> {
         let zone = environment.task().zone()?;
@@ -120,7 +120,7 @@ impl<'a> Fingers<'a> {
 
     /// Returns a lower bound on the y of each tip in the zone's frame, from the surface at every
     /// target: no hull passes through it.
-    fn lowest_y_m(&self) -> Vec<f64> {
+    fn tip_lower_bounds_y_m(&self) -> Vec<f64> {
         let surface_y_m = |finger| self.environment.mesh_y_m(&self.target(finger));
         let surface_y_m: Vec<f64> = (0..self.tips_y_m.len())
             .into_par_iter()
@@ -130,7 +130,7 @@ impl<'a> Fingers<'a> {
         let strips = self.strips();
         let lowest_y_m = |finger: usize| {
             let (row, column) = (finger / across, finger % across);
-            let over_strip = |strip: &Strip| {
+            let over_strip = |strip: &TargetRow| {
                 let row = row.checked_add_signed(strip.row)?;
                 let line = surface_y_m.chunks_exact(across).nth(row)?;
                 let (line, front_m) = match column.checked_add_signed(strip.column) {
@@ -146,7 +146,7 @@ impl<'a> Fingers<'a> {
     }
 
     /// Returns the hull's front over the targets around any finger; targets are equally spaced.
-    fn strips(&self) -> Vec<Strip> {
+    fn strips(&self) -> Vec<TargetRow> {
         let step_m = self.sides_m.each_ref().map(|side| match side[..] {
             [first, .., last] => (last - first) / (side.len() - 1) as f64,
             _ => 0.0,
@@ -163,7 +163,11 @@ impl<'a> Fingers<'a> {
         rows.filter_map(|row| {
             let front_m = |column| self.front.y_m(at(0, column), at(1, row));
             let column = (-across..=across).find(|&column| front_m(column).is_some())?;
-            Some(Strip { row, column, front_m: (column..=-column).filter_map(front_m).collect() })
+            Some(TargetRow {
+                row,
+                column,
+                front_m: (column..=-column).filter_map(front_m).collect(),
+            })
         })
         .collect()
     }
@@ -198,9 +202,9 @@ impl<'a> Fingers<'a> {
         *self.tips_y_m[finger].get_or_init(|| {
             let target = self.target(finger)[..self.zone.sides().count()].to_vec();
             let approach = self.environment.task().approach(&target.into())?;
-            let rest = rest(self.environment, &approach)?;
+            let rest = resting_pose(self.environment, &approach)?;
             let x_zw = self.zone.x_wz().inverse();
-            Some(x_zw.transform_point(&rest.p_wt).y)
+            Some(x_zw.transform_point(&resting_pose.p_wt).y)
         })
     }
 }

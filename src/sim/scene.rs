@@ -8,12 +8,12 @@ use nalgebra::Isometry3;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::robot::finger::profile::Profile;
-use palpate_explore::task::Around;
+use palpate_explore::task::WholeObject;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::zone::Zone;
 use palpate_geometry::surfaces;
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -26,19 +26,19 @@ use std::path::{Path, PathBuf};
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Simulator that carries out a touch.
-    pub body: Body,
+    pub body: SimulatorKind,
     /// Analytic surface, if `body = "function"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub function: Option<Function>,
+    pub function: Option<AnalyticCurve>,
     /// Rectangle to explore on one side of an object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zone: Option<Zone>,
     /// Ball to explore around a whole object; replaces the zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub around: Option<Around>,
+    pub around: Option<WholeObject>,
     /// Object to touch, unless `body = "function"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub object: Option<Object>,
+    pub object: Option<ObjectSettings>,
     /// Finger; not used by `body = "function"`.
     #[serde(default)]
     pub finger: Finger,
@@ -59,12 +59,12 @@ pub struct Scene {
 
 // heuristic: contact is a force above this many standard deviations of its noise, because an
 // approach takes about a thousand readings.
-const SDS_OF_CONTACT: f64 = 5.0;
+const CONTACT_SIGMAS: f64 = 5.0;
 
 /// Simulator of a touch, cheapest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Body {
+pub enum SimulatorKind {
     /// Analytic surface, evaluated without a finger.
     Function,
     /// Finger's rigid hull, swept along the approach to first contact on the exact mesh.
@@ -75,7 +75,7 @@ pub enum Body {
     Dynamic,
 }
 
-impl Body {
+impl SimulatorKind {
     /// Returns the name used in a scene file.
     pub fn name(self) -> &'static str {
         match self {
@@ -87,7 +87,7 @@ impl Body {
     }
 
     /// Returns whether the simulator moves a finger in time.
-    pub fn moves(self) -> bool {
+    pub fn moves_finger(self) -> bool {
         matches!(self, Self::Kinematic | Self::Dynamic)
     }
 }
@@ -95,12 +95,12 @@ impl Body {
 /// Analytic one-dimensional surface y = f(x), touched without a finger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Function {
+pub enum AnalyticCurve {
     /// Sine bump of Yi et al. 2016, Eq. 4: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.
     Toy,
 }
 
-impl Function {
+impl AnalyticCurve {
     /// Returns the height at `x`.
     pub fn height_m(self, x: f64) -> f64 {
         match self {
@@ -128,7 +128,7 @@ impl Function {
 /// Mesh and pose of the object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Object {
+pub struct ObjectSettings {
     /// Mesh file: .obj, .gltf, .glb, .stl or .ply, relative to the scene file.
     pub mesh: PathBuf,
     /// Permission for a .gltf file to name buffers outside its own folder.
@@ -177,7 +177,7 @@ pub enum Unit {
 
 impl Unit {
     /// Returns the length of one unit, in m.
-    pub fn metres(self) -> f64 {
+    pub fn metres_per_unit(self) -> f64 {
         match self {
             Self::M => 1.0,
             Self::Cm => 1e-2,
@@ -195,14 +195,14 @@ impl fmt::Display for Unit {
     }
 }
 
-impl Object {
+impl ObjectSettings {
     /// Returns the pose of the mesh's frame in `W`.
     pub fn x_wo(&self) -> Isometry3<f64> {
         pose(self.position_m, self.rotation_deg)
     }
 }
 
-impl Checked for Object {
+impl Validate for ObjectSettings {
     fn check(&self, rules: &mut Rules) {
         let named = !self.mesh.as_os_str().is_empty();
         rules.require("mesh", "\"\"", named, || {
@@ -218,7 +218,7 @@ impl Checked for Object {
     }
 }
 
-impl Checked for Scene {
+impl Validate for Scene {
     fn check(&self, rules: &mut Rules) {
         let lacks = |rules: &mut Rules, key: &str, lacks: bool, allowed: &str| {
             rules.require(key, "(none)", !lacks, || allowed.into());
@@ -240,7 +240,7 @@ impl Checked for Scene {
         }
         rules.table("finger", &self.finger);
         let body = self.body.name();
-        if self.body == Body::Function {
+        if self.body == SimulatorKind::Function {
             let allowed = "\"toy\", because body = \"function\"";
             lacks(rules, "function", self.function.is_none(), allowed);
             let allowed = "no object: body = \"function\" touches a curve";
@@ -258,7 +258,8 @@ impl Checked for Scene {
             let allowed = format!("a table with a mesh, because body = \"{body}\"");
             lacks(rules, "object", self.object.is_none(), &allowed);
         }
-        let turns = self.around.is_none() || self.arm.is_some() || self.body != Body::Dynamic;
+        let turns =
+            self.around.is_none() || self.arm.is_some() || self.body != SimulatorKind::Dynamic;
         rules.require("body", "\"dynamic\"", turns, || {
             "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must turn, and the \
              stage of body = \"dynamic\" has no wrist"
@@ -267,7 +268,7 @@ impl Checked for Scene {
         rules.table("effects", &self.effects);
         rules.table("touch", &self.touch);
         rules.table("solver", &self.solver);
-        if self.body == Body::Dynamic {
+        if self.body == SimulatorKind::Dynamic {
             let (period_s, step_s) = (self.period_s(), self.solver.step_s);
             let whole = self.solver.steps(period_s).is_some();
             rules.require("touch.period_s", period_s, whole, || {
@@ -292,19 +293,20 @@ impl Checked for Scene {
                     .into()
             });
         }
-        let is_rigid = self.body == Body::Kinematic && self.felt_effects().skin.is_none();
+        let is_rigid =
+            self.body == SimulatorKind::Kinematic && self.effective_effects().skin.is_none();
         let allowed = "a table, because body = \"kinematic\" needs a soft skin (for a rigid finger \
                        use body = \"cast\"; without any [effects] the skin is a BioTac's)";
         lacks(rules, "effects.skin", is_rigid, allowed);
-        let bumps = self.body != Body::Dynamic && self.effects.collision.is_some();
+        let bumps = self.body != SimulatorKind::Dynamic && self.effects.collision.is_some();
         let allowed = "no collision: only body = \"dynamic\" computes collisions of links";
         given(rules, "effects.collision", bumps, allowed);
-        if let (Some(wrench), false) = (&self.effects.wrench, self.frames_tell_contact()) {
-            let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
+        if let (Some(wrench), false) = (&self.effects.wrench, self.detects_by_frames()) {
+            let least_n = CONTACT_SIGMAS * wrench.noise_max_n();
             let told = self.touch.detection_n >= least_n;
             rules.require("touch.detection_n", self.touch.detection_n, told, || {
                 format!(
-                    "at least {least_n} N, {SDS_OF_CONTACT} standard deviations of effects.wrench, \
+                    "at least {least_n} N, {CONTACT_SIGMAS} standard deviations of effects.wrench, \
                      because contact is detected from the force alone"
                 )
             });
@@ -341,15 +343,15 @@ impl Scene {
     /// robotics); a body without inertia needs only one tick for each tactile frame.
     pub fn period_s(&self) -> f64 {
         self.touch.period_s.unwrap_or(match self.body {
-            Body::Dynamic => 0.002,
-            Body::Function | Body::Cast | Body::Kinematic => 0.01,
+            SimulatorKind::Dynamic => 0.002,
+            SimulatorKind::Function | SimulatorKind::Cast | SimulatorKind::Kinematic => 0.01,
         })
     }
 
     /// Returns the effects in use: those of the scene, or those of a BioTac (skin, fluid and
     /// electrodes with their defaults) if a `kinematic` scene names no effects.
-    pub fn felt_effects(&self) -> Cow<'_, Effects> {
-        match self.body == Body::Kinematic && self.effects == Effects::default() {
+    pub fn effective_effects(&self) -> Cow<'_, Effects> {
+        match self.body == SimulatorKind::Kinematic && self.effects == Effects::default() {
             true => Cow::Owned(Effects::biotac()),
             false => Cow::Borrowed(&self.effects),
         }
@@ -358,27 +360,27 @@ impl Scene {
     /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin model
     /// computes the contact force.
     pub fn collides(&self) -> bool {
-        self.body == Body::Dynamic && self.effects.skin.is_none()
+        self.body == SimulatorKind::Dynamic && self.effects.skin.is_none()
     }
 
     /// Returns the fastest approach at which contact is detected before skin and fluid in front of
     /// the tip are fully compressed; `None` for a body that does not move through contact.
     pub fn approach_limit_m_s(&self) -> Option<f64> {
-        let effects = self.felt_effects();
-        if self.body != Body::Kinematic || effects.skin.is_none() {
+        let effects = self.effective_effects();
+        if self.body != SimulatorKind::Kinematic || effects.skin.is_none() {
             return None;
         }
-        let ahead_t = self.finger.ahead_t();
+        let ahead_t = self.finger.direction_t();
         let layers = Profile::biotac(&self.finger).layers(0.0, &ahead_t);
         let batch = effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
-        let told_by_frames = self.frames_tell_contact().then_some(batch);
+        let told_by_frames = self.detects_by_frames().then_some(batch);
         let depth_m = layers.skin_m + layers.gap_m;
         Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
     }
 
     /// Returns whether contact is detected from tactile frames instead of force.
-    fn frames_tell_contact(&self) -> bool {
-        let effects = self.felt_effects();
+    fn detects_by_frames(&self) -> bool {
+        let effects = self.effective_effects();
         self.touch.detection.by.is_heard(effects.fluid.is_some(), effects.electrodes.is_some())
     }
 
@@ -389,16 +391,16 @@ impl Scene {
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
         if loader.has("planners") || loader.has("scene") {
-            return Err(loader.other(
+            return Err(loader.wrong_kind(
                 "an experiment",
                 "a scene is needed here; use the file that the experiment's key `scene` names. palpate \
                  run, show and watch take an experiment",
             ));
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
-        let moved_keys = Self::resolve(&mut loader, "")?;
+        let legacy_keys = Self::resolve(&mut loader, "")?;
         let mut scene: Self = loader.finish()?;
-        scene.effects.moved_keys = moved_keys;
+        scene.effects.legacy_keys = legacy_keys;
         Ok(scene)
     }
 

@@ -1,10 +1,10 @@
 //! Simulated finger in contact with the scene's object, for every simulated backend.
 
 use crate::sim::Environment;
-use crate::sim::environment::Shape;
+use crate::sim::environment::Surface;
 use crate::sim::finger::effects::registration::Registration;
-use crate::sim::finger::effects::wrench::Gauge;
-use crate::sim::finger::{Fingertip, FingertipState, Load};
+use crate::sim::finger::effects::wrench::WrenchSensor;
+use crate::sim::finger::{ContactLoad, Fingertip, FingertipState};
 use nalgebra::Isometry3;
 use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
 use palpate_explore::robot::finger::TipMotion;
@@ -20,11 +20,11 @@ pub struct SimulatedFinger {
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
     /// Fingertip of this trial, if its sensor constants vary; otherwise the environment's is used.
-    own: Option<Box<Fingertip>>,
+    varied_fingertip: Option<Box<Fingertip>>,
     state: FingertipState,
-    gauge: Option<Gauge>,
-    misplaced: Option<Registration>,
-    load: Load,
+    gauge: Option<WrenchSensor>,
+    registration_error: Option<Registration>,
+    load: ContactLoad,
     /// Whether the scene has both fluid (detects contact) and electrodes (locate it).
     has_sensor: bool,
 }
@@ -37,8 +37,9 @@ impl SimulatedFinger {
         let scene = environment.scene();
         let effects = &scene.effects;
         let sensor = effects.variation.as_ref().map(|effect| effect.sensor(stream("variation")));
-        let own: Option<Box<Fingertip>> =
-            sensor.as_ref().map(|sensor| Fingertip::varied(&scene.finger, effects, sensor).into());
+        let own: Option<Box<Fingertip>> = sensor
+            .as_ref()
+            .map(|sensor| Fingertip::with_sensor(&scene.finger, effects, sensor).into());
         let tip = environment.fingertip()?;
         let mut misplaced = None;
         if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
@@ -46,7 +47,9 @@ impl SimulatedFinger {
             let x_wo = object.x_wo();
             let correction = scene.arm.as_ref().and_then(|arm| arm.correction());
             misplaced = Some(Registration {
-                finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
+                finger: effect
+                    .nominal_error(correction)
+                    .map_or(error.finger, |fixed| fixed * error.finger),
                 object: x_wo * error.object.inverse() * x_wo.inverse(),
             });
         }
@@ -58,10 +61,13 @@ impl SimulatedFinger {
         Some(Self {
             x_mt: environment.chain()?.tool,
             state: FingertipState::new(own.as_deref().unwrap_or(tip), &stream("finger")),
-            own,
-            gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
-            misplaced,
-            load: Load::default(),
+            varied_fingertip: own,
+            gauge: effects
+                .wrench
+                .as_ref()
+                .map(|effect| WrenchSensor::new(effect, stream("wrench"))),
+            registration_error: misplaced,
+            load: ContactLoad::default(),
             has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
             environment,
         })
@@ -80,9 +86,9 @@ impl SimulatedFinger {
     /// # Errors
     /// The errors of [`FingertipState::step`].
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
-        let Self { own, state, misplaced, .. } = self;
+        let Self { varied_fingertip: own, state, registration_error: misplaced, .. } = self;
         let tip = own.as_deref().or(self.environment.fingertip());
-        let (Some(tip), Shape::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
+        let (Some(tip), Surface::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
             return Ok(Wrench::default());
         };
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
@@ -94,10 +100,10 @@ impl SimulatedFinger {
     /// Writes the data of a control tick of `period_s` into `reading`: tactile frames that arrived,
     /// the reading of a force/torque sensor under the load `mount` (in `T`), and the true load if
     /// no sensor measures it.
-    pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
+    pub fn write_reading(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.samples.clear();
         reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));
-        reading.samples.extend(self.ideal().map(Sample::Ideal));
+        reading.samples.extend(self.true_contact().map(Sample::Ideal));
         let effect = self.environment.scene().effects.wrench.as_ref();
         reading.wrench = self.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
             gauge.read(effect, &mount.moved(&self.x_mt), period_s).moved(&self.x_mt.inverse())
@@ -105,7 +111,7 @@ impl SimulatedFinger {
     }
 
     /// Returns the true load, if no sensor measures it.
-    fn ideal(&self) -> Option<IdealContact> {
+    fn true_contact(&self) -> Option<IdealContact> {
         let force_n = self.load.force_n.norm();
         (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
             p_tc: self.load.centre_t,

@@ -1,21 +1,21 @@
 //! Simulator shared by the trials of an experiment: the environment with its compiled models; it
 //! makes backends and probes.
 
-use super::kinematic::Kinematic;
+use super::kinematic::KinematicBackend;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
 use super::notice;
-use super::probe::exact;
+use super::probe::exact_probe;
 use crate::sim::Environment;
-use crate::sim::scene::Body;
-use palpate_explore::backend::delay::Delayed;
+use crate::sim::scene::SimulatorKind;
+use palpate_explore::backend::delay::DelayedBackend;
 use palpate_explore::backend::interlock::InterlockSettings;
 use palpate_explore::backend::{Backend, Fault};
 use palpate_explore::probe::Probe;
-use palpate_explore::probe::interlocks::interlocked;
+use palpate_explore::probe::interlocks::with_interlocks;
 use palpate_explore::probe::servo::{Servo, check_reach};
 use palpate_geometry::distance::OrientedBox;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::sync::Arc;
 
 /// Environment with its compiled models, ready to create backends.
@@ -23,7 +23,7 @@ use std::sync::Arc;
 pub struct Simulator {
     environment: Arc<Environment>,
     #[cfg(feature = "mujoco")]
-    models: Option<mujoco::Models>,
+    models: Option<mujoco::CompiledModels>,
 }
 
 impl Simulator {
@@ -31,17 +31,18 @@ impl Simulator {
     ///
     /// # Errors
     /// If the scene cannot be simulated.
-    pub fn new(environment: Arc<Environment>) -> Result<Self, Invalid> {
+    pub fn new(environment: Arc<Environment>) -> Result<Self, InputError> {
         #[cfg(feature = "mujoco")]
         {
-            let moved = environment.scene().body == Body::Dynamic;
-            let models = if moved { Some(mujoco::Models::new(&environment)?) } else { None };
+            let moved = environment.scene().body == SimulatorKind::Dynamic;
+            let models =
+                if moved { Some(mujoco::CompiledModels::new(&environment)?) } else { None };
             Ok(Self { environment, models })
         }
         #[cfg(not(feature = "mujoco"))]
         match environment.scene().body {
-            Body::Dynamic => {
-                Err(Invalid::new("body = \"dynamic\" needs a build with the feature `mujoco`"))
+            SimulatorKind::Dynamic => {
+                Err(InputError::new("body = \"dynamic\" needs a build with the feature `mujoco`"))
             }
             _ => Ok(Self { environment }),
         }
@@ -60,8 +61,8 @@ impl Simulator {
             Some(_) => chain.base.translation.vector.into(),
             None => chain.forward(&chain.home).translation.vector.into(),
         });
-        let sides =
-            foot_w.and_then(|foot_w| notice::out_of_sides(self.environment.task(), &foot_w));
+        let sides = foot_w
+            .and_then(|foot_w| notice::unreachable_directions(self.environment.task(), &foot_w));
         notices.extend(sides);
         #[cfg(feature = "mujoco")]
         if let Some(substeps) = self.models.as_ref().and_then(|models| models.substeps.as_ref()) {
@@ -74,10 +75,10 @@ impl Simulator {
     ///
     /// # Errors
     /// If a part of the zone is out of reach.
-    pub fn check_reach(&self) -> Result<(), Invalid> {
+    pub fn check_reach(&self) -> Result<(), InputError> {
         let environment = &self.environment;
         match (environment.scene().body, environment.robot()) {
-            (Body::Kinematic | Body::Dynamic, Some(robot)) => {
+            (SimulatorKind::Kinematic | SimulatorKind::Dynamic, Some(robot)) => {
                 check_reach(&robot, environment.task())
             }
             _ => Ok(()),
@@ -91,7 +92,7 @@ impl Simulator {
     pub fn probe(&self, seed: u64) -> Result<Box<dyn Probe>, Fault> {
         Ok(match self.body()? {
             Some(body) => Box::new(self.servo(body, seed)?),
-            None => exact(Arc::clone(&self.environment)),
+            None => exact_probe(Arc::clone(&self.environment)),
         })
     }
 
@@ -121,9 +122,9 @@ impl Simulator {
         let mut object = None;
         if let Some(collision) = &self.environment.scene().effects.collision {
             limits.lowest_m.get_or_insert(collision.table_m);
-            object = self.environment.mesh().map(|mesh| OrientedBox::between(mesh.bounds()));
+            object = self.environment.mesh().map(|mesh| OrientedBox::from_corners(mesh.bounds()));
         }
-        let body = interlocked(body, &robot, task, object, &limits)?;
+        let body = with_interlocks(body, &robot, task, object, &limits)?;
         Servo::new(robot, task.touch().clone(), Box::new(body), seed)
     }
 
@@ -134,20 +135,20 @@ impl Simulator {
     /// If there is no memory for its state.
     pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         let body: Box<dyn Backend> = match self.environment.scene().body {
-            Body::Function | Body::Cast => return Ok(None),
-            Body::Kinematic => Box::new(Kinematic::new(&self.environment)?),
+            SimulatorKind::Function | SimulatorKind::Cast => return Ok(None),
+            SimulatorKind::Kinematic => Box::new(KinematicBackend::new(&self.environment)?),
             #[cfg(feature = "mujoco")]
-            Body::Dynamic => {
+            SimulatorKind::Dynamic => {
                 let lacking = || Fault::lacks("a compiled model");
                 let models = self.models.as_ref().ok_or_else(lacking)?;
-                Box::new(mujoco::Dynamic::new(&self.environment, models)?)
+                Box::new(mujoco::DynamicBackend::new(&self.environment, models)?)
             }
             #[cfg(not(feature = "mujoco"))]
-            Body::Dynamic => return Err(Fault::lacks("the feature `mujoco`")),
+            SimulatorKind::Dynamic => return Err(Fault::lacks("the feature `mujoco`")),
         };
         let timing = self.environment.scene().effects.timing.as_ref();
         Ok(Some(match timing.map_or(0.0, |timing| timing.control_delay_s) {
-            delay_s if delay_s > 0.0 => Box::new(Delayed::new(body, delay_s)),
+            delay_s if delay_s > 0.0 => Box::new(DelayedBackend::new(body, delay_s)),
             _ => body,
         }))
     }

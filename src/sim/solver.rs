@@ -1,6 +1,6 @@
 //! Time integration of a body with masses.
 
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,7 @@ impl SolverSettings {
     }
 }
 
-impl Checked for SolverSettings {
+impl Validate for SolverSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("step_s", self.step_s, 1e-5..=LONGEST_STEP_S);
         if let Some(sdf) = &self.sdf {
@@ -150,7 +150,7 @@ impl Default for Sdf {
     }
 }
 
-impl Checked for Sdf {
+impl Validate for Sdf {
     fn check(&self, rules: &mut Rules) {
         let Self { iterations, initpoints } = *self;
         for (key, value) in [("iterations", iterations), ("initpoints", initpoints)] {

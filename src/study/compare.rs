@@ -5,35 +5,35 @@
 //! log RMSE), divided by that of the reference planner in the same trial, so that objects of
 //! different sizes count equally. Smaller is better; the reference has score 1.
 
-use super::check::judged::JUDGED;
+use super::check::judged::CHECK_MEASURES;
 use crate::experiment::measure::outline::TENTHS;
 use crate::experiment::statistics::equal_error::Estimate;
-use crate::experiment::statistics::{RESAMPLES, mean, percentiles_95};
+use crate::experiment::statistics::{RESAMPLES, central_95, mean};
 use crate::experiment::store::Run;
 use crate::experiment::trial::entrant::ORACLE;
-use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
+use crate::experiment::trial::row::{TouchRow, TrialRow, planner_rows};
 use palpate_gp::math::seed;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use rand::RngExt;
 use std::collections::HashMap;
 
 /// Planner with zero gain; the [`ORACLE`] has the full gain.
-pub const FLOOR: &str = "random";
+pub const BASELINE_PLANNER: &str = "random";
 
 /// Results of planners on objects.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Compared {
+pub struct SuiteComparison {
     /// Reference planner.
     pub against: String,
     /// Names of the objects.
     pub objects: Vec<String>,
     /// Compared planners.
-    pub contenders: Vec<Contender>,
+    pub contenders: Vec<Entrant>,
 }
 
 /// A planner, with one run per object.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contender {
+pub struct Entrant {
     /// Name of the planner.
     pub name: String,
     /// Results on each object.
@@ -47,9 +47,9 @@ pub struct ObjectResult {
     /// Scores of the trials that the reference finished, too.
     pub scores: Vec<f64>,
     /// Share of touches without contact.
-    pub missed: Option<f64>,
+    pub miss_share: Option<f64>,
     /// Share of fallback plans.
-    pub stalled: Option<f64>,
+    pub fallback_share: Option<f64>,
     /// Mean lateral travel per trial.
     pub travel_m: Option<f64>,
     /// Mean share of the truth in the 95 % band.
@@ -62,7 +62,7 @@ pub struct ObjectResult {
     pub reliability: [[u32; 2]; TENTHS],
 }
 
-impl Contender {
+impl Entrant {
     /// Scores on each object.
     pub fn scores(&self) -> Vec<&[f64]> {
         self.results.iter().map(|result| result.scores.as_slice()).collect()
@@ -73,10 +73,10 @@ impl Contender {
 ///
 /// # Errors
 /// If the first run of an object lacks that planner, or runs of one name have different trials.
-pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invalid> {
+pub fn compare(runs: &[(String, Run)], against: &str) -> Result<SuiteComparison, InputError> {
     let mut objects: Vec<String> = Vec::new();
     let mut units: Vec<HashMap<u32, f64>> = Vec::new();
-    let mut contenders: Vec<Contender> = Vec::new();
+    let mut contenders: Vec<Entrant> = Vec::new();
     for (folder, run) in runs {
         let name = &run.experiment.name;
         let of_name = || runs.iter().filter(|(_, other)| other.experiment.name == *name);
@@ -89,7 +89,7 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
                 "{folder} and {first} are both \"{name}\" but differ in seed, touches or grid, so their \
                  trials do not pair"
             );
-            return Err(Invalid::new(problem));
+            return Err(InputError::new(problem));
         }
         let known = objects.iter().position(|object| object == name);
         let index = known.unwrap_or(objects.len());
@@ -98,7 +98,7 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
             if unit.is_empty() {
                 let problem =
                     format!("has no trials of the reference planner \"{against}\" (--against)");
-                return Err(Invalid::new(problem).at(folder));
+                return Err(InputError::new(problem).at(folder));
             }
             objects.push(name.clone());
             units.push(unit);
@@ -109,7 +109,7 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
                 _ => format!("{planner} ({folder})"),
             };
             let place = contenders.iter().position(|it| it.name == label).unwrap_or_else(|| {
-                contenders.push(Contender { name: label, results: Vec::new() });
+                contenders.push(Entrant { name: label, results: Vec::new() });
                 contenders.len() - 1
             });
             let results = &mut contenders[place].results;
@@ -120,20 +120,20 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
     for contender in &mut contenders {
         contender.results.resize(objects.len(), ObjectResult::default());
     }
-    Ok(Compared { against: against.into(), objects, contenders })
+    Ok(SuiteComparison { against: against.into(), objects, contenders })
 }
 
 /// Mean log RMSE of a planner's finished trials.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
-    let of = JUDGED[0].of;
-    let finished = of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
+    let of = CHECK_MEASURES[0].of;
+    let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
     finished.filter_map(|row| Some((row.trial, of(row, &run.experiment)?))).collect()
 }
 
 /// Results of a planner relative to `unit`, the mean log RMSE of the reference's trials.
 fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     let finished: Vec<&TrialRow> =
-        of_planner(&run.rows, planner).filter(|row| row.failure.is_none()).collect();
+        planner_rows(&run.rows, planner).filter(|row| row.failure.is_none()).collect();
     let mut logs: Vec<(u32, f64)> = logs(run, planner).into_iter().collect();
     logs.sort_by_key(|(trial, _)| *trial);
     let score = |(trial, log): (u32, f64)| Some((log - unit.get(&trial)?).exp());
@@ -157,8 +157,8 @@ fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     }
     ObjectResult {
         scores: logs.into_iter().filter_map(score).collect(),
-        missed: share(|touch| touch.contact.is_none() && !touch.overload),
-        stalled: share(|touch| touch.stall.is_some()),
+        miss_share: share(|touch| touch.contact.is_none() && !touch.overload),
+        fallback_share: share(|touch| touch.stall.is_some()),
         travel_m: some_mean(travels.collect()),
         coverage: at_end(|touch| touch.metrics.as_ref()?.coverage),
         brier: at_end(|touch| Some(touch.outline.as_ref()?.brier)),
@@ -193,7 +193,7 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
 
 /// Probability that a trial of `one` is better than one of `other`, averaged over the objects that
 /// both explored; a tie counts half.
-pub fn improvement(one: &Contender, other: &Contender) -> Option<f64> {
+pub fn win_probability(one: &Entrant, other: &Entrant) -> Option<f64> {
     let shares: Vec<f64> = (one.scores().into_iter().zip(other.scores()))
         .filter(|(a, b)| !a.is_empty() && !b.is_empty())
         .map(|(a, b)| {
@@ -206,7 +206,7 @@ pub fn improvement(one: &Contender, other: &Contender) -> Option<f64> {
 }
 
 /// Share of trials with a score of at most `score`, averaged over objects.
-pub fn profile(contender: &Contender, score: f64) -> f64 {
+pub fn profile(contender: &Entrant, score: f64) -> f64 {
     let strata = contender.scores().into_iter().filter(|scores| !scores.is_empty());
     let shares: Vec<f64> = strata
         .map(|scores| scores.iter().filter(|it| **it <= score).count() as f64 / scores.len() as f64)
@@ -230,16 +230,16 @@ pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
 /// together because they share initial touches. `None` if one of the three lacks an object of
 /// `objects` or has another number of trials, or if the gap is zero.
 pub fn gap_closed(
-    compared: &Compared,
-    contender: &Contender,
+    compared: &SuiteComparison,
+    contender: &Entrant,
     objects: &[usize],
     seed: u64,
 ) -> Option<Estimate> {
     let named = |name: &str| compared.contenders.iter().find(|it| it.name == name);
-    let of = |it: &Contender| -> Vec<Vec<f64>> {
+    let of = |it: &Entrant| -> Vec<Vec<f64>> {
         objects.iter().map(|object| log_scores(&it.results[*object].scores)).collect()
     };
-    let [floor, own, ceiling] = [of(named(FLOOR)?), of(contender), of(named(ORACLE)?)];
+    let [floor, own, ceiling] = [of(named(BASELINE_PLANNER)?), of(contender), of(named(ORACLE)?)];
     let sizes = counts(&floor);
     if sizes.contains(&0) || counts(&own) != sizes || counts(&ceiling) != sizes {
         return None;
@@ -285,5 +285,5 @@ fn estimate(
         }
         of(&picks)
     });
-    Estimate { value, interval: Some(percentiles_95(found.collect())) }
+    Estimate { value, interval: Some(central_95(found.collect())) }
 }

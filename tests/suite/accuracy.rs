@@ -3,17 +3,17 @@
 use crate::common::shipped;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::Effects;
-use palpate::sim::probe::rest;
+use palpate::sim::probe::resting_pose;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::solver::Collision;
 use palpate::sim::{Environment, Scene};
-use palpate::study::accuracy::comparison::{Comparison, Effort};
+use palpate::study::accuracy::comparison::{AccuracyComparison, MeasurementCounts};
 use palpate::study::accuracy::convergence;
-use palpate::study::accuracy::deviation::{Quantity, Spread};
-use palpate::study::accuracy::level::{LEVELS, Senses, converging};
+use palpate::study::accuracy::deviation::{ErrorStatistics, Quantity};
+use palpate::study::accuracy::level::{LEVELS, SensorModel, converging};
 use palpate::study::accuracy::tolerance::{Origin, Tolerance};
 use palpate::study::accuracy::touches::{
-    ReferenceLoad, Touches, Trials, noise_free, targets, touch_all,
+    ReferenceLoad, TargetTrials, TouchResults, noise_free, targets, touch_all,
 };
 use palpate::study::accuracy::variant::Variant;
 use palpate::task::Target;
@@ -33,7 +33,7 @@ fn every_level_is_a_scene_that_can_be_built_and_saved() {
         let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
         std::fs::write(file.path(), text).unwrap();
         assert_eq!(Scene::load(file.path(), &[]).unwrap(), changed, "{}", level.name());
-        assert_eq!(level.senses == Senses::Rigid, changed.effects == Effects::default());
+        assert_eq!(level.senses == SensorModel::Rigid, changed.effects == Effects::default());
     }
     let names: BTreeSet<String> = LEVELS.iter().map(|level| level.name()).collect();
     assert_eq!(names.len(), LEVELS.len());
@@ -48,7 +48,7 @@ fn every_level_is_a_scene_that_can_be_built_and_saved() {
 #[test]
 fn the_error_falls_with_the_resolution_as_it_should() {
     let scene = scene(&[]);
-    let trials = Trials::new(&scene, 6, 0);
+    let trials = TargetTrials::new(&scene, 6, 0);
     let order = convergence::in_time_step(&scene, &trials).unwrap().unwrap();
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
     let poses: Vec<_> =
@@ -58,7 +58,7 @@ fn the_error_falls_with_the_resolution_as_it_should() {
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
 }
 
-fn touched(scene: &Scene, targets: &[Target]) -> Touches {
+fn touched(scene: &Scene, targets: &[Target]) -> TouchResults {
     let environment = Arc::new(Environment::build(noise_free(scene)).unwrap());
     touch_all(&Simulator::new(environment).unwrap(), targets, 0).unwrap()
 }
@@ -104,7 +104,11 @@ fn a_tolerance_is_a_number_with_a_unit() {
 /// are unknown.
 #[test]
 fn what_stays_within_a_tolerance_depends_on_its_origin() {
-    let of = |error_m: f64| Spread { mean: error_m, p95: error_m, ..Spread::default() };
+    let of = |error_m: f64| ErrorStatistics {
+        mean: error_m,
+        p95: error_m,
+        ..ErrorStatistics::default()
+    };
     let variant = |off_truth_m: f64, contact_m: f64| Variant {
         off_truth_m: Some(of(off_truth_m)),
         contact_m: Some(of(contact_m)),
@@ -113,7 +117,7 @@ fn what_stays_within_a_tolerance_depends_on_its_origin() {
     };
     let [rigid, fine] = [variant(1e-5, 2e-3), variant(5e-4, 1e-4)];
     let within = |variant: &Variant, text: &str, origin| {
-        variant.stays_within(&text.parse::<Tolerance>().unwrap(), origin)
+        variant.is_within(&text.parse::<Tolerance>().unwrap(), origin)
     };
     let [reference, truth] = [Origin::Reference, Origin::Truth];
     assert!(!within(&rigid, "0.2mm", reference) && within(&fine, "0.2mm", reference));
@@ -130,10 +134,10 @@ fn the_cheapest_level_is_tried_on_other_targets() {
     let scene = scene(&[]);
     let tolerance: Tolerance = "1000mm".parse().unwrap();
     let criterion = Some(palpate::study::accuracy::tolerance::Criterion::Touches(tolerance));
-    let effort = Effort { touches: 4, pairs: 0, trials: 0, trial_touches: 1, seed: 0 };
+    let effort = MeasurementCounts { touches: 4, pairs: 0, trials: 0, trial_touches: 1, seed: 0 };
     let named = |name: &str, scene: &Scene| (Variant::named(name.into()), scene.clone());
     let coarse = shipped::scene("container_finger.toml", &["effects.skin.samples=60"]);
-    let mut levels = Comparison::new(named("fine", &scene), effort, criterion).unwrap();
+    let mut levels = AccuracyComparison::new(named("fine", &scene), effort, criterion).unwrap();
     levels.add(named("coarse", &coarse)).unwrap();
     levels.add(named("same", &scene)).unwrap();
     let [coarse, same] = [0, 1].map(|i| levels.variants[i].clone());
@@ -149,9 +153,9 @@ fn the_cheapest_level_is_tried_on_other_targets() {
 #[test]
 fn a_spread_is_that_of_its_values() {
     let values: Vec<f64> = (0..=100).map(f64::from).collect();
-    let spread = Spread::of(values).unwrap();
+    let spread = ErrorStatistics::of(values).unwrap();
     assert_eq!((spread.mean, spread.p95, spread.max), (50.0, 95.0, 100.0));
-    assert_eq!(Spread::of([f64::NAN]), None);
+    assert_eq!(ErrorStatistics::of([f64::NAN]), None);
 }
 
 #[test]
@@ -177,7 +181,7 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
 fn at_the_limit_of_approach_the_skin_is_not_used_up() {
     let mut scene = noise_free(&scene(&[]));
     let limit_m_s = scene.approach_limit_m_s().unwrap();
-    let ahead_t = scene.finger.ahead_t();
+    let ahead_t = scene.finger.direction_t();
     let layers = Profile::biotac(&scene.finger).layers(0.0, &ahead_t);
     let targets = targets(&scene, 4, 0);
     let mut depths_m = |share: f64| -> Vec<Option<f64>> {
@@ -185,8 +189,9 @@ fn at_the_limit_of_approach_the_skin_is_not_used_up() {
         let environment = Environment::build(scene.clone()).unwrap();
         let touches = touched(&scene, &targets);
         let task = environment.task();
-        let rest = |target| rest(&environment, &task.approach(target).unwrap()).unwrap().p_wt;
-        let rest_m = targets.iter().map(|target| rest(target).y);
+        let rest =
+            |target| resting_pose(&environment, &task.approach(target).unwrap()).unwrap().p_wt;
+        let rest_m = targets.iter().map(|target| resting_pose(target).y);
         let depth_m = |(rest_m, load): (f64, &Option<ReferenceLoad>)| {
             Some(rest_m - load.as_ref()?.motion.x_wt.translation.y)
         };

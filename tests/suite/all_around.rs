@@ -5,14 +5,14 @@ use crate::common::shapes::sphere_mesh;
 use crate::common::shipped::{contact, environment, scene};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::{Backend, Fault};
-use palpate::error::Invalid;
+use palpate::error::InputError;
 use palpate::explore::probe::servo::ArmReach;
 use palpate::explore::probe::{Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::report::MeshReport;
 use palpate::geometry::spread::direction;
-use palpate::sim::environment::Shape;
-use palpate::sim::kinematic::Kinematic;
+use palpate::sim::environment::Surface;
+use palpate::sim::kinematic::KinematicBackend;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Zone};
@@ -22,10 +22,10 @@ const MIDDLE_W: [f64; 3] = [0.0, -0.65, 0.5];
 const RADIUS_M: f64 = 0.05;
 
 /// Builds the environment of `scene` with a sphere as the object.
-fn with_sphere(scene: Scene) -> Result<Arc<Environment>, Invalid> {
+fn with_sphere(scene: Scene) -> Result<Arc<Environment>, InputError> {
     let bvh = MeshBvh::new(sphere_mesh(MIDDLE_W.into(), RADIUS_M, 60));
     let report = Box::<MeshReport>::default();
-    Environment::around(scene, Shape::Mesh { bvh, report }).map(Arc::new)
+    Environment::with_shape(scene, Surface::Mesh { bvh, report }).map(Arc::new)
 }
 
 fn around(name: &str, sets: &[&str]) -> Arc<Environment> {
@@ -72,11 +72,11 @@ fn the_finger_is_rolled_only_where_it_must_be_and_always_the_same() {
     for i in 0..200 {
         let outward_w = direction(i, 200);
         let aim = Aim::against(MIDDLE_W.into(), &outward_w);
-        assert!(free.task().reaches(&aim) && free.task().may_reach(&aim));
+        assert!(free.task().is_reachable(&aim) && free.task().is_probably_reachable(&aim));
         let unrolled = free.task().approach(&aim.into()).unwrap();
         assert!((unrolled.r_wa * Vector3::z()).z > -1e-12);
         let approach = low.task().approach(&aim.into());
-        assert_eq!(low.task().reaches(&aim), approach.is_some());
+        assert_eq!(low.task().is_reachable(&aim), approach.is_some());
         if let Some(approach) = approach {
             assert_eq!(Some(approach), low.task().approach(&aim.into()));
             let angle_rad = approach.r_wa.angle_to(&unrolled.r_wa);
@@ -95,18 +95,18 @@ fn nothing_goes_below_what_the_object_stands_on() {
         let environment = around(name, &["around.lowest_m=0.45"]);
         let (task, finger) = (environment.task(), &environment.scene().finger);
         let below = Aim::against(MIDDLE_W.into(), &-Vector3::z());
-        assert!(!task.reaches(&below) && !task.may_reach(&below));
+        assert!(!task.is_reachable(&below) && !task.is_probably_reachable(&below));
         assert!(!task.contains(&below.into()) && task.approach(&below.into()).is_none());
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
         let mut touched = 0;
         for i in (0..60).step_by(3) {
             let aim = Aim::against(MIDDLE_W.into(), &direction(i, 60));
-            if task.reaches(&aim) {
+            if task.is_reachable(&aim) {
                 let approach = task.approach(&aim.into()).unwrap();
                 let end = probe.touch(&approach).unwrap();
                 touched += usize::from(matches!(end, Touch::Contact(_)));
-                let lowest_m =
-                    probe.swept().map_or(1.0, |swept| swept.p_wt.z) - finger.drop_m(&approach.r_wa);
+                let lowest_m = probe.swept_volume().map_or(1.0, |swept| swept.p_wt.z)
+                    - finger.drop_m(&approach.r_wa);
                 assert!(lowest_m > 0.45 - 1e-9, "{i}: {lowest_m}");
             }
         }
@@ -130,7 +130,7 @@ fn an_arm_comes_to_all_that_it_reaches() {
     let mut reached = 0;
     for i in 0..40 {
         let aim = Aim::against(middle_w, &direction((i * 17) % 40, 40));
-        if task.reaches(&aim) {
+        if task.is_reachable(&aim) {
             reached += 1;
             let touch = probe.touch(&task.approach(&aim.into()).unwrap());
             assert!(matches!(touch, Ok(Touch::Contact(_))), "{aim:?}: {touch:?}");
@@ -144,7 +144,7 @@ fn standing_at(q: [f64; 7]) -> Box<dyn Backend> {
     let home = format!("arm.home_deg={:?}", q.map(f64::to_degrees));
     let sets = ["body=\"kinematic\"", "object.position_m=[0, -3, 0.5]", &home];
     let far = Environment::build(scene("container_around_pa10.toml", &sets)).unwrap();
-    Box::new(Kinematic::new(&Arc::new(far)).unwrap())
+    Box::new(KinematicBackend::new(&Arc::new(far)).unwrap())
 }
 
 /// Joints after touches from all sides, and the next of 420 directions: elbow on the other side,
@@ -168,7 +168,7 @@ fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move()
     let mut arrived = Vec::new();
     for (q, i) in LEFT_AT {
         let aim = Aim::against(task.ball().unwrap().centre_w, &direction(i, 420));
-        assert!(task.reaches(&aim), "{i}");
+        assert!(task.is_reachable(&aim), "{i}");
         let mut servo = simulator.servo(standing_at(q), 1).unwrap();
         match servo.touch(&task.approach(&aim.into()).unwrap()) {
             Ok(Touch::Miss) => arrived.push(i),

@@ -9,7 +9,7 @@ fn the_controller_allocates_nothing() {
     assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 1);
     let chain = ArmSettings::default().chain().unwrap();
     let mut q = chain.home;
-    let mut goal = Goal::still(chain.forward(&q));
+    let mut goal = Goal::at_rest(chain.forward(&q));
     let mut controller = Controller::new(chain, 0.004).unwrap();
     // The goal is out of reach, past singularities and limits.
     goal.x_wt.translation.vector.y = -3.0;
@@ -26,7 +26,7 @@ fn interlocks_allocate_nothing() {
     use crate::common::shipped;
     use palpate::backend::interlock::InterlockSettings;
     use palpate::backend::{Backend, Command};
-    use palpate::explore::probe::interlocks::interlocked;
+    use palpate::explore::probe::interlocks::with_interlocks;
     use palpate::sim::simulator::Simulator;
     let sets = ["arm.model=\"pa10\"", "effects={skin={samples=100}, fluid={}, wrench={}}"];
     let environment = shipped::environment("container_finger.toml", &sets);
@@ -34,7 +34,7 @@ fn interlocks_allocate_nothing() {
     let (robot, task) = (environment.robot().unwrap(), environment.task());
     // The tip is so close to the table that the guard checks every tick.
     let settings = InterlockSettings { lowest_m: Some(0.22), ..InterlockSettings::default() };
-    let mut body = interlocked(body, &robot, task, None, &settings).unwrap();
+    let mut body = with_interlocks(body, &robot, task, None, &settings).unwrap();
     let mut command = Command { qdot: vec![0.0; 7] };
     body.reset(1).unwrap();
     // The first frames size the reading.
@@ -53,7 +53,7 @@ fn interlocks_allocate_nothing() {
 fn the_plant_allocates_nothing() {
     use palpate::backend::Wrench;
     use palpate::sim::mjcf;
-    use palpate::sim::mjcf::Mode;
+    use palpate::sim::mjcf::ModelPurpose;
     use palpate::sim::mujoco::{Plant, compile};
     use palpate::sim::{Environment, Scene};
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
@@ -61,14 +61,14 @@ fn the_plant_allocates_nothing() {
     scene.arm = Some(ArmSettings::default());
     scene.effects.wrench = Some(Default::default());
     let environment = Environment::build(scene).unwrap();
-    let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
+    let text = mjcf::scene(&environment, ModelPurpose::Dynamic { step_s: 0.002 }).unwrap();
     let mut plant = Plant::new(compile(&text).unwrap().into()).unwrap();
     let home = environment.chain().unwrap().home;
     let count = allocations(|| {
         plant.reset(home.as_slice()).unwrap();
         for _ in 0..100 {
             plant.step(&[0.1; 7], &Wrench::default()).unwrap();
-            let _ = (plant.tip(), plant.tip_twist(), plant.mount(), plant.q());
+            let _ = (plant.tip(), plant.tip_twist(), plant.mount_wrench(), plant.q());
         }
     });
     assert_eq!(count, 0);

@@ -1,6 +1,6 @@
 //! Tests of zones that face any side of an object.
 
-use crate::common::shapes::Dice;
+use crate::common::shapes::UniformRandom;
 use crate::common::shipped::scene;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use palpate::explore::probe::Touch;
@@ -73,7 +73,7 @@ fn a_side_is_the_same_from_wherever_it_is_explored() {
     ] {
         let scene = scene(name, sets);
         // Targets avoid round numbers, so that a movement's last tick does not depend on rounding.
-        let mut dice = Dice(5);
+        let mut dice = UniformRandom(5);
         let mut share = || 0.5 + 0.45 * dice.roll();
         let targets: Vec<_> =
             (0..12).map(|_| scene.zone.as_ref().unwrap().at(&[share(), share()])).collect();
@@ -117,7 +117,7 @@ proptest! {
     /// near depth to the far one, for any pose.
     #[test]
     fn a_zones_places_are_where_its_approaches_go(seed in any::<u64>()) {
-        let mut dice = Dice(seed);
+        let mut dice = UniformRandom(seed);
         let mut zone = Zone::new([-0.2, 0.3], Some([0.1, 0.5]));
         zone.position_m = dice.vector().into();
         zone.rotation_deg = (dice.vector() * 180.0).into();

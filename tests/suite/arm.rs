@@ -105,14 +105,15 @@ mod mujoco {
     use palpate::robot::arm::ArmSettings;
     use palpate::sim::Environment;
     use palpate::sim::mjcf;
-    use palpate::sim::mjcf::Mode;
+    use palpate::sim::mjcf::ModelPurpose;
     use palpate::sim::mujoco::{Plant, compile};
     use std::sync::Arc;
 
     const STEP_S: f64 = 0.002;
 
     fn model(environment: &Environment) -> MjModel {
-        compile(&mjcf::scene(environment, Mode::Dynamic { step_s: STEP_S }).unwrap()).unwrap()
+        compile(&mjcf::scene(environment, ModelPurpose::Dynamic { step_s: STEP_S }).unwrap())
+            .unwrap()
     }
 
     fn plant(arm: Option<ArmSettings>) -> (Plant, Vec<f64>) {
@@ -255,7 +256,8 @@ mod mujoco {
             let mut most: f64 = 0.0;
             for _ in 0..25 {
                 plant.step(&rest, &Wrench { force_n, torque_nm }).unwrap();
-                most = most.max(plant.motors().iter().fold(0.0, |most, nm| nm.abs().max(most)));
+                most =
+                    most.max(plant.motor_efforts().iter().fold(0.0, |most, nm| nm.abs().max(most)));
             }
             let pushed = plant.q().to_vec();
             for _ in 0..1000 {
@@ -278,7 +280,7 @@ mod mujoco {
                 for _ in 0..1500 {
                     plant.step(&rest, &wrench).unwrap();
                 }
-                plant.mount()
+                plant.mount_wrench()
             };
             let idle = measure(&mut plant, Wrench::default());
             let weight_w = plant.tip().rotation * idle.force_n;
@@ -386,7 +388,7 @@ mod mujoco {
             let chain = environment.chain().unwrap();
             let data = MjData::new(Box::new(model(&environment)));
             assert_eq!(data.qpos().len(), chain.joints.len());
-            assert!(compile(&mjcf::scene(&environment, Mode::Picture).unwrap()).is_ok());
+            assert!(compile(&mjcf::scene(&environment, ModelPurpose::Picture).unwrap()).is_ok());
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Tests of commands on whole objects: outputs can be read back, and commands for zones reject
 //! whole objects.
 
-use crate::common::program::{fails, folder, palpate, said, succeeds};
+use crate::common::program::{fails, folder, palpate, stderr, succeeds};
 use crate::common::shipped::scene;
 use nalgebra::Point3;
-use palpate::explore::registration::KnownBody;
+use palpate::explore::registration::CalibrationBody;
 use palpate::geometry::import::import;
 use palpate::sim::known_body;
 use std::fs;
@@ -65,7 +65,7 @@ fn planners_around_an_object_are_held_against_what_they_were() {
     // Touches are equal, but their evaluation differs.
     let other = palpate(folder.path(), &[&check[..], &["--set", "gp.cells=24"]].concat());
     let told = String::from_utf8_lossy(&other.stdout).into_owned();
-    assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{told} {}", said(&other));
+    assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{told} {}", stderr(&other));
     assert!(told.contains("error after the last touch") && !told.contains("RMSE"), "{told}");
 }
 
@@ -88,7 +88,7 @@ fn what_goes_over_a_zone_refuses_a_whole_object() {
 /// A robot for whole objects registers at one side of a body.
 #[test]
 fn a_known_body_takes_the_place_of_a_whole_object() {
-    let body = KnownBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
+    let body = CalibrationBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
     let scene = scene("container_around_pa10.toml", &[]);
     let environment = known_body::environment(&scene, &body).unwrap();
     assert!(environment.task().ball().is_none());

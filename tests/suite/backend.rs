@@ -1,13 +1,13 @@
 //! Tests of the backend contract, for every body and every wrapper around it.
 
 use crate::common::shipped;
-use palpate::backend::delay::Delayed;
-use palpate::backend::interlock::{InterlockSettings, Interlocked, Site};
+use palpate::backend::delay::DelayedBackend;
+use palpate::backend::interlock::{InterlockSettings, Interlocked, SafetyContext};
 use palpate::backend::watched::Watched;
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::robot::{Finger, Robot};
-use palpate::ros::recording::{About, Recorder, Recording, wall_clock};
+use palpate::ros::recording::{Recording, RecordingBackend, RecordingMetadata, wall_clock};
 use palpate::sim::Environment;
 use palpate::sim::simulator::Simulator;
 use std::sync::Arc;
@@ -31,12 +31,12 @@ const WRAPS: [(&str, Wrap); 5] = [
     ("bare", |body, _| body),
     ("interlocked", |body, chain| Box::new(interlocked(body, chain))),
     ("recorded", |body, _| recorded(body)),
-    ("delayed", |body, _| Box::new(Delayed::new(body, 0.03))),
+    ("delayed", |body, _| Box::new(DelayedBackend::new(body, 0.03))),
     ("watched", |body, _| Box::new(Watched::new(body, 100.0).0)),
 ];
 
 fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
-    let about = About {
+    let about = RecordingMetadata {
         version: String::new(),
         experiment: String::new(),
         planner: String::new(),
@@ -45,13 +45,20 @@ fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
         capabilities: body.capabilities().clone(),
     };
     let recording = Recording::new(Box::new(std::io::sink()), &about, wall_clock).unwrap();
-    Box::new(Recorder::new(body, recording))
+    Box::new(RecordingBackend::new(body, recording))
 }
 
 fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> Interlocked {
     let robot = Robot { chain: chain.clone(), finger: Finger::default(), is_soft: true };
     let (touch_force_n, travel_m_s) = (15.0, 0.1);
-    let site = Site { robot, tip_w: None, farthest: None, object: None, touch_force_n, travel_m_s };
+    let site = SafetyContext {
+        robot,
+        tip_w: None,
+        farthest: None,
+        object: None,
+        touch_force_n,
+        travel_m_s,
+    };
     Interlocked::new(body, &site, &InterlockSettings::default()).unwrap()
 }
 
@@ -252,7 +259,7 @@ fn a_delayed_body_does_later_what_the_bare_one_does() {
     let simulator = Simulator::new(environment(&[])).unwrap();
     let body = || simulator.body().unwrap().unwrap();
     let bare = run(body().as_mut(), 1, 50);
-    let delayed = run(&mut Delayed::new(body(), 0.031), 1, 53);
+    let delayed = run(&mut DelayedBackend::new(body(), 0.031), 1, 53);
     for (bare, delayed) in bare.iter().zip(&delayed[3..]) {
         let apart = bare.q.iter().zip(&delayed.q).map(|(a, b)| (a - b).abs());
         assert!(apart.fold(0.0, f64::max) < 1e-12);

@@ -2,20 +2,20 @@
 
 use palpate::math::least_squares::FitError;
 use palpate::robot::finger::frame::ELECTRODES;
-use palpate::sim::finger::calibration::constants::{CONSTANTS, Model};
-use palpate::sim::finger::calibration::fit::{Free, fit};
-use palpate::sim::finger::calibration::score::{HeldOut, Score, leave_one_out};
-use palpate::sim::finger::calibration::session::{Bench, Session};
+use palpate::sim::finger::calibration::constants::{CONSTANTS, FingerConstants};
+use palpate::sim::finger::calibration::fit::{FreeParameters, fit};
+use palpate::sim::finger::calibration::score::{HeldOutResult, Score, leave_one_out};
+use palpate::sim::finger::calibration::session::{PlateRig, Session};
 use palpate::sim::finger::effects::electrodes::{counts, impedance_ohm};
-use palpate::sim::finger::recording::{Recording, Recordings};
+use palpate::sim::finger::recording::{PlateRecording, Recordings};
 
 fn recordings() -> Recordings {
     serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap()
 }
 
 /// Model with fewer skin points than in a scene: the fit is faster, and counts differ slightly.
-fn coarse() -> Model {
-    let mut model = Model::default();
+fn coarse() -> FingerConstants {
+    let mut model = FingerConstants::default();
     model.skin.samples = 250;
     model
 }
@@ -24,7 +24,8 @@ fn coarse() -> Model {
 /// of 69 and 82), and a smaller error than the no-change predictor at every load.
 #[test]
 fn constants_of_one_sensor_predict_the_other() {
-    let held_out = leave_one_out(&coarse(), &recordings().sensors, Free::Constants).unwrap();
+    let held_out =
+        leave_one_out(&coarse(), &recordings().sensors, FreeParameters::Constants).unwrap();
     for held in &held_out {
         println!("{} from {:?}: {:?}", held.sensor, held.others, held.whole());
         assert_eq!(held.others.len(), 1);
@@ -38,7 +39,7 @@ fn constants_of_one_sensor_predict_the_other() {
         let offset = held.fit.sessions[0].offset;
         assert!((1.02..1.25).contains(&offset), "{offset}");
     }
-    let whole: Vec<Score> = held_out.iter().map(HeldOut::whole).collect();
+    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::whole).collect();
     let all = Score::of(whole.iter());
     assert!(all.model_counts <= 85.0 && all.right_sign() >= 0.95, "{all:?}");
 }
@@ -50,11 +51,11 @@ fn a_fit_finds_what_a_recording_was_made_with() {
     CONSTANTS[1].set(&mut model, 4e8);
     let made = Session { offset: 1.12, gain: 0.9, pitch_rad: 0.2, roll_rad: vec![0.05; 6] };
     let mut recording = recordings().sensors.remove(1);
-    let predicted = made.predict(&model, &recording, &mut Bench::default()).unwrap();
+    let predicted = made.predict(&model, &recording, &mut PlateRig::default()).unwrap();
     for (bin, counts) in recording.near_normal_loads.iter_mut().zip(predicted) {
         bin.mean_counts = counts;
     }
-    let found = fit(&model, &[&recording], Free::Sessions).unwrap();
+    let found = fit(&model, &[&recording], FreeParameters::Sessions).unwrap();
     let session = &found.sessions[0];
     assert!((session.offset - made.offset).abs() < 0.02, "{session:?}");
     assert!((session.gain - made.gain).abs() < 0.04, "{session:?}");
@@ -70,7 +71,7 @@ fn an_offset_alone_is_told_as_one() {
     for bin in &mut recording.near_normal_loads {
         bin.mean_counts = rest.map(|rest| counts(impedance_ohm(rest) / 1.1));
     }
-    let held = leave_one_out(&coarse(), &[recording], Free::Constants).unwrap().remove(0);
+    let held = leave_one_out(&coarse(), &[recording], FreeParameters::Constants).unwrap().remove(0);
     assert!(held.others.is_empty() && held.whole().mean_change_counts.is_none());
     assert!(held.whole().offset_counts < 1.0, "{:?}", held.whole());
     assert!(held.whole().no_change_counts > 50.0, "{:?}", held.whole());
@@ -84,7 +85,7 @@ fn a_constant_that_recordings_do_not_determine_is_refused() {
     for bin in &mut recording.near_normal_loads {
         bin.mean_counts = std::array::from_fn(|i| if i == 16 { 1.0 } else { 3900.0 });
     }
-    let found = fit(&coarse(), &[&recording], Free::Constants).unwrap();
+    let found = fit(&coarse(), &[&recording], FreeParameters::Constants).unwrap();
     assert!(!found.refused.is_empty(), "{found:?}");
     for lost in &found.refused {
         assert!(found.estimates.iter().all(|kept| kept.key != lost.key));
@@ -97,7 +98,7 @@ fn a_constant_that_recordings_do_not_determine_is_refused() {
 #[test]
 fn what_no_sensor_can_say_is_refused_by_name() {
     assert_eq!(recordings().check(), Ok(()));
-    let told = |change: fn(&mut Recording)| {
+    let told = |change: fn(&mut PlateRecording)| {
         let mut all = recordings();
         change(&mut all.sensors[1]);
         all.check().unwrap_err().to_string()
@@ -111,7 +112,7 @@ fn what_no_sensor_can_say_is_refused_by_name() {
     let empty = Recordings { note: String::new(), sensors: Vec::new() };
     let error = empty.check().unwrap_err().to_string();
     assert_eq!(error, "sensors is empty: allowed is at least one entry");
-    assert_eq!(fit(&coarse(), &[], Free::Sessions), Err(FitError::Empty));
+    assert_eq!(fit(&coarse(), &[], FreeParameters::Sessions), Err(FitError::Empty));
 }
 
 /// Mean errors over loads weight all entries equally.

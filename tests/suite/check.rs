@@ -3,13 +3,13 @@
 use crate::common::program::palpate;
 use palpate::experiment::{Experiment, Simulation, runner};
 use palpate::explore::belief::Belief;
-use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner};
+use palpate::explore::planner::{self, Plan, PlanError, Planner, PlannerEntry};
 use palpate::math::seed;
-use palpate::study::check::baseline::Line;
-use palpate::study::check::held::of_planner;
-use palpate::study::check::judged::JUDGED;
-use palpate::study::check::sequence::Sequence;
-use palpate::study::check::{Baseline, Rules, Verdict, hold};
+use palpate::study::check::baseline::TrialLine;
+use palpate::study::check::held::planner_verdict;
+use palpate::study::check::judged::CHECK_MEASURES;
+use palpate::study::check::sequence::ConfidenceSequence;
+use palpate::study::check::{CheckOptions, StoredBaseline, Verdict, run_check};
 use rand::RngExt;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::fs;
@@ -37,7 +37,7 @@ fn intervals_hold_whenever_one_looks() {
             };
             let values: Vec<f64> = (0..50).map(|_| value()).collect();
             (10..=50).step_by(10).any(|n| {
-                let sequence = Sequence::new(&values[..n], 10, ALPHA);
+                let sequence = ConfidenceSequence::new(&values[..n], 10, ALPHA);
                 let [low, high] = sequence.interval;
                 let is_out = low > 0.0 || high < 0.0;
                 assert_eq!(is_out, sequence.p < ALPHA, "{sequence:?}");
@@ -57,36 +57,36 @@ fn what_differs_is_found() {
     for i in 0..200 {
         let mut rng = seed::stream(6, i, "sequence");
         let values: Vec<f64> = (0..20).map(|_| 1.0 + normal(&mut rng)).collect();
-        let sequence = Sequence::new(&values, 10, ALPHA);
+        let sequence = ConfidenceSequence::new(&values, 10, ALPHA);
         found += u32::from(sequence.interval[0] > 0.0);
         let wanted = sequence.wanted(1.0, ALPHA).unwrap();
         assert!((5..40).contains(&wanted), "{wanted}");
     }
     assert!(found > 150, "{found}");
-    let all_same = Sequence::new(&[0.0; 10], 10, ALPHA);
+    let all_same = ConfidenceSequence::new(&[0.0; 10], 10, ALPHA);
     assert!(all_same.is_zero && all_same.interval == [0.0, 0.0]);
-    let one = Sequence::new(&[3.0], 10, ALPHA);
+    let one = ConfidenceSequence::new(&[3.0], 10, ALPHA);
     assert_eq!((one.interval, one.p), ([f64::NEG_INFINITY, f64::INFINITY], 1.0));
 }
 
 /// Results for differences around `shift` with standard deviation `sd`, in every measure.
-fn judged(shift: f64, sd: f64, count: usize) -> Vec<palpate::study::check::Judgement> {
+fn judged(shift: f64, sd: f64, count: usize) -> Vec<palpate::study::check::MeasureResult> {
     let mut rng = seed::stream(7, count as u64, "judged");
     let mut values = || (0..count).map(|_| shift + sd * normal(&mut rng)).collect::<Vec<f64>>();
-    let differences: Vec<_> = JUDGED.iter().map(|judged| (judged, values())).collect();
-    Rules::default().judge(&differences)
+    let differences: Vec<_> = CHECK_MEASURES.iter().map(|judged| (judged, values())).collect();
+    CheckOptions::default().judge(&differences)
 }
 
 #[test]
 fn verdicts_are_what_their_intervals_say() {
-    let said = |shift, sd, count| of_planner(&judged(shift, sd, count));
+    let said = |shift, sd, count| planner_verdict(&judged(shift, sd, count));
     assert_eq!(said(-0.2, 0.05, 20), Verdict::Better);
     assert_eq!(said(0.0, 0.01, 20), Verdict::Ok);
     assert_eq!(said(0.2, 0.05, 20), Verdict::Worse);
     assert_eq!(said(0.0, 0.5, 20), Verdict::Undecided);
     assert_eq!(said(0.0, 0.0, 10), Verdict::Identical);
-    let none: Vec<_> = JUDGED.iter().map(|judged| (judged, Vec::new())).collect();
-    assert_eq!(of_planner(&Rules::default().judge(&none)), Verdict::Missing);
+    let none: Vec<_> = CHECK_MEASURES.iter().map(|judged| (judged, Vec::new())).collect();
+    assert_eq!(planner_verdict(&CheckOptions::default().judge(&none)), Verdict::Missing);
 }
 
 fn simulation(sets: &[&str]) -> Simulation {
@@ -97,30 +97,31 @@ fn simulation(sets: &[&str]) -> Simulation {
 const SHORT: [&str; 4] =
     ["trials=4", "touches=8", "initial_touches=3", "planners=[\"active\",\"random\"]"];
 
-fn baseline(simulation: &Simulation) -> Baseline {
+fn baseline(simulation: &Simulation) -> StoredBaseline {
     let stop = AtomicBool::new(false);
-    let jobs = runner::jobs(simulation, &[]).unwrap();
-    let rows = runner::rows(simulation, jobs, 0, &stop, &|_| ()).unwrap();
-    Baseline::new(simulation, &rows, "a test")
+    let jobs = runner::missing_jobs(simulation, &[]).unwrap();
+    let rows = runner::run_in_memory(simulation, jobs, 0, &stop, &|_| ()).unwrap();
+    StoredBaseline::new(simulation, &rows, "a test")
 }
 
 /// Equal rows are identical; a removed planner, or other trials, are missing.
 #[test]
 fn rows_are_held_against_a_baseline() {
     let stop = AtomicBool::new(false);
-    let rules = Rules { first: 2, batch: 2, ..Rules::default() };
+    let rules = CheckOptions { first: 2, batch: 2, ..CheckOptions::default() };
     let old = baseline(&simulation(&SHORT));
-    let hold = |sets: &[&str]| hold(&simulation(sets), &old, &rules, 0, &stop, &|_| ()).unwrap();
-    let same = hold(&SHORT);
+    let hold =
+        |sets: &[&str]| run_check(&simulation(sets), &old, &rules, 0, &stop, &|_| ()).unwrap();
+    let same = run_check(&SHORT);
     assert_eq!((same.verdict(), same.same_settings), (Verdict::Identical, true));
     assert_eq!(same.rows.len(), 4, "a batch is enough");
-    let gone = hold(&["trials=4", "touches=8", "initial_touches=3", "planners=[\"random\"]"]);
+    let gone = run_check(&["trials=4", "touches=8", "initial_touches=3", "planners=[\"random\"]"]);
     assert_eq!(gone.verdict(), Verdict::Missing);
     let random = gone.planners.iter().find(|planner| planner.name == "random").unwrap();
     assert_eq!(random.verdict, Verdict::Identical);
     let mut other = SHORT.to_vec();
     other.push("gp.noise_sd_m=0.3");
-    let other = hold(&other);
+    let other = run_check(&other);
     assert!(!other.same_settings && other.verdict() > Verdict::Identical, "{:?}", other.planners);
     let text = old.text().unwrap();
     assert_eq!(text.lines().count(), 9);
@@ -196,7 +197,7 @@ impl Planner for Shy {
     }
 }
 
-static WORSE: Entry = Entry {
+static WORSE: PlannerEntry = PlannerEntry {
     name: "worse",
     about: "active, but away from the border",
     zone_only: Some("it keeps away from a border"),
@@ -206,7 +207,7 @@ static WORSE: Entry = Entry {
     },
 };
 
-static RESEEDED: Entry = Entry {
+static RESEEDED: PlannerEntry = PlannerEntry {
     name: "reseeded",
     about: "random, with other random numbers",
     zone_only: None,
@@ -218,21 +219,27 @@ static RESEEDED: Entry = Entry {
 
 /// Checks `new` against the planner `old` with a new seed; returns the verdict, the trials and the
 /// mean difference of mean log RMSE.
-fn one_check(name: &str, seed: u64, old: &Entry, new: &Entry) -> (Verdict, usize, f64) {
+fn one_check(
+    name: &str,
+    seed: u64,
+    old: &PlannerEntry,
+    new: &PlannerEntry,
+) -> (Verdict, usize, f64) {
     let path = format!("experiments/{name}.toml");
     let mut experiment = Experiment::load(Path::new(&path), &[]).unwrap();
     experiment.seed = seed;
     let simulation = Simulation::new(experiment).unwrap();
-    let rules = Rules::default();
-    let mut differences: Vec<_> = JUDGED.iter().map(|judged| (judged, Vec::new())).collect();
+    let rules = CheckOptions::default();
+    let mut differences: Vec<_> =
+        CHECK_MEASURES.iter().map(|judged| (judged, Vec::new())).collect();
     for trial in 0..50 {
         let [was, is] = [old, new]
-            .map(|entry| Line::of(&simulation.trial(entry, trial), simulation.experiment()));
+            .map(|entry| TrialLine::of(&simulation.trial(entry, trial), simulation.experiment()));
         for (judged, values) in &mut differences {
             values.push(is.values[judged.id] - was.values[judged.id]);
         }
         if (trial + 1) % 10 == 0 {
-            let verdict = of_planner(&rules.judge(&differences));
+            let verdict = planner_verdict(&rules.judge(&differences));
             if verdict != Verdict::Undecided || trial == 49 {
                 let values = &differences[0].1;
                 return (verdict, values.len(), values.iter().sum::<f64>() / values.len() as f64);

@@ -3,11 +3,11 @@
 use crate::common::shipped::environment;
 use palpate::backend::interlock::InterlockSettings;
 use palpate::backend::{Command, Fault};
-use palpate::explore::probe::interlocks::interlocked;
+use palpate::explore::probe::interlocks::with_interlocks;
 use palpate::geometry::distance::HalfSpace;
 use palpate::sim::Environment;
 use palpate::sim::mjcf;
-use palpate::sim::mjcf::Mode;
+use palpate::sim::mjcf::ModelPurpose;
 use palpate::sim::simulator::Simulator;
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ fn lower(environment: &Arc<Environment>, guarded: bool) -> (f64, Option<Fault>) 
             tip_margin_m: 10.0,
             ..InterlockSettings::default()
         };
-        body = Box::new(interlocked(body, &robot, task, None, &settings).unwrap());
+        body = Box::new(with_interlocks(body, &robot, task, None, &settings).unwrap());
     }
     body.reset(1).unwrap();
     let table =
@@ -80,7 +80,8 @@ fn a_touch_far_from_everything_is_the_same_to_the_bit() {
     };
     let (without, with) = (arm(&[]), arm(&["effects.collision={}"]));
     assert_eq!(touched(&without), touched(&with));
-    let text = |environment| mjcf::scene(environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
+    let text =
+        |environment| mjcf::scene(environment, ModelPurpose::Dynamic { step_s: 0.002 }).unwrap();
     let (without, with) = (text(&without), text(&with));
     for word in ["table", "hfield", "contype=\"2\""] {
         assert!(!without.contains(word) && with.contains(word), "{word}");

@@ -1,6 +1,6 @@
 //! Tests of the command line.
 
-use crate::common::program::{command, ended, fails, folder, palpate, said, succeeds};
+use crate::common::program::{command, fails, folder, palpate, run_to_end, stderr, succeeds};
 use std::fs;
 use std::path::Path;
 
@@ -50,7 +50,7 @@ fn commands_answer_to_their_old_names() {
     ];
     for (old, says) in renamed {
         let output = palpate(folder.path(), old);
-        let output = said(&output) + &String::from_utf8_lossy(&output.stdout);
+        let output = stderr(&output) + &String::from_utf8_lossy(&output.stdout);
         assert!(says.iter().all(|words| output.contains(words)), "{old:?}: {output}");
     }
     for gone in ["stress", "bench", "cost"] {
@@ -98,16 +98,16 @@ fn a_summary_is_told_to_programs() {
 fn short_work_says_nothing_beside_its_result() {
     let folder = folder();
     let output = palpate(folder.path(), &["run", "small.toml", "--no-report"]);
-    assert!(output.status.success() && !said(&output).contains("left"), "{}", said(&output));
+    assert!(output.status.success() && !stderr(&output).contains("left"), "{}", stderr(&output));
 }
 
 #[test]
 fn errors_are_coloured_where_that_is_asked_for_only() {
     let folder = folder();
-    let plain = said(&palpate(folder.path(), &["run", "none.toml"]));
+    let plain = stderr(&palpate(folder.path(), &["run", "none.toml"]));
     assert!(plain.starts_with("error: ") && !plain.contains('\u{1b}'), "{plain}");
     let mut coloured = command(folder.path(), &["run", "none.toml"]);
-    let coloured = said(&ended(coloured.env("CLICOLOR_FORCE", "1"), "coloured"));
+    let coloured = stderr(&run_to_end(coloured.env("CLICOLOR_FORCE", "1"), "coloured"));
     assert!(coloured.contains("\u{1b}[") && coloured.contains("error:"), "{coloured}");
 }
 

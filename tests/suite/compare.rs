@@ -3,15 +3,15 @@
 use crate::common::program::palpate;
 use palpate::experiment::statistics::equal_error::Estimate;
 use palpate::study::compare::{
-    Contender, ObjectResult, improvement, interquartile, interquartile_mean, profile,
+    Entrant, ObjectResult, interquartile, interquartile_mean, profile, win_probability,
 };
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
 
-fn contender(scores: &[f64]) -> Contender {
+fn contender(scores: &[f64]) -> Entrant {
     let result = ObjectResult { scores: scores.to_vec(), ..ObjectResult::default() };
-    Contender { name: "it".into(), results: vec![result] }
+    Entrant { name: "it".into(), results: vec![result] }
 }
 
 #[test]
@@ -34,9 +34,9 @@ proptest! {
         b in prop::collection::vec(0.1..9.0_f64, 1..30),
     ) {
         let (one, other) = (contender(&a), contender(&b));
-        let both = improvement(&one, &other).unwrap() + improvement(&other, &one).unwrap();
+        let both = win_probability(&one, &other).unwrap() + win_probability(&other, &one).unwrap();
         prop_assert!((both - 1.0).abs() < 1e-12);
-        prop_assert_eq!(improvement(&one, &one), Some(0.5));
+        prop_assert_eq!(win_probability(&one, &one), Some(0.5));
         let Estimate { value: mean, interval } = interquartile(&[&a, &b], 3).unwrap();
         let [low, high] = interval.unwrap();
         prop_assert!(low <= high && (0.1..=9.0).contains(&mean));

@@ -147,7 +147,7 @@ fn a_goal_beyond_a_joints_limit_is_met_again_on_its_way_back() {
 fn the_arm_leaves_its_upright_posture() {
     let chain = arm();
     let home = chain.forward(&chain.home);
-    let (_, damping, off) = drive(&chain, Joints::zeros(), 5000, |_| Goal::still(home));
+    let (_, damping, off) = drive(&chain, Joints::zeros(), 5000, |_| Goal::at_rest(home));
     assert!(damping > 0.99, "{damping}");
     assert!(off < 1e-4, "{off}");
 }
@@ -170,7 +170,11 @@ fn away_from_trouble_the_goal_is_followed_exactly() {
             let motion = controller.step(&q.as_slice()[..n], &Goal { x_wt, twist }).unwrap();
             assert_eq!(motion.damping, 0.0);
             if t > 0.01 {
-                assert!((motion.followed - 1.0).abs() < 1e-6, "{t} {}", motion.followed);
+                assert!(
+                    (motion.achieved_ratio - 1.0).abs() < 1e-6,
+                    "{t} {}",
+                    motion.achieved_ratio
+                );
             }
             q += motion.qdot * PERIOD_S;
         }
@@ -189,9 +193,9 @@ fn the_null_space_brings_the_elbow_home_while_the_tip_stands() {
     // to wrist, found by a simulated motion.
     let mut odd = chain.clone();
     odd.home[2] += 0.8;
-    q = drive(&odd, q, 2000, |_| Goal::still(start)).0;
+    q = drive(&odd, q, 2000, |_| Goal::at_rest(start)).0;
     let away = (q - chain.home).norm();
-    let (back, _, off) = drive(&chain, q, 4000, |_| Goal::still(start));
+    let (back, _, off) = drive(&chain, q, 4000, |_| Goal::at_rest(start));
     assert!(away > 0.2 && (back - chain.home).norm() < 0.02);
     assert!(off < 1e-4, "{off}");
 }
@@ -202,7 +206,7 @@ fn nonsense_is_an_error() {
     assert!(Controller::new(chain.clone(), f64::NAN).is_err());
     assert!(Controller::new(chain.clone(), 0.0).is_err());
     let mut controller = Controller::new(chain.clone(), PERIOD_S).unwrap();
-    let still = Goal::still(chain.forward(&chain.home));
+    let still = Goal::at_rest(chain.forward(&chain.home));
     let wrong = controller.step(&[0.0; 3], &still).unwrap_err();
     assert_eq!(wrong.to_string(), "3 joint positions for an arm of 7 joints");
     assert!(controller.step(&[f64::NAN; 7], &still).is_err());
@@ -288,7 +292,7 @@ mod mujoco {
     use super::*;
     use palpate::backend::Wrench;
     use palpate::sim::mjcf;
-    use palpate::sim::mjcf::Mode;
+    use palpate::sim::mjcf::ModelPurpose;
     use palpate::sim::mujoco::{Plant, compile};
     use std::sync::Arc;
 
@@ -304,7 +308,7 @@ mod mujoco {
             let environment = Environment::build(scene).unwrap();
             let chain = environment.chain().unwrap();
             let n = chain.joints.len();
-            let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
+            let text = mjcf::scene(&environment, ModelPurpose::Dynamic { step_s: 0.002 }).unwrap();
             let mut plant = Plant::new(Arc::new(compile(&text).unwrap())).unwrap();
             let start = Translation3::new(0.02, -0.54, 0.47);
             let start = Isometry3::from_parts(start, environment.scene().finger.r_at());
@@ -337,7 +341,7 @@ fn a_pose_that_was_asked_for_changes_no_command() {
     let chain = arm();
     let [mut asked, mut other] =
         [(); 2].map(|()| Controller::new(chain.clone(), PERIOD_S).unwrap());
-    let goal = Goal::still(chain.forward(&chain.home));
+    let goal = Goal::at_rest(chain.forward(&chain.home));
     for tick in 0..50 {
         let q = chain.home + Joints::from_fn(|i, _| 0.1 * f64::from(tick + 7 * i as i32).sin());
         assert_eq!(asked.x_wt(q.as_slice()), Ok(chain.forward(&q)));

@@ -1,6 +1,6 @@
 //! Tests of `tests/cost.py`, which compares instruction counts with a stored table.
 
-use crate::common::program::ended;
+use crate::common::program::run_to_end;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,7 +25,7 @@ impl Script {
         let mut command = Command::new("python3");
         command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("tests/cost.py").arg(self.table());
         command.args(["--program", env!("CARGO_BIN_EXE_palpate")]).args(more);
-        let output = ended(&mut command, "cost.py");
+        let output = run_to_end(&mut command, "cost.py");
         let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
         (output.status.code(), said)
     }
@@ -90,7 +90,7 @@ fn python(code: &str) -> String {
     let mut command = Command::new("python3");
     let code = format!("import pathlib, sys; sys.path.insert(0, 'tests'); import cost; {code}");
     command.current_dir(env!("CARGO_MANIFEST_DIR")).args(["-B", "-c", &code]);
-    let output = ended(&mut command, "cost.py");
+    let output = run_to_end(&mut command, "cost.py");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }

@@ -5,15 +5,15 @@ use palpate::config::Rules;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::normal::{cumulative, density};
 use palpate::math::seed::stream;
-use palpate::robot::finger::Rest;
-use palpate::robot::finger::detection::Alarm;
+use palpate::robot::finger::RestState;
+use palpate::robot::finger::detection::ContactChannels;
 use palpate::robot::finger::electrode_table::{BASELINES_COUNTS, NOISE_COUNTS};
 use palpate::robot::finger::frame::{ELECTRODES, FRAME_S};
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, TipMotion};
-use palpate::sim::finger::effects::electrodes::{Common, Electrodes, ElectrodesEffect};
+use palpate::sim::finger::effects::electrodes::{CommonNoise, Electrodes, ElectrodesEffect};
 use palpate::sim::finger::effects::fluid::FluidEffect;
 use palpate::sim::finger::effects::skin::{Skin, SkinEffect};
-use palpate::sim::finger::effects::variation::Sensor;
+use palpate::sim::finger::effects::variation::SensorVariation;
 use palpate::sim::finger::effects::variation::VariationEffect;
 use palpate::sim::finger::plate::{direction_t, pose};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
@@ -25,7 +25,7 @@ const PITCHES_DEG: [f64; 4] = [90.0, 70.0, 45.0, 20.0];
 const TARE: usize = 5;
 const WAY: usize = 100;
 
-fn sds(by: Alarm, threshold_sds: f64, frames: u32) -> Detection {
+fn sds(by: ContactChannels, threshold_sds: f64, frames: u32) -> Detection {
     Detection { by, threshold_sds: Some(threshold_sds), frames, ..Detection::default() }
 }
 
@@ -34,7 +34,7 @@ struct Untouched {
     electrodes: Electrodes,
     fluid: FluidEffect,
     counts: [f64; ELECTRODES],
-    common: Common,
+    common: CommonNoise,
     rng: ChaCha8Rng,
     drift: f64,
 }
@@ -52,13 +52,13 @@ impl Untouched {
         let skin = Skin::new(&profile, &few, 1e13);
         let mut electrodes = Electrodes::new(&effect, skin.samples(), 1.0);
         if let Some([_, noisy]) = bad {
-            electrodes.worsen(noisy, 10.0);
+            electrodes.scale_noise(noisy, 10.0);
         }
         Self {
             counts: effect.baseline_counts,
             electrodes,
             fluid: FluidEffect { noise_counts: 1.0, quantise: false, ..Default::default() },
-            common: Common::default(),
+            common: CommonNoise::default(),
             rng: stream(seed, 0, "untouched"),
             drift: 0.0,
         }
@@ -88,7 +88,7 @@ impl Untouched {
         let mut detector = Detector::new(detection.clone());
         let mut alarmed = 0;
         for _ in 0..ways {
-            let rest = self.frames(TARE.max(detector.wants()));
+            let rest = self.frames(TARE.max(detector.tare_frame_count()));
             detector.tare(&rest);
             alarmed += usize::from(self.frames(WAY).iter().any(|frame| detector.update(frame)));
         }
@@ -132,10 +132,12 @@ fn false_alarms_follow_from_threshold_and_frames() {
     for (threshold, n) in [(2.0, 1), (3.0, 1), (2.0, 2), (1.5, 3)] {
         let [shared, own] =
             [1.0 / TARE as f64, 0.0].map(|share| alarm_probability(threshold, n, share));
-        let pressure = Untouched::new(1, None).alarms(&sds(Alarm::Pressure, threshold, n), ways);
+        let pressure =
+            Untouched::new(1, None).alarms(&sds(ContactChannels::Pressure, threshold, n), ways);
         let bad = [None, Some([16, 17])];
-        let electrodes = bad
-            .map(|bad| Untouched::new(2, bad).alarms(&sds(Alarm::Electrodes, threshold, n), ways));
+        let electrodes = bad.map(|bad| {
+            Untouched::new(2, bad).alarms(&sds(ContactChannels::Electrodes, threshold, n), ways)
+        });
         let [shared, own] = [shared, own].map(|probability| probability * ways as f64);
         println!(
             "{threshold} sd, {n} frames: {pressure} of {shared:.1}, {electrodes:?} of {own:.1}"
@@ -160,7 +162,7 @@ fn at_four_standard_deviations_nothing_is_told_of_nothing() {
     let an_hour = 3600.0 / FRAME_S / WAY as f64 * alarm_probability(4.0, 2, 1.0 / TARE as f64);
     assert!(an_hour < 0.01, "{an_hour}");
     for bad in [None, Some([3, 8])] {
-        assert_eq!(Untouched::new(5, bad).alarms(&sds(Alarm::Both, 4.0, 2), 450), 0);
+        assert_eq!(Untouched::new(5, bad).alarms(&sds(ContactChannels::Both, 4.0, 2), 450), 0);
     }
 }
 
@@ -170,8 +172,8 @@ fn at_four_standard_deviations_nothing_is_told_of_nothing() {
 #[test]
 fn common_drift_is_no_contact_and_a_change_of_its_own_is() {
     let mut sensor = Untouched::new(3, None);
-    let mut detector = Detector::new(sds(Alarm::Electrodes, 4.0, 2));
-    detector.tare(&sensor.frames(detector.wants()));
+    let mut detector = Detector::new(sds(ContactChannels::Electrodes, 4.0, 2));
+    detector.tare(&sensor.frames(detector.tare_frame_count()));
     for i in 0..1000 {
         sensor.drift = 0.1 * f64::from(i) / 1000.0;
         assert!(!detector.update(&sensor.frame()), "{i}");
@@ -189,10 +191,10 @@ fn common_drift_is_no_contact_and_a_change_of_its_own_is() {
 #[test]
 fn a_noisy_electrode_is_learnt() {
     let mut sensor = Untouched::new(4, None);
-    let mut rest = Rest::default();
+    let mut rest = RestState::default();
     rest.tare(&sensor.frames(100));
-    sensor.electrodes.worsen(9, 10.0);
-    let above = |rest: &Rest, sensor: &mut Untouched| {
+    sensor.electrodes.scale_noise(9, 10.0);
+    let above = |rest: &RestState, sensor: &mut Untouched| {
         let frames = sensor.frames(200);
         frames.iter().filter(|frame| rest.evidence(frame)[1].unwrap() > 4.0).count()
     };
@@ -209,29 +211,35 @@ fn a_noisy_electrode_is_learnt() {
 #[test]
 fn noise_is_learnt_from_twenty_frames_of_rest() {
     let mut sensor = Untouched::new(6, None);
-    let mut detector = Detector::new(sds(Alarm::Both, 4.0, 2));
-    assert_eq!(detector.wants(), 20);
+    let mut detector = Detector::new(sds(ContactChannels::Both, 4.0, 2));
+    assert_eq!(detector.tare_frame_count(), 20);
     detector.tare(&sensor.frames(21));
-    assert_eq!(detector.wants(), 0);
-    assert_eq!(Detector::new(Detection::default()).wants(), 0);
+    assert_eq!(detector.tare_frame_count(), 0);
+    assert_eq!(Detector::new(Detection::default()).tare_frame_count(), 0);
     // Without a tare, or without the required channels in a frame, detection is not available.
-    assert!(!Detector::new(sds(Alarm::Both, 4.0, 2)).hears(&sensor.frame()));
+    assert!(!Detector::new(sds(ContactChannels::Both, 4.0, 2)).has_channel(&sensor.frame()));
     let dry = Frame { pdc_counts: None, ..sensor.frame() };
-    assert!(detector.hears(&dry) && !detector.hears(&Frame::default()));
+    assert!(detector.has_channel(&dry) && !detector.has_channel(&Frame::default()));
 }
 
 /// Force of a plane on the finger at detection, and the same with [`Detection::default`]; infinite
 /// without detection.
-fn told_n(effects: &Effects, sensor: Option<&Sensor>, pitch_deg: f64, speed_m_s: f64) -> [f64; 2] {
+fn told_n(
+    effects: &Effects,
+    sensor: Option<&SensorVariation>,
+    pitch_deg: f64,
+    speed_m_s: f64,
+) -> [f64; 2] {
     let finger = Finger::default();
     let tip = match sensor {
-        Some(sensor) => Fingertip::varied(&finger, effects, sensor),
+        Some(sensor) => Fingertip::with_sensor(&finger, effects, sensor),
         None => Fingertip::new(&finger, effects),
     };
     let towards_t = direction_t((90.0 - pitch_deg).to_radians(), 0.0);
     let bvh = MeshBvh::new(square(0.1, 2));
     let mut feel = FingertipState::new(&tip, &stream(7, 0, "finger"));
-    let mut detectors = [sds(Alarm::Both, 4.0, 2), Detection::default()].map(Detector::new);
+    let mut detectors =
+        [sds(ContactChannels::Both, 4.0, 2), Detection::default()].map(Detector::new);
     let samples = tip.skin().unwrap().samples().iter();
     let reach_m = samples.map(|s| s.point().coords.dot(&towards_t)).fold(0.0, f64::max);
     let (mut rest, mut told_n) = (Vec::new(), [f64::INFINITY; 2]);
@@ -299,8 +307,8 @@ fn detection_by_counts_is_written_as_ever() {
     assert_eq!(written, "threshold_counts = 10.0\nframes = 3\n");
     let read: Detection = toml::from_str("threshold_counts = 4.0").unwrap();
     assert_eq!(read, Detection { threshold_counts: 4.0, ..Detection::default() });
-    assert!(Rules::hold(&sds(Alarm::Electrodes, 4.0, 2)));
-    for by in [Alarm::Electrodes, Alarm::Both] {
-        assert!(!Rules::hold(&Detection { by, ..Detection::default() }));
+    assert!(Rules::is_satisfied(&sds(ContactChannels::Electrodes, 4.0, 2)));
+    for by in [ContactChannels::Electrodes, ContactChannels::Both] {
+        assert!(!Rules::is_satisfied(&Detection { by, ..Detection::default() }));
     }
 }

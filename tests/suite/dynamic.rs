@@ -5,10 +5,10 @@ use nalgebra::{Isometry3, Translation3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::{Probe, Touch};
-use palpate::sim::environment::Shape;
-use palpate::sim::mujoco::{Models, StepLimit};
-use palpate::sim::probe::rest;
-use palpate::sim::scene::Body;
+use palpate::sim::environment::Surface;
+use palpate::sim::mujoco::{CompiledModels, StepLimit};
+use palpate::sim::probe::resting_pose;
+use palpate::sim::scene::SimulatorKind;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use std::path::Path;
@@ -61,7 +61,7 @@ fn press(simulator: &Simulator, above: &Isometry3<f64>, deep: &Isometry3<f64>) -
     for goal in [above, deep] {
         let until_s = reading.time_s + 5.0;
         while reading.time_s < until_s {
-            let motion = controller.step(&reading.q, &Goal::still(*goal)).unwrap();
+            let motion = controller.step(&reading.q, &Goal::at_rest(*goal)).unwrap();
             let qdot = motion.qdot.as_slice()[..reading.q.len()].to_vec();
             reading.clone_from(body.step(&Command { qdot }).unwrap());
         }
@@ -84,7 +84,7 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
         for fractions in [[0.4, 0.4], [0.7, 0.6], [0.2, 0.7]] {
             let target = scene.zone.as_ref().unwrap().at(&fractions);
             let approach = still.environment().task().approach(&target.as_slice().into()).unwrap();
-            let p = rest(still.environment(), &approach).unwrap().p_wt;
+            let p = resting_pose(still.environment(), &approach).unwrap().p_wt;
             let at = |depth_m: f64| {
                 let place = Translation3::new(p.x, p.y - depth_m, p.z);
                 Isometry3::from_parts(place, scene.finger.r_at())
@@ -125,7 +125,7 @@ fn a_slow_touch_is_the_kinematic_one() {
                         && reading.ideal().is_some_and(|ideal| ideal.force_n > 0.0)
                 };
                 let rest = readings.iter().rev().find(rests).unwrap();
-                (contact(touch).p_wc, rest.ideal().unwrap().force_n)
+                (contact(touch).p_wc, resting_pose.ideal().unwrap().force_n)
             });
             apart = apart.max((kinematic.0 - dynamic.0).norm());
             stronger = stronger.max((dynamic.1 / kinematic.1 - 1.0).abs());
@@ -143,7 +143,7 @@ fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
     for reading in readings {
         let Some(counts) = pdc(reading) else { continue };
         // The tare averages the noise of one or two counts; only a contact exceeds this.
-        above = if counts - rest > detection.threshold_counts { above + 1 } else { 0 };
+        above = if counts - resting_pose > detection.threshold_counts { above + 1 } else { 0 };
         if above == detection.frames {
             return reading.ideal().map_or(0.0, |ideal| ideal.force_n);
         }
@@ -213,11 +213,11 @@ fn a_finger_without_skin_finds_the_surface() {
         let slow = "touch.approach_m_s=0.005";
         let environment = environment(name, &[ARM, DYNAMIC, "effects={}", slow]);
         let mut scene = environment.scene().clone();
-        scene.body = Body::Cast;
+        scene.body = SimulatorKind::Cast;
         let cast = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let mut cast = cast.probe(1).unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
-        let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let Surface::Mesh { bvh, .. } = environment.shape() else { panic!() };
         let (mut off, mut apart): (f64, f64) = (0.0, 0.0);
         for target in environment.task().zone().unwrap().grid(3) {
             let approach = environment.task().approach(&target.as_slice().into()).unwrap();
@@ -248,7 +248,7 @@ fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_n
         }
         scene.touch.force_limit_n *= times;
         let environment = Environment::build(scene).unwrap();
-        (Models::new(&environment), environment)
+        (CompiledModels::new(&environment), environment)
     };
     let limit = |times: f64| {
         let (models, environment) = stiffer(times);
@@ -303,7 +303,7 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
         let approach = environment.task().approach(&[0.01, 0.5].into()).unwrap();
         let found = contact(simulator.probe(seed).unwrap().touch(&approach).unwrap());
-        let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let Surface::Mesh { bvh, .. } = environment.shape() else { panic!() };
         (bvh.closest_point(&found.p_wc).distance_m, found)
     };
     let none = "{finger_m=0, finger_deg=0, object_m=0, object_deg=0}";
@@ -327,7 +327,7 @@ fn a_force_sensor_tells_contact_where_no_fluid_does() {
         let sets = [ARM, body, "effects={skin={}, wrench={}}", "touch.detection_n=0.4"];
         let environment = environment("container_finger.toml", &sets);
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
-        let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let Surface::Mesh { bvh, .. } = environment.shape() else { panic!() };
         for seed in 0..3 {
             let mut probe = simulator.probe(seed).unwrap();
             for target in [[0.0, 0.5], [0.03, 0.47]] {

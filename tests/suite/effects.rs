@@ -4,11 +4,11 @@ use crate::common::shipped;
 use palpate::math::seed;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::frame::FRAME_S;
-use palpate::sim::environment::Shape;
-use palpate::sim::finger::effects::effect::Switch;
+use palpate::sim::environment::Surface;
+use palpate::sim::finger::effects::effect::EffectSwitch;
 use palpate::sim::finger::{Effects, FingertipState};
 use palpate::sim::{Environment, Scene};
-use palpate::study::accuracy::switches::{switched, switches};
+use palpate::study::accuracy::switches::{switches, toggle};
 
 fn scene(sets: &[&str]) -> Scene {
     shipped::scene("container_finger.toml", sets)
@@ -20,7 +20,7 @@ fn scene(sets: &[&str]) -> Scene {
 fn a_switch_is_what_it_says() {
     let scene = scene(&["effects.timing={}"]);
     for switch in switches() {
-        let other = switched(&scene, &switch);
+        let other = toggle(&scene, &switch);
         assert_ne!(switch.is_on(&scene), switch.is_on(&other), "{}", switch.name);
         assert!(Environment::build(other.clone()).is_ok(), "{}", switch.name);
         let mut again = other.clone();
@@ -60,7 +60,7 @@ fn effects_without_what_they_need_are_refused_and_dropped() {
         std::fs::write(file.path(), toml::to_string(&with).unwrap()).unwrap();
         Scene::load(file.path(), &[])
     };
-    let alone = |switch: &Switch<Effects>| {
+    let alone = |switch: &EffectSwitch<Effects>| {
         let mut effects = Effects::default();
         switch.set(&mut effects, true);
         effects
@@ -68,7 +68,7 @@ fn effects_without_what_they_need_are_refused_and_dropped() {
     for switch in Effects::switches() {
         let orphan = alone(&switch);
         let mut kept = orphan.clone();
-        kept.drop_unsupported();
+        kept.remove_orphans();
         let loaded = accepted(&orphan);
         assert_eq!(loaded.is_ok(), kept == orphan, "{}: {loaded:?}", switch.name);
         let is_alone = ["skin", "collision"].contains(&&*switch.name);
@@ -92,10 +92,10 @@ fn an_effect_that_is_off_has_no_state() {
         FingertipState::new(environment.fingertip().unwrap(), &rng).bytes()
     };
     for switch in switches().iter().filter(|switch| BESIDE_SKIN.contains(&&switch.name[..])) {
-        let with = switched(&dry, switch);
+        let with = toggle(&dry, switch);
         assert!(switch.is_on(&with), "{}", switch.name);
         assert!(bytes(&with) > bytes(&dry), "{}", switch.name);
-        assert_eq!(switched(&with, switch).effects.skin, dry.effects.skin);
+        assert_eq!(toggle(&with, switch).effects.skin, dry.effects.skin);
     }
 }
 
@@ -105,7 +105,7 @@ fn an_effect_that_is_off_has_no_state() {
 fn a_finger_without_effects_feels_what_its_skin_feels() {
     let environment =
         shipped::environment("container_finger.toml", &["effects={skin={}, fluid={}}"]);
-    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip().unwrap(), environment.shape())
+    let (tip, Surface::Mesh { bvh, .. }) = (environment.fingertip().unwrap(), environment.shape())
     else {
         panic!()
     };

@@ -9,7 +9,7 @@ mod own_planner;
 #[path = "../../examples/own_sensor.rs"]
 mod own_sensor;
 
-use palpate::experiment::statistics::summary::typical;
+use palpate::experiment::statistics::summary::representative_value;
 use palpate::explore::probe::Touch;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
@@ -44,7 +44,7 @@ fn an_own_planner_explores_zones_and_whole_objects() {
 #[test]
 fn an_own_measure_is_found_from_rows() {
     let rows = own_measure::rows().unwrap();
-    let value = typical(&rows, "active", 20, &own_measure::MEAN_RMSE).unwrap();
+    let value = representative_value(&rows, "active", 20, &own_measure::MEAN_RMSE).unwrap();
     let errors = rows.iter().filter(|row| row.planner == "active").flat_map(|row| &row.touches);
     let errors: Vec<f64> = errors.filter_map(|touch| Some(touch.metrics?.rmse_m)).collect();
     let (low, high) = errors.iter().fold((f64::MAX, 0.0), |(a, b), &e| (e.min(a), e.max(b)));

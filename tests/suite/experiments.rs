@@ -4,7 +4,7 @@ use palpate::experiment::measure::{EDGE_RMSE, R, RMSE};
 use palpate::experiment::statistics::equal_error::equal_error;
 use palpate::experiment::statistics::summary;
 use palpate::experiment::statistics::summary::CurvePoint;
-use palpate::experiment::trial::row::{TrialRow, of_planner};
+use palpate::experiment::trial::row::{TrialRow, planner_rows};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use rayon::prelude::*;
@@ -53,7 +53,7 @@ fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
     let [active, random] = ["active", "random"].map(|planner| r(planner, 23));
     let error = active.error.unwrap().hypot(random.error.unwrap());
     assert!(active.mean - random.mean > 3.0 * error, "{} {}", active.mean, random.mean);
-    for row in of_planner(&rows, "active") {
+    for row in planner_rows(&rows, "active") {
         let r = row.touches.last().unwrap().metrics.unwrap().r;
         assert!(r >= FOUND, "trial {} ends at {r}", row.trial);
     }
@@ -143,7 +143,7 @@ fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
         let equal = equal_error(&experiment, &rows, ["travel", "active"], &RMSE).unwrap();
         assert!(equal.ratio.value <= 1.2, "{name}: {equal:?}");
         assert!(equal.path_ratio.value <= 0.4, "{name}: {equal:?}");
-        for row in of_planner(&rows, "travel") {
+        for row in planner_rows(&rows, "travel") {
             for (i, touch) in row.touches.iter().enumerate() {
                 let mut earlier = row.touches[..i].iter();
                 assert!(earlier.all(|earlier| earlier.target != touch.target), "{name}, {i}");

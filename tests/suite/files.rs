@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::common::program::{
-    EXPERIMENT, MESH, SCENE, command, ended, fails, folder, palpate, said, succeeds,
+    EXPERIMENT, MESH, SCENE, command, fails, folder, palpate, run_to_end, stderr, succeeds,
 };
 
 fn marked(text: &str) -> Vec<u8> {
@@ -87,7 +87,7 @@ fn streams_that_cannot_be_written_stop_no_work() {
     let shown = shown.stdout(full()).stderr(Stdio::piped()).spawn().unwrap();
     let shown = shown.wait_with_output().unwrap();
     assert_eq!(shown.status.code(), Some(2));
-    assert!(said(&shown).starts_with("error: standard output: "), "{}", said(&shown));
+    assert!(stderr(&shown).starts_with("error: standard output: "), "{}", stderr(&shown));
 }
 
 /// Runs the program with a file size limit of `blocks` of 512 bytes, as on a full disk.
@@ -96,7 +96,7 @@ fn on_a_small_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process:
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
     let mut command = Command::new("sh");
     command.args(["-c", &script]).current_dir(folder).stdin(Stdio::null());
-    ended(&mut command, arguments)
+    run_to_end(&mut command, arguments)
 }
 
 #[test]
@@ -106,18 +106,18 @@ fn a_full_disk_is_named_with_its_file_and_the_run_resumes() {
     assert!(whole.contains("report"), "{whole}");
     for (blocks, file) in [(0, "resolved.toml"), (2, "resolved.toml"), (8, "figures")] {
         let output = on_a_small_disk(folder.path(), blocks, "run small.toml");
-        let message = said(&output);
+        let message = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{blocks}: {message}");
         assert!(message.contains("runs/small/") && message.contains(file), "{blocks}: {message}");
         for fresh in [&[][..], &["--fresh"]] {
             let arguments = [&["run", "small.toml", "--no-report"], fresh].concat();
             let resumed = palpate(folder.path(), &arguments);
-            assert!(resumed.status.success(), "{blocks}: {}", said(&resumed));
+            assert!(resumed.status.success(), "{blocks}: {}", stderr(&resumed));
         }
         fs::remove_dir_all(folder.path().join("runs")).unwrap();
     }
     let output = on_a_small_disk(folder.path(), 0, "show scene.toml --mjcf scene.xml");
-    assert!(said(&output).starts_with("error: scene.xml: "), "{}", said(&output));
+    assert!(stderr(&output).starts_with("error: scene.xml: "), "{}", stderr(&output));
     assert!(!folder.path().join("scene.xml.part").exists());
 }
 
@@ -173,7 +173,7 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
         // A single triangle in the plane z = 0 covers no part of the zone, but it was read.
         let set = ["show", "gltf.toml", "--set", "object.outside_buffers=true"];
         let output = palpate(folder.path(), &set);
-        assert!(!said(&output).contains("outside_buffers"), "{uri}: {}", said(&output));
+        assert!(!stderr(&output).contains("outside_buffers"), "{uri}: {}", stderr(&output));
     }
     fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", "../../../../../../etc/passwd"))
         .unwrap();
@@ -228,7 +228,7 @@ fn nothing_is_written_through_a_symbolic_link() {
             _ => vec!["run", "small.toml", "--out", "run", "--set", "backend.kind=\"ros2\""],
         };
         let output = palpate(folder.path(), &arguments);
-        assert_eq!(output.status.code(), Some(2), "{name}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));
         assert!(fs::read(&outside).unwrap().is_empty(), "{name}");
         fs::remove_file(&file).unwrap();
         fs::write(&file, rows).unwrap();

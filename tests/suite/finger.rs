@@ -18,7 +18,7 @@ use palpate::sim::finger::effects::skin::{Skin, SkinEffect};
 use palpate::sim::finger::foundation::Column;
 use palpate::sim::finger::load::PressError;
 use palpate::sim::finger::plate::direction_t;
-use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
+use palpate::sim::finger::{ContactLoad, Effects, Fingertip, FingertipState};
 use proptest::prelude::*;
 
 const CAVITY_PA_M3: f64 = 1e13;
@@ -38,7 +38,7 @@ fn biotac(samples: usize, cavity_pa_m3: f64) -> Skin {
     Skin::new(&Profile::biotac(&Finger::default()), &effect, cavity_pa_m3)
 }
 
-fn press(skin: &Skin, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> Load {
+fn press(skin: &Skin, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> ContactLoad {
     skin.press(bvh, x_wt, &mut skin.relaxed()).unwrap()
 }
 
@@ -99,7 +99,7 @@ fn force_grows_with_depth_and_stays_finite_down_to_the_axis() {
     let skin = biotac(500, CAVITY_PA_M3);
     for (pitch, roll) in [(0.0, 0.0), (0.5, 0.3), (1.2, -0.4), (0.0, 1.2)] {
         let towards_t = direction_t(pitch, roll);
-        let mut last = Load::default();
+        let mut last = ContactLoad::default();
         for step in 0..90 {
             let height = 9e-3 - 1e-4 * f64::from(step);
             let load = press(&skin, &plane(), &over(Vector3::new(0.0, 0.0, height), &towards_t));
@@ -108,7 +108,7 @@ fn force_grows_with_depth_and_stays_finite_down_to_the_axis() {
             assert!(load.pressure_pa >= last.pressure_pa && load.force_n.dot(&towards_t) <= 0.0);
             last = load;
         }
-        assert!(last.force_n.norm() > 100.0 && last.on_core);
+        assert!(last.force_n.norm() > 100.0 && last.is_core_loaded);
     }
 }
 
@@ -143,7 +143,8 @@ fn the_fluid_keeps_its_volume_and_pushes_the_free_skin_out() {
     let mut pressed = skin.relaxed();
     let pose = over(Vector3::new(0.0, 0.0, 7e-3), &direction_t(0.1, 0.0));
     let load = skin.press(&plane(), &pose, &mut pressed).unwrap();
-    let wet = skin.samples().iter().zip(&pressed.inward_m).filter(|(sample, _)| sample.layers.wet);
+    let wet =
+        skin.samples().iter().zip(&pressed.inward_m).filter(|(sample, _)| sample.layers.has_fluid);
     let volume_m3: f64 = wet.clone().map(|(sample, inward_m)| sample.section_m2() * inward_m).sum();
     near(volume_m3, load.pressure_pa / CAVITY_PA_M3, 1e-16);
     assert!(load.pressure_pa > 1e3 && load.displaced_m3 > 1e-8);
@@ -151,7 +152,7 @@ fn the_fluid_keeps_its_volume_and_pushes_the_free_skin_out() {
     assert!(least < -5e-5 && least > -1e-3, "{least}");
     // Beyond ε of the contact there is no force.
     let far = over(Vector3::new(0.0, 0.0, 0.02), &direction_t(0.1, 0.0));
-    assert_eq!(skin.press(&plane(), &far, &mut pressed), Ok(Load::default()));
+    assert_eq!(skin.press(&plane(), &far, &mut pressed), Ok(ContactLoad::default()));
     assert!(pressed.inward_m.iter().chain(&pressed.indentation_m).all(|&moved| moved == 0.0));
 }
 
@@ -177,14 +178,14 @@ fn slow_wrench(
     let respond = |i: usize, pressure: f64| {
         let layers = &skin.samples()[i].layers;
         let depth = hits[i].map_or(f64::NEG_INFINITY, |(s, _)| layers.outer_m - s);
-        let felt = if layers.wet { pressure } else { 0.0 };
+        let felt = if layers.has_fluid { pressure } else { 0.0 };
         column.respond(depth, layers.gap_m, felt)
     };
     let (mut low, mut high) = (0.0, 1e7);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         let volume: f64 = (0..hits.len())
-            .filter(|&i| skin.samples()[i].layers.wet)
+            .filter(|&i| skin.samples()[i].layers.has_fluid)
             .map(|i| skin.samples()[i].section_m2() * respond(i, middle).inward_m)
             .sum();
         if volume > middle / cavity { low = middle } else { high = middle }
@@ -208,7 +209,7 @@ fn the_wrench_is_that_of_a_slow_twin() {
     let mesh = Arc::new(sphere_mesh(point(0.0, 0.0, -0.02), 0.02, 24));
     let bvh = MeshBvh::new(mesh.clone());
     let skin = biotac(300, CAVITY_PA_M3);
-    let mut dice = Dice(5);
+    let mut dice = UniformRandom(5);
     for _ in 0..12 {
         let towards_t = direction_t(0.6 + 0.6 * dice.roll(), 0.8 * dice.roll());
         let pose = over(Vector3::new(3e-3 * dice.roll(), 3e-3 * dice.roll(), 6.5e-3), &towards_t);
@@ -325,7 +326,7 @@ fn a_needle_between_samples_and_a_mesh_with_holes_are_finite() {
     let holed: Vec<Triangle> = whole.iter_corners().step_by(3).collect();
     let holed = MeshBvh::new(soup(&holed).unwrap());
     for bvh in [needle, holed] {
-        let mut dice = Dice(9);
+        let mut dice = UniformRandom(9);
         for _ in 0..200 {
             let pose =
                 over(dice.vector() * 4e-3 + Vector3::z() * 6e-3, &direction_t(0.4, dice.roll()));
@@ -345,9 +346,9 @@ fn an_absent_skin_feels_nothing() {
     let tip = Fingertip::new(&Finger::default(), &Effects::default());
     let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
     let motion = TipMotion::at(over(Vector3::new(0.0, 0.0, 7e-3), &-Vector3::z()));
-    assert_eq!(feel.step(&tip, &plane(), &motion, 0.1), Ok(Load::default()));
+    assert_eq!(feel.step(&tip, &plane(), &motion, 0.1), Ok(ContactLoad::default()));
     assert_eq!(feel.frame(), None);
-    assert!(feel.pressed().is_none());
+    assert!(feel.skin_state().is_none());
 }
 
 #[test]
@@ -361,13 +362,13 @@ fn a_fingertip_is_shared_and_a_trial_moves_between_threads() {
 #[test]
 fn culling_queries_agree_with_the_nearest_point() {
     let bvh = MeshBvh::new(sphere_mesh(Point3::origin(), 1.0, 20));
-    let mut dice = Dice(3);
+    let mut dice = UniformRandom(3);
     for _ in 0..2000 {
         let p = Point3::from(dice.vector() * 2.0);
         let radius = dice.roll().abs();
         assert_eq!(bvh.touches(&p, radius), bvh.closest_point(&p).distance_m <= radius);
         if (p.coords.norm() - 1.0).abs() > 0.05 {
-            assert_eq!(bvh.surrounds(&p), p.coords.norm() < 1.0);
+            assert_eq!(bvh.is_enclosed(&p), p.coords.norm() < 1.0);
         }
     }
 }

@@ -12,7 +12,7 @@ use palpate::sim::finger::effects::fluid::FluidEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
 use palpate::sim::finger::effects::thermal::ThermalEffect;
 use palpate::sim::finger::effects::timing::{Channel, channel};
-use palpate::sim::finger::plate::{Plate, direction_t};
+use palpate::sim::finger::plate::{PlateContact, direction_t};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 
 const TICK_S: f64 = 1e-3;
@@ -68,7 +68,7 @@ fn untouched_electrodes_read_their_baselines_and_impedances_invert() {
 #[test]
 fn pressure_rises_saturates_near_2_n_and_electrodes_move_as_measured() {
     let cavity_pa_m3 = FluidEffect::default().stiffness_pa_m3;
-    let mut plate = Plate::new(&SkinEffect::default(), cavity_pa_m3).unwrap();
+    let mut plate = PlateContact::new(&SkinEffect::default(), cavity_pa_m3).unwrap();
     let towards_t = direction_t(0.14, 0.0);
     let mut pressure_pa = |force_n| plate.press_to(&towards_t, force_n).unwrap().pressure_pa;
     let steps = [0.5, 1.0, 2.0, 4.0, 8.0].map(&mut pressure_pa);
@@ -80,7 +80,8 @@ fn pressure_rises_saturates_near_2_n_and_electrodes_move_as_measured() {
     let baselines = effect.baseline_counts;
     plate.press_to(&towards_t, 8.0).unwrap();
     let electrodes = Electrodes::new(&effect, plate.skin.samples(), 1.0);
-    let counts = electrodes.counts_closed(&electrodes.closed(plate.pressed.moved_m()), 1.0);
+    let counts = electrodes
+        .counts_closed(&electrodes.closed_fractions(plate.pressed.inward_or_empty_m()), 1.0);
     for (i, (found, rest)) in counts.iter().zip(baselines).enumerate() {
         let ratio = impedance_ohm(*found) / impedance_ohm(rest);
         assert!((0.36..40.0).contains(&ratio), "E{}: Z/Z0 {ratio}", i + 1);

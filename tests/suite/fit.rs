@@ -3,13 +3,14 @@
 use crate::common::shipped::toy;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
-use palpate::gp::fit::Choice;
+use palpate::gp::fit::KernelSelection;
 use palpate::gp::kernel;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::{Posterior, Scratch};
 use palpate::gp::{
-    Fit, LogNormal, Mean, Observations, Range, Refits, Scale, SearchBox, TouchNoise,
+    Fit, LogNormal, MeanModel, Observations, Range, RefitSequence, SearchBox, SignalModel,
+    TouchNoise,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,7 +20,7 @@ use std::path::Path;
 static KERNEL: SquaredExponential = SquaredExponential;
 
 /// Default search ranges of noise and signal.
-fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
+fn search_box(mean: MeanModel, length_scales: Vec<Range>) -> SearchBox {
     let (noise_ratio, signal_sd) = ((1e-4, 1e-2).into(), (1e-3, 1e3).into());
     SearchBox {
         mean,
@@ -34,15 +35,15 @@ fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
 /// Reference implementation of a fit: the profiled likelihood on a dense grid over the same box,
 /// with `levels` of each length scale and of the noise.
 fn best_on_grid(bounds: &SearchBox, touches: &Observations, levels: [usize; 2]) -> f64 {
-    let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, touches);
+    let mut likelihood = Likelihood::new(&KERNEL, MeanModel::Zero, touches);
     let level = |Range { low, high, .. }: Range, i: usize, of: usize| {
         low * (high / low).powf(i as f64 / (of - 1) as f64)
     };
     let [per_length, noises] = levels;
     let Range { low, high, .. } = bounds.signal_sd;
     let (scale, noise_ratio) = match bounds.touch_noise {
-        TouchNoise::Known(sd) => (Scale::KnownNoise(sd), (sd / high, sd / low).into()),
-        _ => (Scale::Best(bounds.signal_sd), bounds.noise_ratio),
+        TouchNoise::Known(sd) => (SignalModel::KnownNoise(sd), (sd / high, sd / low).into()),
+        _ => (SignalModel::Best(bounds.signal_sd), bounds.noise_ratio),
     };
     let mut best = f64::MIN;
     for index in 0..per_length.pow(bounds.length_scales.len() as u32) {
@@ -69,7 +70,7 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let experiment = Experiment::load(&root.join("experiments/toy.toml"), &[]).unwrap();
     let simulation = Simulation::new(experiment).unwrap();
-    let bounds = search_box(Mean::Zero, vec![(0.02, 4.0).into()]);
+    let bounds = search_box(MeanModel::Zero, vec![(0.02, 4.0).into()]);
     let (mut fits, mut warm, mut cold) = (0, 0, 0);
     for (number, name) in [(0, "active"), (1, "active"), (2, "active"), (3, "random")] {
         let planner = planner::by_name(name).unwrap();
@@ -99,7 +100,7 @@ fn fits_of_a_known_noise_reach_the_global_maximum() {
     let simulation = Simulation::new(Experiment::load(&path, &[]).unwrap()).unwrap();
     let lengths = vec![(5e-4, 0.1).into(), (6e-4, 0.12).into()];
     let noise = TouchNoise::Known(3e-4);
-    let bounds = SearchBox { touch_noise: noise, ..search_box(Mean::Zero, lengths) };
+    let bounds = SearchBox { touch_noise: noise, ..search_box(MeanModel::Zero, lengths) };
     let zone = simulation.environment().task().zone().unwrap().clone();
     let row = simulation.trial(planner::by_name("active").unwrap(), 19);
     let mut touches = Observations::new(2);
@@ -119,11 +120,11 @@ fn fits_of_a_known_noise_reach_the_global_maximum() {
 /// within 0.05 nat until the next scan.
 #[test]
 fn fits_touch_by_touch_reach_what_cold_fits_reach() {
-    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    let bounds = search_box(MeanModel::Zero, vec![(0.005, 1.0).into(); 2]);
     let (mut fits, mut gaps) = (0, Vec::new());
     for trial in 0..4 {
         let mut touches = Observations::new(2);
-        let mut fits_so_far = Refits::of(&KERNEL);
+        let mut fits_so_far = RefitSequence::of(&KERNEL);
         for i in 0..90 {
             let step = f64::from(trial) * 0.377 + f64::from(i);
             let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
@@ -156,7 +157,7 @@ fn hard_surfaces() -> [fn(f64, f64) -> f64; 3] {
 /// once: two scales, five touches.
 #[test]
 fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
-    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    let bounds = search_box(MeanModel::Zero, vec![(0.005, 1.0).into(); 2]);
     let (mut fits, mut gaps) = (0, Vec::new());
     for surface in hard_surfaces() {
         for (count, shift) in
@@ -182,7 +183,7 @@ fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
 /// of all touches.
 #[test]
 fn a_fit_of_many_touches_reaches_the_global_maximum() {
-    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    let bounds = search_box(MeanModel::Zero, vec![(0.005, 1.0).into(); 2]);
     for surface in hard_surfaces() {
         let mut touches = Observations::new(2);
         for i in 0..1100 {
@@ -204,7 +205,7 @@ fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
         let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
         touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
     }
-    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    let bounds = search_box(MeanModel::Zero, vec![(0.005, 1.0).into(); 2]);
     let fit = bounds.fit(&KERNEL, &touches).hyperparameters;
     assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
 }
@@ -231,10 +232,10 @@ fn a_fit_in_six_dimensions_finds_what_draws_were_made_with() {
             let sum: f64 = waves.iter().map(height).sum();
             touches.push(&x, (2.0 / 400.0f64).sqrt() * sum);
         }
-        let bounds = search_box(Mean::Zero, vec![(0.05, 5.0).into(); 6]);
+        let bounds = search_box(MeanModel::Zero, vec![(0.05, 5.0).into(); 6]);
         let fit = bounds.fit(&KERNEL, &touches);
-        let scale = Scale::Best(bounds.signal_sd);
-        let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+        let scale = SignalModel::Best(bounds.signal_sd);
+        let mut likelihood = Likelihood::new(&KERNEL, MeanModel::Zero, &touches);
         let made_with = likelihood.profile(&lengths, 1e-4, &scale, None).unwrap();
         assert!(fit.log_likelihood >= made_with.log_likelihood, "{draw}: {fit:?} {made_with:?}");
         assert!(fit.factorisations < 500, "{}", fit.factorisations);
@@ -248,7 +249,7 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
         let x = -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75 % 1.0);
         touches.push(&[x], 1000.0 + toy(x));
     }
-    let free = search_box(Mean::Constant, vec![(0.02, 4.0).into()]);
+    let free = search_box(MeanModel::Constant, vec![(0.02, 4.0).into()]);
     let found = free.fit(&KERNEL, &touches).hyperparameters;
     assert!((found.mean - 1001.0).abs() < 1.0 && found.signal_sd < 2.0, "{found:?}");
     let prior = Some(LogNormal { median: 1.0, spread: 1.05 });
@@ -270,7 +271,7 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
 /// The selected kernel is the one with the largest individual likelihood, and a row records it.
 #[test]
 fn of_several_kernels_the_likeliest_is_taken() {
-    let bounds = search_box(Mean::Zero, vec![(0.05, 4.0).into()]);
+    let bounds = search_box(MeanModel::Zero, vec![(0.05, 4.0).into()]);
     let smooth = |x: f64| (3.0 * x).sin();
     let edged = |x: f64| if x < 1.9 { 0.0 } else { 1.0 };
     let mut chosen = Vec::new();
@@ -278,16 +279,16 @@ fn of_several_kernels_the_likeliest_is_taken() {
         let mut touches = Observations::new(1);
         (0..25).for_each(|i| touches.push(&[0.16 * f64::from(i)], surface(0.16 * f64::from(i))));
         let names = ["matern_32", "squared_exponential"].map(String::from);
-        let mut choice = Choice::between(&names);
+        let mut choice = KernelSelection::between(&names);
         let fit = choice.fit(&bounds, &touches);
         let alone: Vec<Fit> =
             names.iter().map(|name| bounds.fit(kernel::by_name(name).unwrap(), &touches)).collect();
         let best = alone.iter().map(|fit| fit.log_likelihood).fold(f64::MIN, f64::max);
         assert_eq!(fit.log_likelihood, best);
         assert_eq!(fit.factorisations, alone.iter().map(|fit| fit.factorisations).sum::<u32>());
-        let mut again = Choice::between(&names);
+        let mut again = KernelSelection::between(&names);
         again.follow(&fit);
-        let at = |choice: &Choice| {
+        let at = |choice: &KernelSelection| {
             Posterior::new(choice.kernel(), fit.hyperparameters.clone(), touches.clone())
         };
         let [mean, told] = [&choice, &again]
@@ -296,7 +297,7 @@ fn of_several_kernels_the_likeliest_is_taken() {
         chosen.push(fit.kernel.unwrap());
     }
     assert_eq!(chosen, ["squared_exponential", "matern_32"]);
-    let mut one = Choice::between(&["matern_52".into()]);
+    let mut one = KernelSelection::between(&["matern_52".into()]);
     let mut touches = Observations::new(1);
     touches.push(&[0.1], 0.2);
     assert_eq!(one.fit(&bounds, &touches).kernel, None);

@@ -11,8 +11,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
 
-use crate::common::program::{command, fails, folder, said, succeeds};
-use palpate::experiment::store::{Entry, Journal};
+use crate::common::program::{command, fails, folder, stderr, succeeds};
+use palpate::experiment::store::{Journal, JournalEntry};
 use palpate::experiment::trial::row::TouchRow;
 
 /// Number of kills; `PALPATE_FUZZ` sets more.
@@ -49,7 +49,7 @@ fn kill_and_resume(folder: &Path, kill: u64, longest: Duration, whole: &[u8]) {
     assert!(
         resumed.status.success(),
         "{kill}: {} {:?}",
-        said(&resumed),
+        stderr(&resumed),
         left().collect::<Vec<_>>()
     );
     assert!(fs::read(out.join("trials.jsonl")).unwrap() == whole, "{kill}");
@@ -115,14 +115,14 @@ fn every_beginning_that_a_crash_leaves_is_begun_anew() {
                     fs::write(out.path().join(name), bytes).unwrap();
                 }
                 let output = run(folder.path(), out.path(), fresh);
-                assert!(output.status.success(), "{i} {fresh:?}: {}", said(&output));
+                assert!(output.status.success(), "{i} {fresh:?}: {}", stderr(&output));
                 assert!(fs::read(out.path().join("trials.jsonl")).unwrap() == rows, "{i}");
             }
         }
     }
     // With rows it is kept: only --fresh deletes another run's rows.
     let refused = run(folder.path(), &other, &[]);
-    assert!(said(&refused).contains("contains another experiment"), "{}", said(&refused));
+    assert!(stderr(&refused).contains("contains another experiment"), "{}", stderr(&refused));
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn what_others_put_into_a_folder_is_not_touched() {
 fn a_journal_has_the_touches_that_were_added() {
     let folder = TempDir::new().unwrap();
     let touch: TouchRow = serde_json::from_str("{\"target\":[0.1,0.2],\"contact\":null}").unwrap();
-    let entry = |trial| Entry {
+    let entry = |trial| JournalEntry {
         time_unix_s: 1.0,
         trial,
         planner: "active".into(),
@@ -177,13 +177,13 @@ fn a_journal_has_the_touches_that_were_added() {
         journal.add(entry(trial)).unwrap();
     }
     assert_eq!(journal.touches(0, "active").len(), 2);
-    let fault = Entry { touch: None, fault: Some("no".into()), ..entry(0) };
+    let fault = JournalEntry { touch: None, fault: Some("no".into()), ..entry(0) };
     journal.add(fault).unwrap();
     let again = Journal::open(folder.path()).unwrap();
     for journal in [journal, again] {
         assert_eq!(journal.touches(0, "active").len(), 2);
         assert_eq!(journal.touches(1, "active").len(), 1);
         assert!(journal.touches(0, "random").is_empty());
-        assert_eq!(journal.halted(), Some("no"));
+        assert_eq!(journal.halt_reason(), Some("no"));
     }
 }

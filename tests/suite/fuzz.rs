@@ -22,7 +22,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use tempfile::TempDir;
 
-use crate::common::program::{EXPERIMENT, SCENE, command, ended, folder, said, succeeds};
+use crate::common::program::{EXPERIMENT, SCENE, command, folder, run_to_end, stderr, succeeds};
 use crate::formats;
 
 /// Default number of cases per target.
@@ -302,7 +302,7 @@ fn damage(files: &[(PathBuf, Vec<u8>)], file: usize, edits: &[Edit]) {
 /// Generates all outputs of a run.
 fn told(path: &Path, draw: bool) -> Result<(), String> {
     let run = Run::read(path).map_err(|error| error.to_string())?;
-    let analysis = Analysis::of(&run);
+    let analysis = Analysis::new(&run);
     drop((tables::summary::text(&run), analysis));
     for planner in &run.experiment.planners {
         let replay = Replay::new(&run, planner, run.experiment.touches);
@@ -350,8 +350,8 @@ fn the_program_on_damaged_runs() {
         (cases() / 1000).max(24),
         |(file, edits, which)| {
             damage(&files, *file, edits);
-            let output = ended(&mut command(folder.path(), commands[*which]), "a damaged run");
-            let message = said(&output);
+            let output = run_to_end(&mut command(folder.path(), commands[*which]), "a damaged run");
+            let message = stderr(&output);
             match output.status.code() {
                 Some(0) if output.stdout.is_empty() => Err("nothing said".into()),
                 Some(0) => Ok(()),

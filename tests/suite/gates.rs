@@ -2,7 +2,7 @@
 
 use crate::common::fake::{World, body_of};
 #[cfg(feature = "mujoco")]
-use crate::common::program::{palpate, said};
+use crate::common::program::{palpate, stderr};
 use crate::common::shipped;
 use palpate::backend::interlock::{GateSettings, check_start};
 use palpate::backend::{Fault, Reading};
@@ -90,8 +90,8 @@ fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
         let arguments: Vec<&str> =
             ["run", experiment, "--out", out].into_iter().chain(sets).collect();
         let output = palpate(Path::new(env!("CARGO_MANIFEST_DIR")), &arguments);
-        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-        said(&output)
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        stderr(&output)
     };
     for missing in 0..needed.len() {
         let sets: Vec<_> = (0..needed.len()).filter(|&i| i != missing).map(|i| needed[i]).collect();
@@ -130,7 +130,7 @@ fn a_folder_that_may_not_be_used_is_refused_before_the_arm_is_looked_for() {
         ])
         .chain(sets)
         .collect();
-    let run = || said(&palpate(Path::new(env!("CARGO_MANIFEST_DIR")), &arguments));
+    let run = || stderr(&palpate(Path::new(env!("CARGO_MANIFEST_DIR")), &arguments));
     fs::create_dir(&out).unwrap();
     let trials = fs::File::create(out.join("trials.jsonl")).unwrap();
     trials.lock().unwrap();

@@ -42,7 +42,7 @@ fn box_has_its_measures() {
 #[test]
 fn ray_meets_a_box_at_its_slabs() {
     let bvh = unit_box();
-    let mut dice = Dice(1);
+    let mut dice = UniformRandom(1);
     for _ in 0..2000 {
         let origin = Point3::from(dice.vector() * 3.0);
         let direction = dice.direction();
@@ -102,7 +102,7 @@ fn no_ray_slips_between_triangles() {
 #[test]
 fn nearest_point_of_a_box_is_the_clamped_point() {
     let bvh = unit_box();
-    let mut dice = Dice(2);
+    let mut dice = UniformRandom(2);
     for _ in 0..2000 {
         let p = Point3::from(dice.vector() * 3.0);
         let hit = bvh.closest_point(&p);
@@ -120,7 +120,7 @@ fn nearest_point_of_a_box_is_the_clamped_point() {
 #[test]
 fn capsule_lands_on_a_plane_at_any_attitude() {
     let bvh = MeshBvh::new(square(10.0, 7));
-    let mut dice = Dice(3);
+    let mut dice = UniformRandom(3);
     for _ in 0..1000 {
         let p0_w = point(dice.roll(), dice.roll(), 2.0);
         let p1_w = p0_w + dice.vector() * 0.5;
@@ -208,7 +208,7 @@ fn overlap_is_contact_at_once() {
 #[test]
 fn sphere_sweep_of_no_radius_is_a_ray() {
     let bvh = MeshBvh::new(sphere_mesh(point(0.1, 0.2, 0.3), 0.05, 20));
-    let mut dice = Dice(4);
+    let mut dice = UniformRandom(4);
     for _ in 0..500 {
         let origin = point(0.1, 0.2, 0.3) + dice.vector() * 0.2;
         let direction = dice.direction();
@@ -226,7 +226,7 @@ fn sphere_sweep_of_no_radius_is_a_ray() {
 /// passes through the parallelogram.
 #[test]
 fn needle_agrees_with_the_parallelogram_it_sweeps() {
-    let mut dice = Dice(7);
+    let mut dice = UniformRandom(7);
     let mut hits = 0;
     for _ in 0..3000 {
         let triangle = [(); 3].map(|()| Point3::from(dice.vector()));
@@ -280,7 +280,7 @@ fn twins_agree_near_and_far_from_the_origin() {
         let centre = point(distance, -distance, distance / 2.0);
         let mesh = Arc::new(sphere_mesh(centre, 0.05, 16));
         let bvh = MeshBvh::new(mesh.clone());
-        let mut dice = Dice(5);
+        let mut dice = UniformRandom(5);
         for _ in 0..1000 {
             let p = centre + dice.vector() * 0.15;
             check_ray(&mesh, &bvh, &p, &dice.direction());
@@ -342,7 +342,7 @@ fn sweep_agrees_with_advancement() {
         point(0.1 * u, 0.1 * v, 0.03 * (9.0 * u).sin() * (7.0 * v + 1.0).cos())
     }));
     let bvh = MeshBvh::new(mesh.clone());
-    let mut dice = Dice(6);
+    let mut dice = UniformRandom(6);
     for _ in 0..60 {
         let p0_w =
             point(0.05, 0.05, 0.08) + dice.vector().component_mul(&Vector3::new(0.08, 0.08, 0.02));

@@ -7,7 +7,7 @@ use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::explore::probe::{Contact, SweptVolume, Touch};
 use palpate::gp::Posterior;
 use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
@@ -43,7 +43,7 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         let truth = Truth::sample(&environment, 21, &|_| ());
         let zone = environment.task().zone().unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
-        assert_eq!(probe.swept(), None);
+        assert_eq!(probe.swept_volume(), None);
         let mut rng = seed::stream(1, 0, "targets");
         let (mut bounded, mut tight) = (0, 0);
         for _ in 0..200 {
@@ -52,10 +52,10 @@ fn the_surface_is_below_what_the_finger_has_swept() {
                     &environment.task().approach(&planner::uniform(zone, &mut rng).into()).unwrap(),
                 )
                 .unwrap();
-            let swept = probe.swept().unwrap();
+            let swept = probe.swept_volume().unwrap();
             let Touch::Contact(Contact { p_wc, .. }) = touch else { panic!("missed") };
             let ceiling_m =
-                |place: &[f64]| swept.ceilings_m(zone, std::iter::once(place)).next().unwrap();
+                |place: &[f64]| swept.upper_bounds_m(zone, std::iter::once(place)).next().unwrap();
             let at_contact = ceiling_m(&zone.place(&p_wc)).unwrap();
             assert!((at_contact - zone.height_m(&p_wc)).abs() < 1e-6, "{at_contact} {p_wc}");
             for (place, height_m) in truth.places.iter().zip(&truth.heights_m) {
@@ -72,7 +72,7 @@ fn the_surface_is_below_what_the_finger_has_swept() {
             probe.touch(&environment.task().approach(&[0.3, 0.5].into()).unwrap()),
             Ok(Touch::Miss)
         );
-        assert!(probe.swept().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
+        assert!(probe.swept_volume().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
     }
 }
 
@@ -94,7 +94,7 @@ fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
         if let Some(depth_m) = depth_m {
             let finger = Finger { length_m: 0.0, ..Finger::default() };
             let p_wt = Point3::new(0.0, SQUARE.datum_y_m() + depth_m + finger.radius_m, 0.0);
-            belief.observe_swept(&Swept { finger, p_wt });
+            belief.observe_swept(&SweptVolume { finger, p_wt });
         }
         belief.refit().unwrap();
         belief.surface().unwrap().clone()
@@ -183,7 +183,7 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
             belief.observe(&touch.target.numbers(), &Touch::Contact(Contact { p_wc, normal_w }));
             if let Some(tip) = touch.tip {
                 let finger = experiment.scene.finger.clone();
-                belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
+                belief.observe_swept(&SweptVolume { finger, p_wt: Point3::from(tip) });
             }
         }
         let last = read.touches.last().unwrap();
@@ -221,7 +221,7 @@ fn contacts_say_how_wide_the_band_is() {
     let [likely, left_out] = ["likelihood", "leave_one_out"].map(|band| {
         let sets = [format!("gp.band={band:?}"), "grid=21".into(), "touches=40".into()];
         let path = "experiments/suite/reporting.toml";
-        let cells = palpate::experiment::sweep::cells(path.as_ref()).unwrap();
+        let cells = palpate::experiment::sweep::sweep_cases(path.as_ref()).unwrap();
         let cell = cells.iter().find(|cell| cell.label.ends_with("gear")).unwrap();
         let experiment = Experiment::load_cell(path.as_ref(), cell, &sets).unwrap();
         let sobol = planner::by_name("sobol").unwrap();

@@ -3,9 +3,9 @@
 use crate::common::fake::{Fake, World, body_of};
 use crate::common::shipped;
 use nalgebra::{Point3, Vector3};
-use palpate::backend::interlock::{INTERLOCKS, InterlockSettings, Interlocked, Site};
+use palpate::backend::interlock::{INTERLOCKS, InterlockSettings, Interlocked, SafetyContext};
 use palpate::backend::{Backend, Command, Fault, Reading, Wrench};
-use palpate::explore::probe::interlocks::interlocked;
+use palpate::explore::probe::interlocks::with_interlocks;
 use palpate::robot::arm::stage::stage;
 use palpate::robot::arm::{ArmSettings, Chain};
 use palpate::robot::{Finger, Robot};
@@ -13,17 +13,21 @@ use palpate::sim::simulator::Simulator;
 use proptest::prelude::*;
 use std::sync::Arc;
 
-fn site(chain: Chain) -> Site {
+fn site(chain: Chain) -> SafetyContext {
     let robot = Robot { chain, finger: Finger::default(), is_soft: true };
     let (touch_force_n, travel_m_s) = (15.0, 0.1);
-    Site { robot, tip_w: None, farthest: None, object: None, touch_force_n, travel_m_s }
+    SafetyContext { robot, tip_w: None, farthest: None, object: None, touch_force_n, travel_m_s }
 }
 
-fn arm() -> Site {
+fn arm() -> SafetyContext {
     site(ArmSettings::default().chain().unwrap())
 }
 
-fn interlocks(site: &Site, settings: &InterlockSettings, world: World) -> (Interlocked, Fake) {
+fn interlocks(
+    site: &SafetyContext,
+    settings: &InterlockSettings,
+    world: World,
+) -> (Interlocked, Fake) {
     let (body, fake) = body_of(&site.robot.chain, world);
     let mut body = Interlocked::new(Box::new(body), site, settings).unwrap();
     body.reset(1).unwrap();
@@ -346,7 +350,7 @@ fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
     for (way, named) in [([0.0, -0.05, 0.0], "depth"), ([0.05, 0.0, 0.0], "workspace")] {
         let (body, fake) = body_of(&robot.chain, World::simulated());
         let settings = InterlockSettings::default();
-        let mut body = interlocked(Box::new(body), &robot, task, None, &settings).unwrap();
+        let mut body = with_interlocks(Box::new(body), &robot, task, None, &settings).unwrap();
         body.reset(1).unwrap();
         let ahead = Command { qdot: way.to_vec() };
         let fault = (0..5000).find_map(|_| body.step(&ahead).err()).unwrap();

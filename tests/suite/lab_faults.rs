@@ -17,14 +17,14 @@ use std::time::Duration;
 const NOT_SEEN_S: f64 = 0.6;
 
 /// An exploration that is disturbed while the arm moves.
-struct Scene {
+struct FaultScenario {
     network: Network,
     twin: TwinProcess,
     explorer: Child,
     folder: tempfile::TempDir,
 }
 
-impl Scene {
+impl FaultScenario {
     fn new(number: u16, injected: &[&str], sets: &[&str]) -> Self {
         let network = Network::new(number);
         let injected: Vec<&str> = injected.iter().flat_map(|name| ["--inject", *name]).collect();
@@ -89,7 +89,7 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
     .into_iter()
     .enumerate()
     {
-        let mut scene = Scene::new(30 + i as u16, &[&format!("{name}@1")], &[]);
+        let mut scene = FaultScenario::new(30 + i as u16, &[&format!("{name}@1")], &[]);
         let (said, halted_s) = scene.halted();
         let begins = |event: &Value| event["failure"]["is_on"] == true;
         let at_s = scene.twin.wait_for(begins, 1.0);
@@ -123,7 +123,7 @@ fn loss_latency_and_noise_are_lived_with() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_death_of_either_side_stops_the_other() {
     for (number, name) in [(50, "STOP"), (51, "KILL")] {
-        let mut scene = Scene::new(number, &[], &[]);
+        let mut scene = FaultScenario::new(number, &[], &[]);
         scene.twin.wait_until_it_moves();
         signal(&scene.explorer, name);
         let at_s = pace::now_s();
@@ -144,7 +144,7 @@ fn the_death_of_either_side_stops_the_other() {
         }
     }
     for (number, name) in [(52, "STOP"), (53, "KILL")] {
-        let mut scene = Scene::new(number, &[], &[]);
+        let mut scene = FaultScenario::new(number, &[], &[]);
         scene.twin.wait_until_it_moves();
         signal(&scene.twin.child, name);
         let at_s = pace::now_s();
@@ -167,7 +167,7 @@ fn the_death_of_either_side_stops_the_other() {
 fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
     let ip = |words: &str| Command::new("ip").args(words.split(' ')).status().unwrap().success();
     let has_dummy = Path::new("/sys/class/net/dds0").exists();
-    let mut scene = Scene::new(54, &[], &[]);
+    let mut scene = FaultScenario::new(54, &[], &[]);
     scene.twin.wait_until_it_moves();
     let before_s = pace::now_s();
     assert!(ip("link set lo down") && (!has_dummy || ip("link set dds0 down")));
@@ -194,7 +194,7 @@ fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_second_publisher_of_commands_stops_the_arm() {
-    let mut scene = Scene::new(55, &[], &[]);
+    let mut scene = FaultScenario::new(55, &[], &[]);
     scene.twin.wait_until_it_moves();
     let before_s = pace::now_s();
     let open = connect(&scene.network.settings, Side::Explorer, Vec::new()).unwrap();

@@ -3,7 +3,7 @@
 use crate::common::counting::peak_bytes;
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::gp::likelihood::Likelihood;
-use palpate::gp::{Mean, Observations, Posterior};
+use palpate::gp::{MeanModel, Observations, Posterior};
 
 /// Peak memory of `work` above the initial memory, in doubles per n².
 fn doubles_per_square<R>(n: usize, work: impl FnOnce() -> R) -> f64 {
@@ -26,7 +26,7 @@ fn four_thousand_touches_need_at_most_three_squares_of_doubles() {
         mean: 0.0,
     };
     let gradient = doubles_per_square(n, || {
-        let mut likelihood = Likelihood::new(&SquaredExponential, Mean::Zero, &touches);
+        let mut likelihood = Likelihood::new(&SquaredExponential, MeanModel::Zero, &touches);
         likelihood.value_gradient(&at, &mut [0.0; 4]).unwrap()
     });
     assert!((1.0..=3.0).contains(&gradient), "likelihood with gradient: {gradient} n² doubles");

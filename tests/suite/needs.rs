@@ -2,9 +2,9 @@
 
 use crate::common::program::{fails, palpate};
 use palpate::sim::Scene;
-use palpate::study::accuracy::comparison::{Comparison, Effort};
-use palpate::study::accuracy::deviation::Share;
-use palpate::study::accuracy::switches::{full, switches};
+use palpate::study::accuracy::comparison::{AccuracyComparison, MeasurementCounts};
+use palpate::study::accuracy::deviation::TouchShare;
+use palpate::study::accuracy::switches::{switches, with_all_effects};
 use palpate::study::accuracy::tolerance::Criterion;
 use palpate::study::accuracy::variant::Variant;
 use palpate::study::accuracy::verdict::Relevance;
@@ -50,9 +50,10 @@ fn need(
     let folder = folder(slope_deg, more);
     let scene = Scene::load(&folder.path().join("scene.toml"), &[]).unwrap();
     let criterion = Criterion::Touches(tolerance.parse().unwrap());
-    let effort = Effort { touches, pairs: 2, trials: 0, trial_touches: 1, seed: 0 };
+    let effort = MeasurementCounts { touches, pairs: 2, trials: 0, trial_touches: 1, seed: 0 };
     let mut variants = Variant::effects(&scene).into_iter();
-    let mut whole = Comparison::new(variants.next().unwrap(), effort, Some(criterion)).unwrap();
+    let mut whole =
+        AccuracyComparison::new(variants.next().unwrap(), effort, Some(criterion)).unwrap();
     whole.add(variants.find(|(it, _)| it.effect.as_deref() == Some(effect)).unwrap()).unwrap();
     println!("{effect} at {slope_deg} deg: {:?}", whole.variants[0].beyond);
     whole.variants[0].relevance.unwrap()
@@ -112,7 +113,7 @@ fn the_full_scene_is_one_that_is_accepted() {
     for body in ["kinematic", "dynamic"] {
         let set = format!("body=\"{body}\"");
         let scene = Scene::load(&folder.path().join("scene.toml"), &[set]).unwrap();
-        let whole = full(&scene);
+        let whole = with_all_effects(&scene);
         let text = toml::to_string(&whole).unwrap();
         fs::write(folder.path().join("full.toml"), text).unwrap();
         assert_eq!(Scene::load(&folder.path().join("full.toml"), &[]).unwrap(), whole);
@@ -240,9 +241,9 @@ fn where_neither_planner_wins_there_is_no_verdict_to_change() {
 }
 
 /// Share of touches that are each a trial.
-fn share(count: usize, of: usize) -> Share {
+fn share(count: usize, of: usize) -> TouchShare {
     let touches = (0..of).map(|i| vec![i < count]).collect::<Vec<_>>();
-    Share::of(&touches).unwrap()
+    TouchShare::of(&touches).unwrap()
 }
 
 /// For 0 of n the bound is 1 − 0.025^(1/n); for 4 of 20 it is in Clopper and Pearson's tables.
@@ -254,19 +255,19 @@ fn an_interval_is_the_textbooks() {
     assert!((low - 0.0573).abs() < 1e-4 && (high - 0.4366).abs() < 1e-4, "{low} {high}");
     let [low, high] = share(100, 100).interval;
     assert!((low - 0.025f64.powf(0.01)).abs() < 1e-9 && high == 1.0, "{low} {high}");
-    assert_eq!(Share::of(&[]), None);
+    assert_eq!(TouchShare::of(&[]), None);
 }
 
 /// Ten trials of identical touches count as ten touches.
 #[test]
 fn touches_that_are_alike_count_once() {
     let alike: Vec<Vec<bool>> = (0..10).map(|i| vec![i < 4; 10]).collect();
-    let [low, high] = Share::of(&alike).unwrap().interval;
+    let [low, high] = TouchShare::of(&alike).unwrap().interval;
     let ten = share(4, 10).interval;
     assert!(low <= ten[0] && high >= ten[1], "{low} {high}");
     assert!(high - low > 2.0 * (share(40, 100).interval[1] - share(40, 100).interval[0]));
     // One touch in trials of ten is hardly more than zero.
     let one: Vec<Vec<bool>> = (0..12).map(|i| (0..10).map(|j| i + j == 0).collect()).collect();
-    let [_, high] = Share::of(&one).unwrap().interval;
+    let [_, high] = TouchShare::of(&one).unwrap().interval;
     assert!(high >= share(1, 120).interval[1], "{high}");
 }

@@ -1,6 +1,6 @@
 //! Tests of the two commands from an unprepared mesh to a report.
 
-use crate::common::program::{fails, palpate, said, succeeds};
+use crate::common::program::{fails, palpate, stderr, succeeds};
 use crate::common::shapes::sphere_mesh;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate::experiment::Experiment;
@@ -89,8 +89,8 @@ fn every_finger_has_a_scene_that_can_be_built() {
             let arguments = ["new", "container.obj", "--finger", finger, "--side", side, "--force"];
             succeeds(folder.path(), &[&arguments[..], &["--up", "z"]].concat());
             let output = palpate(folder.path(), &["show", "container-scene.toml"]);
-            assert!(output.status.success(), "{finger} {side}: {}", said(&output));
-            assert_eq!(said(&output), "", "{finger} {side}");
+            assert!(output.status.success(), "{finger} {side}: {}", stderr(&output));
+            assert_eq!(stderr(&output), "", "{finger} {side}");
         }
         // Settings that are best for unknown objects in the suite, and the sensor's noise.
         let written = Experiment::load(&folder.path().join("container.toml"), &[]).unwrap();
@@ -162,7 +162,7 @@ fn sizes_are_guessed_from_what_a_finger_can_explore() {
     // Without a plausible unit the mesh is scaled to the size of a hand, in readable numbers.
     for (extent, unit) in [(2.0, None), (4000.0, None), (1e-5, None), (30.0, Some(Unit::M))] {
         let (unit, scale) = size(extent, unit);
-        let size_m = extent * unit.metres() * scale;
+        let size_m = extent * unit.metres_per_unit() * scale;
         assert!((0.14..0.16).contains(&size_m), "{extent} {unit} {scale}");
         assert!(format!("{scale:e}").len() < 8, "{scale:e}");
     }

@@ -52,8 +52,8 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
         ["verification_rmse_m", "verification_nlpd", "verification_coverage", "repeatability_m"]
     {
         let measure = measure::by_id(id).unwrap();
-        assert!(measure.of(&verified, 10).is_some(), "{id}");
-        assert_eq!((measure.of(&verified, 9), measure.of(&plain, 10)), (None, None), "{id}");
+        assert!(measure.value(&verified, 10).is_some(), "{id}");
+        assert_eq!((measure.value(&verified, 9), measure.value(&plain, 10)), (None, None), "{id}");
     }
 }
 
@@ -62,7 +62,7 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
 #[test]
 fn an_exact_probe_repeats_and_verifies() {
     let verified = row(container(&["verification_touches=200", "repeat_touches=6"]), "active", 0);
-    let of = |id: &str| measure::by_id(id).unwrap().of(&verified, 10).unwrap();
+    let of = |id: &str| measure::by_id(id).unwrap().value(&verified, 10).unwrap();
     assert_eq!(of("repeatability_m"), 0.0);
     assert_eq!(of("verification_missed"), 0.0);
     let ratio = of("verification_rmse_m") / of("rmse_m");
@@ -85,7 +85,7 @@ fn a_run_without_truth_is_told() {
         let places = zone.grid(experiment.grid as usize);
         let count = places.len();
         let truth = Truth::new(zone, places, vec![None; count], vec![false; count]);
-        let simulation = Simulation::against(experiment, environment, truth.clone()).unwrap();
+        let simulation = Simulation::with_truth(experiment, environment, truth.clone()).unwrap();
         let planners = ["active", "random"].map(|name| planner::by_name(name).unwrap());
         let rows: Vec<TrialRow> = (0..2)
             .flat_map(|trial| planners.map(|planner| simulation.trial(planner, trial)))
@@ -95,7 +95,7 @@ fn a_run_without_truth_is_told() {
         let experiment = simulation.experiment().clone();
         let run = Run { experiment, truth, rows, unlisted: 0 };
         let folder = tempfile::tempdir().unwrap();
-        let analysis = Analysis::of(&run);
+        let analysis = Analysis::new(&run);
         report::write_tables(&run, &analysis, folder.path()).unwrap();
         report::write(&run, &analysis, folder.path()).unwrap();
         let page = fs::read_to_string(folder.path().join("report.html")).unwrap();

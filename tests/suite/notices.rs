@@ -1,6 +1,6 @@
 //! Tests of warnings about likely mistakes in valid scenes and runs.
 
-use crate::common::program::{fails, palpate, said};
+use crate::common::program::{fails, palpate, stderr};
 use std::fs;
 use std::path::Path;
 use std::process::Output;
@@ -30,7 +30,7 @@ fn run(folder: &TempDir, more: &[&str]) -> Output {
 }
 
 fn table(output: &Output) -> String {
-    assert!(output.status.success(), "{}", said(output));
+    assert!(output.status.success(), "{}", stderr(output));
     String::from_utf8_lossy(&output.stdout).into()
 }
 
@@ -48,7 +48,7 @@ fn a_scene_that_means_what_it_says_is_told_nothing() {
     let folder = folder("container.toml", &[]);
     let output = run(&folder, &[]);
     assert!(!table(&output).contains("note:"));
-    assert_eq!(said(&output), "");
+    assert_eq!(stderr(&output), "");
 }
 
 /// Fingers of three radii on the container: the error does not grow with the difference from 7 mm.
@@ -69,7 +69,7 @@ fn a_soft_finger_of_another_radius_has_no_bias_of_the_difference() {
 fn a_datum_that_is_left_out_is_the_middle_of_the_surface() {
     let folder = folder("container.toml", &[("datum_y_m = -0.65\n", "")]);
     let output = run(&folder, &[]);
-    assert!(!table(&output).contains("note:") && said(&output).is_empty(), "{}", said(&output));
+    assert!(!table(&output).contains("note:") && stderr(&output).is_empty(), "{}", stderr(&output));
     let resolved = fs::read_to_string(folder.path().join("runs/it/resolved.toml")).unwrap();
     let line = resolved.lines().find(|line| line.starts_with("datum_y_m = ")).unwrap();
     // The surface is 22.1 to 40.0 mm in front of the object's middle at y = -0.65.
@@ -81,7 +81,7 @@ fn a_datum_that_is_left_out_is_the_middle_of_the_surface() {
 fn a_datum_far_from_the_surface_and_an_r_that_says_nothing_are_told() {
     let folder = folder("container.toml", &[("datum_y_m = -0.65", "datum_y_m = 0")]);
     let output = run(&folder, &["--set", "touches=8"]);
-    let (text, notes) = (table(&output), said(&output));
+    let (text, notes) = (table(&output), stderr(&output));
     for words in [&text, &notes] {
         assert!(words.contains("zone.datum_y_m = 0 lies 610.0 mm from the surface"), "{words}");
         assert!(words.contains("the zone is 120.0 mm wide"), "{words}");
@@ -95,13 +95,13 @@ fn a_datum_far_from_the_surface_and_an_r_that_says_nothing_are_told() {
 fn a_forgotten_unit_is_told_with_the_one_that_fits() {
     let container = folder("container.toml", &[("unit = \"mm\"\n", "")]);
     let output = palpate(container.path(), &["show", "scene.toml"]);
-    let notes = said(&output);
+    let notes = stderr(&output);
     assert!(notes.contains("1667 times larger than the zone"), "{notes}");
     assert!(notes.contains("with object.unit = \"mm\" it would measure 0.2000 m"), "{notes}");
     assert!(notes.contains("can reach only 0 of 1681 test points"), "{notes}");
     let bird =
         folder("bird.toml", &[("[zone]", "[zone]"), ("[object]", "[object]\nunit = \"mm\"")]);
-    let notes = said(&palpate(bird.path(), &["show", "scene.toml"]));
+    let notes = stderr(&palpate(bird.path(), &["show", "scene.toml"]));
     assert!(notes.contains("702 times smaller than the zone"), "{notes}");
     assert!(notes.contains("with object.unit = \"m\" it would measure 0.1425 m"), "{notes}");
 }
@@ -110,7 +110,7 @@ fn a_forgotten_unit_is_told_with_the_one_that_fits() {
 fn few_places_and_few_contacts_are_told_before_and_after() {
     let folder = folder("container.toml", &[("x_m = [-0.05, 0.05]", "x_m = [-0.05, 0.5]")]);
     let output = palpate(folder.path(), &["run", "it.toml"]);
-    let (text, notes) = (table(&output), said(&output));
+    let (text, notes) = (table(&output), stderr(&output));
     let page = fs::read_to_string(folder.path().join("runs/it/report.html")).unwrap();
     for words in [&text, &notes, &page] {
         assert!(words.contains("of 441 test points lie on the object"), "{words}");
@@ -125,8 +125,8 @@ fn a_run_whose_every_trial_failed_says_why_and_keeps_headers() {
     let folder = folder("container_finger.toml", &[]);
     let sets = ["--set", "scene.effects.timing.control_delay_s=0.9", "--set", "touches=4"];
     let output = run(&folder, &sets);
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    let notes = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let notes = stderr(&output);
     assert!(
         notes.contains("error: 4 of 4 trials failed, the first (random, trial 0): "),
         "{notes}"
@@ -169,13 +169,13 @@ fn a_soft_finger_without_tables_is_a_biotac_and_says_so() {
         &[("[effects.skin]\n", ""), ("[effects.fluid]\n", ""), ("[effects.electrodes]", "")],
     );
     let output = run(&folder, &["--set", "touches=4"]);
-    assert!(said(&output).contains("default [effects.skin]"), "{}", said(&output));
+    assert!(stderr(&output).contains("default [effects.skin]"), "{}", stderr(&output));
     let resolved = fs::read_to_string(folder.path().join("runs/it/resolved.toml")).unwrap();
     for table in ["[scene.effects.skin]", "[scene.effects.fluid]", "[scene.effects.electrodes]"] {
         assert!(resolved.contains(table), "{resolved}");
     }
     let quiet = palpate(folder.path(), &["-q", "show", "scene.toml"]);
-    assert_eq!(said(&quiet), "");
+    assert_eq!(stderr(&quiet), "");
 }
 
 /// A note gives the cost of a radius that differs from the calibrated one.
@@ -186,8 +186,8 @@ fn a_soft_finger_of_another_size_is_told_what_it_costs() {
         let set = format!("finger.radius_m={radius_m}");
         palpate(folder.path(), &["show", "scene.toml", "--set", &set])
     };
-    let told = said(&show("0.01"));
+    let told = stderr(&show("0.01"));
     assert!(told.contains("finger.radius_m = 0.01") && told.contains("0.79 at 0.010"), "{told}");
-    let told = said(&show("0.007"));
+    let told = stderr(&show("0.007"));
     assert!(!told.contains("finger.radius_m"), "{told}");
 }

@@ -1,23 +1,23 @@
 //! Tests of planners over several objects: the statistics, and the order of the planners.
 
 use crate::common::program::palpate;
-use palpate::experiment::sweep::cells;
+use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::study::check::judged::JUDGED;
-use palpate::study::compare::{Compared, Contender, ObjectResult, gap_closed, geometric};
+use palpate::study::check::judged::CHECK_MEASURES;
+use palpate::study::compare::{Entrant, ObjectResult, SuiteComparison, gap_closed, geometric};
 use proptest::prelude::*;
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
 
-fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> Compared {
-    let contender = |(name, scores): (&str, &[f64])| Contender {
+fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> SuiteComparison {
+    let contender = |(name, scores): (&str, &[f64])| Entrant {
         name: name.into(),
         results: vec![ObjectResult { scores: scores.to_vec(), ..ObjectResult::default() }],
     };
     let named = [("random", random), ("own", own), ("oracle", oracle)];
     let contenders = named.map(contender).into();
-    Compared { against: "random".into(), objects: vec!["it".into()], contenders }
+    SuiteComparison { against: "random".into(), objects: vec!["it".into()], contenders }
 }
 
 proptest! {
@@ -65,7 +65,7 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
         let logs = rows.map(|row| {
             let is_whole = row.failure.is_none();
             assert!(is_whole && row.touches.iter().all(|it| it.stall.is_none()), "{name}");
-            (JUDGED[0].of)(&row, simulation.experiment()).unwrap()
+            (CHECK_MEASURES[0].of)(&row, simulation.experiment()).unwrap()
         });
         logs.sum::<f64>() / f64::from(trials)
     };
@@ -80,7 +80,7 @@ fn planners_keep_their_order_on_six_objects() {
     // Without normals, which take five times as long.
     let sets = ["planning.oracle.candidates=20", "grid=15", "gp.normals=false"].map(String::from);
     let mut sums = [0.0; 3];
-    for cell in cells(path).unwrap() {
+    for cell in sweep_cases(path).unwrap() {
         let experiment = Experiment::load_cell(path, &cell, &sets).unwrap();
         let found = logs(experiment, &["sobol", "silhouette", "oracle"], 3);
         sums.iter_mut().zip(found).for_each(|(sum, log)| *sum += log / 6.0);
@@ -94,7 +94,7 @@ fn planners_keep_their_order_on_six_objects() {
 #[test]
 fn an_oracle_may_fit_again() {
     let path = Path::new("experiments/suite/six.toml");
-    let cell = &cells(path).unwrap()[1];
+    let cell = &sweep_cases(path).unwrap()[1];
     let sets = ["planning.oracle.candidates=10", "planning.oracle.refit=true", "grid=15"];
     let sets = [&sets[..], &["touches=12", "gp.normals=false"]].concat();
     let sets: Vec<String> = sets.into_iter().map(String::from).collect();
@@ -110,7 +110,7 @@ fn free_space_makes_no_belief_worse() {
     let mut found = Vec::new();
     for half in ["choosing", "reporting"] {
         let path = format!("experiments/suite/{half}.toml");
-        for cell in cells(Path::new(&path)).unwrap() {
+        for cell in sweep_cases(Path::new(&path)).unwrap() {
             let [without, with] = [false, true].map(|free_space| {
                 let sets = ["grid=15", "gp.normals=false"].map(String::from);
                 let sets = [&sets[..], &[format!("gp.free_space={free_space}")]].concat();

@@ -6,7 +6,7 @@ use palpate::experiment::trial::row::TrialId;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{
-    self, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_own, sample,
+    self, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_external, sample,
 };
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -40,7 +40,7 @@ impl PlannerFactory for Mine {
 impl Planner for Random {
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
         match belief.targets().len() < self.touches {
-            true => Ok(Plan::at(sample::anywhere(belief, &mut self.random))),
+            true => Ok(Plan::at(sample::random_target(belief, &mut self.random))),
             false => Err("enough".into()),
         }
     }
@@ -69,7 +69,7 @@ fn an_own_planner_is_one_of_the_experiments() {
     let folder = tempfile::tempdir().unwrap();
     let experiment = simulation.experiment();
     let (mut rows, done) = rows_of(&simulation, folder.path(), false).unwrap();
-    let jobs = runner::jobs(&simulation, &done).unwrap();
+    let jobs = runner::missing_jobs(&simulation, &done).unwrap();
     let stop = AtomicBool::new(false);
     runner::run(&simulation, (&mut rows, jobs), 0, &stop, None, &|_| ()).unwrap();
     rows.sort(experiment).unwrap();
@@ -104,16 +104,16 @@ fn a_planner_that_names_no_target_fails_its_trial() {
 fn a_planner_that_is_not_there_is_an_error() {
     let experiment = simulation(8).experiment().clone();
     let bare = Simulation::new(experiment).unwrap();
-    let error = runner::jobs(&bare, &[]).err().unwrap().to_string();
+    let error = runner::missing_jobs(&bare, &[]).err().unwrap().to_string();
     assert!(error.starts_with("planner `mine:Random` is not available in this program"), "{error}");
     assert!(bare.planner("random").is_some());
 }
 
 #[test]
 fn names_of_own_planners_have_a_module() {
-    assert!(["a:b", "my.module:Class.Inner", "__main__:f"].into_iter().all(is_own));
-    assert!(!["active", ":b", "a:", "a:b:c", "a b:c", "a/b:c"].into_iter().any(is_own));
-    assert!(planner::PLANNERS.iter().all(|entry| !is_own(entry.name)));
+    assert!(["a:b", "my.module:Class.Inner", "__main__:f"].into_iter().all(is_external));
+    assert!(!["active", ":b", "a:", "a:b:c", "a b:c", "a/b:c"].into_iter().any(is_external));
+    assert!(planner::PLANNERS.iter().all(|entry| !is_external(entry.name)));
 }
 
 /// Planners of the command line run beside the file's; an unavailable one is rejected before the

@@ -147,7 +147,7 @@ fn around(page: &str, widths: &[u32]) -> String {
 /// The report page of a synthetic run in a folder, with a script at its end.
 fn page(folder: &Path, run: &Run, script: &str) -> PathBuf {
     let path = folder.join("report.html");
-    report::write(run, &Analysis::of(run), folder).unwrap();
+    report::write(run, &Analysis::new(run), folder).unwrap();
     let page = fs::read_to_string(&path).unwrap();
     let page = page.replace("<head>", &format!("<head>{CLOCK}"));
     fs::write(&path, page.replace("</body>", &format!("<script>{{{script}}}</script></body>")))

@@ -1,13 +1,13 @@
 //! Tests of the probability of a surface and of planners that use it.
 
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::sweep::cells;
-use palpate::experiment::trial::recorded_trial::Resumed;
+use palpate::experiment::sweep::sweep_cases;
+use palpate::experiment::trial::recorded_trial::ResumedProbe;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::explore::probe::{Contact, SweptVolume, Touch};
 use palpate::geometry::import::import;
 use palpate::robot::Finger;
 use palpate::task::Zone;
@@ -26,7 +26,7 @@ fn touch(belief: &mut HeightField, zone: &Zone, target: &[f64], meets: bool) {
     let p_wt = zone.point(target, 0.0);
     let contact = Contact { p_wc: p_wt, normal_w: Vector3::y() };
     belief.observe(target, &if meets { Touch::Contact(contact) } else { Touch::Miss });
-    belief.observe_swept(&Swept { finger: Finger::default(), p_wt });
+    belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
 }
 
 proptest! {
@@ -43,11 +43,11 @@ proptest! {
             touch(&mut belief, &zone, &[*x, *z], *meets);
         }
         let silhouette = belief.presence().silhouette();
-        let [here, hoped] = [silhouette.at(&at), silhouette.hoped(&at)];
-        let asked = silhouette.of_contact(&at);
+        let [here, hoped] = [silhouette.probability(&at), silhouette.optimistic_probability(&at)];
+        let asked = silhouette.hit_probability(&at);
         prop_assert!(here >= 0.0 && here <= hoped && hoped <= asked + 1e-9 && asked <= 1.0);
         for (x, z, meets) in touches {
-            let missed = silhouette.at(&[x, z]) == 0.0;
+            let missed = silhouette.probability(&[x, z]) == 0.0;
             prop_assert!(meets || missed);
         }
     }
@@ -59,15 +59,15 @@ proptest! {
 fn touches_speak_for_their_surroundings() {
     let zone = zone();
     let mut belief = HeightField::new(zone.clone(), GpSettings::default());
-    assert_eq!(belief.presence().silhouette().at(&[0.05, 0.05]), 1.0);
+    assert_eq!(belief.presence().silhouette().probability(&[0.05, 0.05]), 1.0);
     touch(&mut belief, &zone, &[0.02, 0.05], true);
     touch(&mut belief, &zone, &[0.08, 0.05], false);
     let silhouette = belief.presence().silhouette();
     let along: Vec<f64> =
-        (0..6).map(|i| silhouette.at(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
+        (0..6).map(|i| silhouette.probability(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
     assert!(along.is_sorted_by(|a, b| a >= b) && along[0] > 0.9 && along[5] < 0.5, "{along:?}");
     // The finger slants down: it passed below its target, not above.
-    let [below, above] = [-0.012, 0.012].map(|z| silhouette.at(&[0.08, 0.05 + z]));
+    let [below, above] = [-0.012, 0.012].map(|z| silhouette.probability(&[0.08, 0.05 + z]));
     assert!(below == 0.0 && above > 0.0, "{below} {above}");
     let radius_m = Finger::default().radius_m;
     let beyond = |offset: f64| {
@@ -76,8 +76,8 @@ fn touches_speak_for_their_surroundings() {
         let contact = Contact { p_wc, normal_w: Vector3::y() };
         belief.observe(&[0.05, 0.05], &Touch::Contact(contact));
         let p_wt = zone.point(&[0.05, 0.05], 0.0);
-        belief.observe_swept(&Swept { finger: Finger::default(), p_wt });
-        belief.presence().silhouette().at(&[0.05 + radius_m, 0.05])
+        belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
+        belief.presence().silhouette().probability(&[0.05 + radius_m, 0.05])
     };
     assert!(beyond(0.9) < 0.5 && beyond(0.1) > 0.6, "{} {}", beyond(0.9), beyond(0.1));
 }
@@ -105,15 +105,15 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
             Touch::Contact(Contact { p_wc: Point3::from(p_w), normal_w: Vector3::y() })
         });
         belief.observe(target, &touch);
-        belief.observe_swept(&Swept { finger: finger.clone(), p_wt });
+        belief.observe_swept(&SweptVolume { finger: finger.clone(), p_wt });
     }
     let silhouette = belief.presence().silhouette();
     let truth = simulation.truth();
-    let share = truth.count() as f64 / truth.places.len() as f64;
+    let share = truth.surface_count() as f64 / truth.places.len() as f64;
     let mut sums = [0.0; 2];
     for (place, height) in truth.places.iter().zip(&truth.heights_m) {
         let is_there = f64::from(u8::from(height.is_some()));
-        sums[0] += (silhouette.at(place) - is_there).powi(2);
+        sums[0] += (silhouette.probability(place) - is_there).powi(2);
         sums[1] += (share - is_there).powi(2);
     }
     sums.map(|sum| sum / truth.places.len() as f64)
@@ -144,7 +144,7 @@ fn a_trial_goes_on_where_it_was_broken_off() {
     assert!(made.iter().any(|touch| touch.contact.is_none()));
     assert!(whole.touches.iter().all(|touch| touch.tip.is_some() == touch.contact.is_none()));
     let mut probe = simulation.probe(0).unwrap();
-    let mut resumed = Resumed::new(made, &simulation, &mut *probe);
+    let mut resumed = ResumedProbe::new(made, &simulation, &mut *probe);
     assert_eq!(simulation.trial_with(&mut resumed, planner, 0, &mut |_| Ok(())), whole);
 }
 
@@ -154,8 +154,9 @@ fn a_trial_goes_on_where_it_was_broken_off() {
 fn every_object_stands_in_one_half() {
     for (kind, folder) in [("", "scenes/suite"), ("around-", "scenes/suite/around")] {
         let of = |half: &str| {
-            let cells = cells(Path::new(&format!("experiments/suite/{kind}{half}.toml"))).unwrap();
-            cells.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
+            let cells =
+                sweep_cases(Path::new(&format!("experiments/suite/{kind}{half}.toml"))).unwrap();
+            sweep_cases.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
         };
         let [choosing, reporting] = ["choosing", "reporting"].map(of);
         assert_eq!((choosing.len(), reporting.len()), (12, 12));
@@ -189,7 +190,7 @@ fn the_suite_is_whole() {
         let report = mesh.unwrap().1;
         assert!(report.is_closed() && report.degenerate_removed.count == 0, "{name}");
         let truth = simulation(name).truth().clone();
-        shares.push(truth.count() as f64 / truth.places.len() as f64);
+        shares.push(truth.surface_count() as f64 / truth.places.len() as f64);
         println!("{name}: {:.0} %", 100.0 * shares[shares.len() - 1]);
     }
     let count =

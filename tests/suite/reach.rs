@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::sim::environment::Shape;
-use palpate::sim::probe::rest;
+use palpate::sim::environment::Surface;
+use palpate::sim::probe::resting_pose;
 use palpate::sim::reach;
 use palpate::sim::{Environment, Scene};
 use rand::{RngExt, SeedableRng};
@@ -39,7 +39,7 @@ const SPHERE: &str = "radius_m = 0.007\nlength_m = 0";
 fn across(environment: &Environment) -> Vec<(f64, bool)> {
     let places: Vec<Vec<f64>> = (-190..=190).map(|i| vec![1e-4 * f64::from(i), 0.0]).collect();
     let heights: Vec<_> = places.iter().map(|place| environment.true_height_m(place)).collect();
-    let reachable = reach::is_reachable(environment, &places, &heights, &|_| ());
+    let reachable = reach::reachable(environment, &places, &heights, &|_| ());
     places.iter().map(|place| place[0]).zip(reachable).collect()
 }
 
@@ -107,9 +107,11 @@ fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
     for j in 0..=steps[1] as usize {
         for i in 0..=steps[0] as usize {
             let target = zone.at(&[i as f64 / steps[0], j as f64 / steps[1]]);
-            let rest =
-                rest(environment, &environment.task().approach(&target.as_slice().into()).unwrap());
-            fingers.extend(rest.map(|rest| (target, (x_zw * rest.p_wt).y)));
+            let rest = resting_pose(
+                environment,
+                &environment.task().approach(&target.as_slice().into()).unwrap(),
+            );
+            fingers.extend(resting_pose.map(|rest| (target, (x_zw * resting_pose.p_wt).y)));
         }
     }
     let is_reachable = |place: &Vec<f64>| {
@@ -157,13 +159,13 @@ fn reach_is_what_letting_every_finger_down_finds() {
             scene.zone.as_mut().unwrap().depth_m = None;
             scene.zone.as_mut().unwrap().rotation_deg = [0.0, 0.0, 20.0 * rng.random::<f64>()];
             let bvh = MeshBvh::new(random_relief(rng, rough_m));
-            let Shape::Mesh { report, .. } = profile.shape() else { unreachable!() };
-            let shape = Shape::Mesh { bvh, report: report.clone() };
-            let environment = Environment::around(scene, shape).unwrap();
+            let Surface::Mesh { report, .. } = profile.shape() else { unreachable!() };
+            let shape = Surface::Mesh { bvh, report: report.clone() };
+            let environment = Environment::with_shape(scene, shape).unwrap();
             let places = environment.task().zone().unwrap().grid(15);
             let heights: Vec<_> =
                 places.iter().map(|place| environment.true_height_m(place)).collect();
-            let fast = reach::is_reachable(&environment, &places, &heights, &|_| ());
+            let fast = reach::reachable(&environment, &places, &heights, &|_| ());
             assert_eq!(fast, by_brute_force(&environment, &places), "{finger} {rough_m}");
             fast.iter().for_each(|&is_reachable| counts[usize::from(is_reachable)] += 1);
         }

@@ -2,14 +2,14 @@
 //! trial is the same trial.
 
 use crate::common::counting::allocations;
-use crate::common::program::{MESH, command, ended, fails, said, succeeds};
+use crate::common::program::{MESH, command, fails, run_to_end, stderr, succeeds};
 use crate::common::shipped;
 use mcap::MessageStream;
 use mcap::records::{MessageHeader, Record};
 use palpate::backend::{
     Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample, Wrench,
 };
-use palpate::experiment::trial::Touched;
+use palpate::experiment::trial::FinishedTouch;
 use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
 use palpate::experiment::trial::replay::{self, Difference};
 use palpate::experiment::trial::row::TouchRow;
@@ -18,8 +18,8 @@ use palpate::explore::planner::{self, PlannerFactory};
 use palpate::robot::finger::Frame;
 use palpate::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
 use palpate::ros::recording::{
-    About, Ending, Marker, Player, Recorded, Recorder, Recording, Shape, TOPICS, Tick, Touch,
-    decoded,
+    Marker, RecordedTrial, Recording, RecordingBackend, RecordingMetadata, ReplayBackend, Shape,
+    TOPICS, TickMessage, TouchMessage, TrialEnd, decoded,
 };
 use palpate::sim::simulator::Simulator;
 use proptest::prelude::*;
@@ -56,8 +56,8 @@ fn clock() -> u64 {
     1_700_000_000_000_000_000
 }
 
-fn about(capabilities: &Capabilities) -> About {
-    About {
+fn about(capabilities: &Capabilities) -> RecordingMetadata {
+    RecordingMetadata {
         version: "0.0.0".into(),
         experiment: "name = \"none\"".into(),
         planner: "active".into(),
@@ -206,20 +206,20 @@ proptest! {
         let paper = paper(usize::MAX);
         let about = about(fake.capabilities());
         let recording = Recording::new(Box::new(paper.clone()), &about, clock).unwrap();
-        let mut recorder = Recorder::new(Box::new(fake), recording.clone());
+        let mut recorder = RecordingBackend::new(Box::new(fake), recording.clone());
         recorder.reset(9).unwrap();
         let commands = || ticks.iter().map(|(_, qdot)| Command { qdot: qdot.clone() });
         for command in commands() {
             recorder.step(&command).unwrap();
         }
         prop_assert_eq!(recorder.step(&Command::default()).unwrap_err(), lost.clone());
-        recording.end(1.0, &Ending { failure: Some("it was lost".into()), is_interrupted: false }).unwrap();
+        recording.end(1.0, &TrialEnd { failure: Some("it was lost".into()), is_interrupted: false }).unwrap();
 
-        let recorded = Recorded::of(paper.0.lock().unwrap().clone()).unwrap();
+        let recorded = RecordedTrial::of(paper.0.lock().unwrap().clone()).unwrap();
         prop_assert_eq!(&recorded.about, &about);
         prop_assert_eq!(recorded.tick_count, ticks.len() + 2);
         prop_assert_eq!(recorded.ending.clone().unwrap().failure.unwrap(), "it was lost");
-        let mut player = Player::new(recorded);
+        let mut player = ReplayBackend::new(recorded);
         // Each reset restarts the replay.
         for _ in 0..2 {
             let other = player.reset(8).unwrap_err();
@@ -251,7 +251,7 @@ proptest! {
         if is_cut {
             bytes.truncate(cut.index(bytes.len()));
         }
-        match Recorded::of(bytes) {
+        match RecordedTrial::of(bytes) {
             Ok(recorded) => prop_assert!(recorded.ticks().count() <= recorded.tick_count),
             Err(error) => prop_assert!(!error.to_string().is_empty()),
         }
@@ -272,7 +272,7 @@ fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
     let paper = paper(usize::MAX);
     let about = about(body.capabilities());
     let recording = Recording::new(Box::new(paper.clone()), &about, clock).unwrap();
-    let mut recorder = Recorder::new(body, recording.clone());
+    let mut recorder = RecordingBackend::new(body, recording.clone());
     let mut readings = vec![recorder.reset(5).unwrap().clone()];
     for touch in 1..=2 {
         for tick in 0..ticks {
@@ -281,10 +281,14 @@ fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
         }
         let mut shape = Marker::new("belief", Shape::LineStrip, 1e-3, Default::default());
         shape.points = vec![nalgebra::Point3::new(1.0, 2.0, 3.0).into(); 3];
-        let done = Touch { touch, time_s: readings[readings.len() - 1].time_s, ..Touch::default() };
+        let done = TouchMessage {
+            touch,
+            time_s: readings[readings.len() - 1].time_s,
+            ..TouchMessage::default()
+        };
         recording.touched(&done, [shape.clone(), shape]).unwrap();
     }
-    recording.end(1.0, &Ending::default()).unwrap();
+    recording.end(1.0, &TrialEnd::default()).unwrap();
     let bytes = paper.0.lock().unwrap().clone();
     (bytes, readings)
 }
@@ -317,7 +321,7 @@ fn without_slips(bytes: &[u8]) -> Vec<u8> {
             Record::Message { header, data } => {
                 let (channel_id, is_tick) = channels[&header.channel_id];
                 let end = match is_tick {
-                    true => data.len() - 4 - decoded::<Tick>(&data).unwrap().slips.len(),
+                    true => data.len() - 4 - decoded::<TickMessage>(&data).unwrap().slips.len(),
                     false => data.len(),
                 };
                 let header = MessageHeader { channel_id, ..header };
@@ -336,13 +340,13 @@ fn a_recording_without_slips_is_read_as_ever() {
     let (bytes, _) = short(40);
     let shorter = without_slips(&bytes);
     assert!(shorter != bytes);
-    let [now, before] = [bytes, shorter].map(|bytes| Recorded::of(bytes).unwrap());
+    let [now, before] = [bytes, shorter].map(|bytes| RecordedTrial::of(bytes).unwrap());
     assert_eq!((now.tick_count, &now.touches), (before.tick_count, &before.touches));
     let mut told = 0;
     for (now, before) in now.ticks().zip(before.ticks()) {
         told += now.slips.len();
         assert!(before.slips.is_empty());
-        assert_eq!(Tick { slips: Default::default(), ..now }, before);
+        assert_eq!(TickMessage { slips: Default::default(), ..now }, before);
     }
     assert!(told > 10, "{told}");
 }
@@ -398,13 +402,13 @@ fn what_others_read_is_what_was_read() {
                 assert_eq!(f64::from(hand.bt_data[0].pdc_data), frame.pdc_counts.unwrap());
             }
             "/palpate/tick" => {
-                let tick: Tick = decoded(data).unwrap();
+                let tick: TickMessage = decoded(data).unwrap();
                 assert_eq!(&*tick.q, &*at(number).q);
                 assert_eq!((tick.tick, tick.is_reset()), (number as u64, number == 0));
                 assert_eq!(tick.seed, if number == 0 { 5 } else { 0 });
             }
             "/palpate/touch" => {
-                assert_eq!(decoded::<Touch>(data).unwrap().touch as usize, number + 1)
+                assert_eq!(decoded::<TouchMessage>(data).unwrap().touch as usize, number + 1)
             }
             _ => assert_eq!(decoded::<Marker>(data).unwrap().points.len(), 3),
         }
@@ -418,13 +422,14 @@ fn what_others_read_is_what_was_read() {
 fn a_file_that_was_cut_is_read_up_to_the_cut() {
     // More than the 64 kB that LZ4 compresses as one block.
     let (bytes, _) = short(160);
-    let whole = Recorded::of(bytes.clone()).unwrap();
+    let whole = RecordedTrial::of(bytes.clone()).unwrap();
     assert!(whole.ending.is_some());
-    let head = (0..bytes.len()).find(|&at| Recorded::of(bytes[..at].to_vec()).is_ok()).unwrap();
+    let head =
+        (0..bytes.len()).find(|&at| RecordedTrial::of(bytes[..at].to_vec()).is_ok()).unwrap();
     assert!(head < 2000, "the first {head} bytes are needed to know what it is of");
     let (mut before, mut partly) = ((0, 0), 0);
     for at in (head..bytes.len()).step_by((bytes.len() - head) / 200) {
-        let cut = Recorded::of(bytes[..at].to_vec()).unwrap();
+        let cut = RecordedTrial::of(bytes[..at].to_vec()).unwrap();
         let now = (cut.tick_count, cut.touches.len());
         assert!(now.0 >= before.0 && now.1 >= before.1, "{at}: {now:?} after {before:?}");
         assert_eq!(cut.ticks().count(), cut.tick_count);
@@ -434,10 +439,10 @@ fn a_file_that_was_cut_is_read_up_to_the_cut() {
     assert_eq!(before, (whole.tick_count, whole.touches.len()));
     assert!(partly > 0, "no cut in the midst of a touch was read up to the cut");
     for at in [0, 3, 8, head - 1] {
-        let error = Recorded::of(bytes[..at].to_vec()).unwrap_err();
+        let error = RecordedTrial::of(bytes[..at].to_vec()).unwrap_err();
         assert!(error.to_string().contains("the metadata `palpate` is missing"), "{at}: {error}");
     }
-    let error = Recorded::of(b"a text that is something else".to_vec()).unwrap_err();
+    let error = RecordedTrial::of(b"a text that is something else".to_vec()).unwrap_err();
     assert!(error.to_string().contains("does not begin like an MCAP file"), "{error}");
 }
 
@@ -453,20 +458,20 @@ fn a_disk_that_is_full_is_a_fault() {
         let Ok(recording) = Recording::new(Box::new(paper), &about, clock) else { continue };
         begun += 1;
         let fake = Fake::new(3, (0..2001).map(|_| reading()).collect());
-        let mut recorder = Recorder::new(Box::new(fake), recording.clone());
+        let mut recorder = RecordingBackend::new(Box::new(fake), recording.clone());
         recorder.reset(1).unwrap();
         let step = |i| recorder.step(&Command { qdot: vec![f64::from(i).sin(); 3] }).map(drop);
         let ticks = (0..2000).try_for_each(step);
         let ended = ticks.and_then(|()| {
             let shape = || Marker::new("belief", Shape::LineStrip, 1e-3, Default::default());
-            let touch = Touch { time_s: 2.5, ..Touch::default() };
+            let touch = TouchMessage { time_s: 2.5, ..TouchMessage::default() };
             recording.touched(&touch, [shape(), shape()])
         });
         let fault = ended.unwrap_err();
         assert!(matches!(fault, Fault::Unrecorded { time_s: 2.5, .. }), "{fault}");
         // The error persists.
         assert!(recorder.step(&Command { qdot: vec![0.0; 3] }).is_err());
-        assert!(recording.end(2.5, &Ending::default()).is_err());
+        assert!(recording.end(2.5, &TrialEnd::default()).is_err());
     }
     assert!((1..=2).contains(&begun));
     let nowhere = Recording::create(Path::new("/nowhere/at/all.mcap"), &about);
@@ -485,7 +490,7 @@ fn recording_a_tick_asks_for_no_memory_but_for_the_index() {
     };
     let about = about(body().capabilities());
     let recording = Recording::new(Box::new(io::sink()), &about, clock).unwrap();
-    let recorded = count(Box::new(Recorder::new(body(), recording)));
+    let recorded = count(Box::new(RecordingBackend::new(body(), recording)));
     // Five channels have an index of their messages, a list that doubles its capacity: four times.
     let more = recorded - count(body());
     assert!(more <= 5 * 4, "{more} in 2000 ticks");
@@ -514,7 +519,7 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
 
 #[track_caller]
 fn replayed(path: &Path, sets: &[&str]) -> Result<replay::Replay, Fault> {
-    let recorded = Recorded::read(path).unwrap();
+    let recorded = RecordedTrial::read(path).unwrap();
     let sets: Vec<String> = sets.iter().map(|set| (*set).into()).collect();
     let experiment = replay::experiment(&recorded, path, &sets).unwrap();
     replay::replay(&Simulation::new(experiment).unwrap(), &recorded)
@@ -529,7 +534,7 @@ fn a_recorded_trial_is_played_to_the_same_rows() {
         let folder = TempDir::new().unwrap();
         let (simulation, path) = record(folder.path(), sets);
         let touches = simulation.experiment().touches;
-        let recorded = Recorded::read(&path).unwrap();
+        let recorded = RecordedTrial::read(&path).unwrap();
         assert_eq!(recorded.touches.len(), touches as usize);
         let replay = replayed(&path, &[]).unwrap();
         assert_eq!((replay.touches, replay.is_cut, replay.difference), (touches, false, None));
@@ -601,8 +606,8 @@ fn the_program_records_and_replays() {
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&json["replay"]["touches"], &json["trial"]), (&3.into(), &1.into()));
     let changed = ["replay", file, "--set", "scene.touch.approach_m_s=0.011"];
-    let other = ended(&mut command(path, &changed), "replay");
-    assert_eq!(other.status.code(), Some(1), "{}", said(&other));
+    let other = run_to_end(&mut command(path, &changed), "replay");
+    assert_eq!(other.status.code(), Some(1), "{}", stderr(&other));
     let words = String::from_utf8(other.stdout).unwrap();
     assert!(words.contains("touch 1 differs at tick "), "{words}");
     fails(path, &["replay", "small.toml"], &["small.toml", "not a recording"]);
@@ -627,7 +632,7 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let touched = [2, 4, 5];
     for after in touched {
         let (part, made) = (next_part(&path), kept.clone());
-        let mut interrupt = |touched: &Touched| {
+        let mut interrupt = |touched: &FinishedTouch| {
             if touched.count as usize > kept.len() {
                 kept.push(touched.row.clone());
             }
@@ -645,7 +650,7 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let names: Vec<_> = parts.iter().map(|part| part.file_name().unwrap()).collect();
     assert_eq!(names, ["active-0000.mcap", "active-0000-part-2.mcap", "active-0000-part-3.mcap"]);
     for (part, (made, touches)) in parts.iter().zip([0, 2, 4].into_iter().zip(touched)) {
-        assert_eq!(Recorded::read(part).unwrap().made, made);
+        assert_eq!(RecordedTrial::read(part).unwrap().made, made);
         let replay = replayed(part, &[]).unwrap();
         assert_eq!((replay.touches, replay.is_cut, replay.difference), (touches, false, None));
     }

@@ -7,11 +7,11 @@ use nalgebra::{
 use palpate::explore::registration::hand_eye::parameters;
 use palpate::explore::registration::icp::align;
 use palpate::explore::registration::{
-    Design, HandEyeFit, KnownBody, Outline, RegistrationTouch, conclude, register,
+    CalibrationBody, Design, HandEyeFit, Outline, RegistrationTouch, conclude, register,
 };
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::geometry::solids::{ball, block};
+use palpate::geometry::solids::{box_mesh, sphere_mesh};
 use palpate::math::least_squares::{NARROWER, Problem, fit};
 use palpate::math::pose::{parts, pose};
 use palpate::math::seed;
@@ -76,32 +76,33 @@ fn pa10(is_soft: bool) -> Robot {
     Robot { chain: ArmSettings::default().chain().unwrap(), finger: Finger::default(), is_soft }
 }
 
-const BALL: KnownBody = KnownBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
+const BALL: CalibrationBody =
+    CalibrationBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
 
 /// Kinematic poses at which a finger displaced by `error` touches `body`, from many sides with many
 /// parts of the finger.
 fn touches(
     robot: &Robot,
     error: &Isometry3<f64>,
-    body: &KnownBody,
+    body: &CalibrationBody,
     (give_m, pressed_m): (f64, f64),
     random: &mut impl rand::Rng,
 ) -> Vec<RegistrationTouch> {
-    let outline = Outline::of(robot);
+    let outline = Outline::new(robot);
     let touch = |_| {
         let (p_t, outward_t) =
             outline.at(random.random_range(-0.018..0.006), random.random_range(-1.2..1.2));
         let side_w = match body {
-            KnownBody::Plate { normal_w, .. } => *normal_w,
-            KnownBody::Ball { .. } => UnitVector3::new_normalize(Vector3::new(
+            CalibrationBody::Plate { normal_w, .. } => *normal_w,
+            CalibrationBody::Ball { .. } => UnitVector3::new_normalize(Vector3::new(
                 random.random_range(-0.7..0.7),
                 1.0,
                 random.random_range(-0.7..0.7),
             )),
         };
         let p_w = match body {
-            KnownBody::Ball { centre_w, radius_m } => centre_w + side_w.scale(*radius_m),
-            KnownBody::Plate { point_w, .. } => {
+            CalibrationBody::Ball { centre_w, radius_m } => centre_w + side_w.scale(*radius_m),
+            CalibrationBody::Plate { point_w, .. } => {
                 point_w + side_w.cross(&Vector3::x()) * random.random_range(-0.02..0.02)
             }
         };
@@ -112,11 +113,11 @@ fn touches(
             UnitQuaternion::from_rotation_matrix(&turn),
         );
         for _ in 0..40 {
-            let short_m = outline.meet(body, &x_wt, give_m).1 + pressed_m;
+            let short_m = outline.contact(body, &x_wt, give_m).1 + pressed_m;
             x_wt.translation.vector -= side_w.scale(short_m);
         }
-        let felt_t = Some(outline.meet(body, &x_wt, give_m).0);
-        RegistrationTouch { x_wt: x_wt * error.inverse(), pressed_m, felt_t }
+        let felt_t = Some(outline.contact(body, &x_wt, give_m).0);
+        RegistrationTouch { x_wt: x_wt * error.inverse(), pressed_m, sensed_t: felt_t }
     };
     (0..40).map(touch).collect()
 }
@@ -142,7 +143,7 @@ proptest! {
         let give = if is_soft { (4e-4, 3e-4) } else { (0.0, 0.0) };
         let mut touches = touches(&robot, &error, &BALL, give, &mut random);
         // Away from the ball, where it is touched.
-        let KnownBody::Ball { centre_w, .. } = BALL else { panic!() };
+        let CalibrationBody::Ball { centre_w, .. } = BALL else { panic!() };
         let side_w = (touches[7].x_wt.translation.vector - centre_w.coords).normalize();
         touches[7].x_wt.translation.vector += side_w.scale(5e-3);
         let believed = BALL.moved([0.4, -0.3, 0.2]);
@@ -156,7 +157,7 @@ proptest! {
         prop_assert!(place_off.iter().all(|off| off.abs() < place_m), "{:?}", place_off);
         prop_assert!(turn_off[0].abs() < roll_deg, "{:?}", turn_off);
         prop_assert!(turn_off.iter().skip(1).all(|off| off.abs() < turn_deg), "{:?}", turn_off);
-        let KnownBody::Ball { centre_w, .. } = found.found.body else { panic!() };
+        let CalibrationBody::Ball { centre_w, .. } = found.found.body else { panic!() };
         prop_assert!((centre_w - Point3::new(0.0, -0.65, 0.5)).norm() < 2.0 * place_m);
     }
 }
@@ -165,9 +166,9 @@ proptest! {
 /// tries negative values recovers.
 #[test]
 fn a_way_grows_with_the_give() {
-    let outline = Outline::of(&pa10(true));
+    let outline = Outline::new(&pa10(true));
     let x_wt = Isometry3::translation(0.0, -0.6, 0.5);
-    let way_m = |give_m| outline.meet(&BALL, &x_wt, give_m).1;
+    let way_m = |give_m| outline.contact(&BALL, &x_wt, give_m).1;
     let gives_m = [-3e-4, -1e-4, -1e-7, 0.0, 1e-4, 3e-4, 6e-4];
     assert!(gives_m.array_windows().all(|[less, more]| way_m(*less) < way_m(*more)));
     assert!((way_m(-1e-7) - way_m(0.0)).abs() < 1e-6 && (way_m(1e-7) - way_m(0.0)).abs() < 1e-6);
@@ -178,8 +179,10 @@ fn a_way_grows_with_the_give() {
 #[test]
 fn what_touches_do_not_determine_is_said_and_not_invented() {
     let robot = pa10(false);
-    let plate =
-        KnownBody::Plate { point_w: Point3::new(0.0, -0.65, 0.5), normal_w: Vector3::y_axis() };
+    let plate = CalibrationBody::Plate {
+        point_w: Point3::new(0.0, -0.65, 0.5),
+        normal_w: Vector3::y_axis(),
+    };
     let mut random = seed::stream(1, 0, "touches");
     let all = touches(&robot, &Isometry3::identity(), &plate, (0.0, 0.0), &mut random);
     let same: Vec<_> = (0..20)
@@ -268,11 +271,14 @@ fn a_correction_moves_the_tool() {
 #[test]
 fn too_few_contacts_are_refused() {
     let robot = pa10(false);
-    let outline = Outline::of(&robot);
+    let outline = Outline::new(&robot);
     let start = HandEyeFit::start(BALL);
     let none: [RegistrationTouch; 0] = [];
     // Without touches the covariance is the prior's.
-    let foreseen = palpate::math::least_squares::foresee(&HandEyeFit::new(&outline, &none), &start);
+    let foreseen = palpate::math::least_squares::predict_information(
+        &HandEyeFit::new(&outline, &none),
+        &start,
+    );
     assert!(foreseen.unwrap().undetermined.len() >= 11);
     struct Nothing;
     impl palpate::explore::probe::Probe for Nothing {
@@ -299,7 +305,7 @@ fn mesh((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> MeshBvh {
 }
 
 fn brick() -> MeshBvh {
-    mesh(block([-0.03, -0.02, -0.05], [0.05, 0.02, 0.04]))
+    mesh(box_mesh([-0.03, -0.02, -0.05], [0.05, 0.02, 0.04]))
 }
 
 /// Points on faces of a mesh, as in a scan, in the mesh's world pose.
@@ -344,7 +350,7 @@ proptest! {
 /// these directions.
 #[test]
 fn what_a_cloud_does_not_determine_is_said() {
-    let sphere = mesh(ball(Point3::origin(), 0.03, 60));
+    let sphere = mesh(sphere_mesh(Point3::origin(), 0.03, 60));
     let start = pose([1e-3, -1e-3, 5e-4], [2.0, -1.0, 1.0]);
     let points = cloud(&sphere, &Isometry3::identity(), 400, 1);
     let found = align(&sphere, &points, &start).unwrap();

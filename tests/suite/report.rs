@@ -1,9 +1,9 @@
 //! Tests of figures and pages of synthetic runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
-use palpate::experiment::measure::outline::Outline;
+use palpate::experiment::measure::outline::SilhouetteMetrics;
 use palpate::experiment::measure::shape::ShapeMetrics;
-use palpate::experiment::measure::{Direction, MEASURES, Scale};
+use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
 use palpate::experiment::report_settings::Claim;
 use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
@@ -18,7 +18,7 @@ use std::path::Path;
 
 /// Returns every file of a folder's report by name.
 fn written(run: &Run, folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    report::write(run, &Analysis::of(run), folder).unwrap();
+    report::write(run, &Analysis::new(run), folder).unwrap();
     [folder.to_owned(), folder.join("figures")]
         .iter()
         .flat_map(|folder| fs::read_dir(folder).unwrap())
@@ -133,7 +133,7 @@ fn rows_of_another_zone_are_refused() {
     run.rows[0].touches[0].target = [0.0].into();
     let folder = tempfile::tempdir().unwrap();
     let error =
-        format!("{:#}", report::write(&run, &Analysis::of(&run), folder.path()).unwrap_err());
+        format!("{:#}", report::write(&run, &Analysis::new(&run), folder.path()).unwrap_err());
     assert!(
         error.contains(
             "surfaces: trial 0 of random, touch 5: target outside the zone's coordinates"
@@ -166,7 +166,7 @@ fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
         metrics.for_each(|metrics| metrics.rmse_m *= 2.0);
     }
     let folder = tempfile::tempdir().unwrap();
-    report::write_tables(&run, &Analysis::of(&run), folder.path()).unwrap();
+    report::write_tables(&run, &Analysis::new(&run), folder.path()).unwrap();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let equal = read("equal_error.csv");
     // 0.02 / count is twice 0.02 / 20 at 10, and random never falls below twice that.
@@ -223,13 +223,13 @@ const SHAPE: ShapeMetrics = ShapeMetrics {
 #[test]
 fn a_zone_has_no_measures_of_whole_objects() {
     let run = run(SURFACE);
-    let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::of(&run));
+    let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::new(&run));
     report::write_tables(&run, &analysis, folder.path()).unwrap();
     let mut told = text(&drawn(&run), "report.html").to_owned();
     for name in ["summary.csv", "comparison.csv", "equal_error.csv"] {
         told += &fs::read_to_string(folder.path().join(name)).unwrap();
     }
-    for measure in MEASURES.iter().filter(|measure| measure.is_of_shapes()) {
+    for measure in MEASURES.iter().filter(|measure| measure.is_for_whole_objects()) {
         assert!(!told.contains(measure.title), "{measure:?}");
         for name in measure.columns().into_iter().chain([measure.id.into()]) {
             assert!(!told.contains(&format!(",{name},")), "{name}");
@@ -243,7 +243,8 @@ fn a_measure_is_told_wherever_measures_are() {
     let mut run = run(SURFACE);
     for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
         touch.time_s = Some(1.0);
-        touch.outline = Some(Outline { brier: 0.1, iou: 0.8, wrong_share: 0.1, reliability: None });
+        touch.outline =
+            Some(SilhouetteMetrics { brier: 0.1, iou: 0.8, wrong_share: 0.1, reliability: None });
         touch.metrics.iter_mut().for_each(|metrics| metrics.unreachable_rmse_m = Some(0.1));
         touch.shape = Some(SHAPE);
     }
@@ -253,7 +254,7 @@ fn a_measure_is_told_wherever_measures_are() {
         touches: 10,
         measures: MEASURES.iter().map(|measure| measure.id.into()).collect(),
     }];
-    let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::of(&run));
+    let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::new(&run));
     report::write_tables(&run, &analysis, folder.path()).unwrap();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let (summary, comparison) = (read("summary.csv"), read("comparison.csv"));
@@ -269,10 +270,10 @@ fn a_measure_is_told_wherever_measures_are() {
         assert_eq!(ends.map(has), [aggregate.has_median(); 3], "{measure:?}");
         assert_eq!(has("minus_random_low"), measure.is_error, "{measure:?}");
         // Measures without values in the rows are omitted.
-        let is_told = run.rows.iter().any(|row| measure.of(row, 20).is_some());
+        let is_told = run.rows.iter().any(|row| measure.value(row, 20).is_some());
         let is_compared = is_told && measure.direction != Direction::Neither;
         assert_eq!(comparison.contains(&format!(",{},", measure.id)), is_compared, "{measure:?}");
-        let is_drawn = !matches!(measure.scale, Scale::Undrawn);
+        let is_drawn = !matches!(measure.scale, PanelAxis::Undrawn);
         let (title, unit) = (measure.title, measure.unit.symbol);
         let unit = |before: &str, after: &str| match unit {
             "" => String::new(),
@@ -282,7 +283,7 @@ fn a_measure_is_told_wherever_measures_are() {
         assert_eq!(figure.contains(&panel), is_drawn, "{measure:?}");
         let head = format!("{title}{}", unit(", ", ""));
         assert!(claims.contains(&format!(" {head}</td>")), "{measure:?}");
-        let is_tabled = is_told && measure.is_tabled;
+        let is_tabled = is_told && measure.in_tables;
         assert_eq!(tables.contains(&format!(" {head}</th>")), is_tabled, "{measure:?}");
     }
     assert!(summary.lines().all(|line| line.split(',').count() == columns.len()));
@@ -301,7 +302,7 @@ fn planners_are_held_against_their_baselines() {
         for (i, row) in run.rows.iter_mut().enumerate() {
             row.planner = planners[i % 2].into();
         }
-        let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::of(&run));
+        let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::new(&run));
         report::write_tables(&run, &analysis, folder.path()).unwrap();
         let page = text(&drawn(&run), "report.html").to_owned();
         ["comparison.csv", "equal_error.csv"].map(|name| {

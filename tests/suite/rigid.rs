@@ -9,10 +9,10 @@ use palpate::explore::probe::{Contact, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::sim::Environment;
-use palpate::sim::environment::Shape;
+use palpate::sim::environment::Surface;
 use palpate::sim::mjcf;
-use palpate::sim::mjcf::Mode;
-use palpate::sim::mujoco::{Models, Plant, compile};
+use palpate::sim::mjcf::ModelPurpose;
+use palpate::sim::mujoco::{CompiledModels, Plant, compile};
 use palpate::sim::simulator::Simulator;
 use palpate::sim::solver::Collision;
 use palpate::sim::solver::Integrator;
@@ -38,8 +38,8 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
         ],
     );
     scene.solver.collision = Some(collision);
-    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
-    let environment = Arc::new(Environment::around(scene, shape).unwrap());
+    let shape = Surface::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
+    let environment = Arc::new(Environment::with_shape(scene, shape).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let mut probe = simulator.probe(0).unwrap();
     let mut touch = |target: &[f64; 2]| match probe
@@ -166,9 +166,9 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
     let mut scene = scene("container_pa10.toml", &[]);
     (scene.solver.integrator, scene.solver.step_s) = (integrator, step_s);
     let environment = Environment::build(scene).unwrap();
-    let mut plant = Plant::new(Models::new(&environment).unwrap().plant).unwrap();
+    let mut plant = Plant::new(CompiledModels::new(&environment).unwrap().plant).unwrap();
     let joints = environment.chain().unwrap().joints;
-    let mut dice = crate::common::shapes::Dice(1);
+    let mut dice = crate::common::shapes::UniformRandom(1);
     let mut most: f64 = 0.0;
     for _ in 0..40 {
         let posture = joints.iter().map(|joint| {
@@ -198,13 +198,13 @@ fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
         // With Euler steps the mass matrix is the arm's.
         let euler = ["solver={integrator=\"euler\", step_s=1e-3}", links];
         let environment = Environment::build(scene("container_pa10.toml", &euler)).unwrap();
-        let model = Models::new(&environment).unwrap().plant;
+        let model = CompiledModels::new(&environment).unwrap().plant;
         let joints = environment.chain().unwrap().joints;
         let n = joints.len();
         let root = DVector::from_fn(n, |i, _| model.actuator_gainprm()[i][0].sqrt());
         let root = DMatrix::from_diagonal(&root);
         let mut data = MjData::new(Arc::clone(&model));
-        let mut dice = crate::common::shapes::Dice(1);
+        let mut dice = crate::common::shapes::UniformRandom(1);
         let mut rate_per_s: f64 = 0.0;
         for _ in 0..3000 {
             for (q, joint) in data.qpos_mut().iter_mut().zip(&joints) {
@@ -245,7 +245,7 @@ fn no_integrator_makes_the_servos_chatter() {
 fn gains_in_the_mass_matrix_are_mujocos_servos_where_nothing_rubs() {
     let environment = Environment::build(scene("container_pa10.toml", &[])).unwrap();
     let home = environment.chain().unwrap().home;
-    let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 2e-3 }).unwrap();
+    let text = mjcf::scene(&environment, ModelPurpose::Dynamic { step_s: 2e-3 }).unwrap();
     let apart_rad_s = |text: &str| {
         let own = MjModel::from_xml_string(text).unwrap();
         let mut plants =
@@ -305,7 +305,7 @@ fn every_integrator_presses_alike() -> Result<(), Fault> {
 fn one_iteration_finds_the_force_of_contact() {
     let scene = scene("bird_finger.toml", &["body=\"dynamic\"", "effects={}"]);
     let environment = Environment::build(scene).unwrap();
-    let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 2e-3 }).unwrap();
+    let text = mjcf::scene(&environment, ModelPurpose::Dynamic { step_s: 2e-3 }).unwrap();
     let chain = environment.chain().unwrap();
     let force_n = |option: &str| {
         let text = text.replace("<option timestep", &format!("<option {option} timestep"));

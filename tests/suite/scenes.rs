@@ -87,13 +87,13 @@ fn the_mesh_and_its_formula_give_the_same_heights() {
 fn the_generated_model_names_the_object_the_board_and_the_finger() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
     let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
-    let text = mjcf::scene(&environment, mjcf::Mode::Picture).unwrap();
+    let text = mjcf::scene(&environment, mjcf::ModelPurpose::Picture).unwrap();
     for name in ["object", "board", "finger", "floor", "mount", "tip"] {
         assert!(text.contains(&format!("name=\"{name}\"")), "{name}");
     }
     let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/toy.toml");
     let toy = Environment::build(Scene::load(&toy, &[]).unwrap()).unwrap();
-    assert!(mjcf::scene(&toy, mjcf::Mode::Picture).is_none());
+    assert!(mjcf::scene(&toy, mjcf::ModelPurpose::Picture).is_none());
 }
 
 /// From outside, every triangle of pad and nail is counter-clockwise, and the pad faces −z.
@@ -101,7 +101,7 @@ fn the_generated_model_names_the_object_the_board_and_the_finger() {
 fn faces_of_the_fingertip_look_outwards() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
     let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
-    let text = mjcf::scene(&environment, mjcf::Mode::Picture).unwrap();
+    let text = mjcf::scene(&environment, mjcf::ModelPurpose::Picture).unwrap();
     for name in ["pad", "nail"] {
         let (_, text) = text.split_once(&format!("<mesh name=\"{name}\"")).unwrap();
         let numbers = |key: &str| -> Vec<f64> {
@@ -131,7 +131,8 @@ fn mujoco_compiles_the_generated_model() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
         let model =
-            mujoco::compile(&mjcf::scene(&environment, mjcf::Mode::Picture).unwrap()).unwrap();
+            mujoco::compile(&mjcf::scene(&environment, mjcf::ModelPurpose::Picture).unwrap())
+                .unwrap();
         assert_eq!((model.ngeom(), model.nmeshvert()), (5, vertices), "{name}");
     }
     assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());

@@ -3,7 +3,7 @@
 
 use crate::common::around::{belief, belief_with, meet, simulation, trial};
 use nalgebra::{Point3, Vector3};
-use palpate::explore::around::{ImplicitSurface, SpaceSettings};
+use palpate::explore::around::{ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::spread::directions;
 use palpate::task::Aim;
 
@@ -36,7 +36,8 @@ fn the_ball_may_be_too_large() {
 #[test]
 fn what_contacts_have_in_common_is_not_averaged_away() {
     let [exact, off] = [0.0, 3e-4].map(|offset_m| {
-        let settings = SpaceSettings { offset_m: Some(offset_m), ..SpaceSettings::default() };
+        let settings =
+            SpatialGpSettings { offset_m: Some(offset_m), ..SpatialGpSettings::default() };
         touched(belief_with(settings, 0.08, 0.007))
     });
     let places = [Point3::new(0.04, 0.0, 0.0), Point3::new(0.0, 0.03, 0.01)];

@@ -37,7 +37,7 @@ fn a_file_gives_the_constants_of_a_scene() {
     assert_eq!(is.skin.as_ref().unwrap().flatten_pa_m, 1.8e6);
     assert_eq!(is.electrodes.as_ref().unwrap().noise, 0.0);
     assert_eq!(is.skin.as_ref().unwrap().core_pa_m, was.skin.as_ref().unwrap().core_pa_m);
-    assert!(is.friction.is_none() && is.moved_keys.is_empty());
+    assert!(is.friction.is_none() && is.legacy_keys.is_empty());
     assert_eq!(scene(&["effects.sensor=biotac"]).unwrap(), shipped);
     assert_eq!(scene(&["effects.sensor=models/biotac.toml"]).unwrap(), shipped);
     let inline = scene(&["effects.sensor={skin={flatten_pa_m=1.8e6}, electrodes={noise=0.0}}"]);
@@ -78,14 +78,14 @@ fn constants_in_effects_are_still_read() {
     let old = "effects.skin.flatten_pa_m=2e6";
     let given = scene(&[&set, old, "effects.skin.core_pa_m=1.4e9"]).unwrap();
     assert_eq!(given.effects.skin.as_ref().unwrap().flatten_pa_m, 2e6);
-    assert_eq!(given.effects.moved_keys, ["effects.skin.flatten_pa_m"]);
+    assert_eq!(given.effects.legacy_keys, ["effects.skin.flatten_pa_m"]);
     let environment = Environment::build(given).unwrap();
     let notices = environment.notices();
     assert!(
         notices.iter().any(|notice| notice.contains("effects.skin.flatten_pa_m")),
         "{notices:?}"
     );
-    assert!(scene(&["effects.skin.flatten_pa_m=3.5e6"]).unwrap().effects.moved_keys.is_empty());
+    assert!(scene(&["effects.skin.flatten_pa_m=3.5e6"]).unwrap().effects.legacy_keys.is_empty());
 }
 
 /// `resolved.toml` contains the constants that differ and can be run without the sensor's file;

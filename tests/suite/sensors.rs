@@ -11,12 +11,12 @@ use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::frame::ELECTRODES;
 use palpate::robot::finger::{Finger, Frame};
 use palpate::sim::Environment;
-use palpate::sim::finger::effects::creep::{CreepEffect, Lag};
+use palpate::sim::finger::effects::creep::{CreepEffect, RelaxationState};
 use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, impedance_ohm};
 use palpate::sim::finger::effects::fluid::{FluidEffect, VibrationEffect};
-use palpate::sim::finger::effects::variation::{Sensor, VariationEffect};
+use palpate::sim::finger::effects::variation::{SensorVariation, VariationEffect};
 use palpate::sim::finger::recording::Recordings;
-use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
+use palpate::sim::finger::{ContactLoad, Effects, Fingertip, FingertipState};
 use palpate::sim::simulated_finger::SimulatedFinger;
 use std::sync::Arc;
 
@@ -86,7 +86,7 @@ fn electrodes_share_a_part_of_their_noise() {
     }
 }
 
-fn drawn(effect: &VariationEffect, count: u32) -> Vec<Sensor> {
+fn drawn(effect: &VariationEffect, count: u32) -> Vec<SensorVariation> {
     (0..count).map(|trial| effect.sensor(stream(1, trial.into(), "variation"))).collect()
 }
 
@@ -107,7 +107,7 @@ fn sensors_vary_as_much_as_is_said() {
     near(log_sd(sensors.iter().map(|sensor| sensor.stiffness)), effect.stiffness);
     let squares: f64 = sensors.iter().map(|sensor| sensor.attitude.angle().powi(2)).sum();
     near((squares / 3.0 / 4000.0).sqrt().to_degrees(), effect.attitude_deg);
-    let part = |bad: fn(&Sensor) -> bool| {
+    let part = |bad: fn(&SensorVariation) -> bool| {
         sensors.iter().filter(|sensor| bad(sensor)).count() as f64 / 4000.0
     };
     assert!((part(|sensor| sensor.dead.is_some()) - effect.dead).abs() < 0.02);
@@ -116,7 +116,7 @@ fn sensors_vary_as_much_as_is_said() {
     let stiffer = VariationEffect { gain: 0.0, ..effect.clone() };
     for (one, other) in sensors.iter().zip(drawn(&stiffer, 20)) {
         assert_eq!(other.gain, 1.0);
-        assert_eq!(&Sensor { gain: 1.0, ..one.clone() }, &other);
+        assert_eq!(&SensorVariation { gain: 1.0, ..one.clone() }, &other);
     }
 }
 
@@ -142,7 +142,7 @@ fn a_sensor_is_drawn_for_each_trial_and_nothing_varies_by_nothing() {
         finger.step(&TipMotion::at(away), 0.01).unwrap();
         finger.step(&TipMotion::at(away), 0.01).unwrap();
         let mut reading = Reading::default();
-        finger.report(&Wrench::default(), 0.02, &mut reading);
+        finger.write_reading(&Wrench::default(), 0.02, &mut reading);
         let Some(Sample::BioTac(frame)) = reading.samples.first() else { panic!() };
         frame.clone()
     };
@@ -172,9 +172,10 @@ fn an_open_electrode_says_nothing() {
     assert_eq!(point(rest, now), sound);
 }
 
-fn press(lag: &mut Lag, effect: &CreepEffect, force_n: f64, dt_s: f64) -> f64 {
+fn press(lag: &mut RelaxationState, effect: &CreepEffect, force_n: f64, dt_s: f64) -> f64 {
     let force = Vector3::new(0.0, 0.0, force_n);
-    let mut load = Load { force_n: force, pressure_pa: 1e3 * force_n, ..Load::default() };
+    let mut load =
+        ContactLoad { force_n: force, pressure_pa: 1e3 * force_n, ..ContactLoad::default() };
     lag.step(effect, dt_s, &mut load);
     assert!(load.force_n.z >= 0.0 && load.force_n.xy().norm() == 0.0);
     assert!((load.pressure_pa - 1e3 * load.force_n.z).abs() < 1e-9);
@@ -186,7 +187,7 @@ fn press(lag: &mut Lag, effect: &CreepEffect, force_n: f64, dt_s: f64) -> f64 {
 #[test]
 fn silicone_relaxes_and_a_cycle_costs_work() {
     let effect = CreepEffect::default();
-    let mut lag = Lag::default();
+    let mut lag = RelaxationState::default();
     let sudden = press(&mut lag, &effect, 2.0, 1e-6);
     assert!((sudden / 2.0 - 1.1).abs() < 1e-5, "{sudden}");
     let later = press(&mut lag, &effect, 2.0, effect.time_constant_s);
@@ -194,7 +195,7 @@ fn silicone_relaxes_and_a_cycle_costs_work() {
     assert!((press(&mut lag, &effect, 2.0, 100.0) / 2.0 - 1.0).abs() < 1e-9);
     // A spring of 1 N/mm, pressed to 2 mm and back.
     let lost_j = |duration_s: f64| {
-        let (mut lag, steps) = (Lag::default(), 2000);
+        let (mut lag, steps) = (RelaxationState::default(), 2000);
         let depth_m =
             |i: i32| 2e-3 * (1.0 - f64::from((i - steps / 2).abs()) / f64::from(steps / 2));
         let dt_s = duration_s / f64::from(steps);

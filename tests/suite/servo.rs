@@ -5,8 +5,8 @@ use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::explore::probe::servo::Servo;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::Environment;
-use palpate::sim::environment::Shape;
-use palpate::sim::kinematic::Kinematic;
+use palpate::sim::environment::Surface;
+use palpate::sim::kinematic::KinematicBackend;
 use palpate::sim::simulator::Simulator;
 use std::sync::{Arc, Mutex};
 
@@ -20,7 +20,7 @@ fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<To
 
 /// Distance of a touch's contact from the mesh.
 fn off_surface_m(environment: &Environment, contact: &Contact) -> f64 {
-    let Shape::Mesh { bvh, .. } = environment.shape() else { panic!("no mesh") };
+    let Surface::Mesh { bvh, .. } = environment.shape() else { panic!("no mesh") };
     bvh.closest_point(&contact.p_wc).distance_m
 }
 
@@ -129,7 +129,7 @@ type Breaks = fn(u32, &mut Reading);
 
 /// A kinematic body whose readings pass through `breaks` and whose commands are recorded.
 struct Broken {
-    inner: Kinematic,
+    inner: KinematicBackend,
     breaks: Breaks,
     ticks: u32,
     reading: Reading,
@@ -158,7 +158,7 @@ impl Backend for Broken {
 fn broken(environment: &Arc<Environment>, breaks: Breaks) -> (Result<Touch, Fault>, Vec<Vec<f64>>) {
     let commands = Arc::new(Mutex::new(Vec::new()));
     let body = Broken {
-        inner: Kinematic::new(environment).unwrap(),
+        inner: KinematicBackend::new(environment).unwrap(),
         breaks,
         ticks: 0,
         reading: Reading::default(),

@@ -2,11 +2,11 @@
 
 use crate::common::shapes::{box_corners, box_mesh, point, sphere_mesh};
 use nalgebra::{UnitVector3, Vector3};
-use palpate::experiment::measure::shape::{Reach, TrueShape};
+use palpate::experiment::measure::shape::{FingerReach, TrueShape};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
-use palpate::geometry::spread::{Spot, over_surface};
+use palpate::geometry::spread::{SurfacePoint, over_surface};
 use palpate::robot::finger::Finger;
 use std::path::Path;
 
@@ -17,12 +17,12 @@ fn tip_first(finger: &Finger) -> impl Fn(&UnitVector3<f64>) -> Vector3<f64> + Sy
 }
 
 /// Reachability with tip-first approaches from any direction.
-fn touched(mesh: &MeshBvh, spots: &[Spot], radius_m: f64) -> Vec<bool> {
+fn touched(mesh: &MeshBvh, spots: &[SurfacePoint], radius_m: f64) -> Vec<bool> {
     let axis_w = tip_first(&Finger::default());
-    Reach { radius_m, axis_w: &axis_w, lowest_m: None }.touches(mesh, spots)
+    FingerReach { radius_m, axis_w: &axis_w, lowest_m: None }.touches(mesh, spots)
 }
 
-fn spread(mesh: Mesh, count: usize) -> (MeshBvh, Vec<Spot>) {
+fn spread(mesh: Mesh, count: usize) -> (MeshBvh, Vec<SurfacePoint>) {
     let spots = over_surface(&mesh, count);
     (MeshBvh::new(mesh), spots)
 }
@@ -77,7 +77,7 @@ fn nothing_reaches_into_a_closed_cavity() {
     let (out, within) = ([[0.0; 3], [0.1; 3]], [[0.02; 3], [0.08; 3]]);
     let (mesh, _) = spread(boxes(&[out, within]), 1);
     let axis_w = tip_first(&Finger::default());
-    let reach = Reach { radius_m: 0.007, axis_w: &axis_w, lowest_m: None };
+    let reach = FingerReach { radius_m: 0.007, axis_w: &axis_w, lowest_m: None };
     let truth = TrueShape::new(mesh, true).with_reach(&reach);
     let share = truth.reachable_share().unwrap();
     let law = 0.1_f64.powi(2) / (0.1_f64.powi(2) + 0.06_f64.powi(2));
@@ -109,7 +109,7 @@ fn what_the_object_stands_on_is_in_the_way() {
     let (ball_m, radius_m) = (0.05, 0.007);
     let (mesh, spots) = spread(sphere_mesh(point(0.0, 0.0, 0.2), ball_m, 40), 2000);
     let axis_w = tip_first(&Finger::default());
-    let reach = Reach { radius_m, axis_w: &axis_w, lowest_m: Some(0.2 - ball_m) };
+    let reach = FingerReach { radius_m, axis_w: &axis_w, lowest_m: Some(0.2 - ball_m) };
     let limit = (radius_m - ball_m) / (radius_m + ball_m);
     for (spot, is_touched) in spots.iter().zip(reach.touches(&mesh, &spots)) {
         let up = (spot.point.z - 0.2) / ball_m;
@@ -136,12 +136,12 @@ fn the_finger_behind_the_tip_must_fit_too() {
     let ground = (0..mesh.mesh().triangles().len())
         .find(|&i| corners(i).iter().all(|corner| corner.z == 0.01))
         .unwrap();
-    let spot = [Spot { point: point(0.025, 0.025, 0.01), triangle: ground as u32 }];
+    let spot = [SurfacePoint { point: point(0.025, 0.025, 0.01), triangle: ground as u32 }];
     let first = tip_first(&Finger::default());
     let across = |ahead: &UnitVector3<f64>| {
         ahead.cross(&Vector3::new(0.3, 0.5, 0.8)).normalize() * Finger::default().length_m
     };
-    let reach = Reach { radius_m: 0.007, axis_w: &first, lowest_m: None };
+    let reach = FingerReach { radius_m: 0.007, axis_w: &first, lowest_m: None };
     assert_eq!(reach.touches(&mesh, &spot), [true]);
-    assert_eq!(Reach { axis_w: &across, ..reach }.touches(&mesh, &spot), [false]);
+    assert_eq!(FingerReach { axis_w: &across, ..reach }.touches(&mesh, &spot), [false]);
 }

@@ -28,7 +28,7 @@ fn said(arguments: &[&str]) -> (Option<i32>, String) {
 #[test]
 fn a_shard_is_every_nth_trial() {
     let third: Shard = "3/8".parse().unwrap();
-    assert_eq!((0..24).filter(|&trial| third.has(trial)).collect::<Vec<_>>(), [2, 10, 18]);
+    assert_eq!((0..24).filter(|&trial| third.contains(trial)).collect::<Vec<_>>(), [2, 10, 18]);
     for text in ["0/8", "9/8", "3", "3/", "/8", "-1/8", "a/b", "1/0"] {
         assert!(text.parse::<Shard>().is_err(), "{text}");
     }

@@ -2,20 +2,20 @@
 //! sensors, and the located contact.
 
 use crate::common::quiet::{plane, quiet as ideal};
-use crate::common::shapes::Dice;
+use crate::common::shapes::UniformRandom;
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3, Vector6};
 use palpate::math::seed::stream;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::plane_fit::PlaneFit;
 use palpate::robot::finger::profile::Profile;
 use palpate::robot::finger::{Finger, Frame, PointOfContact, TipMotion};
-use palpate::sim::finger::calibration::constants::Model;
-use palpate::sim::finger::calibration::shear::{Agreement, ShearRecordings, compare};
+use palpate::sim::finger::calibration::constants::FingerConstants;
+use palpate::sim::finger::calibration::shear::{ShearRecordings, SlopeComparison, compare};
 use palpate::sim::finger::effects::electrodes::ElectrodesEffect;
 use palpate::sim::finger::effects::fluid::VibrationEffect;
 use palpate::sim::finger::effects::friction::FrictionEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
-use palpate::sim::finger::plate::{Plate, direction_t, pose};
+use palpate::sim::finger::plate::{PlateContact, direction_t, pose};
 use palpate::sim::finger::recording::Recordings;
 use palpate::sim::finger::samples::spread;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
@@ -47,14 +47,14 @@ fn frames(effects: &Effects, height_m: f64, way: &[(f64, Vector3<f64>)]) -> Vec<
 
 const STILL: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 
-fn agreements() -> Vec<(String, Agreement, Agreement)> {
+fn agreements() -> Vec<(String, SlopeComparison, SlopeComparison)> {
     let flat: Recordings =
         serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap();
     let slopes: ShearRecordings =
         serde_json::from_str(include_str!("../data/biotac_shear.json")).unwrap();
     flat.check().unwrap();
     slopes.check().unwrap();
-    let mut model = Model::default();
+    let mut model = FingerConstants::default();
     model.skin.samples = 250;
     let found = slopes.sensors.iter().map(|of| {
         let same = flat.sensors.iter().find(|recording| recording.sensor == of.sensor).unwrap();
@@ -93,7 +93,7 @@ fn electrodes_answer_tangential_force_as_real_ones_do() {
 #[test]
 fn agreement_is_pearsons_correlation_and_least_squares() {
     let measured = std::array::from_fn(|i| (i as f64 - 9.0) * 10.0);
-    let of = |model| Agreement { measured, model };
+    let of = |model| SlopeComparison { measured, model };
     let twice = of(measured.map(|slope| 2.0 * slope));
     assert!((twice.correlation() - 1.0).abs() < 1e-12 && (twice.scale() - 0.5).abs() < 1e-12);
     assert_eq!(twice.ratios(), [2.0, 2.0]);
@@ -177,13 +177,13 @@ fn located(
     let tip = Fingertip::new(&Finger::default(), effects);
     let bvh = plane();
     let tare = Frame::mean(&frames(effects, 0.02, &[(0.1, STILL)]));
-    let mut dice = Dice(11);
+    let mut dice = UniformRandom(11);
     let (mut squares, mut angles) = (0.0, Vec::new());
     for pitch in [-0.1, 0.1, 0.3, 0.5, 0.7] {
         for roll in [-0.6, -0.3, 0.0, 0.3, 0.6] {
             for force_n in [1.0, 3.0, 6.0] {
                 let towards_t = direction_t(pitch, roll);
-                let mut plate = Plate::new(&SkinEffect::default(), 1e13).unwrap();
+                let mut plate = PlateContact::new(&SkinEffect::default(), 1e13).unwrap();
                 let height_m = plate.height_m(&towards_t, force_n).unwrap();
                 let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
                 let mut motion = TipMotion::at(pose(&towards_t, height_m));

@@ -9,11 +9,11 @@ use palpate::math::seed::stream;
 use palpate::robot::finger::Finger;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::Scene;
-use palpate::sim::finger::Load;
-use palpate::sim::finger::effects::skin::{Pressed, Skin, SkinEffect, SkinModel};
+use palpate::sim::finger::ContactLoad;
+use palpate::sim::finger::effects::skin::{Skin, SkinEffect, SkinModel, SkinState};
 use palpate::sim::finger::plate::{direction_t, pose};
 use palpate::sim::finger::samples::{Lattice, Node};
-use palpate::sim::finger::shell::membrane::{Membrane, Push};
+use palpate::sim::finger::shell::membrane::{Membrane, NodeContact};
 use palpate::sim::finger::shell::sheet::Material;
 use palpate::sim::simulator::Simulator;
 use rand::RngExt;
@@ -71,12 +71,17 @@ pub fn at(pitch_deg: f64, depth_m: f64) -> Isometry3<f64> {
     Isometry3::from_parts((-front_w.coords - Vector3::z() * depth_m).into(), turned.rotation)
 }
 
-pub fn press(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>, pressed: &mut Pressed) -> Load {
+pub fn press(
+    skin: &Skin,
+    object: &Object,
+    x_wt: &Isometry3<f64>,
+    pressed: &mut SkinState,
+) -> ContactLoad {
     skin.press(&object.bvh, x_wt, pressed).unwrap()
 }
 
 /// Result of a press after repeated settling.
-pub fn settled(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>) -> Load {
+pub fn settled(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>) -> ContactLoad {
     let mut pressed = skin.relaxed();
     (0..20).map(|_| press(skin, object, x_wt, &mut pressed)).last().unwrap()
 }
@@ -112,12 +117,12 @@ fn a_dry_press_agrees_with_mujocos_material() {
     let membrane = Membrane::new(&lattice, &material, 1.4e9, 0.0);
     let lowest_m = lattice.nodes().iter().map(|node| -node.point.z).fold(0.0, f64::max);
     for (depth_m, force_n) in DEPTHS_M.into_iter().zip([0.26, 0.66]) {
-        let push = |(node, at): (usize, &Node)| Push {
+        let push = |(node, at): (usize, &Node)| NodeContact {
             node,
             normal_t: Vector3::z(),
             overlap_m: depth_m - lowest_m - at.point.z,
         };
-        let pushes: Vec<Push> = lattice.nodes().iter().enumerate().map(push).collect();
+        let pushes: Vec<NodeContact> = lattice.nodes().iter().enumerate().map(push).collect();
         let mut state = membrane.relaxed();
         (0..10).for_each(|_| membrane.settle(&pushes, &mut state));
         let found_n: f64 = pushes.iter().map(|push| membrane.push_n(push, &state)).sum();
@@ -156,7 +161,7 @@ fn it_follows_a_press_and_unloads_along_its_path() {
             };
             let down: Vec<_> = (1..=ticks).map(&mut go).collect();
             let up: Vec<_> = (1..=ticks).rev().map(&mut go).collect();
-            assert!(down[ticks - 1].0.on_core || pitch_deg < 90.0);
+            assert!(down[ticks - 1].0.is_core_loaded || pitch_deg < 90.0);
             let work_j: f64 = down.iter().map(|(load, _)| load.force_n.norm() * tick_m).sum();
             let back_j: f64 = up.iter().map(|(load, _)| load.force_n.norm() * tick_m).sum();
             assert!((back_j / work_j - 1.0).abs() < 0.01, "{pitch_deg}°: {work_j} {back_j}");
@@ -192,7 +197,7 @@ fn left_and_right_are_alike() {
     assert!(left.force_n.y.abs() > 0.1 * left.force_n.norm(), "{left:?}");
 }
 
-fn is_finite(load: &Load) -> bool {
+fn is_finite(load: &ContactLoad) -> bool {
     let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
     vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
         && load.energy_j.is_finite()
@@ -208,13 +213,17 @@ fn a_correction_never_adds_energy() {
         let membrane = Membrane::new(&lattice, &SILICONE, core_pa_m, cavity_pa_m3);
         let mut state = membrane.relaxed();
         for _ in 0..60 {
-            let pushes: Vec<Push> = (0..lattice.nodes().len())
+            let pushes: Vec<NodeContact> = (0..lattice.nodes().len())
                 .filter_map(|node| {
                     let turn = Vector3::from_fn(|_, _| rng.random_range(-0.7..0.7));
                     let normal_t =
                         (turn - lattice.nodes()[node].direction.into_inner()).normalize();
                     let overlap_m = rng.random_range(-3e-3..3e-3);
-                    (rng.random_range(0..3) == 0).then_some(Push { node, normal_t, overlap_m })
+                    (rng.random_range(0..3) == 0).then_some(NodeContact {
+                        node,
+                        normal_t,
+                        overlap_m,
+                    })
                 })
                 .collect();
             let before_j = membrane.energy_j(&pushes, &state);
@@ -260,7 +269,7 @@ fn nothing_makes_it_diverge() {
                 assert!(pressed.inward_m.iter().all(|inward_m| inward_m.abs() < 7e-3));
             }
             let away = press(&skin, object, &at(pitch_deg, -5e-3), &mut pressed);
-            assert_eq!(away, Load::default());
+            assert_eq!(away, ContactLoad::default());
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::common::shipped::environment;
 use crate::shell::{CAVITY_PA_M3, Object, at, ball, plane, press, settled, shell};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use palpate::geometry::bvh::MeshBvh;
-use palpate::sim::finger::Load;
+use palpate::sim::finger::ContactLoad;
 use palpate::sim::finger::effects::skin::Skin;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
@@ -38,12 +38,12 @@ fn objects() -> [(&'static str, Object); 4] {
 }
 
 /// Relative errors of force and pressure.
-fn apart(found: &Load, right: &Load) -> [f64; 2] {
+fn apart(found: &ContactLoad, right: &ContactLoad) -> [f64; 2] {
     [found.force_n.norm() / right.force_n.norm() - 1.0, found.pressure_pa / right.pressure_pa - 1.0]
 }
 
 /// Equilibrium of the shell at a depth from rest, on the same elements.
-fn ends(skin: &Skin, object: &Object, pitch_deg: f64, depth_m: f64) -> Load {
+fn ends(skin: &Skin, object: &Object, pitch_deg: f64, depth_m: f64) -> ContactLoad {
     let mut pressed = skin.relaxed();
     let x_wt = at(pitch_deg, depth_m);
     (0..40).map(|_| press(skin, object, &x_wt, &mut pressed)).last().unwrap()

@@ -11,7 +11,7 @@ use palpate::robot::finger::Finger;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::samples::Lattice;
 use palpate::sim::finger::shell::sheet::{Material, Sheet};
-use palpate::sim::finger::shell::springs::Springs;
+use palpate::sim::finger::shell::springs::UnilateralSprings;
 use std::collections::HashMap;
 
 const YOUNG_PA: f64 = 1.552e6;
@@ -152,7 +152,7 @@ impl Other {
                     .iter()
                     .map(|&l| yields(&|k| Vector3::z() * f64::from(u8::from(k == l))))
                     .collect();
-                let mut springs = Springs::default();
+                let mut springs = UnilateralSprings::default();
                 for &k in &links {
                     springs.stiffness_n_m.push(skin_n_m(k));
                     springs.force_n.push(force_n(k, &moved_m));

@@ -11,7 +11,7 @@ use palpate::geometry::coarse::coarse;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
 use palpate::report::files::png;
-use palpate::report::solid::{Frame, Sequence, counts, figure, section};
+use palpate::report::solid::{Frame, PlannerSurfaces, counts, figure, section};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use std::slice;
 /// Cell size of synthetic beliefs: about 1300 triangles each.
 const CELL_M: f64 = 0.008;
 
-fn sequences() -> Vec<Sequence> {
+fn sequences() -> Vec<PlannerSurfaces> {
     ["uncertain", "random"].map(|planner| sequence(planner, 12, CELL_M)).to_vec()
 }
 
@@ -145,7 +145,11 @@ fn a_corner_may_lie_far_back() {
     let sd_m = vec![1e-3; vertices.len()];
     let mesh = (vertices, triangles.clone());
     let frame = Frame { mesh, sd_m, ..Frame::default() };
-    let fan = Sequence { planner: "fan".into(), frames: vec![frame], ..Sequence::default() };
+    let fan = PlannerSurfaces {
+        planner: "fan".into(),
+        frames: vec![frame],
+        ..PlannerSurfaces::default()
+    };
     let data = data(&section(&[fan], None, 0).unwrap());
     let told = corners(&data["planners"][0]["frames"][0]["corners"]);
     let given: Vec<usize> = triangles.as_flattened().iter().map(|&i| i as usize).collect();
@@ -156,7 +160,7 @@ fn a_corner_may_lie_far_back() {
 #[test]
 fn the_same_is_written_every_time_and_no_name_ends_the_script() {
     let (mut given, truth) = (sequences(), ring());
-    let section = |given: &[Sequence]| section(given, Some(&truth), 0).unwrap();
+    let section = |given: &[PlannerSurfaces]| section(given, Some(&truth), 0).unwrap();
     let plain = section(&given);
     assert!(plain == section(&given));
     let scripts = |html: &str| html.matches("</script").count();
@@ -167,7 +171,7 @@ fn the_same_is_written_every_time_and_no_name_ends_the_script() {
     assert_eq!(html.matches("<script").count(), plain.matches("<script").count());
     assert!(!html.contains("</SCRIPT") && !html.contains("<!--"));
     assert_eq!(data(&html)["planners"][0]["name"], given[0].planner.as_str());
-    let figure = |given: &[Sequence]| figure(given, Some(&truth), &[5, 12]).unwrap();
+    let figure = |given: &[PlannerSurfaces]| figure(given, Some(&truth), &[5, 12]).unwrap();
     let svg = figure(&given);
     assert!(svg == figure(&given) && !svg.contains("<script"));
     assert!(png(&svg).unwrap() == png(&svg).unwrap());
@@ -187,7 +191,7 @@ fn counts_fill_the_room_on_a_page() {
     let triangles: usize =
         given.iter().flat_map(|sequence| &sequence.frames).map(|frame| frame.mesh.1.len()).sum();
     let frames = given.iter().map(|sequence| sequence.frames.len()).sum::<usize>();
-    let empty: Vec<Sequence> = (given.iter().cloned())
+    let empty: Vec<PlannerSurfaces> = (given.iter().cloned())
         .map(|mut sequence| {
             sequence.frames.iter_mut().for_each(|frame| frame.mesh.1.clear());
             sequence
@@ -201,10 +205,10 @@ fn counts_fill_the_room_on_a_page() {
 /// Without a belief there is no section; with a belief without a surface there is one.
 #[test]
 fn nothing_and_little_can_be_shown() {
-    let none = Sequence { frames: Vec::new(), ..sequence("none", 6, 0.02) };
+    let none = PlannerSurfaces { frames: Vec::new(), ..sequence("none", 6, 0.02) };
     assert_eq!(section(&[], None, 0).unwrap(), "");
     assert_eq!(section(slice::from_ref(&none), Some(&ring()), 0).unwrap(), "");
-    let drawn = |of: Sequence, counts: &[u32]| figure(&[of], None, counts);
+    let drawn = |of: PlannerSurfaces, counts: &[u32]| figure(&[of], None, counts);
     assert_eq!(drawn(none, &[6]), None);
     let mut bare = sequence("bare", 6, 0.02);
     bare.frames[0] = Frame { touches: 4, ..Frame::default() };

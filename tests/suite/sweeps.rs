@@ -1,8 +1,8 @@
 //! Tests of several experiments in one file.
 
-use crate::common::program::{command, ended, folder};
+use crate::common::program::{command, folder, run_to_end};
 use palpate::experiment::store::Run;
-use palpate::experiment::sweep::cells;
+use palpate::experiment::sweep::sweep_cases;
 use std::fs;
 
 const SWEEP: &str = "\n[sweep]\ngrid = [5, 7]\nscene = [\"scene.toml\", \"other.toml\"]\n";
@@ -16,7 +16,8 @@ fn a_sweep_is_a_run_for_each_combination() {
     fs::copy(at("scene.toml"), at("other.toml")).unwrap();
     let text = fs::read_to_string(&file).unwrap().replace("scene = \"scene.toml\"\n", "");
     fs::write(&file, text.clone() + SWEEP).unwrap();
-    let labels: Vec<String> = cells(&file).unwrap().into_iter().map(|cell| cell.label).collect();
+    let labels: Vec<String> =
+        sweep_cases(&file).unwrap().into_iter().map(|cell| cell.label).collect();
     assert_eq!(
         labels,
         [
@@ -26,7 +27,7 @@ fn a_sweep_is_a_run_for_each_combination() {
             "-grid-7-scene-other"
         ]
     );
-    let run = |arguments: &[&str]| ended(&mut command(folder.path(), arguments), "a sweep");
+    let run = |arguments: &[&str]| run_to_end(&mut command(folder.path(), arguments), "a sweep");
     let output = run(&["--quiet", "run", "small.toml", "--no-report"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let rows = |label: &str| Run::read(&at("runs/small").join(format!("small{label}"))).unwrap();

@@ -6,7 +6,7 @@ use crate::common::hub::Hub;
 use crate::common::rig::ARM;
 use crate::common::rig::{Rig, STAGE, patient};
 use palpate::explore::probe::Touch;
-use palpate::ros::arm::Lab;
+use palpate::ros::arm::RosArm;
 use palpate::ros::settings::BackendSettings;
 use palpate::ros::topics::{CommandMessage, Service, Side, TactileMessage};
 use palpate::ros::twin::serve::services;
@@ -72,7 +72,7 @@ fn joints_of_other_names_are_named() {
     let hub = rig.hub.clone();
     let connect = Box::new(move || Ok(Box::new(hub.end(Side::Explorer)) as _));
     let chain = rig.simulator.environment().chain().unwrap();
-    let error = Lab::connect(&settings, &chain, connect).map(|_| ()).unwrap_err();
+    let error = RosArm::connect(&settings, &chain, connect).map(|_| ()).unwrap_err();
     let error = error.to_string();
     let says = "Skipped a message: joints [\"X\", \"Y\", \"Z\"] are not joints of the arm, [\"A\", \"B\", \"C\"]";
     assert!(error.contains(says), "{error}");
@@ -83,7 +83,7 @@ fn nobody_there_is_said_with_names_and_types() {
     let settings = BackendSettings { patience_s: 0.1, ..BackendSettings::default() };
     let chain = palpate::robot::arm::ArmSettings::default().chain().unwrap();
     let connect = Box::new(|| Ok(Box::new(Hub::default().end(Side::Explorer)) as _));
-    let error = Lab::connect(&settings, &chain, connect).map(|_| ()).unwrap_err().to_string();
+    let error = RosArm::connect(&settings, &chain, connect).map(|_| ()).unwrap_err().to_string();
     for word in ["0.1 s", "/joint_states (sensor_msgs/msg/JointState)", "/biotac_pub", "domain"] {
         assert!(error.contains(word), "{error}");
     }

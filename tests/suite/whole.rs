@@ -17,7 +17,7 @@ use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
 use palpate::report::{findings, whole};
-use palpate::sim::environment::Shape;
+use palpate::sim::environment::Surface;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Target};
 use rand_chacha::ChaCha8Rng;
@@ -142,7 +142,7 @@ fn size_does_not_matter() {
         let mut sobol = make("sobol", stream(1, 0, "aims"));
         for _ in 0..25 {
             let aim = plan(&mut sobol, &belief);
-            let outward = -aim.ahead_w.into_inner();
+            let outward = -aim.direction_w.into_inner();
             // An ellipsoid, hit where the path through its middle leaves it.
             let radii = Vector3::new(0.06, 0.035, 0.045) * scale;
             let reach = 1.0 / outward.component_div(&radii).norm();
@@ -300,8 +300,8 @@ fn a_ball_beside_the_object_is_refused() {
     let scene: Scene = toml::from_str(text).unwrap();
     let mesh = mesh(sphere);
     let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();
-    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: report.into() };
-    let error = Environment::around(scene, shape).err().unwrap().to_string();
+    let shape = Surface::Mesh { bvh: MeshBvh::new(mesh), report: report.into() };
+    let error = Environment::with_shape(scene, shape).err().unwrap().to_string();
     assert!(error.contains("around.centre_m"), "{error}");
 }
 
@@ -342,7 +342,7 @@ fn a_run_says_what_it_found() {
     assert_eq!(active.measure.id, "chamfer_m");
     let touches = active.touches.value;
     assert!(touches % 4.0 == 0.0 && (8.0..=32.0).contains(&touches), "{touches}");
-    let run = Run { experiment, truth: Truth::around(None), rows, unlisted: 0 };
+    let run = Run { experiment, truth: Truth::whole_object(None), rows, unlisted: 0 };
     let found = findings::sentences(&run).join(" ");
     assert!(found.contains("After 32 touches the mean Chamfer distance is: active"), "{found}");
     assert!(found.contains(&format!(": active {touches}.")), "{found}");
@@ -367,7 +367,7 @@ fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
             // Predicted and actual contact are nearly equal along the approach.
             let aim = touch.target.aim().unwrap();
             let met = Point3::from(touch.contact.unwrap());
-            let before_m = -(met - aim.p_w).dot(&aim.ahead_w);
+            let before_m = -(met - aim.p_w).dot(&aim.direction_w);
             assert!((before_m - touch.predicted_m).abs() < 0.02, "{name}: {touch:?} {before_m}");
             assert!(touch.predicted_sd_m > 0.0 && touch.predicted_sd_m < 5e-3, "{touch:?}");
         }
@@ -375,8 +375,8 @@ fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
             assert!(touch.difference_m.unwrap().abs() < 1e-9, "{name}: {touch:?}");
         }
         let covered = palpate::experiment::measure::by_id("verification_coverage").unwrap();
-        assert!(covered.of(&row, 40).unwrap() >= 0.85, "{name}");
+        assert!(covered.value(&row, 40).unwrap() >= 0.85, "{name}");
         let rmse = palpate::experiment::measure::VERIFICATION_RMSE;
-        assert!(rmse.of(&row, 40).unwrap() < 1e-3, "{name}");
+        assert!(rmse.value(&row, 40).unwrap() < 1e-3, "{name}");
     }
 }

@@ -4,7 +4,7 @@ use super::Piece;
 use super::sample::{KERNEL, hyperparameters, place, search_box, touches};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Posterior};
+use palpate::gp::{MeanModel, Posterior};
 use std::hint::black_box;
 
 /// Evaluations in one optimisation.
@@ -34,7 +34,7 @@ fn likelihood(count: usize) -> Piece {
         flops: times * n.powi(3),
         bytes: times * 3.0 * 8.0 * n.powi(2),
         run: Box::new(move || {
-            let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+            let mut likelihood = Likelihood::new(&KERNEL, MeanModel::Zero, &touches);
             let mut gradient = [0.0; 4];
             for _ in 0..EVALUATIONS {
                 let at = hyperparameters();
@@ -116,7 +116,8 @@ fn appended(count: usize) -> Option<Piece> {
 /// of the order of the inducing ones.
 fn through(most: usize, count: usize) -> Option<Piece> {
     let touches = touches(count);
-    let induce = move || Posterior::through(most, &KERNEL, hyperparameters(), &touches);
+    let induce =
+        move || Posterior::with_inducing_points(most, &KERNEL, hyperparameters(), &touches);
     let kept = induce().ok()?.posterior.observations().len() as f64;
     Some(Piece {
         name: format!("{count} touches through {most}, of which {kept} suffice"),

@@ -1,7 +1,7 @@
 //! Data of the Gaussian-process pieces.
 
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
-use palpate::gp::{Mean, Observations, SearchBox, TouchNoise};
+use palpate::gp::{MeanModel, Observations, SearchBox, TouchNoise};
 
 /// Kernel of all pieces.
 pub static KERNEL: SquaredExponential = SquaredExponential;
@@ -34,7 +34,7 @@ pub fn hyperparameters() -> Hyperparameters {
 /// Returns the default search ranges of a belief.
 pub fn search_box() -> SearchBox {
     SearchBox {
-        mean: Mean::Zero,
+        mean: MeanModel::Zero,
         length_scales: vec![(0.005, 1.0).into(); 2],
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),

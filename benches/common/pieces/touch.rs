@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use palpate::explore::control::{Controller, Goal};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::geometry::solids::ball;
+use palpate::geometry::solids::sphere_mesh;
 use palpate::geometry::sweep::Capsule;
 use palpate::math::seed;
 use palpate::robot::arm::ArmSettings;
@@ -25,7 +25,7 @@ const SPEED_M_S: f64 = 0.02;
 
 pub fn pieces() -> Vec<Piece> {
     let middle = Point3::new(0.0, -BALL_M, 0.0);
-    let (points, triangles) = ball(middle, BALL_M, RINGS);
+    let (points, triangles) = sphere_mesh(middle, BALL_M, RINGS);
     let Ok((mesh, _)) = Mesh::new(&points, &triangles) else { return Vec::new() };
     let bvh = MeshBvh::new(mesh);
     let mut pieces = geometry(&bvh);
@@ -85,6 +85,6 @@ fn control_tick() -> Option<Piece> {
     x_wt.translation.vector.y -= 0.01;
     let mut controller = Controller::new(chain, TICK_S).ok()?;
     Some(Piece::uncounted("tick of the arm's control", move || {
-        let _ = black_box(controller.step(black_box(home.as_slice()), &Goal::still(x_wt)));
+        let _ = black_box(controller.step(black_box(home.as_slice()), &Goal::at_rest(x_wt)));
     }))
 }

@@ -40,7 +40,7 @@ impl Slides {
     /// Creates the stage at the home of `robot`, whose chain is a stage.
     pub fn new(robot: &Robot) -> Self {
         let chain = robot.chain.clone();
-        let capabilities = Capabilities::of(&chain, 0.01);
+        let capabilities = Capabilities::simulated(&chain, 0.01);
         let (radius_m, reading) = (robot.finger.radius_m, Reading::default());
         Self { chain, radius_m, capabilities, reading }
     }
@@ -86,7 +86,7 @@ impl Backend for Slides {
 }
 
 /// Returns the task and the robot.
-pub fn task_and_robot() -> Result<(Task, Robot), palpate_input::error::Invalid> {
+pub fn task_and_robot() -> Result<(Task, Robot), palpate_input::error::InputError> {
     let finger = Finger { length_m: 0.0, ..Finger::default() };
     let mut zone = Zone::new([-0.05, 0.05], Some([-0.05, 0.05]));
     // Depths run along the approach: the wall lies between y = 0.03 and y = −0.03.

@@ -2,7 +2,7 @@
 
 use crate::robot::arm::{ArmError, Chain, Jacobian, Joints};
 use nalgebra::{Isometry3, Matrix6, SymmetricEigen, Vector6};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 
 /// Gain of the pose error, 1/s; a heuristic: a tenth of the servos' integral rate, so that the two
 /// loops do not interact.
@@ -23,7 +23,7 @@ pub struct Goal {
 
 impl Goal {
     /// A goal at rest at `x_wt`.
-    pub fn still(x_wt: Isometry3<f64>) -> Self {
+    pub fn at_rest(x_wt: Isometry3<f64>) -> Self {
         Self { x_wt, twist: Vector6::zeros() }
     }
 }
@@ -37,7 +37,7 @@ pub struct JointMotion {
     pub damping: f64,
     /// Fraction of the desired tip velocity that `qdot` achieves: below 1 near singularities and at
     /// limits.
-    pub followed: f64,
+    pub achieved_ratio: f64,
 }
 
 /// Resolved-rate control (Whitney 1969) with feed-forward: `qdot = J⁺ · (twist + GAIN_PER_S ·
@@ -108,7 +108,7 @@ impl Controller {
         let task = ResolvedRate::new(&self.chain, &q, jacobian, twist);
         let (wanted, damping) = task.solve().ok_or_else(not_finite)?;
         self.qdot = limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
-        Ok(JointMotion { qdot: self.qdot, damping, followed: task.followed(&self.qdot) })
+        Ok(JointMotion { qdot: self.qdot, damping, achieved_ratio: task.followed(&self.qdot) })
     }
 
     /// Returns the command for the next period towards the joint positions and velocities of
@@ -116,7 +116,7 @@ impl Controller {
     ///
     /// # Errors
     /// If a number is not finite or missing; the last command remains in force.
-    pub fn along(&mut self, q: &[f64], posture: &[Joints; 2]) -> Result<Joints, ArmError> {
+    pub fn step_posture(&mut self, q: &[f64], posture: &[Joints; 2]) -> Result<Joints, ArmError> {
         let q = positions(&self.chain, q)?;
         let [to, qdot] = posture;
         let wanted = qdot + (to - q) * GAIN_PER_S;
@@ -129,13 +129,13 @@ impl Controller {
 }
 
 fn not_finite() -> ArmError {
-    Invalid::new("the arm's position, goal or period is not finite").into()
+    InputError::new("the arm's position, goal or period is not finite").into()
 }
 
 fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ArmError> {
     let expected = chain.joints.len();
     let joints = chain.joints_from(q).ok_or_else(|| {
-        Invalid::new(format!("{} joint positions for an arm of {expected} joints", q.len()))
+        InputError::new(format!("{} joint positions for an arm of {expected} joints", q.len()))
     })?;
     let finite = joints.iter().all(|q| q.is_finite());
     if finite { Ok(joints) } else { Err(not_finite()) }
@@ -174,7 +174,7 @@ fn limited(chain: &Chain, q: &Joints, before: &Joints, wanted: &Joints, period_s
     let joints = || chain.joints.iter().enumerate().take(q.len());
     let mut scale: f64 = 1.0;
     for (i, joint) in joints() {
-        let allowed = joint.fastest(q[i], wanted[i], period_s);
+        let allowed = joint.speed_limit(q[i], wanted[i], period_s);
         if wanted[i].abs() > allowed {
             scale = scale.min(allowed / wanted[i].abs());
         }
@@ -189,7 +189,7 @@ fn limited(chain: &Chain, q: &Joints, before: &Joints, wanted: &Joints, period_s
     }
     let mut qdot = before + change * part;
     for (i, joint) in joints() {
-        let allowed = joint.fastest(q[i], qdot[i], period_s);
+        let allowed = joint.speed_limit(q[i], qdot[i], period_s);
         let step = joint.qddot_limit * period_s;
         qdot[i] = qdot[i].max(-allowed).min(allowed).max(before[i] - step).min(before[i] + step);
     }
@@ -233,7 +233,7 @@ impl ResolvedRate {
             home *= HOME_MAX / fastest;
         }
         let mut room = [Joints::repeat(1.0); 2];
-        let turns = chain.turns();
+        let turns = chain.has_revolute();
         for (i, joint) in chain.joints.iter().enumerate().take(q.len()) {
             if turns {
                 room[0][i] = ((q[i] - joint.q_limits[0]) / MARGIN_RAD).clamp(0.0, 1.0);
@@ -341,7 +341,7 @@ const TURNS_DEG: [f64; 8] = [0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0
 /// [`ArmError::OutOfReach`] if no start converges within the joint limits.
 pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ArmError> {
     let mut nearest = (f64::INFINITY, f64::INFINITY);
-    let starts = if chain.turns() { &TURNS_DEG[..] } else { &TURNS_DEG[..1] };
+    let starts = if chain.has_revolute() { &TURNS_DEG[..] } else { &TURNS_DEG[..1] };
     for turn in starts {
         let mut q = chain.home;
         q[0] += turn.to_radians();

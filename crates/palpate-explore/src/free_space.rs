@@ -20,10 +20,10 @@
 //! on which the finger came to rest there is no surface, rather than one far below.
 
 use super::presence::Silhouette;
-use super::probe::Swept;
+use super::probe::SweptVolume;
 use crate::task::Zone;
 use palpate_gp::math::normal;
-use palpate_gp::means::Means;
+use palpate_gp::means::FixedPlaceMeans;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::{Hyperparameters, Observation, Posterior};
 
@@ -46,12 +46,12 @@ const SURE: f64 = 0.92;
 
 /// The lowest upper bound so far, on a grid over the zone.
 #[derive(Clone)]
-pub(super) struct Ceiling {
+pub(super) struct FreeSpaceBound {
     places: Vec<Vec<f64>>,
     heights_m: Vec<f64>,
 }
 
-impl Ceiling {
+impl FreeSpaceBound {
     /// Creates a bound without any free space.
     pub(super) fn new(zone: &Zone) -> Self {
         let places = zone.grid(PER_SIDE);
@@ -59,8 +59,8 @@ impl Ceiling {
     }
 
     /// Lowers the bound to the volume swept by one touch.
-    pub(super) fn lower(&mut self, zone: &Zone, swept: &Swept) {
-        let ceilings_m = swept.ceilings_m(zone, self.places.iter().map(Vec::as_slice));
+    pub(super) fn lower(&mut self, zone: &Zone, swept: &SweptVolume) {
+        let ceilings_m = swept.upper_bounds_m(zone, self.places.iter().map(Vec::as_slice));
         for (height_m, ceiling_m) in self.heights_m.iter_mut().zip(ceilings_m) {
             *height_m = height_m.min(ceiling_m.unwrap_or(f64::INFINITY));
         }
@@ -75,7 +75,7 @@ impl Ceiling {
         let mut scratch = Scratch::default();
         let mut bounds: Vec<Bound> = self.bounds().collect();
         let places = bounds.iter().map(|bound| bound.place);
-        let mut means = Means::at(belief, places);
+        let mut means = FixedPlaceMeans::at(belief, places);
         for _ in 0..CUTS_MAX {
             let excess = means.of(belief).iter().zip(&bounds).map(|(mean, at)| mean - at.height_m);
             let mut above: Vec<(usize, f64)> = (excess.enumerate())
@@ -84,7 +84,8 @@ impl Ceiling {
             above.sort_by(|a, b| b.1.total_cmp(&a.1));
             let mut there = |(i, excess): (usize, f64)| {
                 let bound = &mut bounds[i];
-                let chance = SURE * *bound.chance.get_or_insert_with(|| silhouette.at(bound.place));
+                let chance =
+                    SURE * *bound.chance.get_or_insert_with(|| silhouette.probability(bound.place));
                 // The mean is above the bound, so the probability of a surface below it is at most
                 // one half.
                 if 0.5 * chance < 1.0 - chance {
@@ -101,11 +102,13 @@ impl Ceiling {
             };
             bounds[worst].is_done = true;
             let Bound { place, height_m, .. } = bounds[worst];
-            let Some((height, sd)) = site(height_m + excess, variance, height_m, soft_sd) else {
+            let Some((height, sd)) =
+                pseudo_observation(height_m + excess, variance, height_m, soft_sd)
+            else {
                 continue;
             };
             let cut = Observation { place, height, noise: sd.max(soft_sd) / noise_sd, slope: None };
-            if belief.take_in(&cut).is_err() {
+            if belief.push(&cut).is_err() {
                 return;
             }
         }
@@ -130,7 +133,7 @@ struct Bound<'a> {
 
 /// Returns the pseudo-observation (height, standard deviation) that moves N(μ, σ²) to its moments
 /// below a bound; `None` where the variance is too small to change.
-fn site(mean: f64, variance: f64, bound: f64, soft_sd: f64) -> Option<(f64, f64)> {
+fn pseudo_observation(mean: f64, variance: f64, bound: f64, soft_sd: f64) -> Option<(f64, f64)> {
     let spread = (variance + soft_sd * soft_sd).sqrt();
     let z = (bound - mean) / spread;
     let h = normal::inverse_mills(z);
@@ -163,7 +166,7 @@ mod tests {
             }
             let twin_mean = sums[1] / sums[0];
             let twin_variance = sums[2] / sums[0] - twin_mean * twin_mean;
-            let (height, site_sd) = site(mean, variance, bound, noise).unwrap();
+            let (height, site_sd) = pseudo_observation(mean, variance, bound, noise).unwrap();
             let precision = 1.0 / variance + site_sd.powi(-2);
             let ours = (mean / variance + height * site_sd.powi(-2)) / precision;
             assert!((ours - twin_mean).abs() < 1e-6, "{ours} {twin_mean}");

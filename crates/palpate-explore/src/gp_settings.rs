@@ -1,8 +1,8 @@
 //! Settings of the Gaussian process of a belief.
 
 use palpate_gp::kernel;
-use palpate_gp::{LogNormal, Mean};
-use palpate_input::config::{Checked, Rules, is_default};
+use palpate_gp::{LogNormal, MeanModel};
+use palpate_input::config::{Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ pub struct GpSettings {
     /// Kernel name, or several names, of which each fit selects the most likely.
     pub kernel: Kernels,
     /// Prior mean: how it is determined.
-    pub mean: Mean,
+    pub mean: MeanModel,
     /// Bounds of each length scale, as fractions of the zone's side.
     pub length_scale: [f64; 2],
     /// Bounds of the touch noise's standard deviation, as fractions of the signal's.
@@ -100,7 +100,7 @@ impl Default for GpSettings {
     fn default() -> Self {
         Self {
             kernel: Kernels::One("squared_exponential".into()),
-            mean: Mean::Zero,
+            mean: MeanModel::Zero,
             length_scale: [0.005, 1.0],
             noise: [1e-4, 1e-2],
             noise_sd_m: None,
@@ -116,7 +116,7 @@ impl Default for GpSettings {
     }
 }
 
-impl Checked for GpSettings {
+impl Validate for GpSettings {
     fn check(&self, rules: &mut Rules) {
         let names: Vec<&str> = kernel::KERNELS.iter().map(|(name, _)| *name).collect();
         let chosen = self.kernel.names();
@@ -139,7 +139,7 @@ impl Checked for GpSettings {
             let names: Vec<&str> = smooth.map(|(name, _)| *name).collect();
             format!("a kernel with continuously varying slopes: {}", names.join(", "))
         });
-        rules.given("noise_sd_m", self.noise_sd_m, 1e-9..=1e3);
+        rules.optional_number("noise_sd_m", self.noise_sd_m, 1e-9..=1e3);
         if let Some(least_m) = self.noise_sd_min_m {
             rules.number("noise_sd_min_m", least_m, 1e-9..=1e3);
             rules.require("noise_sd_min_m", least_m, self.noise_sd_m.is_none(), || {

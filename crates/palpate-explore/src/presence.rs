@@ -15,14 +15,16 @@
 //! hull passed without contact. The length scale is the most likely one of a few. The optimistic
 //! probability has c = 0.
 
-use super::probe::Swept;
+use super::probe::SweptVolume;
 use crate::robot::Finger;
 use crate::task::Zone;
 use nalgebra::{Point3, Vector2};
 use palpate_gp::kernel::SquaredExponential;
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::math::normal;
-use palpate_gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Range, Scale};
+use palpate_gp::{
+    Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
+};
 use std::cell::OnceCell;
 
 /// Probability of a surface one radius beyond a contact, on the side of the hull's middle: that for
@@ -37,7 +39,7 @@ const MISS_PLACES: usize = 3;
 
 /// Evidence from touches for the presence of a surface.
 #[derive(Clone, Debug)]
-pub struct Presence {
+pub struct SurfaceEvidence {
     /// For each contact, the target of the hull and the place of contact.
     contacts: Vec<[Vector2<f64>; 2]>,
     misses: Vec<Stadium>,
@@ -46,7 +48,7 @@ pub struct Presence {
     zone: Zone,
 }
 
-impl Presence {
+impl SurfaceEvidence {
     /// Creates an empty set of evidence.
     pub(super) fn new(zone: &Zone) -> Self {
         Self { contacts: Vec::new(), misses: Vec::new(), hull: None, zone: zone.clone() }
@@ -60,7 +62,7 @@ impl Presence {
     }
 
     /// Adds the final place of a touch's hull, and whether the touch was a miss.
-    pub(super) fn passed(&mut self, swept: &Swept, has_missed: bool) {
+    pub(super) fn passed(&mut self, swept: &SweptVolume, has_missed: bool) {
         let tip = flat(&self.zone.x_wz().inverse_transform_point(&swept.p_wt));
         let hull = Stadium::new(&swept.finger, tip);
         if has_missed {
@@ -80,7 +82,7 @@ impl Presence {
         let Some(hull) = &self.hull else { return labels };
         for [target, contact] in &self.contacts {
             labels.push((*contact, 1.0));
-            let inwards = hull.about(*target).nearest(contact) - contact;
+            let inwards = hull.moved_to(*target).nearest(contact) - contact;
             let offset = inwards.norm() / hull.radius_m;
             if offset > 0.0 {
                 let share = BEYOND_A_FACE - LESS_AT_THE_RIM * offset.min(1.0).powi(2);
@@ -123,10 +125,10 @@ const ACROSS: [f64; 3] = [-0.8, 0.0, 0.8];
 pub struct Silhouette {
     zone: Zone,
     /// `None` before the first swept volume: the probability is then 1 everywhere.
-    seen: Option<Seen>,
+    seen: Option<SilhouetteModel>,
 }
 
-struct Seen {
+struct SilhouetteModel {
     hull: Stadium,
     misses: Vec<Stadium>,
     belief: Posterior,
@@ -147,23 +149,23 @@ impl Silhouette {
         let seen = hull.and_then(|hull| {
             let belief = belief(hull.radius_m, labels)?;
             let (hull, misses) = (hull.clone(), misses.to_vec());
-            Some(Seen { hull, misses, belief, table: OnceCell::new() })
+            Some(SilhouetteModel { hull, misses, belief, table: OnceCell::new() })
         });
         Self { zone: zone.clone(), seen }
     }
 
     /// Whether a swept volume was observed.
-    pub fn is_seen(&self) -> bool {
+    pub fn is_known(&self) -> bool {
         self.seen.is_some()
     }
 
     /// Returns the probability of a surface at `place`.
-    pub fn at(&self, place: &[f64]) -> f64 {
-        self.over([place])[0]
+    pub fn probability(&self, place: &[f64]) -> f64 {
+        self.probabilities([place])[0]
     }
 
     /// Returns the probability of a surface at each of `places`.
-    pub fn over<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
+    pub fn probabilities<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
         let flat = |place| flat(&self.zone.local(place, 0.0));
         let places: Vec<Vector2<f64>> = places.into_iter().map(flat).collect();
         match &self.seen {
@@ -176,30 +178,34 @@ impl Silhouette {
     /// first miss.
     pub fn is_likely<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<bool> {
         match self.seen.as_ref().is_some_and(|seen| !seen.misses.is_empty()) {
-            true => self.over(places).into_iter().map(|probability| probability > 0.5).collect(),
+            true => self
+                .probabilities(places)
+                .into_iter()
+                .map(|probability| probability > 0.5)
+                .collect(),
             false => places.into_iter().map(|_| true).collect(),
         }
     }
 
     /// Returns the optimistic probability of a surface at `place`, with threshold 0; interpolated
     /// between grid points half a radius apart.
-    pub fn hoped(&self, place: &[f64]) -> f64 {
+    pub fn optimistic_probability(&self, place: &[f64]) -> f64 {
         let place = flat(&self.zone.local(place, 0.0));
         self.seen.as_ref().map_or(1.0, |seen| seen.hoped(&self.zone, &place))
     }
 
     /// Returns the optimistic probability that a touch at `target` ends in contact: 1 − (1 − p)²
     /// with the most likely place under the hull, as if two places under it were independent.
-    pub fn of_contact(&self, target: &[f64]) -> f64 {
+    pub fn hit_probability(&self, target: &[f64]) -> f64 {
         let Some(seen) = &self.seen else { return 1.0 };
-        let hull = seen.hull.about(flat(&self.zone.local(target, 0.0)));
+        let hull = seen.hull.moved_to(flat(&self.zone.local(target, 0.0)));
         let likeliest =
             places(&hull).map(|place| seen.hoped(&self.zone, &place)).fold(0.0, f64::max);
         1.0 - (1.0 - likeliest).powi(2)
     }
 }
 
-impl Seen {
+impl SilhouetteModel {
     fn over(&self, places: &[Vector2<f64>]) -> Vec<f64> {
         let believed = self.belief.predict(places.iter().map(|place| place.as_slice()));
         let told = places.iter().zip(believed);
@@ -214,7 +220,7 @@ impl Seen {
 
     /// Returns the probability that evidence of this mean and variance at `place` exceeds `divide`.
     fn above(&self, divide: f64, place: &Vector2<f64>, mean: f64, variance: f64) -> f64 {
-        match self.misses.iter().any(|miss| miss.holds(place)) {
+        match self.misses.iter().any(|miss| miss.contains(place)) {
             true => 0.0,
             false => normal::cumulative((mean - divide) / (variance + NOISE_VARIANCE).sqrt()),
         }
@@ -240,14 +246,14 @@ fn places(hull: &Stadium) -> impl Iterator<Item = Vector2<f64>> {
 fn belief(radius_m: f64, labels: &[(Vector2<f64>, f64)]) -> Option<Posterior> {
     let mut evidence = Observations::new(2);
     for (place, probability) in labels {
-        evidence.push(place.as_slice(), 2.0 * probability - 1.0 - PRIOR);
+        evidence.push_height(place.as_slice(), 2.0 * probability - 1.0 - PRIOR);
     }
     if evidence.is_empty() {
         return None;
     }
     let noise: NoiseRatio = NOISE_VARIANCE.sqrt().into();
-    let scale = Scale::Best(Range::from((1e-2, 1e2)));
-    let mut likelihood = Likelihood::new(&SquaredExponential, Mean::Zero, &evidence);
+    let scale = SignalModel::Best(Range::from((1e-2, 1e2)));
+    let mut likelihood = Likelihood::new(&SquaredExponential, MeanModel::Zero, &evidence);
     let scored = LENGTHS.into_iter().filter_map(|radii| {
         let lengths = vec![radii * radius_m; 2];
         let profiled = likelihood.profile(&lengths, noise, &scale, None).ok()?;
@@ -325,7 +331,7 @@ impl Stadium {
     }
 
     /// Returns this hull with its tip at `start`.
-    fn about(&self, start: Vector2<f64>) -> Self {
+    fn moved_to(&self, start: Vector2<f64>) -> Self {
         Self { start, ..self.clone() }
     }
 
@@ -337,7 +343,7 @@ impl Stadium {
     }
 
     /// Whether it contains `place`.
-    fn holds(&self, place: &Vector2<f64>) -> bool {
+    fn contains(&self, place: &Vector2<f64>) -> bool {
         (place - self.nearest(place)).norm() <= self.radius_m
     }
 }

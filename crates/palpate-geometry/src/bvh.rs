@@ -109,13 +109,13 @@ impl MeshBvh {
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
     ) -> Option<RayHit> {
-        self.ray_near(&Nearby::WHOLE, origin, direction, max_distance_m)
+        self.ray_near(&MeshParts::WHOLE, origin, direction, max_distance_m)
     }
 
     /// Returns the first intersection of a ray that stays in the ball of `near`.
     pub fn ray_near(
         &self,
-        near: &Nearby,
+        near: &MeshParts,
         origin: &Point3<f64>,
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
@@ -155,7 +155,7 @@ impl MeshBvh {
         };
         let mut best = (reach(0), 0);
         self.visit(
-            &Nearby::WHOLE,
+            &MeshParts::WHOLE,
             best.0.0,
             |node| Box3::of(node).distance_squared(&from, &from),
             |triangle, limit| {
@@ -172,16 +172,16 @@ impl MeshBvh {
 
     /// Whether the mesh comes within `radius_m` of `centre`.
     pub fn touches(&self, centre: &Point3<f64>, radius_m: f64) -> bool {
-        self.touches_near(&Nearby::WHOLE, centre, radius_m)
+        self.touches_near(&MeshParts::WHOLE, centre, radius_m)
     }
 
     /// Returns the part of the mesh within `radius_m` of `centre`, for queries that stay there.
-    pub fn nearby(&self, centre: &Point3<f64>, radius_m: f64) -> Nearby {
-        Nearby::new(&self.bvh, &(centre - self.centre), radius_m)
+    pub fn nearby(&self, centre: &Point3<f64>, radius_m: f64) -> MeshParts {
+        MeshParts::new(&self.bvh, &(centre - self.centre), radius_m)
     }
 
     /// Whether the part `near` comes within `radius_m` of `centre`.
-    pub fn touches_near(&self, near: &Nearby, centre: &Point3<f64>, radius_m: f64) -> bool {
+    pub fn touches_near(&self, near: &MeshParts, centre: &Point3<f64>, radius_m: f64) -> bool {
         let ball = SingleBall::new(&(centre - self.centre));
         let mut touched = false;
         let reach = (radius_m * radius_m).next_up();
@@ -200,13 +200,13 @@ impl MeshBvh {
     }
 
     /// Whether the mesh intersects `capsule`.
-    pub fn enters(&self, capsule: &Capsule) -> bool {
+    pub fn intersects(&self, capsule: &Capsule) -> bool {
         self.overlap(capsule).is_some()
     }
 
     /// Whether all six axis-parallel rays from `p` meet back faces: it is inside a closed mesh, or
     /// deep in one with few holes.
-    pub fn surrounds(&self, p: &Point3<f64>) -> bool {
+    pub fn is_enclosed(&self, p: &Point3<f64>) -> bool {
         let from = p - self.centre;
         if Box3::of(self.bvh.nodes[0].aabb()).distance_squared(&from, &from) > 0.0 {
             return false;
@@ -240,7 +240,7 @@ impl MeshBvh {
         };
         let mut hit = None;
         self.visit(
-            &Nearby::WHOLE,
+            &MeshParts::WHOLE,
             max_travel_m.next_up(),
             |node| lower(&Box3::of(node)),
             |triangle, limit_m| {
@@ -271,7 +271,7 @@ impl MeshBvh {
         let mut nearest = None;
         let reach = (capsule.radius_m * capsule.radius_m).next_up();
         self.visit(
-            &Nearby::WHOLE,
+            &MeshParts::WHOLE,
             reach,
             |node| lower(&Box3::of(node)),
             |triangle, limit| {
@@ -324,7 +324,7 @@ impl MeshBvh {
     #[inline]
     pub(super) fn visit(
         &self,
-        parts: &Nearby,
+        parts: &MeshParts,
         mut limit: f64,
         lower: impl Fn(&Aabb) -> f64,
         mut ask: impl FnMut(u32, f64) -> f64,
@@ -380,12 +380,12 @@ const MOST: usize = 8;
 
 /// Parts of a mesh that contain every triangle within some ball, and perhaps others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Nearby {
+pub struct MeshParts {
     nodes: [u32; MOST],
     count: usize,
 }
 
-impl Nearby {
+impl MeshParts {
     /// The whole mesh.
     pub(super) const WHOLE: Self = Self { nodes: [0; MOST], count: 1 };
 
@@ -468,12 +468,12 @@ mod tests {
                 return Ok(());
             };
             let max_m = (radius_m - (start - centre).norm()).max(0.0);
-            let distance_m = |near: &Nearby| {
+            let distance_m = |near: &MeshParts| {
                 bvh.ray_near(near, &start, &direction, max_m).map(|hit| hit.distance_m)
             };
-            prop_assert_eq!(distance_m(&near), distance_m(&Nearby::WHOLE));
-            let touches = |near: &Nearby| bvh.touches_near(near, &start, part * max_m);
-            prop_assert_eq!(touches(&near), touches(&Nearby::WHOLE));
+            prop_assert_eq!(distance_m(&near), distance_m(&MeshParts::WHOLE));
+            let touches = |near: &MeshParts| bvh.touches_near(near, &start, part * max_m);
+            prop_assert_eq!(touches(&near), touches(&MeshParts::WHOLE));
         }
     }
 }

@@ -67,13 +67,13 @@ mod tests {
     use super::coarse;
     use crate::bvh::MeshBvh;
     use crate::mesh::Mesh;
-    use crate::solids::{ball, block};
+    use crate::solids::{box_mesh, sphere_mesh};
     use nalgebra::Point3;
 
     /// A wall of 2 mm with cells of 9 mm keeps its two sides.
     #[test]
     fn a_coarse_mesh_is_near_the_fine_one_and_as_closed() {
-        let (points, triangles) = ball(Point3::origin(), 0.05, 100);
+        let (points, triangles) = sphere_mesh(Point3::origin(), 0.05, 100);
         let wall = points.iter().map(|p| Point3::new(p.x, 0.02 * p.y, p.z)).collect();
         for (points, factor) in [(points, 0.97), (wall, 0.9)] {
             let (fine, _) = Mesh::new(&points, &triangles).unwrap();
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn what_is_coarse_stays_as_it_is() {
-        let (points, triangles) = block([0.0; 3], [0.1; 3]);
+        let (points, triangles) = box_mesh([0.0; 3], [0.1; 3]);
         let (mesh, _) = Mesh::new(&points, &triangles).unwrap();
         assert_eq!(coarse(&mesh, 12), (mesh.vertices().to_vec(), mesh.triangles().to_vec()));
     }

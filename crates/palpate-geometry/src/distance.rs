@@ -15,7 +15,7 @@ pub struct OrientedBox {
 
 impl OrientedBox {
     /// Returns the box along the axes of `W` with these smallest and largest coordinates.
-    pub fn between((low, high): (Point3<f64>, Point3<f64>)) -> Self {
+    pub fn from_corners((low, high): (Point3<f64>, Point3<f64>)) -> Self {
         let middle = Translation3::from(nalgebra::center(&low, &high).coords);
         Self { x_wb: middle.into(), half_m: (high - low) / 2.0 }
     }

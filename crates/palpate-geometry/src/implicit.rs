@@ -137,7 +137,7 @@ impl Field {
     }
 
     /// Returns the solid with a layer of `thickness_m` added (negative: removed).
-    pub fn grown(self, thickness_m: f64) -> Self {
+    pub fn offset(self, thickness_m: f64) -> Self {
         Self { value: self.value - thickness_m, ..self }
     }
 

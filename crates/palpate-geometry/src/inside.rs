@@ -8,7 +8,7 @@
 //! from both of its ends.
 
 use super::bounds::SingleSlab;
-use super::bvh::{MeshBvh, Nearby};
+use super::bvh::{MeshBvh, MeshParts};
 use super::primitives::Line;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
@@ -34,7 +34,7 @@ impl Crossing {
 impl MeshBvh {
     /// Reports every crossing of the infinite ray from `origin` with the mesh, in no particular
     /// order. A crossing through an edge is reported for both triangles.
-    pub fn cross(
+    pub fn crossings(
         &self,
         origin: &Point3<f64>,
         direction: &UnitVector3<f64>,
@@ -43,7 +43,7 @@ impl MeshBvh {
         let slab = SingleSlab::new(&self.local(origin), direction);
         let line = Line::along(direction);
         self.visit(
-            &Nearby::WHOLE,
+            &MeshParts::WHOLE,
             f64::INFINITY,
             |node| slab.enter_m(node),
             |triangle, limit| {
@@ -68,7 +68,7 @@ impl MeshBvh {
             let direction = UnitVector3::new_normalize(Vector3::from(*axis));
             let [ahead, behind] = [direction, -direction].map(|way| {
                 let (mut left, mut any) = (0, false);
-                self.cross(p, &way, |crossing| {
+                self.crossings(p, &way, |crossing| {
                     left -= crossing.sign();
                     any = true;
                 });
@@ -103,7 +103,7 @@ pub fn spans_inside(crossings: &mut [Crossing], spans: &mut Vec<[f64; 2]>) {
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
-    use crate::solids::{Triangles, ball, block};
+    use crate::solids::{Triangles, box_mesh, sphere_mesh};
     use proptest::prelude::*;
 
     fn all_of(pieces: &[Triangles]) -> MeshBvh {
@@ -162,8 +162,8 @@ mod tests {
                 ([1.5, 1.0, 0.0], [3.0, 2.0, 3.0]),
                 ([0.25, 0.5, 0.5], [0.75, 1.0, 1.0]),
             ];
-            let mut pieces: Vec<Triangles> = boxes.iter().map(|(l, h)| block(*l, *h)).collect();
-            pieces.push(ball(Point3::new(3.8, 3.8, 3.8), 0.5, 8));
+            let mut pieces: Vec<Triangles> = boxes.iter().map(|(l, h)| box_mesh(*l, *h)).collect();
+            pieces.push(sphere_mesh(Point3::new(3.8, 3.8, 3.8), 0.5, 8));
             let p = Point3::from(at);
             let from_ball = (p - Point3::new(3.8, 3.8, 3.8)).norm();
             prop_assume!(!(0.4..0.51).contains(&from_ball));
@@ -182,7 +182,8 @@ mod tests {
     /// Boxes that share a whole face keep one copy of its triangles.
     #[test]
     fn a_face_shared_by_two_boxes_may_belong_to_either() {
-        let two = all_of(&[block([0.0; 3], [1.0; 3]), block([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])]);
+        let two =
+            all_of(&[box_mesh([0.0; 3], [1.0; 3]), box_mesh([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])]);
         assert_eq!(two.mesh().triangles().len(), 22);
         for x in [0.03, 0.3, 0.97, 1.03, 1.6] {
             for (y, z) in [(0.5, 0.5), (0.1, 0.9), (0.93, 0.27)] {
@@ -198,13 +199,13 @@ mod tests {
     #[test]
     fn a_line_is_inside_from_where_it_enters_to_where_it_leaves() {
         let boxes = all_of(&[
-            block([0.0; 3], [3.0; 3]),
-            block([1.0; 3], [2.0; 3]),
-            block([4.0, 1.0, 1.0], [5.0, 2.0, 2.0]),
+            box_mesh([0.0; 3], [3.0; 3]),
+            box_mesh([1.0; 3], [2.0; 3]),
+            box_mesh([4.0, 1.0, 1.0], [5.0, 2.0, 2.0]),
         ]);
         let mut crossings = Vec::new();
         let start = Point3::new(-1.0, 1.6, 1.7);
-        boxes.cross(&start, &Vector3::x_axis(), |crossing| crossings.push(crossing));
+        boxes.crossings(&start, &Vector3::x_axis(), |crossing| crossings.push(crossing));
         assert_eq!(crossings.len(), 6);
         let mut spans = vec![[7.0; 2]];
         spans_inside(&mut crossings, &mut spans);

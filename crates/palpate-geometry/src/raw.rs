@@ -1,7 +1,7 @@
 //! Output of the importers: unchecked vertices and triangles.
 
 use nalgebra::Point3;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::fmt;
 
 /// Largest number of triangles, so that a corrupt count cannot exhaust memory.
@@ -52,7 +52,7 @@ impl RawMesh {
         name: impl Into<String>,
         vertices: impl ExactSizeIterator<Item = Point3<f64>>,
         triangles: impl IntoIterator<Item = [u32; 3]>,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         let part = Part {
             name: name.into(),
             first_vertex: self.vertices.len(),
@@ -60,18 +60,18 @@ impl RawMesh {
         };
         let (base, count) = (part.first_vertex, vertices.len());
         if count > MAX_VERTICES - base {
-            return Err(Invalid::new(format!("holds more than {MAX_VERTICES} vertices")));
+            return Err(InputError::new(format!("holds more than {MAX_VERTICES} vertices")));
         }
         self.vertices.extend(vertices);
         for (number, triangle) in triangles.into_iter().enumerate() {
             if let Some(&index) = triangle.iter().find(|&&index| index as usize >= count) {
                 let triangle = Element { part: part.name, index: number };
-                return Err(Invalid::new(format!(
+                return Err(InputError::new(format!(
                     "triangle {triangle} refers to vertex {index}, but there are {count}"
                 )));
             }
             if self.triangles.len() == MAX_TRIANGLES {
-                return Err(Invalid::new(format!("holds more than {MAX_TRIANGLES} triangles")));
+                return Err(InputError::new(format!("holds more than {MAX_TRIANGLES} triangles")));
             }
             self.triangles.push(triangle.map(|index| base as u32 + index));
         }

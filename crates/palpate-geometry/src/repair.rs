@@ -5,9 +5,9 @@ use nalgebra::Point3;
 
 use super::mesh::Mesh;
 use super::raw::{Element, RawMesh};
-use super::report::{Finding, MeshReport};
+use super::report::{DefectCount, MeshReport};
 use super::topology::orient;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 
 /// Largest coordinate, in metres; a larger one indicates a wrong unit.
 pub const MAX_COORDINATE_M: f64 = 1e4;
@@ -26,9 +26,9 @@ const MIN_ASPECT: f64 = 1e-12;
 ///
 /// # Errors
 /// If no triangle has an area, or a vertex is not finite or too far away.
-pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
+pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), InputError> {
     if raw.triangles.is_empty() {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "holds no triangles ({} primitives of points or lines were skipped)",
             raw.skipped_primitives
         )));
@@ -42,10 +42,10 @@ pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
         welded: raw.vertices.len() - vertices.len(),
         ..MeshReport::default()
     };
-    let (mut triangles, sources) = sift(&raw, &vertices, &canonical, &mut report);
+    let (mut triangles, sources) = remove_invalid(&raw, &vertices, &canonical, &mut report);
     if triangles.is_empty() {
         let count = raw.triangles.len();
-        return Err(Invalid::new(format!("all {count} triangles are degenerate")));
+        return Err(InputError::new(format!("all {count} triangles are degenerate")));
     }
     let topology = orient(&triangles, |triangle| {
         // Relative to a vertex, so that a mesh far from the origin loses no digits.
@@ -56,7 +56,7 @@ pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
         triangles[triangle as usize].swap(1, 2);
     }
     let name = |triangle: &u32| raw.triangle_element(sources[*triangle as usize] as usize);
-    let finding = |list: &[u32]| Finding { count: list.len(), first: list.first().map(name) };
+    let finding = |list: &[u32]| DefectCount { count: list.len(), first: list.first().map(name) };
     report.flipped = finding(&topology.flip);
     report.border_edges = finding(&topology.border);
     report.non_manifold_edges = finding(&topology.non_manifold);
@@ -75,30 +75,30 @@ impl Mesh {
     pub fn new(
         vertices: &[Point3<f64>],
         triangles: &[[u32; 3]],
-    ) -> Result<(Self, MeshReport), Invalid> {
+    ) -> Result<(Self, MeshReport), InputError> {
         let mut raw = RawMesh::default();
         raw.add_part("the mesh", vertices.iter().copied(), triangles.iter().copied())?;
         repair(raw)
     }
 }
 
-fn check_positions(raw: &RawMesh) -> Result<(), Invalid> {
+fn check_positions(raw: &RawMesh) -> Result<(), InputError> {
     for (number, vertex) in raw.vertices.iter().enumerate() {
         let farthest_m = vertex.coords.amax();
         let element = || raw.vertex_element(number);
         if !vertex.iter().all(|coordinate| coordinate.is_finite()) {
             let at_m: [f64; 3] = vertex.coords.into();
-            return Err(Invalid::new(format!("vertex {} is not finite: {at_m:?}", element())));
+            return Err(InputError::new(format!("vertex {} is not finite: {at_m:?}", element())));
         }
         if farthest_m > MAX_COORDINATE_M {
-            let too_far = Invalid::new(format!(
+            let too_far = InputError::new(format!(
                 "vertex {} lies {farthest_m:e} m from the origin, more than {MAX_COORDINATE_M} m",
                 element()
             ));
             let mut units = [("mm", 1e-3), ("um", 1e-6)].into_iter();
             return Err(match units.find(|(_, metres)| farthest_m * metres <= MAX_COORDINATE_M) {
                 Some((unit, _)) => {
-                    too_far.mend(format!("for a file in {unit}, set unit = \"{unit}\""))
+                    too_far.remedy(format!("for a file in {unit}, set unit = \"{unit}\""))
                 }
                 None => too_far,
             });
@@ -129,7 +129,7 @@ fn weld(vertices: &[Point3<f64>]) -> (Vec<Point3<f64>>, Vec<u32>) {
 
 /// Removes degenerate and duplicate triangles. Returns the rest over merged vertices, and the raw
 /// index of each.
-fn sift(
+fn remove_invalid(
     raw: &RawMesh,
     vertices: &[Point3<f64>],
     canonical: &[u32],
@@ -188,7 +188,7 @@ fn compact(vertices: Vec<Point3<f64>>, mut triangles: Vec<[u32; 3]>) -> Mesh {
     Mesh::from_sound_parts(kept.collect(), triangles)
 }
 
-impl Finding {
+impl DefectCount {
     fn add(&mut self, element: impl FnOnce() -> Element) {
         self.count += 1;
         self.first.get_or_insert_with(element);

@@ -15,14 +15,14 @@ pub const MAX_TOUCHABLE_M: f64 = 5.0;
 
 /// Number of occurrences of a defect, and the first triangle with it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Finding {
+pub struct DefectCount {
     /// Number of occurrences.
     pub count: usize,
     /// First triangle, as named by its source.
     pub first: Option<Element>,
 }
 
-impl fmt::Display for Finding {
+impl fmt::Display for DefectCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.count)?;
         match &self.first {
@@ -58,15 +58,15 @@ pub struct MeshReport {
     /// Number of vertices merged into an earlier one at the same position.
     pub welded: usize,
     /// Triangles without area, removed.
-    pub degenerate_removed: Finding,
+    pub degenerate_removed: DefectCount,
     /// Triangles with the vertices of an earlier one, removed.
-    pub duplicates_removed: Finding,
+    pub duplicates_removed: DefectCount,
     /// Triangles whose winding was reversed.
-    pub flipped: Finding,
+    pub flipped: DefectCount,
     /// Edges with one triangle.
-    pub border_edges: Finding,
+    pub border_edges: DefectCount,
     /// Edges with three or more triangles.
-    pub non_manifold_edges: Finding,
+    pub non_manifold_edges: DefectCount,
     /// Components, connected over edges with two triangles.
     pub components: usize,
     /// Components that are one-sided, like a Möbius strip.

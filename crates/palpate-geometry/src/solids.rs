@@ -35,7 +35,7 @@ pub fn normals(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<
 }
 
 /// Returns a box between two corners.
-pub fn block(low: [f64; 3], high: [f64; 3]) -> Triangles {
+pub fn box_mesh(low: [f64; 3], high: [f64; 3]) -> Triangles {
     let corner = |i: usize| {
         Point3::from(std::array::from_fn(
             |axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] },
@@ -45,7 +45,7 @@ pub fn block(low: [f64; 3], high: [f64; 3]) -> Triangles {
 }
 
 /// Returns a sphere of `rings` rings from pole to pole along y, with twice as many corners around.
-pub fn ball(centre: Point3<f64>, radius_m: f64, rings: u32) -> Triangles {
+pub fn sphere_mesh(centre: Point3<f64>, radius_m: f64, rings: u32) -> Triangles {
     use std::f64::consts::{PI, TAU};
     let turns = 2 * rings;
     let mut points = vec![centre + Vector3::y() * radius_m, centre - Vector3::y() * radius_m];

@@ -15,7 +15,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
 /// A point of a mesh's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
+pub struct SurfacePoint {
     /// Position, in metres.
     pub point: Point3<f64>,
     /// Index of the triangle that contains it.
@@ -44,7 +44,7 @@ pub fn direction(number: usize, count: usize) -> UnitVector3<f64> {
 /// Returns `count` points of the surface, each for an equal part of its area: one at the centre of
 /// each stratum of the area accumulated over triangles in their order; the position within a
 /// triangle follows from the sequence of the square, folded along the diagonal.
-pub fn over_surface(mesh: &Mesh, count: usize) -> Vec<Spot> {
+pub fn over_surface(mesh: &Mesh, count: usize) -> Vec<SurfacePoint> {
     let doubled_m2 = |[a, b, c]: [Point3<f64>; 3]| (b - a).cross(&(c - a)).norm();
     let stratum_m2 = mesh.iter_corners().map(doubled_m2).sum::<f64>() / count as f64;
     let mut spots = Vec::with_capacity(count);
@@ -56,7 +56,7 @@ pub fn over_surface(mesh: &Mesh, count: usize) -> Vec<Spot> {
             let (u, v) = if u + v > 1.0 { (1.0 - v, 1.0 - u) } else { (u, v) };
             let [a, b, c] = corners;
             let point = a + (b - a) * u + (c - a) * v;
-            spots.push(Spot { point, triangle: triangle as u32 });
+            spots.push(SurfacePoint { point, triangle: triangle as u32 });
         }
     }
     spots
@@ -65,7 +65,7 @@ pub fn over_surface(mesh: &Mesh, count: usize) -> Vec<Spot> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solids::{ball, block};
+    use crate::solids::{box_mesh, sphere_mesh};
 
     #[test]
     fn steps_are_powers_of_their_roots() {
@@ -90,7 +90,7 @@ mod tests {
     /// triangles, and every octant of a ball its eighth.
     #[test]
     fn points_lie_on_the_surface_in_proportion_to_its_area() {
-        let (vertices, triangles) = block([0.0; 3], [0.1, 0.2, 0.3]);
+        let (vertices, triangles) = box_mesh([0.0; 3], [0.1, 0.2, 0.3]);
         let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
         for count in [1, 7, 4000] {
             let spots = over_surface(&mesh, count);
@@ -105,7 +105,7 @@ mod tests {
                 }
             }
         }
-        let (vertices, triangles) = ball(Point3::origin(), 0.05, 24);
+        let (vertices, triangles) = sphere_mesh(Point3::origin(), 0.05, 24);
         let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
         let mut octants = [0_usize; 8];
         for spot in over_surface(&mesh, 4000) {

@@ -35,7 +35,7 @@ impl Implicit for Container {
         let body = side.intersection(lid, 0.014).intersection(floor, 0.014);
 
         let bead_height = Field::plane(p, point![0.0, 0.0, 0.096], Vector3::z());
-        let bead = side.grown(-0.002).tube(bead_height, 0.004);
+        let bead = side.offset(-0.002).tube(bead_height, 0.004);
         body.union(bead, 0.004)
     }
 

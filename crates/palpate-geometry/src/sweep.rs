@@ -89,12 +89,12 @@ impl Sweep {
         }
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let (a, b) = (&triangle[i], &triangle[j]);
-            offer(self.onto_edge(a, b));
-            offer(self.onto_corner(a));
+            offer(self.edge_travel(a, b));
+            offer(self.corner_travel(a));
             if !is_sphere {
-                offer(self.onto_edge(&far[i], &far[j]));
-                offer(self.onto_edge(a, &far[i]));
-                offer(self.onto_corner(&far[i]));
+                offer(self.edge_travel(&far[i], &far[j]));
+                offer(self.edge_travel(a, &far[i]));
+                offer(self.corner_travel(&far[i]));
                 self.side([a, b, &far[j], &far[i]], &mut offer);
             }
         }
@@ -128,7 +128,7 @@ impl Sweep {
     }
 
     /// The cylinder around an edge, without its ends.
-    fn onto_edge(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64> {
+    fn edge_travel(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64> {
         let (axis, length_m) = UnitVector3::try_new_and_get(b - a, 0.0)?;
         let arm = self.start - a;
         let (arm_along, speed_along) = (arm.dot(&axis), self.direction.dot(&axis));
@@ -146,7 +146,7 @@ impl Sweep {
     }
 
     /// The sphere around a corner.
-    fn onto_corner(&self, corner: &Point3<f64>) -> Option<f64> {
+    fn corner_travel(&self, corner: &Point3<f64>) -> Option<f64> {
         let arm = self.start - corner;
         let nearest_m = -arm.dot(&self.direction);
         let miss_squared = (arm + self.direction.scale(nearest_m)).norm_squared();

@@ -6,7 +6,7 @@
 
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::kernel::SquaredExponential;
-use palpate_gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
+use palpate_gp::{MeanModel, Observations, Posterior, SearchBox, TouchNoise};
 
 fn toy_m(x_m: f64) -> f64 {
     let wave = if x_m.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x_m).sin() } else { 0.0 };
@@ -15,7 +15,7 @@ fn toy_m(x_m: f64) -> f64 {
 
 fn main() -> Result<(), CovarianceError> {
     let search_box = SearchBox {
-        mean: Mean::Zero,
+        mean: MeanModel::Zero,
         length_scales: vec![(0.02, 4.0).into()],
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
@@ -25,7 +25,7 @@ fn main() -> Result<(), CovarianceError> {
     let grid: Vec<[f64; 1]> = (0..=400).map(|i| [-2.0 + 0.01 * f64::from(i)]).collect();
     let mut observations = Observations::new(1);
     for x_m in [-1.7, 0.1, 1.2] {
-        observations.push(&[x_m], toy_m(x_m));
+        observations.push_height(&[x_m], toy_m(x_m));
     }
     println!("heights  length m  signal m  largest sd m    rmse m    next x m");
     while observations.len() <= 30 {
@@ -48,7 +48,7 @@ fn main() -> Result<(), CovarianceError> {
             found.signal_sd,
             largest.sqrt(),
         );
-        observations.push(&[next_m], toy_m(next_m));
+        observations.push_height(&[next_m], toy_m(next_m));
     }
     Ok(())
 }

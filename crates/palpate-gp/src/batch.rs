@@ -19,7 +19,7 @@ const MANY: usize = 16;
 const FEW: usize = 8;
 
 /// Quantities computed at the places of one block.
-enum Asked<'a> {
+enum Requested<'a> {
     Means,
     Variances,
     Both,
@@ -40,7 +40,7 @@ impl Posterior {
     pub fn predict<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<Prediction> {
         let places: Vec<&[f64]> = places.into_iter().collect();
         let mut predictions = Vec::with_capacity(places.len());
-        self.in_blocks(&places, |_| Asked::Both, |prediction| predictions.push(prediction));
+        self.in_blocks(&places, |_| Requested::Both, |prediction| predictions.push(prediction));
         predictions
     }
 
@@ -48,7 +48,7 @@ impl Posterior {
     pub fn means<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
         let places: Vec<&[f64]> = places.into_iter().collect();
         let mut means = Vec::with_capacity(places.len());
-        self.in_blocks(&places, |_| Asked::Means, |prediction| means.push(prediction.mean));
+        self.in_blocks(&places, |_| Requested::Means, |prediction| means.push(prediction.mean));
         means
     }
 
@@ -59,11 +59,11 @@ impl Posterior {
         let mut variances = Vec::with_capacity(places.len());
         let mut gradients = gradients;
         let asked = |count: usize| match std::mem::take(&mut gradients) {
-            [] => Asked::Variances,
+            [] => Requested::Variances,
             all => {
                 let (now, later) = all.split_at_mut(count.min(all.len()));
                 gradients = later;
-                Asked::Gradients(now)
+                Requested::Gradients(now)
             }
         };
         self.in_blocks(&places, asked, |prediction| variances.push(prediction.variance));
@@ -73,7 +73,7 @@ impl Posterior {
     fn in_blocks<'a>(
         &self,
         places: &[&[f64]],
-        mut asked: impl FnMut(usize) -> Asked<'a>,
+        mut asked: impl FnMut(usize) -> Requested<'a>,
         mut tell: impl FnMut(Prediction),
     ) {
         let (mut many, mut few) = (Lanes::<MANY>::default(), Lanes::<FEW>::default());
@@ -92,24 +92,24 @@ impl<const N: usize> Lanes<N> {
         &mut self,
         posterior: &Posterior,
         places: &[&[f64]],
-        asked: Asked,
+        asked: Requested,
         tell: &mut impl FnMut(Prediction),
     ) {
-        self.correlate(posterior, places, matches!(asked, Asked::Gradients(_)));
+        self.correlate(posterior, places, matches!(asked, Requested::Gradients(_)));
         let mut predictions = [Prediction { mean: f64::NAN, variance: f64::NAN }; N];
-        if matches!(asked, Asked::Means | Asked::Both) {
+        if matches!(asked, Requested::Means | Requested::Both) {
             let mean = posterior.hyperparameters().mean;
             let sums = weighted(&self.correlations, posterior.weights());
             predictions.iter_mut().zip(sums).for_each(|(at, sum)| at.mean = mean + sum);
         }
-        if !matches!(asked, Asked::Means) {
+        if !matches!(asked, Requested::Means) {
             self.solved.clone_from(&self.correlations);
             let explained = posterior.factor().solve_lower_lanes(&mut self.solved);
             for (at, explained) in predictions.iter_mut().zip(explained) {
                 at.variance = posterior.remaining(explained);
             }
         }
-        if let Asked::Gradients(gradients) = asked {
+        if let Requested::Gradients(gradients) = asked {
             posterior.factor().solve_upper_lanes(&mut self.solved);
             self.differentiate(posterior, places, gradients);
         }

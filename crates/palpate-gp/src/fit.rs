@@ -5,8 +5,8 @@ use super::kernel::{Hyperparameters, KERNELS, Kernel};
 use super::likelihood::{Likelihood, ProfiledLikelihood};
 use super::observations::Observations;
 use super::scan::{Grid, Scan};
-use super::search_box::{Scale, SearchBox, TouchNoise};
-use crate::math::climb::{Climb, Manner, climb};
+use super::search_box::{SearchBox, SignalModel, TouchNoise};
+use crate::math::climb::{BfgsOptions, Climb, climb};
 use crate::math::optimize::{Bounds, Stop};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,7 @@ pub struct Fit {
     /// Largest residual standard deviation of a touch's height given the inducing touches, in the
     /// heights' unit, if the posterior is approximate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub left_sd: Option<f64>,
+    pub nystrom_residual_sd: Option<f64>,
     /// Number of factored covariance matrices, not counting those of the scan that grew by a row.
     pub factorisations: u32,
     /// Number of observations at the last scan of the whole box, in this fit or an earlier one that
@@ -51,16 +51,16 @@ const HALVED: usize = 1024;
 /// Sequence of fits of growing observations with one kernel; each starts from the last one's
 /// optimum.
 #[derive(Clone)]
-pub struct Refits {
+pub struct RefitSequence {
     kernel: &'static dyn Kernel,
     /// State of the search of the whole box, and of that with the sensor's noise.
-    free: Memory,
-    bound: Memory,
+    free: FitState,
+    bound: FitState,
 }
 
 /// State that one fit passes to the next.
 #[derive(Clone, Default)]
-struct Memory {
+struct FitState {
     last: Option<Fit>,
     /// Negative second derivatives at its optimum.
     curvature: Vec<f64>,
@@ -68,10 +68,10 @@ struct Memory {
     scan: Arc<Scan>,
 }
 
-impl Refits {
+impl RefitSequence {
     /// Creates an empty sequence.
     pub fn of(kernel: &'static dyn Kernel) -> Self {
-        Self { kernel, free: Memory::default(), bound: Memory::default() }
+        Self { kernel, free: FitState::default(), bound: FitState::default() }
     }
 
     /// Its kernel.
@@ -98,7 +98,7 @@ impl Refits {
     }
 }
 
-impl Memory {
+impl FitState {
     fn fit(
         &mut self,
         sought: &SearchBox,
@@ -121,7 +121,7 @@ impl Memory {
             match recent {
                 Some(last) => {
                     let mut start = sought.log_parameters(&last.hyperparameters);
-                    sought.shorten(&mut start, &lower, &upper);
+                    sought.shorter_lengths(&mut start, &lower, &upper);
                     search.climb(&start, None);
                 }
                 // A single fit has no successor, and no state needs to be stored.
@@ -139,7 +139,7 @@ impl Memory {
         }
         let factorisations = in_half + search.likelihood.factorisations();
         let (hyperparameters, log_likelihood, stop) = match search.best {
-            Some(Top { x, profile, stop, curvature, .. }) => {
+            Some(Maximum { x, profile, stop, curvature, .. }) => {
                 self.curvature = curvature;
                 let (lengths, noise) = sought.parameters(&x);
                 let at = Hyperparameters::new(profile.signal_sd, lengths, noise, profile.mean);
@@ -157,7 +157,7 @@ impl Memory {
             kernel: None,
             hyperparameters,
             log_likelihood,
-            left_sd: None,
+            nystrom_residual_sd: None,
             factorisations,
             scanned_at: recent.map_or(count, |last| last.scanned_at),
             stop,
@@ -178,7 +178,7 @@ impl SearchBox {
     /// A noise with a lower bound (the sensor's) is fitted, and is set to the bound if less would
     /// be more likely.
     pub fn fit(&self, kernel: &'static dyn Kernel, observations: &Observations) -> Fit {
-        Refits::of(kernel).fit(self, observations)
+        RefitSequence::of(kernel).fit(self, observations)
     }
 
     /// Returns the hyperparameters before any touch: the geometric middle of the box.
@@ -198,7 +198,8 @@ impl SearchBox {
 /// A climb ends where its predicted gain is below 1e-4 nat, which no data can resolve; most need a
 /// tenth of the budget. The first step is a third of the distance between two places of the scan;
 /// heuristics.
-const MANNER: Manner = Manner { first_step: 0.05, gain: 1e-4, relative_gain: 0.0, budget: 100 };
+const MANNER: BfgsOptions =
+    BfgsOptions { first_step: 0.05, gain: 1e-4, relative_gain: 0.0, budget: 100 };
 /// A climb is stopped if it would stay below the highest optimum even with this many times its
 /// predicted gain; a heuristic. See [`SearchBox::fit`] for the optima that this misses.
 const HOPE: f64 = 4.0;
@@ -215,7 +216,7 @@ const GAIN_MIN: f64 = 1e-6;
 const NEARLY_AS_LIKELY: f64 = 0.3;
 
 /// Highest optimum so far.
-struct Top {
+struct Maximum {
     x: Vec<f64>,
     score: f64,
     profile: ProfiledLikelihood,
@@ -231,10 +232,10 @@ struct Search<'a> {
     kernel: &'static dyn Kernel,
     observations: &'a Observations,
     likelihood: Likelihood<'a>,
-    scale: Scale,
+    scale: SignalModel,
     bounds: Bounds<'a>,
     /// Highest optimum; `None` while no covariance could be factored.
-    best: Option<Top>,
+    best: Option<Maximum>,
 }
 
 impl<'a> Search<'a> {
@@ -247,8 +248,8 @@ impl<'a> Search<'a> {
         upper: &'a [f64],
     ) -> Self {
         let scale = match sought.touch_noise {
-            TouchNoise::Known(noise_sd) => Scale::KnownNoise(noise_sd),
-            TouchNoise::Fitted | TouchNoise::AtLeast(_) => Scale::Best(sought.signal_sd),
+            TouchNoise::Known(noise_sd) => SignalModel::KnownNoise(noise_sd),
+            TouchNoise::Fitted | TouchNoise::AtLeast(_) => SignalModel::Best(sought.signal_sd),
         };
         let likelihood = Likelihood::new(kernel, sought.mean, observations);
         let bounds = Bounds { lower, upper };
@@ -267,13 +268,13 @@ impl<'a> Search<'a> {
         let (mut here, mut highest) = (None, f64::NEG_INFINITY);
         let is_worth = |climb: &Climb| {
             let Some(best) = &best else { return true };
-            let is_lower = climb.top().value < best.score;
+            let is_lower = climb.best().value < best.score;
             let apart = |((x, top), (lower, upper)): ((&f64, &f64), (&f64, &f64))| {
                 (x - top).abs() > SAME_TOP * (upper - lower)
             };
             let sides = bounds.lower.iter().zip(bounds.upper);
-            let is_apart = climb.top().x.iter().zip(&best.x).zip(sides).any(apart);
-            let is_hopeless = climb.is_measured() && climb.hope(HOPE) < best.score;
+            let is_apart = climb.best().x.iter().zip(&best.x).zip(sides).any(apart);
+            let is_hopeless = climb.is_measured() && climb.upper_bound(HOPE) < best.score;
             !(is_lower && (is_hopeless || !is_apart))
         };
         let start = Climb::new(*bounds, start, curvature, MANNER);
@@ -286,7 +287,7 @@ impl<'a> Search<'a> {
         });
         if let Some(profile) = profile.filter(|_| top.value > self.best_score() + GAIN_MIN) {
             let (x, score, stop) = (top.x, top.value, top.stop);
-            self.best = Some(Top { x, score, profile, stop, curvature });
+            self.best = Some(Maximum { x, score, profile, stop, curvature });
         }
     }
 
@@ -345,7 +346,7 @@ impl<'a> Search<'a> {
 fn score(
     sought: &SearchBox,
     likelihood: &mut Likelihood,
-    scale: &Scale,
+    scale: &SignalModel,
     x: &[f64],
     mut gradient: Option<&mut [f64]>,
     told: &mut Option<ProfiledLikelihood>,
@@ -364,7 +365,7 @@ fn score(
 }
 
 /// Returns log likelihood plus log priors at `x`.
-fn with_priors(sought: &SearchBox, scale: &Scale, x: &[f64], at: &ProfiledLikelihood) -> f64 {
+fn with_priors(sought: &SearchBox, scale: &SignalModel, x: &[f64], at: &ProfiledLikelihood) -> f64 {
     let priors = sought.ranges().zip(x).filter_map(|(range, &log)| {
         let prior = range.prior?;
         Some(prior.log_density(log))
@@ -374,18 +375,19 @@ fn with_priors(sought: &SearchBox, scale: &Scale, x: &[f64], at: &ProfiledLikeli
 
 /// One or several kernels, of which each fit selects the most likely.
 #[derive(Clone)]
-pub struct Choice {
+pub struct KernelSelection {
     /// Fits by kernel name.
-    candidates: Vec<(&'static str, Refits)>,
+    candidates: Vec<(&'static str, RefitSequence)>,
     chosen: usize,
 }
 
-impl Choice {
+impl KernelSelection {
     /// Creates a selection between the kernels of these names, the first one until there is a fit.
     /// Unknown names are skipped; if none is left, the kernel is the squared exponential.
     pub fn between(names: &[String]) -> Self {
-        let candidate =
-            |(name, kernel): &(&'static str, &'static dyn Kernel)| (*name, Refits::of(*kernel));
+        let candidate = |(name, kernel): &(&'static str, &'static dyn Kernel)| {
+            (*name, RefitSequence::of(*kernel))
+        };
         let known = KERNELS.iter().filter(|(name, _)| names.iter().any(|asked| asked == name));
         let mut candidates: Vec<_> = known.map(candidate).collect();
         if candidates.is_empty() {

@@ -32,7 +32,7 @@ const BLOCK: usize = 256;
 const JITTER: f64 = 1e-15;
 
 /// Approximate posterior from inducing touches.
-pub struct Induced {
+pub struct InducingPosterior {
     /// Posterior given the inducing touches.
     pub posterior: Posterior,
     /// Largest residual standard deviation of another touch's height given the inducing ones, in
@@ -45,12 +45,12 @@ impl Posterior {
     ///
     /// # Errors
     /// [`CovarianceError`] if an observation is not finite, or the covariance cannot be factored.
-    pub fn through(
+    pub fn with_inducing_points(
         most: usize,
         kernel: &'static dyn Kernel,
         hyperparameters: Hyperparameters,
         observations: &Observations,
-    ) -> Result<Induced, CovarianceError> {
+    ) -> Result<InducingPosterior, CovarianceError> {
         if let Some(index) = observations.first_not_finite() {
             return Err(CovarianceError::NotFinite { index });
         }
@@ -66,7 +66,7 @@ impl Posterior {
         let kept = kept.with_heights(heights.collect());
         let left_sd = hyperparameters.signal_sd * left_variance.sqrt();
         let posterior = Self::factored(kernel, hyperparameters, kept, &dense);
-        Ok(Induced { posterior, left_sd })
+        Ok(InducingPosterior { posterior, left_sd })
     }
 }
 

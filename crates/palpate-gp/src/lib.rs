@@ -74,8 +74,8 @@ mod scan;
 pub mod search_box;
 mod tiles;
 
-pub use fit::{Fit, Refits};
+pub use fit::{Fit, RefitSequence};
 pub use kernel::{Hyperparameters, Kernel};
 pub use observations::{NoiseRatio, Observation, Observations, Slope};
 pub use posterior::Posterior;
-pub use search_box::{LogNormal, Mean, Range, Scale, SearchBox, TouchNoise};
+pub use search_box::{LogNormal, MeanModel, Range, SearchBox, SignalModel, TouchNoise};

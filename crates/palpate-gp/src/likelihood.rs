@@ -6,8 +6,8 @@ use super::covariance::{Correlations, batches};
 use super::dense::Dense;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{NoiseRatio, Observations};
-use super::search_box::Mean;
-use super::search_box::Scale;
+use super::search_box::MeanModel;
+use super::search_box::SignalModel;
 use crate::math::simd::{widest, widest_dot};
 
 /// Log marginal likelihood of hyperparameters given fixed observations, with buffers kept between
@@ -20,7 +20,7 @@ use crate::math::simd::{widest, widest_dot};
 /// density is that of the slope.
 pub struct Likelihood<'a> {
     kernel: &'static dyn Kernel,
-    mean: Mean,
+    mean: MeanModel,
     observations: &'a Observations,
     dense: Dense,
     /// L⁻¹·y, then A⁻¹·y if a gradient is requested.
@@ -54,7 +54,11 @@ pub(super) fn of_height(fit: f64, signal_sd: f64, order: usize, log_determinant:
 
 impl<'a> Likelihood<'a> {
     /// Prepares the likelihood of hyperparameters given `observations`.
-    pub fn new(kernel: &'static dyn Kernel, mean: Mean, observations: &'a Observations) -> Self {
+    pub fn new(
+        kernel: &'static dyn Kernel,
+        mean: MeanModel,
+        observations: &'a Observations,
+    ) -> Self {
         let count = observations.order();
         Self {
             kernel,
@@ -108,7 +112,7 @@ impl<'a> Likelihood<'a> {
         &mut self,
         length_scales: &[f64],
         noise_ratio: impl Into<NoiseRatio>,
-        scale: &Scale,
+        scale: &SignalModel,
         gradient: Option<&mut [f64]>,
     ) -> Result<ProfiledLikelihood, CovarianceError> {
         let noise = noise_ratio.into();
@@ -123,7 +127,7 @@ impl<'a> Likelihood<'a> {
             self.gradient(signal2, length_scales, noise, gradient);
             // At the optimal signal_sd the value is stationary in it; with a known noise, signal_sd
             // decreases as the ratio increases.
-            if let (Scale::KnownNoise(_), Some(by_noise)) =
+            if let (SignalModel::KnownNoise(_), Some(by_noise)) =
                 (scale, gradient.get_mut(length_scales.len()))
             {
                 *by_noise -= fit / signal2 - count as f64;

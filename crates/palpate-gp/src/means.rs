@@ -7,7 +7,7 @@ use super::posterior::{Posterior, Scratch};
 use crate::math::simd::{widest, widest_dot, widest_fn};
 
 /// Fixed places with their correlations with the observations so far.
-pub struct Means {
+pub struct FixedPlaceMeans {
     places: Observations,
     /// Correlations of each place with all initially observed numbers, place by place.
     first: Vec<f64>,
@@ -19,7 +19,7 @@ pub struct Means {
     means: Vec<f64>,
 }
 
-impl Means {
+impl FixedPlaceMeans {
     /// Prepares for `places`, with the current observations of `belief`.
     pub fn at<'a>(belief: &Posterior, places: impl Iterator<Item = &'a [f64]>) -> Self {
         let observations = belief.observations();
@@ -27,7 +27,7 @@ impl Means {
         let mut first = Vec::new();
         let mut scratch = Scratch::default();
         for place in places {
-            all.push(place, 0.0);
+            all.push_height(place, 0.0);
             first.extend_from_slice(belief.mean_with_correlations(place, &mut scratch).1);
         }
         let (order, count) = (observations.order(), observations.len());
@@ -243,14 +243,14 @@ mod tests {
                 let slope = Slope { gradient: &[0.3, -0.1], noise: 1.0 };
                 let slope = is_sloped.then_some(slope);
                 let height = (3.0 * place[0]).sin() + place[1];
-                observations.take_in(&Observation { place: &place, height, noise: 1.0, slope });
+                observations.push(&Observation { place: &place, height, noise: 1.0, slope });
             }
             let noise = crate::NoiseRatio { height: 0.01, slope: 0.1 };
             let at = Hyperparameters::new(0.7, vec![0.4, 0.6], noise, 0.2);
             let mut belief = Posterior::new(&Matern52, at, observations).unwrap();
             let places: Vec<[f64; 2]> =
                 (0..37).map(|i| [0.03 * f64::from(i), (0.7 * f64::from(i)).fract()]).collect();
-            let mut means = Means::at(&belief, places.iter().map(|place| &place[..]));
+            let mut means = FixedPlaceMeans::at(&belief, places.iter().map(|place| &place[..]));
             for added in [[0.5, 0.5], [0.1, 0.9]] {
                 let mut scratch = Scratch::default();
                 for (place, mean) in places.iter().zip(means.of(&belief)) {
@@ -272,7 +272,7 @@ mod tests {
             let gradient = [number(), number(), number()];
             let slope = (i % 3 > 0).then_some(Slope { gradient: &gradient, noise: 1.0 });
             let height = number();
-            observations.take_in(&Observation { place: &place, height, noise: 1.0, slope });
+            observations.push(&Observation { place: &place, height, noise: 1.0, slope });
         }
         let kernels: [&'static dyn Kernel; 2] = [&Matern52, &SquaredExponential];
         for kernel in kernels {

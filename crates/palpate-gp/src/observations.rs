@@ -86,12 +86,12 @@ impl Observations {
     }
 
     /// Adds a height; `place` has `dimension` coordinates.
-    pub fn push(&mut self, place: &[f64], height: f64) {
-        self.take_in(&Observation::height(place, height));
+    pub fn push_height(&mut self, place: &[f64], height: f64) {
+        self.push(&Observation::height(place, height));
     }
 
     /// Adds one observation; its place, and its slope if it has one, have `dimension` coordinates.
-    pub fn take_in(&mut self, observation: &Observation) {
+    pub fn push(&mut self, observation: &Observation) {
         self.starts.push(self.order());
         for (column, at) in self.columns.iter_mut().zip(observation.place) {
             column.push(*at);
@@ -125,7 +125,7 @@ impl Observations {
             let place: Vec<f64> = self.place(i).collect();
             let noise = self.slope_noise2[i].sqrt();
             let gradient = self.slope(i);
-            some.take_in(&Observation {
+            some.push(&Observation {
                 place: &place,
                 height: self.heights[i],
                 noise: self.height_noise2[i].sqrt(),
@@ -138,7 +138,7 @@ impl Observations {
     /// Returns heights of 0 at the places of the observations `indices`.
     pub(super) fn places(&self, indices: &[usize]) -> Self {
         let mut places = Self::new(self.dimension());
-        indices.iter().for_each(|&i| places.push(&self.place(i).collect::<Vec<f64>>(), 0.0));
+        indices.iter().for_each(|&i| places.push_height(&self.place(i).collect::<Vec<f64>>(), 0.0));
         places
     }
 

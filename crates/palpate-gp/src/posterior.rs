@@ -74,14 +74,14 @@ impl Posterior {
     /// If the enlarged covariance is not positive definite; the posterior is then unchanged, and
     /// [`new`](Self::new) would find the necessary jitter.
     pub fn add(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
-        self.take_in(&Observation::height(place, height))
+        self.push(&Observation::height(place, height))
     }
 
     /// Adds any observation, like [`add`](Self::add).
     ///
     /// # Errors
     /// The same as [`add`](Self::add).
-    pub fn take_in(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
+    pub fn push(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
         self.append(observation)?;
         self.weigh();
         Ok(())
@@ -110,7 +110,7 @@ impl Posterior {
                 return Err(indefinite);
             }
         }
-        self.observations.take_in(observation);
+        self.observations.push(observation);
         Ok(())
     }
 
@@ -141,7 +141,7 @@ impl Posterior {
             return Ok(fantasy);
         }
         let mut observations = self.observations.clone();
-        places.for_each(|place| observations.push(place, 0.0));
+        places.for_each(|place| observations.push_height(place, 0.0));
         Self::new(self.kernel, self.hyperparameters.clone(), observations)
     }
 
@@ -206,7 +206,7 @@ impl Posterior {
     /// Returns the leave-one-out z-scores of the heights: the deviation of each from its prediction
     /// by all others, in standard deviations, z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the covariance s²·A
     /// (Rasmussen & Williams 2006, Eqs. 5.10 to 5.12). n³/2 operations.
-    pub fn left_out(&self) -> Vec<f64> {
+    pub fn loo_z_scores(&self) -> Vec<f64> {
         let mut unit = Vec::new();
         let z = |i: usize| {
             let at = self.observations.start(i);
@@ -221,7 +221,7 @@ impl Posterior {
 
     /// Multiplies every standard deviation, of surface and noise, by `factor`; the means are
     /// unchanged.
-    pub fn widen(&mut self, factor: f64) {
+    pub fn inflate(&mut self, factor: f64) {
         let Hyperparameters { signal_sd, noise_sd, slope_noise_sd, .. } = &mut self.hyperparameters;
         [signal_sd, noise_sd, slope_noise_sd].into_iter().for_each(|sd| *sd *= factor);
     }

@@ -21,7 +21,7 @@ impl<'a> Reduction<'a> {
         let mut whitened = Vec::new();
         let mut scratch = Scratch::default();
         for place in references {
-            places.push(place, 0.0);
+            places.push_height(place, 0.0);
             posterior.whiten(place, &mut scratch);
             whitened.extend_from_slice(&scratch.solved);
         }

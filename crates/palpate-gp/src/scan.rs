@@ -9,9 +9,9 @@ use super::kernel::Kernel;
 use super::likelihood;
 use super::likelihood::ProfiledLikelihood;
 use super::observations::Observations;
-use super::search_box::Mean;
-use super::search_box::Scale;
+use super::search_box::MeanModel;
 use super::search_box::SearchBox;
+use super::search_box::SignalModel;
 use crate::math::optimize::Bounds;
 use crate::math::simd::widest_dot;
 
@@ -176,7 +176,7 @@ struct Point {
     ones: Vec<f64>,
     log_determinant: f64,
     /// Whether its covariance cannot be factored without jitter.
-    is_lost: bool,
+    is_singular: bool,
 }
 
 impl Scan {
@@ -186,7 +186,7 @@ impl Scan {
     pub(super) fn profiles(
         &mut self,
         sought: &SearchBox,
-        (grid, scale): (&Grid, &Scale),
+        (grid, scale): (&Grid, &SignalModel),
         kernel: &dyn Kernel,
         observations: &Observations,
     ) -> Vec<Option<ProfiledLikelihood>> {
@@ -215,7 +215,7 @@ impl Scan {
             }
             for (point, noise) in points.iter().zip(&ratios) {
                 let profile = || point.profile(sought.mean, scale, noise.height, observations);
-                profiles.push((!point.is_lost).then(profile));
+                profiles.push((!point.is_singular).then(profile));
             }
         }
         self.taken.clone_from(observations);
@@ -230,13 +230,13 @@ impl Point {
         self.heights.clear();
         self.ones.clear();
         self.log_determinant = 0.0;
-        self.is_lost = false;
+        self.is_singular = false;
     }
 
     fn append(&mut self, row: &[f64], height: f64) {
-        self.is_lost = self.is_lost || self.factor.append(row).is_err();
+        self.is_singular = self.is_singular || self.factor.append(row).is_err();
         let count = row.len() - 1;
-        if self.is_lost {
+        if self.is_singular {
             self.heights.push(f64::NAN);
             return;
         }
@@ -251,16 +251,16 @@ impl Point {
 
     fn profile(
         &self,
-        mean: Mean,
-        scale: &Scale,
+        mean: MeanModel,
+        scale: &SignalModel,
         noise: f64,
         observations: &Observations,
     ) -> ProfiledLikelihood {
         let count = observations.len();
         let mean = match mean {
-            Mean::Zero => 0.0,
-            Mean::Data => observations.heights().iter().sum::<f64>() / count.max(1) as f64,
-            Mean::Constant => {
+            MeanModel::Zero => 0.0,
+            MeanModel::Data => observations.heights().iter().sum::<f64>() / count.max(1) as f64,
+            MeanModel::Constant => {
                 widest_dot(&self.ones, &self.heights) / widest_dot(&self.ones, &self.ones)
             }
         };

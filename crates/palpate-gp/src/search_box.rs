@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug)]
 pub struct SearchBox {
     /// Model of the prior mean.
-    pub mean: Mean,
+    pub mean: MeanModel,
     /// Bounds of each length scale, in the unit of the inputs.
     pub length_scales: Vec<Range>,
     /// Bounds of the noise, as a fraction of the signal's standard deviation. If the noise is
@@ -76,7 +76,7 @@ impl SearchBox {
 
     /// Moves to a third of the lengths and the middle noises: a start from which a fit in a corner
     /// of its box detects that new touches show a rougher surface.
-    pub(super) fn shorten(&self, logs: &mut [f64], lower: &[f64], upper: &[f64]) {
+    pub(super) fn shorter_lengths(&self, logs: &mut [f64], lower: &[f64], upper: &[f64]) {
         let lengths = self.length_scales.len();
         logs.iter_mut().take(lengths).for_each(|log| *log -= 3f64.ln());
         for (noise, (lower, upper)) in logs.iter_mut().zip(lower.iter().zip(upper)).skip(lengths) {
@@ -137,14 +137,14 @@ impl LogNormal {
 
 /// Model of the signal's standard deviation s, given the other hyperparameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scale {
+pub enum SignalModel {
     /// Most probable s in a range, with the noise as a fraction of it.
     Best(Range),
     /// s follows from a known touch noise and its ratio.
     KnownNoise(f64),
 }
 
-impl Scale {
+impl SignalModel {
     /// Returns s, given the fit F = yᵀA⁻¹y of `count` heights and the noise ratio.
     ///
     /// Maximises −½F/s² − n·ln s plus the log prior of s. Without a prior, s is sqrt(F/n); with
@@ -179,7 +179,7 @@ impl Scale {
 /// Model of the prior mean in a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Mean {
+pub enum MeanModel {
     /// Zero, as in Yi et al. 2016.
     #[default]
     Zero,
@@ -189,7 +189,7 @@ pub enum Mean {
     Constant,
 }
 
-impl Mean {
+impl MeanModel {
     /// Returns the mean of `observations` whose covariance is proportional to the factored matrix;
     /// the buffers are overwritten.
     pub(super) fn of(
@@ -228,9 +228,9 @@ mod tests {
         for prior in [None, prior] {
             let range = Range { low: 1e-3, high: 1e3, prior };
             for (fit, count) in [(3.0, 7), (1e-9, 2), (40.0, 1)] {
-                let best = Scale::Best(range).signal_sd(fit, count, 0.1);
+                let best = SignalModel::Best(range).signal_sd(fit, count, 0.1);
                 let value = |s: f64| {
-                    let prior = Scale::Best(range).log_prior(s);
+                    let prior = SignalModel::Best(range).log_prior(s);
                     -0.5 * fit / (s * s) - count as f64 * s.ln() + prior
                 };
                 for factor in [0.5, 0.99, 1.01, 2.0] {

@@ -9,7 +9,7 @@ use std::path::Path;
 /// It is shown as `place: problem = value: allowed is …; mend`, without absent parts. A separate
 /// enum is for errors that a caller distinguishes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Invalid(Box<Parts>);
+pub struct InputError(Box<Parts>);
 
 #[derive(Clone, Debug, PartialEq)]
 struct Parts {
@@ -20,7 +20,7 @@ struct Parts {
     mend: Option<String>,
 }
 
-impl Invalid {
+impl InputError {
     /// Creates an error from its problem.
     pub fn new(problem: impl Into<String>) -> Self {
         let problem = problem.into();
@@ -51,13 +51,13 @@ impl Invalid {
     }
 
     /// Sets the remedy, in the imperative.
-    pub fn mend(mut self, mend: impl Into<String>) -> Self {
+    pub fn remedy(mut self, mend: impl Into<String>) -> Self {
         self.0.mend = Some(mend.into());
         self
     }
 }
 
-impl fmt::Display for Invalid {
+impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Parts { place, problem, value, allowed, mend } = &*self.0;
         if let Some(place) = place {
@@ -77,7 +77,7 @@ impl fmt::Display for Invalid {
     }
 }
 
-impl std::error::Error for Invalid {}
+impl std::error::Error for InputError {}
 
 #[cfg(test)]
 mod tests {
@@ -85,9 +85,12 @@ mod tests {
 
     #[test]
     fn absent_parts_leave_no_trace() {
-        assert_eq!(Invalid::new("not a mesh").to_string(), "not a mesh");
-        let whole =
-            Invalid::new("`trials`").at("a.toml:3").value(0).allowed("1 or more").mend("use --set");
+        assert_eq!(InputError::new("not a mesh").to_string(), "not a mesh");
+        let whole = InputError::new("`trials`")
+            .at("a.toml:3")
+            .value(0)
+            .allowed("1 or more")
+            .remedy("use --set");
         assert_eq!(whole.to_string(), "a.toml:3: `trials` = 0: allowed is 1 or more; use --set");
     }
 }

@@ -54,13 +54,13 @@ pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 /// The errors of [`bytes`], and if it is not UTF-8.
 pub fn text(path: &Path, most: u64) -> io::Result<String> {
     let bytes = bytes(path, most)?;
-    let text = str::from_utf8(unmarked(&bytes));
+    let text = str::from_utf8(without_bom(&bytes));
     let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "not UTF-8 text");
     text.map(str::to_owned).map_err(no_text)
 }
 
 /// Returns `bytes` without a leading byte order mark.
-pub fn unmarked(bytes: &[u8]) -> &[u8] {
+pub fn without_bom(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)
 }
 
@@ -81,7 +81,7 @@ pub fn replace_by(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let partial = partial(path);
+    let partial = partial_path(path);
     let written = create(&partial).and_then(|file| {
         let mut file = BufWriter::new(file);
         write(&mut file)?;
@@ -96,7 +96,7 @@ pub fn replace_by(
 }
 
 /// Returns the path of a file during writing.
-pub fn partial(path: &Path) -> PathBuf {
+pub fn partial_path(path: &Path) -> PathBuf {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".part");
     partial.into()

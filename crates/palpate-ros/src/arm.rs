@@ -2,23 +2,23 @@
 //! received messages as readings.
 
 use super::link::Link;
-use super::mailbox::{Heard, Mailbox, TopicState, refused};
+use super::mailbox::{LatestMessages, Mailbox, TopicState, refused};
 use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::settings::BackendSettings;
 use super::status::ArmStatus;
 use super::topics::{Service, Side, Topic};
 use super::transport::{Connect, cannot_open};
 use palpate_explore::backend::interlock::check_start;
-use palpate_explore::backend::pace::Pace;
+use palpate_explore::backend::pace::RealTimePacer;
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading, Sample};
 use palpate_explore::robot::arm::Chain;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// Connection to an arm; several backends may use it, one after another.
-pub struct Lab {
+pub struct RosArm {
     chain: Chain,
     link: Link,
     mailbox: Arc<Mailbox>,
@@ -29,16 +29,16 @@ pub struct Lab {
 }
 
 /// Polling interval for received messages; a heuristic: well below a control tick.
-const LOOK: Duration = Duration::from_millis(1);
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Time without an answer after which an idempotent service call is repeated.
 // heuristic: ten times the duration of discovery and an answer on a local network.
 const REPEAT_S: f64 = 0.5;
 
 /// Topics that must be received from an arm.
-const HEARD: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
+const REQUIRED_TOPICS: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
 
-impl Lab {
+impl RosArm {
     /// Connects to the arm of `chain` over the transport of `settings`.
     ///
     /// # Errors
@@ -62,7 +62,7 @@ impl Lab {
         let mailbox = Arc::new(Mailbox::new(names, settings.clone()));
         let period = Duration::from_secs_f64(1.0 / settings.rate_hz);
         let (taker, idler) = (Arc::clone(&mailbox), Arc::clone(&mailbox));
-        let take = move |delivery| taker.take(delivery);
+        let take = move |delivery| taker.push(delivery);
         let link = Link::open(connect, period, take, move || idler.idle_command())?;
         let sensor = settings.net_ft.as_ref();
         let _net_ft = sensor.map(|sensor| listen(sensor, &mailbox)).transpose()?;
@@ -74,15 +74,15 @@ impl Lab {
     }
 
     /// Returns a backend on this arm; use one at a time.
-    pub fn body(self: &Arc<Self>) -> LabArm {
+    pub fn body(self: &Arc<Self>) -> RosBackend {
         let period_s = 1.0 / self.settings().rate_hz;
-        let capabilities = Capabilities::of(&self.chain, period_s);
-        LabArm {
+        let capabilities = Capabilities::simulated(&self.chain, period_s);
+        RosBackend {
             lab: Arc::clone(self),
             capabilities: Capabilities { resettable: false, real_time: true, ..capabilities },
             reading: Reading::default(),
             since: Instant::now(),
-            pace: Pace::new(period_s),
+            pace: RealTimePacer::new(period_s),
             still: Command { qdot: vec![0.0; self.chain.joints.len()] },
         }
     }
@@ -109,12 +109,12 @@ impl Lab {
     }
 
     fn call_within(&self, service: &Service, timeout_s: f64) -> Result<(), LinkFault> {
-        self.mailbox.heard().answers.retain(|(other, _)| other != service);
+        self.mailbox.latest().answers.retain(|(other, _)| other != service);
         self.link.call(service.clone());
         let begun = Instant::now();
         let mut called = Instant::now();
         let words = loop {
-            let mut heard = self.mailbox.heard();
+            let mut heard = self.mailbox.latest();
             let found = heard.answers.iter().position(|(other, _)| other == service);
             if let Some((_, answer)) = found.map(|i| heard.answers.swap_remove(i)) {
                 match answer.success {
@@ -137,10 +137,10 @@ impl Lab {
                 self.link.call(service.clone());
                 called = Instant::now();
             }
-            sleep(LOOK);
+            sleep(POLL_INTERVAL);
         };
         let name = service.name(self.settings().topics.namespace());
-        Err(Invalid::new(format!("service {name}: {words}")).into())
+        Err(InputError::new(format!("service {name}: {words}")).into())
     }
 
     /// Clears faults, here and on the arm; only an operator may request it.
@@ -149,7 +149,7 @@ impl Lab {
     /// If the arm refuses.
     pub fn clear_fault(&self) -> Result<(), LinkFault> {
         self.call(&Service::ClearFault)?;
-        let mut heard = self.mailbox.heard();
+        let mut heard = self.mailbox.latest();
         heard.refused = None;
         heard.topics.iter_mut().for_each(|state| state.stamp_s = 0.0);
         drop(heard);
@@ -164,13 +164,13 @@ impl Lab {
     fn wait_for_topics(&self) -> Result<(), LinkFault> {
         let begun = Instant::now();
         loop {
-            let heard = self.mailbox.heard();
+            let heard = self.mailbox.latest();
             if let Some(refused) = &heard.refused {
                 return Err(refused.clone());
             }
             let state = |topic: &Topic| &heard.topics[*topic as usize];
             let missing: Vec<Topic> =
-                HEARD.into_iter().filter(|topic| state(topic).at.is_none()).collect();
+                REQUIRED_TOPICS.into_iter().filter(|topic| state(topic).at.is_none()).collect();
             if missing.is_empty() {
                 return Ok(());
             }
@@ -182,7 +182,7 @@ impl Lab {
                 let skipped = missing.iter().filter_map(|topic| state(topic).skipped.as_ref());
                 let skipped: String =
                     skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
-                return Err(Invalid::new(format!(
+                return Err(InputError::new(format!(
                     "no message within {patience_s} s on {}; check that the arm's driver runs in the same \
                      domain and that [backend.topics] has its names and types.{skipped}",
                     names.join(", ")
@@ -190,7 +190,7 @@ impl Lab {
                 .into());
             }
             drop(heard);
-            sleep(LOOK);
+            sleep(POLL_INTERVAL);
         }
     }
 
@@ -201,30 +201,30 @@ impl Lab {
         }
         let topic = self.settings().topics.name(Topic::Command);
         let words = format!("{count} publishers on {topic}; allowed is one (this program)");
-        Err(Invalid::new(words).into())
+        Err(InputError::new(words).into())
     }
 
     /// Sends joint velocities.
     fn command(&self, qdot: &[f64]) {
-        self.mailbox.heard().commanded = Some(Instant::now());
+        self.mailbox.latest().commanded = Some(Instant::now());
         self.link.send(self.mailbox.command(qdot));
     }
 
     /// Checks that all received messages are recent enough and permit motion.
-    fn check(&self, heard: &Heard) -> Result<(), LinkFault> {
+    fn check(&self, heard: &LatestMessages) -> Result<(), LinkFault> {
         if let Some(refused) = &heard.refused {
             return Err(refused.clone());
         }
         if let Some(words) = heard.status.as_ref().and_then(|status| status.refusal()) {
             return Err(LinkFault::Arm(words));
         }
-        for topic in HEARD {
+        for topic in REQUIRED_TOPICS {
             let topics = &self.settings().topics;
             let state = &heard.topics[topic as usize];
             if self.settings().is_on_change(topic) {
                 if self.link.publisher_count(topic) == 0 {
                     let words = format!("the publisher on {} has gone", topics.name(topic));
-                    return Err(Invalid::new(words).into());
+                    return Err(InputError::new(words).into());
                 }
                 continue;
             }
@@ -244,7 +244,7 @@ impl Lab {
 fn listen(settings: &NetFtSettings, mailbox: &Arc<Mailbox>) -> Result<NetFt, LinkFault> {
     let (mailbox, address) = (Arc::clone(mailbox), settings.address.clone());
     let take = move |record: Record| {
-        let mut heard = mailbox.heard();
+        let mut heard = mailbox.latest();
         heard.topics[Topic::Wrench as usize].at = Some(Instant::now());
         heard.wrench = Some(record.wrench);
         if record.status != 0 {
@@ -256,7 +256,7 @@ fn listen(settings: &NetFtSettings, mailbox: &Arc<Mailbox>) -> Result<NetFt, Lin
 }
 
 /// Returns the error of a topic without a new message for `age_s`.
-fn silent(topic: &str, age_s: f64, state: &TopicState) -> Invalid {
+fn silent(topic: &str, age_s: f64, state: &TopicState) -> InputError {
     let mut words = format!("no new message on {topic} for {:.0} ms", 1e3 * age_s);
     if let Some(late_s) = state.late_s {
         words += &format!(
@@ -268,14 +268,14 @@ fn silent(topic: &str, age_s: f64, state: &TopicState) -> Invalid {
         let count = state.backward;
         words += &format!("; {count} messages were dropped because their stamps ran backwards");
     }
-    Invalid::new(words)
+    InputError::new(words)
 }
 
-impl Drop for Lab {
+impl Drop for RosArm {
     /// Ends commanding with a hold on the arm, so that it raises no alarm.
     fn drop(&mut self) {
         let was_engaged = {
-            let mut heard = self.mailbox.heard();
+            let mut heard = self.mailbox.latest();
             heard.is_ready = false;
             std::mem::take(&mut heard.is_engaged)
         };
@@ -286,16 +286,16 @@ impl Drop for Lab {
 }
 
 /// Backend of an arm behind topics.
-pub struct LabArm {
-    lab: Arc<Lab>,
+pub struct RosBackend {
+    lab: Arc<RosArm>,
     capabilities: Capabilities,
     reading: Reading,
     since: Instant,
-    pace: Pace,
+    pace: RealTimePacer,
     still: Command,
 }
 
-impl LabArm {
+impl RosBackend {
     fn time_s(&self) -> f64 {
         self.since.elapsed().as_secs_f64()
     }
@@ -307,7 +307,7 @@ impl LabArm {
         // No command goes to an arm that was stopped by hand: even a zero velocity could release
         // its brakes again.
         if matches!(cause, LinkFault::Arm(_)) {
-            let mut heard = self.lab.mailbox.heard();
+            let mut heard = self.lab.mailbox.latest();
             (heard.is_engaged, heard.is_ready) = (false, false);
         }
         let cause = self.lab.latch().get_or_insert(cause).clone();
@@ -324,16 +324,16 @@ impl LabArm {
 
     /// Returns the newest reading, or latches a fault.
     fn read(&mut self) -> Result<&Reading, Fault> {
-        match self.take_over() {
+        match self.update_reading() {
             Ok(()) => Ok(&self.reading),
             Err(cause) => Err(self.fault(cause)),
         }
     }
 
     /// Copies the newest messages into the reading.
-    fn take_over(&mut self) -> Result<(), LinkFault> {
+    fn update_reading(&mut self) -> Result<(), LinkFault> {
         let mailbox = Arc::clone(&self.lab.mailbox);
-        let mut heard = mailbox.heard();
+        let mut heard = mailbox.latest();
         self.lab.check(&heard)?;
         let time_s = self.time_s();
         let dt_s = time_s - self.reading.time_s;
@@ -345,7 +345,7 @@ impl LabArm {
                     let words = format!(
                         "joint \"{joint}\" jumped from {from:.4} to {to:.4} in {dt_ms:.0} ms, beyond its speed limit"
                     );
-                    return Err(Invalid::new(words).into());
+                    return Err(InputError::new(words).into());
                 }
             }
         }
@@ -367,7 +367,7 @@ const JUMP_RAD: f64 = 0.02;
 /// Duration of zero velocity commands before the arm moves; a heuristic.
 const HANDSHAKE_S: f64 = 0.1;
 
-impl Backend for LabArm {
+impl Backend for RosBackend {
     fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }
@@ -378,7 +378,7 @@ impl Backend for LabArm {
         let lab = Arc::clone(&self.lab);
         (self.since, self.reading) = (Instant::now(), Reading::default());
         {
-            let mut heard = lab.mailbox.heard();
+            let mut heard = lab.mailbox.latest();
             heard.since = Some(self.since);
             heard.frames.clear();
             (heard.is_engaged, heard.is_ready) = (true, false);
@@ -389,8 +389,8 @@ impl Backend for LabArm {
         // Brakes are released after the first zero velocity commands.
         let begun = Instant::now();
         loop {
-            sleep(LOOK);
-            let mut heard = lab.mailbox.heard();
+            sleep(POLL_INTERVAL);
+            let mut heard = lab.mailbox.latest();
             let status = heard.status.as_ref();
             let is_ready = status.is_some_and(|status| status.refusal().is_none());
             let is_final = status.is_some_and(ArmStatus::needs_operator);

@@ -12,7 +12,7 @@ pub struct Definition {
 }
 
 /// A message type that is sent over topics.
-pub trait Described {
+pub trait HasDefinition {
     /// Name and fields.
     const DEFINITION: Definition;
 }
@@ -176,7 +176,7 @@ macro_rules! messages {
             }
         }
 
-        impl Described for $name {
+        impl HasDefinition for $name {
             const DEFINITION: Definition = Definition {
                 name: concat!(stringify!($package), "/msg/", stringify!($name)),
                 fields: concat!($($constants,)? $(

@@ -5,7 +5,7 @@ use super::message::{
 };
 use super::topics::{CommandMessage, CommandTopic};
 use super::transport::Packet;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 
 /// Names of an arm's joints, in the arm's order.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,21 +37,21 @@ impl JointNames {
         names: &[String],
         values: &[f64],
         into: &mut Vec<f64>,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         if values.len() != names.len() {
             let (found, expected) = (values.len(), names.len());
-            return Err(Invalid::new(format!("{found} {what} for {expected} joints")));
+            return Err(InputError::new(format!("{found} {what} for {expected} joints")));
         }
         into.clear();
         for name in &self.0 {
             let mut found = names.iter().zip(values).filter(|(other, _)| *other == name);
-            let missing = || Invalid::new(format!("no joint \"{name}\" among {names:?}"));
+            let missing = || InputError::new(format!("no joint \"{name}\" among {names:?}"));
             let (_, &value) = found.next().ok_or_else(missing)?;
             if found.next().is_some() {
-                return Err(Invalid::new(format!("joint \"{name}\" is named twice")));
+                return Err(InputError::new(format!("joint \"{name}\" is named twice")));
             }
             if !value.is_finite() {
-                return Err(Invalid::new(format!("{what} of \"{name}\" is {value}")));
+                return Err(InputError::new(format!("{what} of \"{name}\" is {value}")));
             }
             into.push(value);
         }
@@ -67,7 +67,7 @@ impl JointNames {
         message: &JointState,
         q: &mut Vec<f64>,
         qdot: &mut Vec<f64>,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         self.pick("positions", &message.name, &message.position, q)?;
         self.pick("velocities", &message.name, &message.velocity, qdot)
     }
@@ -109,9 +109,9 @@ impl JointNames {
         &self,
         packet: &Packet,
         qdot: &mut Vec<f64>,
-    ) -> Result<Option<[f64; 2]>, Invalid> {
+    ) -> Result<Option<[f64; 2]>, InputError> {
         let points = |found: usize| {
-            Err(Invalid::new(format!("{found} points in a velocity command; allowed is one")))
+            Err(InputError::new(format!("{found} points in a velocity command; allowed is one")))
         };
         match packet {
             Packet::Command(message) => {
@@ -123,7 +123,7 @@ impl JointNames {
                     let known = &self.0;
                     let words =
                         format!("\"{name}\" is not a joint of this arm; its joints are {known:?}");
-                    return Err(Invalid::new(words));
+                    return Err(InputError::new(words));
                 }
                 self.pick("velocities", names, &point.velocities, qdot)?;
                 Ok(Some([message.header.stamp.s(), point.time_from_start.s()]))

@@ -42,7 +42,7 @@ pub mod topics;
 pub mod transport;
 pub mod twin;
 
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
 pub use ros1::spare_certificates;
 use settings::{BackendKind, BackendSettings};
@@ -58,7 +58,7 @@ pub fn connect(
     settings: &BackendSettings,
     side: Side,
     services: Vec<Service>,
-) -> Result<Connect, Invalid> {
+) -> Result<Connect, InputError> {
     let owned = settings.clone();
     match settings.kind {
         #[cfg(feature = "ros2")]
@@ -69,14 +69,14 @@ pub fn connect(
         BackendKind::Ros1 => Ok(Box::new(move || {
             Ok(Box::new(ros1::Ros1::open(&owned, side, services)?) as Box<dyn transport::Transport>)
         })),
-        BackendKind::Simulated => Err(Invalid::new(
+        BackendKind::Simulated => Err(InputError::new(
             "kind = \"simulated\" has no arm to connect to; allowed are \"ros2\", \"ros1\"",
         )),
         #[cfg(not(all(feature = "ros1", feature = "ros2")))]
         kind => {
             drop((owned, side, services));
             let kind = kind.name();
-            Err(Invalid::new(format!(
+            Err(InputError::new(format!(
                 "kind = \"{kind}\" needs a build with the feature `{kind}`: \
                  cargo build --release --features {kind}"
             )))

@@ -4,7 +4,7 @@
 use super::message::TriggerResponse;
 use super::topics::{Service, Topic};
 use super::transport::{Connect, Delivery, Packet, Transport, Waker};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 const COUNTED_S: f64 = 0.1;
 
 /// A send operation, run by the thread.
-type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), Invalid> + Send>;
+type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), InputError> + Send>;
 
 /// Largest number of pending jobs; older ones are obsolete.
 const JOBS_MAX: usize = 256;
@@ -27,7 +27,7 @@ struct Shared {
     is_closed: AtomicBool,
     /// Number of known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
-    broken: Mutex<Option<Invalid>>,
+    broken: Mutex<Option<InputError>>,
     /// Calls whose server has not been found yet.
     waiting: Mutex<Vec<Service>>,
 }
@@ -50,7 +50,7 @@ impl Link {
         period: Duration,
         take: impl FnMut(Delivery) + Send + 'static,
         idle: impl FnMut() -> Option<Packet> + Send + 'static,
-    ) -> Result<Self, Invalid> {
+    ) -> Result<Self, InputError> {
         let shared = Arc::new(Shared::default());
         let (opened, is_open) = channel();
         let inside = Arc::clone(&shared);
@@ -63,7 +63,7 @@ impl Link {
                 let _ = opened.send(Err(error));
             }
         });
-        let gone = |_| Invalid::new("cannot open the transport: its thread ended");
+        let gone = |_| InputError::new("cannot open the transport: its thread ended");
         let waker = is_open.recv().map_err(gone)??;
         Ok(Self { shared, waker, thread: Some(thread) })
     }
@@ -99,7 +99,7 @@ impl Link {
     }
 
     /// Returns the error that ended sending, if there is one.
-    pub fn broken(&self) -> Option<Invalid> {
+    pub fn broken(&self) -> Option<InputError> {
         lock(&self.shared.broken).clone()
     }
 

@@ -10,7 +10,7 @@ use super::topics::{Service, Topic};
 use super::transport::{Delivery, Packet};
 use palpate_explore::backend::{LinkFault, Wrench, pace};
 use palpate_explore::robot::finger::Frame;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -24,7 +24,7 @@ const SILENT_PERIODS: f64 = 1.5;
 
 /// The last message of each topic.
 #[derive(Default)]
-pub struct Heard {
+pub struct LatestMessages {
     /// Joint positions, rad.
     pub q: Vec<f64>,
     /// Joint velocities, rad/s.
@@ -69,7 +69,7 @@ pub struct TopicState {
 
 /// Returns the fault of an unusable message on `topic`.
 pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
-    Invalid::new(format!("message on {topic} refused: {words}")).into()
+    InputError::new(format!("message on {topic} refused: {words}")).into()
 }
 
 /// The newest messages of an arm, shared between the link's thread and the control loop.
@@ -78,30 +78,30 @@ pub struct Mailbox {
     pub names: JointNames,
     /// Table `[backend]` of the experiment.
     pub settings: BackendSettings,
-    heard: Mutex<Heard>,
+    heard: Mutex<LatestMessages>,
 }
 
 impl Mailbox {
     /// Returns one without messages.
     pub fn new(names: JointNames, settings: BackendSettings) -> Self {
-        let heard = Heard { since: Some(Instant::now()), ..Heard::default() };
+        let heard = LatestMessages { since: Some(Instant::now()), ..LatestMessages::default() };
         Self { names, settings, heard: Mutex::new(heard) }
     }
 
     /// Locks the messages; the link's thread waits meanwhile.
-    pub fn heard(&self) -> MutexGuard<'_, Heard> {
+    pub fn latest(&self) -> MutexGuard<'_, LatestMessages> {
         self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Stores a received delivery.
-    pub fn take(&self, delivery: Delivery) {
+    pub fn push(&self, delivery: Delivery) {
         match delivery {
             Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
             Delivery::Garbled { topic, words } => {
                 let fault = refused(&self.settings.topics.name(topic), words);
-                self.heard().refused.get_or_insert(fault);
+                self.latest().refused.get_or_insert(fault);
             }
-            Delivery::Answered { service, answer } => self.heard().answers.push((service, answer)),
+            Delivery::Answered { service, answer } => self.latest().answers.push((service, answer)),
             Delivery::Call { .. } => (),
         }
     }
@@ -109,7 +109,7 @@ impl Mailbox {
     /// Returns a zero velocity command if the arm is engaged and there was no other command
     /// recently.
     pub fn idle_command(&self) -> Option<Packet> {
-        let heard = self.heard();
+        let heard = self.latest();
         let silent_s = SILENT_PERIODS / self.settings.rate_hz;
         let is_silent = heard.commanded.is_none_or(|last| last.elapsed().as_secs_f64() >= silent_s);
         let still = || self.command(&vec![0.0; self.names.names().len()]);
@@ -127,7 +127,7 @@ impl Mailbox {
         if is_other || topic == Topic::Command {
             return;
         }
-        let heard = &mut *self.heard();
+        let heard = &mut *self.latest();
         let stamp = packet.stamp_mut().copied().unwrap_or_default();
         if let Err(fault) = self.read(heard, &packet, stamp, received) {
             if matches!(fault, LinkFault::Arm(_)) {
@@ -140,7 +140,7 @@ impl Mailbox {
     /// Reads a message into `heard`, if it belongs to the arm and is recent.
     fn read(
         &self,
-        heard: &mut Heard,
+        heard: &mut LatestMessages,
         packet: &Packet,
         stamp: Time,
         received: Instant,

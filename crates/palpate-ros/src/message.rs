@@ -3,7 +3,7 @@
 //! `biotac_sensors` (kth-ros-pkg/biotac_driver, BSD) and `sr_robot_msgs` (shadow-robot/sr_common,
 //! BSD-3) are packages of ROS 1; for ROS 2 they keep their fields, with the ROS 2 header.
 
-use super::definition::{Definition, Described, messages};
+use super::definition::{Definition, HasDefinition, messages};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 

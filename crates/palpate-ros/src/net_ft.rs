@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 use palpate_explore::backend::Wrench;
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -25,7 +25,7 @@ pub struct NetFtSettings {
     pub counts_per_nm: f64,
 }
 
-impl Checked for NetFtSettings {
+impl Validate for NetFtSettings {
     fn check(&self, rules: &mut Rules) {
         let has_port = self.address.rsplit_once(':').is_some_and(|(host, port)| {
             !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0)

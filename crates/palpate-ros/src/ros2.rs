@@ -1,6 +1,6 @@
 //! ROS 2 transport by RustDDS, without an installation of ROS.
 
-use super::definition::Described;
+use super::definition::HasDefinition;
 use super::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     TriggerRequest, TriggerResponse, WrenchStamped,
@@ -8,8 +8,10 @@ use super::message::{
 use super::network::network;
 use super::settings::{BackendSettings, MappingKind};
 use super::topics::{CommandMessage, Service, Side, TactileMessage, Topic, Topics};
-use super::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
-use palpate_input::error::Invalid;
+use super::transport::{
+    Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
+};
+use palpate_input::error::InputError;
 use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::request_id::RmwRequestId;
 use ros2_client::{
@@ -109,7 +111,7 @@ impl Ros2 {
         settings: &BackendSettings,
         side: Side,
         services: Vec<Service>,
-    ) -> Result<Self, Invalid> {
+    ) -> Result<Self, InputError> {
         let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
             .map_err(cannot_open("the network"))?;
         let mut participant = DomainParticipantBuilder::new(domain);
@@ -155,7 +157,7 @@ impl Ros2 {
         Ok(end)
     }
 
-    fn topics(&mut self) -> Result<(), Invalid> {
+    fn topics(&mut self) -> Result<(), InputError> {
         self.topic::<JointState>(Topic::Joints)?;
         self.topic::<WrenchStamped>(Topic::Wrench)?;
         self.topic::<DiagnosticArray>(Topic::Status)?;
@@ -176,9 +178,9 @@ impl Ros2 {
 
     /// Creates a topic with messages of type `M`: a writer on the side that publishes it, a reader
     /// on the other.
-    fn topic<M>(&mut self, topic: Topic) -> Result<(), Invalid>
+    fn topic<M>(&mut self, topic: Topic) -> Result<(), InputError>
     where
-        M: Packed + Described + Serialize + DeserializeOwned + Clone + 'static,
+        M: PacketMessage + HasDefinition + Serialize + DeserializeOwned + Clone + 'static,
     {
         if topic.publisher() != self.side {
             return self.subscribe::<M>(topic, best_effort());
@@ -197,11 +199,11 @@ impl Ros2 {
     }
 
     /// Returns the name of a topic, and its DDS topic.
-    fn dds_topic<M: Described>(
+    fn dds_topic<M: HasDefinition>(
         &mut self,
         topic: Topic,
         qos: &QosProfile,
-    ) -> Result<(String, rustdds::Topic), Invalid> {
+    ) -> Result<(String, rustdds::Topic), InputError> {
         let name = self.topics.name(topic);
         let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
         let path = Name::parse(&name).map_err(cannot_open(&name))?;
@@ -210,9 +212,9 @@ impl Ros2 {
     }
 
     /// Creates a reader of messages of type `M`.
-    fn subscribe<M>(&mut self, topic: Topic, qos: QosProfile) -> Result<(), Invalid>
+    fn subscribe<M>(&mut self, topic: Topic, qos: QosProfile) -> Result<(), InputError>
     where
-        M: Packed + Described + DeserializeOwned + 'static,
+        M: PacketMessage + HasDefinition + DeserializeOwned + 'static,
     {
         let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let mut subscription =
@@ -238,7 +240,7 @@ impl Ros2 {
         Ok(())
     }
 
-    fn serve(&mut self, service: Service) -> Result<(), Invalid> {
+    fn serve(&mut self, service: Service) -> Result<(), InputError> {
         let name = service.name(self.topics.namespace());
         let path = Name::parse(&name).map_err(cannot_open(&name))?;
         // The client's vendor is not known in advance: the default mapping, unless set.
@@ -287,7 +289,7 @@ impl Ros2 {
     }
 
     /// Registers `source` with the poll.
-    fn watch(&self, source: &mut impl mio1::event::Source, name: &str) -> Result<(), Invalid> {
+    fn watch(&self, source: &mut impl mio1::event::Source, name: &str) -> Result<(), InputError> {
         let token = Token(WAKE.0 + 1);
         self.poll.registry().register(source, token, Interest::READABLE).map_err(cannot_open(name))
     }
@@ -315,7 +317,7 @@ impl Transport for Ros2 {
         })
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+    fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
         let sent = sent.unwrap_or(Err("not this side's".into()));
         sent.map_err(|words| cannot_send(&self.topics.name(packet.topic()), words))
@@ -349,7 +351,7 @@ impl Transport for Ros2 {
         self.client(service).is_some_and(|(_, since)| since.elapsed() > SETTLE)
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+    fn call(&mut self, service: &Service) -> Result<(), InputError> {
         let name = service.name(self.topics.namespace());
         let (client, _) = self.client(service).ok_or_else(|| cannot_send(&name, "not known"))?;
         let sent = client.send_request(TriggerRequest::default());
@@ -361,7 +363,7 @@ impl Transport for Ros2 {
         service: &Service,
         call: u64,
         answer: TriggerResponse,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         let name = service.name(self.topics.namespace());
         let server = self.servers.iter().find(|(other, _)| other == service);
         let (Some((_, server)), Some(id)) = (server, self.calls.remove(&call)) else {

@@ -5,7 +5,7 @@ use super::net_ft::NetFtSettings;
 use super::topics::{Topic, Topics};
 use palpate_explore::backend::interlock::{FORMER_KEYS, GateSettings, InterlockSettings};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
-use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Value;
@@ -190,7 +190,7 @@ impl BackendSettings {
     }
 }
 
-impl Checked for BackendSettings {
+impl Validate for BackendSettings {
     fn check(&self, rules: &mut Rules) {
         if let Some(domain) = self.domain {
             rules.number("domain", domain.into(), 0.0..=DOMAIN_MAX.into());

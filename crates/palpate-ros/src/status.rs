@@ -1,7 +1,7 @@
 //! State of an arm, as reported by its computer.
 
 use super::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use serde::Serialize;
 
 /// State of an arm.
@@ -81,14 +81,15 @@ impl ArmStatus {
     ///
     /// # Errors
     /// If a flag is missing or unreadable, so that motion may not be permitted.
-    pub fn read(message: &DiagnosticArray, device: &str) -> Result<Option<Self>, Invalid> {
+    pub fn read(message: &DiagnosticArray, device: &str) -> Result<Option<Self>, InputError> {
         let of_arm = |status: &&DiagnosticStatus| status.name == device;
         let entries: Vec<_> = message.status.iter().filter(of_arm).collect();
         let worst = entries.iter().max_by_key(|status| status.level);
         let Some(worst) = worst else { return Ok(None) };
         let flag = |key| {
             let words = WORDS.map(|[no, yes]| format!("{yes}/{no}")).join(", ");
-            let unreadable = |found| Invalid::new(format!("{key} is {found}; allowed are {words}"));
+            let unreadable =
+                |found| InputError::new(format!("{key} is {found}; allowed are {words}"));
             flag(&entries, key).map_err(unreadable)
         };
         let [servo_on, brake, estop, deadman, hold] = FLAGS.map(flag);

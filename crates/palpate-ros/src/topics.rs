@@ -1,11 +1,11 @@
 //! Topics of an arm: names, message types and age limits; and its services.
 
-use super::definition::Described;
+use super::definition::HasDefinition;
 use super::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     WrenchStamped,
 };
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -232,7 +232,7 @@ impl Service {
     }
 }
 
-impl Checked for Topics {
+impl Validate for Topics {
     fn check(&self, rules: &mut Rules) {
         let namespace = self.namespace.as_deref();
         rules.require(

@@ -5,11 +5,11 @@ use super::message::{
     TriggerResponse, WrenchStamped,
 };
 use super::topics::{Service, Topic};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::time::{Duration, Instant};
 
 /// A message type of a [`Packet`].
-pub trait Packed: Into<Packet> {
+pub trait PacketMessage: Into<Packet> {
     /// Returns the message in `packet`, if it is of this type.
     fn in_packet(packet: &Packet) -> Option<&Self>;
 }
@@ -38,7 +38,7 @@ macro_rules! packets {
                 }
             }
 
-            impl Packed for $message {
+            impl PacketMessage for $message {
                 fn in_packet(packet: &Packet) -> Option<&Self> {
                     let Packet::$kind(message) = packet else { return None };
                     Some(message)
@@ -117,14 +117,14 @@ pub enum Delivery {
 }
 
 /// Returns the error of a part of a transport that cannot be opened.
-pub(super) fn cannot_open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> Invalid {
-    move |error| Invalid::new(format!("cannot open {what}: {error}"))
+pub(super) fn cannot_open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> InputError {
+    move |error| InputError::new(format!("cannot open {what}: {error}"))
 }
 
 /// Returns the error of a message that cannot be sent to `what`.
 #[cfg(any(feature = "ros1", feature = "ros2"))]
-pub(super) fn cannot_send(what: &str, error: impl std::fmt::Display) -> Invalid {
-    Invalid::new(format!("cannot send to {what}: {error}"))
+pub(super) fn cannot_send(what: &str, error: impl std::fmt::Display) -> InputError {
+    InputError::new(format!("cannot send to {what}: {error}"))
 }
 
 /// Wakes a waiting transport from another thread.
@@ -139,7 +139,7 @@ pub trait Transport {
     ///
     /// # Errors
     /// If the transport can no longer send.
-    fn send(&mut self, packet: &Packet) -> Result<(), Invalid>;
+    fn send(&mut self, packet: &Packet) -> Result<(), InputError>;
 
     /// Waits for at most `timeout` and passes all received items to `take`.
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery));
@@ -154,7 +154,7 @@ pub trait Transport {
     ///
     /// # Errors
     /// If the call cannot be sent.
-    fn call(&mut self, service: &Service) -> Result<(), Invalid>;
+    fn call(&mut self, service: &Service) -> Result<(), InputError>;
 
     /// Answers a call.
     ///
@@ -165,8 +165,8 @@ pub trait Transport {
         service: &Service,
         call: u64,
         answer: TriggerResponse,
-    ) -> Result<(), Invalid>;
+    ) -> Result<(), InputError>;
 }
 
 /// Creates a transport in the thread that will own it.
-pub type Connect = Box<dyn FnOnce() -> Result<Box<dyn Transport>, Invalid> + Send>;
+pub type Connect = Box<dyn FnOnce() -> Result<Box<dyn Transport>, InputError> + Send>;

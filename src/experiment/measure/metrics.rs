@@ -66,7 +66,9 @@ impl Metrics {
     /// Compares true heights f with predicted heights g; leaves out calibration and the errors on
     /// parts of the zone. Welford's rule updates the centred sums, so that a large common offset
     /// does not cancel small variations of the heights.
-    pub(in crate::experiment) fn of(heights: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub(in crate::experiment) fn from_heights(
+        heights: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
         let (mut count, mut squares, mut max_error_m) = (0.0, 0.0, 0.0_f64);
         let [mut ff, mut gg, mut fg] = [0.0; 3];
         let [mut mean_f, mut mean_g] = [0.0; 2];
@@ -128,7 +130,7 @@ mod tests {
     use super::*;
 
     fn compare(pairs: &[(f64, f64)]) -> Metrics {
-        Metrics::of(pairs.iter().copied())
+        Metrics::from_heights(pairs.iter().copied())
     }
 
     /// Half of the toy is 1 and the other half has mean 1 and mean square 1.5, so a constant scores

@@ -10,7 +10,7 @@ pub mod shape;
 
 use self::Direction::{Less, More, Neither};
 use self::metrics::{Metrics, calibration, rmse};
-use self::outline::Outline;
+use self::outline::SilhouetteMetrics;
 use self::shape::ShapeMetrics;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use std::fmt;
@@ -24,7 +24,7 @@ pub static MEASURES: &[Measure] = &[
     measure(Less, "reachable_rmse_m", "RMSE where the finger reaches", MM)
         .from(Source::Metrics(|it| it.reachable_rmse_m))
         .aggregated(Aggregate::Median)
-        .drawn(Scale::LogBeside(&UNREACHABLE_RMSE))
+        .drawn(PanelAxis::LogBeside(&UNREACHABLE_RMSE))
         .untabled()
         .error(),
     UNREACHABLE_RMSE,
@@ -33,14 +33,14 @@ pub static MEASURES: &[Measure] = &[
         .aggregated(Aggregate::Median),
     COVERAGE,
     measure(Less, "coverage_off", "share in the 95 % band, away from 0.95", SHARE)
-        .from(Source::Metrics(|it| Some((it.coverage? - HONEST).abs())))
+        .from(Source::Metrics(|it| Some((it.coverage? - CALIBRATED_COVERAGE).abs())))
         .untabled(),
     measure(Less, "nlpd", "NLPD", PLAIN).from(Source::Metrics(|it| it.nlpd)),
     measure(Less, "presence_brier", "Brier score of where there is a surface", SHARE)
         .from(Source::Outline(|it| Some(it.brier))),
     measure(More, "silhouette_iou", "silhouette, intersection over union", SHARE)
         .from(Source::Outline(|it| Some(it.iou)))
-        .drawn(Scale::UpToOne),
+        .drawn(PanelAxis::UpToOne),
     measure(
         Less,
         "silhouette_wrong",
@@ -58,7 +58,7 @@ pub static MEASURES: &[Measure] = &[
         .untabled(),
     measure(More, "f_1", "F-score at 1 % of the diagonal", SHARE)
         .from(Source::Shape(|it| Some(it.f_1)))
-        .drawn(Scale::UpToOne),
+        .drawn(PanelAxis::UpToOne),
     measure(More, "f_3", "F-score at 3 % of the diagonal", SHARE)
         .from(Source::Shape(|it| Some(it.f_3))),
     measure(Neither, "volume_error", "believed volume, too much", PERCENT)
@@ -67,7 +67,7 @@ pub static MEASURES: &[Measure] = &[
         .from(Source::Shape(|it| Some(it.area_error))),
     measure(More, "iou", "insides, intersection over union", SHARE)
         .from(Source::Shape(|it| it.iou))
-        .drawn(Scale::UpToOne),
+        .drawn(PanelAxis::UpToOne),
     measure(
         Neither,
         "shape_coverage",
@@ -75,10 +75,10 @@ pub static MEASURES: &[Measure] = &[
         SHARE,
     )
     .from(Source::Shape(|it| it.coverage))
-    .drawn(Scale::UpToOne),
+    .drawn(PanelAxis::UpToOne),
     measure(Less, "path_m", "lateral travel", METRES)
         .from(Source::Trial(TrialRow::path_m))
-        .drawn(Scale::Linear),
+        .drawn(PanelAxis::Linear),
     measure(Less, "time_s", "time of the body", SECONDS).from(Source::Touch(|it| it.time_s)),
     VERIFICATION_RMSE,
     measure(Less, "verification_nlpd", "NLPD at verification touches", PLAIN)
@@ -98,30 +98,30 @@ pub static MEASURES: &[Measure] = &[
 ];
 
 /// Share of the truth inside a calibrated 95 % band.
-const HONEST: f64 = 0.95;
+const CALIBRATED_COVERAGE: f64 = 0.95;
 
 /// R of Eq. 5, Yi et al. 2016.
 pub const R: Measure = measure(More, "r", "R (Eq. 5)", CORRELATION)
     .from(Source::Metrics(|it| Some(it.r)))
-    .drawn(Scale::UpToOne);
+    .drawn(PanelAxis::UpToOne);
 
 /// R after subtracting the means.
 pub const CENTRED_R: Measure = measure(More, "centred_r", "centred R", CORRELATION)
     .from(Source::Metrics(|it| Some(it.centred_r)))
-    .drawn(Scale::UpToOne);
+    .drawn(PanelAxis::UpToOne);
 
 /// Root mean square error.
 pub const RMSE: Measure = measure(Less, "rmse_m", "RMSE", MM)
     .from(Source::Metrics(|it| Some(it.rmse_m)))
     .aggregated(Aggregate::Both)
-    .drawn(Scale::Log)
+    .drawn(PanelAxis::Log)
     .error();
 
 /// Root mean square error in the outer tenth of the zone.
 pub const EDGE_RMSE: Measure = measure(Less, "edge_rmse_m", "RMSE in the outer tenth", MM)
     .from(Source::Metrics(|it| it.edge_rmse_m))
     .aggregated(Aggregate::Median)
-    .drawn(Scale::Log)
+    .drawn(PanelAxis::Log)
     .error();
 
 const UNREACHABLE_RMSE: Measure =
@@ -133,13 +133,13 @@ const UNREACHABLE_RMSE: Measure =
 /// Share of the truth inside the 95 % band.
 pub const COVERAGE: Measure = measure(Neither, "coverage", "share in the 95 % band", SHARE)
     .from(Source::Metrics(|it| it.coverage))
-    .drawn(Scale::UpToOne);
+    .drawn(PanelAxis::UpToOne);
 
 /// Chamfer distance between the estimated and the true surface of a whole object.
 pub const CHAMFER: Measure = measure(Less, "chamfer_m", "Chamfer distance", MM)
     .from(Source::Shape(|it| it.chamfer_m))
     .aggregated(Aggregate::Both)
-    .drawn(Scale::Log)
+    .drawn(PanelAxis::Log)
     .error();
 
 /// Root mean square error at verification touches, which the belief predicted and was not fitted
@@ -193,9 +193,9 @@ fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
 }
 
 /// Measures with columns in files about `rows`.
-pub fn in_files(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
+pub fn measures_with_columns(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
     let has_shape = rows.iter().flat_map(|row| &row.touches).any(|touch| touch.shape.is_some());
-    MEASURES.iter().filter(move |measure| has_shape || !measure.is_of_shapes())
+    MEASURES.iter().filter(move |measure| has_shape || !measure.is_for_whole_objects())
 }
 
 /// Finds the measure by its name in files.
@@ -211,15 +211,15 @@ pub struct Measure {
     /// Title for readers.
     pub title: &'static str,
     /// Unit, in files and for readers.
-    pub unit: Unit,
+    pub unit: MeasureUnit,
     /// Direction in which the measure improves.
     pub direction: Direction,
     /// Statistics reported over many trials.
     pub aggregate: Aggregate,
     /// Axis on which the measure is drawn over touches.
-    pub scale: Scale,
+    pub scale: PanelAxis,
     /// Whether the summary on the terminal and the page lists it.
-    pub is_tabled: bool,
+    pub in_tables: bool,
     /// Whether it is an error: planners are compared in it after every touch, and in the touches
     /// that they need to reduce it.
     pub is_error: bool,
@@ -233,7 +233,7 @@ pub enum Source {
     /// Agreement of the heights with the ground truth after a touch.
     Metrics(fn(&Metrics) -> Option<f64>),
     /// Agreement of the silhouettes after a touch.
-    Outline(fn(&Outline) -> Option<f64>),
+    Outline(fn(&SilhouetteMetrics) -> Option<f64>),
     /// Agreement of the closed surfaces after a touch. Files of runs over a zone have no column for
     /// such a measure.
     Shape(fn(&ShapeMetrics) -> Option<f64>),
@@ -245,7 +245,7 @@ pub enum Source {
 
 /// A unit in files and for readers.
 #[derive(Clone, Copy, Debug)]
-pub struct Unit {
+pub struct MeasureUnit {
     /// Suffix of names in files.
     pub suffix: &'static str,
     /// Symbol shown to readers.
@@ -294,7 +294,7 @@ impl Aggregate {
 
 /// Axis of a measure's panel over touches.
 #[derive(Clone, Copy, Debug)]
-pub enum Scale {
+pub enum PanelAxis {
     /// Not drawn.
     Undrawn,
     /// Linear axis.
@@ -316,16 +316,19 @@ pub(super) const FAR_M: f64 = 1e6;
 // exceeded it.
 const LARGE: f64 = 1e300;
 
-const PLAIN: Unit =
-    Unit { suffix: "", symbol: "", per_si: 1.0, decimals: 3, range: [-LARGE, LARGE] };
-const CORRELATION: Unit = Unit { decimals: 4, range: [-1.000_001, 1.000_001], ..PLAIN };
-const SHARE: Unit = Unit { range: [0.0, 1.000_001], ..PLAIN };
-const PERCENT: Unit = Unit { symbol: "%", per_si: 100.0, range: [-FAR_M, FAR_M], ..PLAIN };
+const PLAIN: MeasureUnit =
+    MeasureUnit { suffix: "", symbol: "", per_si: 1.0, decimals: 3, range: [-LARGE, LARGE] };
+const CORRELATION: MeasureUnit =
+    MeasureUnit { decimals: 4, range: [-1.000_001, 1.000_001], ..PLAIN };
+const SHARE: MeasureUnit = MeasureUnit { range: [0.0, 1.000_001], ..PLAIN };
+const PERCENT: MeasureUnit =
+    MeasureUnit { symbol: "%", per_si: 100.0, range: [-FAR_M, FAR_M], ..PLAIN };
 /// Metres.
-pub const METRES: Unit = Unit { suffix: "_m", symbol: "m", range: [0.0, FAR_M], ..PLAIN };
-const MM: Unit = Unit { symbol: "mm", per_si: 1e3, ..METRES };
-const SECONDS: Unit =
-    Unit { suffix: "_s", symbol: "s", decimals: 1, range: [-LARGE, LARGE], ..PLAIN };
+pub const METRES: MeasureUnit =
+    MeasureUnit { suffix: "_m", symbol: "m", range: [0.0, FAR_M], ..PLAIN };
+const MM: MeasureUnit = MeasureUnit { symbol: "mm", per_si: 1e3, ..METRES };
+const SECONDS: MeasureUnit =
+    MeasureUnit { suffix: "_s", symbol: "s", decimals: 1, range: [-LARGE, LARGE], ..PLAIN };
 
 impl Measure {
     /// Returns the columns of its statistics over many trials: mean and standard error, median and
@@ -352,15 +355,15 @@ impl Measure {
     }
 
     /// Value after some touches; `None` if the trial has none.
-    pub fn of(&self, row: &TrialRow, touches: u32) -> Option<f64> {
+    pub fn value(&self, row: &TrialRow, touches: u32) -> Option<f64> {
         match self.source {
             Source::Trial(of) => of(row, touches),
-            _ => self.of_touch(row.touches.get((touches as usize).checked_sub(1)?)?),
+            _ => self.value_after_touch(row.touches.get((touches as usize).checked_sub(1)?)?),
         }
     }
 
     /// Value after a touch; `None` for a measure of a trial.
-    pub fn of_touch(&self, touch: &TouchRow) -> Option<f64> {
+    pub fn value_after_touch(&self, touch: &TouchRow) -> Option<f64> {
         match self.source {
             Source::Metrics(of) => of(touch.metrics.as_ref()?),
             Source::Outline(of) => of(touch.outline.as_ref()?),
@@ -371,7 +374,7 @@ impl Measure {
     }
 
     /// Whether it applies to whole objects.
-    pub fn is_of_shapes(&self) -> bool {
+    pub fn is_for_whole_objects(&self) -> bool {
         matches!(self.source, Source::Shape(_))
     }
 
@@ -386,13 +389,13 @@ impl Measure {
     }
 
     /// Sets the axis on which it is drawn.
-    const fn drawn(self, scale: Scale) -> Self {
+    const fn drawn(self, scale: PanelAxis) -> Self {
         Self { scale, ..self }
     }
 
     /// Removes it from the tables; it stays in files.
     const fn untabled(self) -> Self {
-        Self { is_tabled: false, ..self }
+        Self { in_tables: false, ..self }
     }
 
     /// Marks it as an error, in which planners are compared after every touch.
@@ -413,7 +416,7 @@ const fn measure(
     direction: Direction,
     id: &'static str,
     title: &'static str,
-    unit: Unit,
+    unit: MeasureUnit,
 ) -> Measure {
     Measure {
         id,
@@ -421,8 +424,8 @@ const fn measure(
         unit,
         direction,
         aggregate: Aggregate::Mean,
-        scale: Scale::Undrawn,
-        is_tabled: true,
+        scale: PanelAxis::Undrawn,
+        in_tables: true,
         is_error: false,
         source: Source::Trial(|_, _| None),
     }

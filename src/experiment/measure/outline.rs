@@ -1,7 +1,7 @@
 //! Errors of the estimated silhouette of an object.
 
 use crate::experiment::truth::Truth;
-use palpate_explore::presence::Presence;
+use palpate_explore::presence::SurfaceEvidence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ pub const TENTHS: usize = 10;
 
 /// Agreement of the estimated presence of a surface with the ground truth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Outline {
+pub struct SilhouetteMetrics {
     /// Brier score: mean squared error of the probability of a surface.
     pub brier: f64,
     /// Intersection over union of the estimated (probability > ½) and the true surface area.
@@ -23,23 +23,23 @@ pub struct Outline {
     pub reliability: Option<[[u32; 2]; TENTHS]>,
 }
 
-impl Outline {
+impl SilhouetteMetrics {
     /// Compares `presence` with the ground truth at the test points. Returns `None` if every point
     /// has a surface, if the points without one are unknown, or before any observed sweep of the
     /// finger.
-    pub fn of(presence: &Presence, truth: &Truth) -> Option<Self> {
+    pub fn of(presence: &SurfaceEvidence, truth: &Truth) -> Option<Self> {
         let count = truth.places.len();
-        if !truth.is_whole || truth.count() == count {
+        if !truth.is_complete || truth.surface_count() == count {
             return None;
         }
         let silhouette = presence.silhouette();
-        if !silhouette.is_seen() {
+        if !silhouette.is_known() {
             return None;
         }
         let (mut squares, mut wrong, mut both, mut either) = (0.0, 0.0, 0.0, 0.0);
         let mut reliability = [[0; 2]; TENTHS];
         let one_if = |holds: bool| f64::from(u8::from(holds));
-        let probabilities = silhouette.over(truth.places.iter().map(Vec::as_slice));
+        let probabilities = silhouette.probabilities(truth.places.iter().map(Vec::as_slice));
         for (probability, height_m) in probabilities.into_iter().zip(&truth.heights_m) {
             let is_there = height_m.is_some();
             let is_believed = probability > 0.5;

@@ -1,7 +1,7 @@
 //! Comparisons between the planners of a run, computed once for its files and its page because
 //! bootstraps take time.
 
-use crate::experiment::statistics::comparison::{Comparison, comparisons};
+use crate::experiment::statistics::comparison::{PairedComparison, comparisons};
 use crate::experiment::statistics::equal_error::{EqualError, equal_errors};
 use crate::experiment::store::Run;
 
@@ -9,14 +9,14 @@ use crate::experiment::store::Run;
 #[derive(Debug)]
 pub struct Analysis<'a> {
     /// Differences in every measure after the last touch.
-    pub comparisons: Vec<Comparison<'a>>,
+    pub comparisons: Vec<PairedComparison<'a>>,
     /// Touches to equal error.
     pub equal_errors: Vec<EqualError<'a>>,
 }
 
 impl<'a> Analysis<'a> {
     /// Computes the comparisons of a run's rows.
-    pub fn of(run: &'a Run) -> Self {
+    pub fn new(run: &'a Run) -> Self {
         let Run { experiment, rows, .. } = run;
         Self {
             comparisons: comparisons(experiment, rows),

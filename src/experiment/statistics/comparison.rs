@@ -3,13 +3,13 @@
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{Direction, MEASURES, Measure};
-use crate::experiment::statistics::Paired;
-use crate::experiment::trial::row::{TrialRow, of_planner};
+use crate::experiment::statistics::PairedDifference;
+use crate::experiment::trial::row::{TrialRow, planner_rows};
 use std::collections::HashMap;
 
 /// One measure of one planner relative to one baseline after the last touch.
 #[derive(Debug)]
-pub struct Comparison<'a> {
+pub struct PairedComparison<'a> {
     /// Name of the planner.
     pub planner: &'a str,
     /// Name of the baseline.
@@ -17,17 +17,22 @@ pub struct Comparison<'a> {
     /// Compared measure.
     pub measure: &'static Measure,
     /// Paired difference.
-    pub paired: Paired,
+    pub paired: PairedDifference,
 }
 
 /// Compares every planner with every baseline in every measure that both have and that has a
 /// direction.
-pub fn comparisons<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<Comparison<'a>> {
+pub fn comparisons<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<PairedComparison<'a>> {
     let mut found = Vec::new();
     for (planner, baseline) in pairs(experiment) {
         for measure in MEASURES.iter().filter(|measure| measure.direction != Direction::Neither) {
             let paired = paired(experiment, rows, [planner, baseline], experiment.touches, measure);
-            found.extend(paired.map(|paired| Comparison { planner, baseline, measure, paired }));
+            found.extend(paired.map(|paired| PairedComparison {
+                planner,
+                baseline,
+                measure,
+                paired,
+            }));
         }
     }
     found
@@ -48,14 +53,15 @@ pub fn paired(
     [planner, baseline]: [&str; 2],
     touches: u32,
     measure: &Measure,
-) -> Option<Paired> {
+) -> Option<PairedDifference> {
     let values = |planner| {
-        of_planner(rows, planner).filter_map(|row| Some((row.trial, measure.of(row, touches)?)))
+        planner_rows(rows, planner)
+            .filter_map(|row| Some((row.trial, measure.value(row, touches)?)))
     };
     let theirs: HashMap<u32, f64> = values(baseline).collect();
     let pairs: Vec<(f64, f64)> =
         values(planner).filter_map(|(trial, value)| Some((value, *theirs.get(&trial)?))).collect();
-    let mut paired = Paired::new(&pairs, experiment.seed)?;
+    let mut paired = PairedDifference::new(&pairs, experiment.seed)?;
     if measure.direction == Direction::More {
         paired.won = 1.0 - paired.won;
     }

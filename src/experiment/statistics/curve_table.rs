@@ -1,8 +1,8 @@
 //! Curves over touches as a table with intervals, the content of `summary.csv`.
 
 use crate::experiment::experiment::Experiment;
-use crate::experiment::measure::{Measure, in_files};
-use crate::experiment::statistics::Samples;
+use crate::experiment::measure::{Measure, measures_with_columns};
+use crate::experiment::statistics::BootstrapSamples;
 use crate::experiment::statistics::comparison::paired;
 use crate::experiment::statistics::summary;
 use crate::experiment::statistics::summary::CurvePoint;
@@ -22,7 +22,7 @@ pub fn columns(experiment: &Experiment, rows: &[TrialRow]) -> Vec<String> {
         });
         measure.columns().into_iter().chain(differences.collect::<Vec<_>>())
     };
-    in_files(rows).flat_map(of_measure).collect()
+    measures_with_columns(rows).flat_map(of_measure).collect()
 }
 
 /// Returns a point for each planner and each touch count that `is_wanted`, with its values in the
@@ -36,20 +36,20 @@ pub fn curve_table(
         .flat_map(|planner| summary::curve(experiment, rows, planner))
         .filter(|point| is_wanted(point.touches))
         .collect();
-    let measures: Vec<&Measure> = in_files(rows).collect();
-    let values = |point: &CurvePoint| record((experiment, &measures), rows, point);
+    let measures: Vec<&Measure> = measures_with_columns(rows).collect();
+    let values = |point: &CurvePoint| values((experiment, &measures), rows, point);
     let values: Vec<_> = points.par_iter().map(values).collect();
     points.into_iter().zip(values).collect()
 }
 
-fn record(
+fn values(
     (experiment, measures): (&Experiment, &[&Measure]),
     rows: &[TrialRow],
     point: &CurvePoint,
 ) -> Vec<Option<f64>> {
     let mut values = Vec::new();
     // Samples of all trials; a measure that fewer trials have draws its own samples.
-    let samples = Samples::new(point.trials, experiment.seed);
+    let samples = BootstrapSamples::new(point.trials, experiment.seed);
     for &measure in measures {
         let summary = point.of(measure);
         if measure.aggregate.has_mean() {
@@ -80,31 +80,31 @@ fn ends(interval: Option<[f64; 2]>) -> [Option<f64>; 2] {
 
 /// 95 % bootstrap interval of the median; `None` for a single trial.
 fn interval(
-    (experiment, samples): (&Experiment, &Samples),
+    (experiment, samples): (&Experiment, &BootstrapSamples),
     rows: &[TrialRow],
     point: &CurvePoint,
     measure: &Measure,
 ) -> Option<[f64; 2]> {
     let all: Vec<f64> = summary::fitted(rows, &point.planner, point.touches)
         .into_iter()
-        .filter_map(|row| measure.of(row, point.touches))
+        .filter_map(|row| measure.value(row, point.touches))
         .collect();
     match all.len() == samples.count {
         true => samples.median_interval(&all),
-        false => Samples::new(all.len(), experiment.seed).median_interval(&all),
+        false => BootstrapSamples::new(all.len(), experiment.seed).median_interval(&all),
     }
 }
 
 /// Uncertainty of a measure's reported value: the 95 % bootstrap interval of a median, one standard
 /// error on either side of a mean; `None` for a single trial.
-pub fn band(
+pub fn uncertainty(
     experiment: &Experiment,
     rows: &[TrialRow],
     point: &CurvePoint,
     measure: &Measure,
 ) -> Option<[f64; 2]> {
     if measure.aggregate.has_median() {
-        let samples = Samples::new(point.trials, experiment.seed);
+        let samples = BootstrapSamples::new(point.trials, experiment.seed);
         return interval((experiment, &samples), rows, point, measure);
     }
     let summary = point.of(measure)?;

@@ -10,8 +10,8 @@
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::statistics::comparison::pairs;
-use crate::experiment::statistics::{Ranked, Samples, percentiles_95};
-use crate::experiment::trial::row::{TrialRow, of_planner};
+use crate::experiment::statistics::{BootstrapSamples, RankedValues, central_95};
+use crate::experiment::trial::row::{TrialRow, planner_rows};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 
@@ -71,12 +71,12 @@ pub fn equal_error<'a>(
     measure: &'static Measure,
 ) -> Option<EqualError<'a>> {
     let [ours, theirs] = [planner, baseline].map(|name| curves(experiment, rows, name, measure));
-    let pairs: Vec<[&Curve<f64>; 2]> =
+    let pairs: Vec<[&ErrorCurve<f64>; 2]> =
         ours.iter().filter_map(|(trial, curve)| Some([curve, theirs.get(trial)?])).collect();
     let compared = compared(experiment);
     let goal_touches = experiment.goal_touches();
     let goal_index = compared.partition_point(|&count| count <= goal_touches).checked_sub(1)?;
-    let medians = [0, 1].map(|which| Curve::new(pairs.iter().map(|pair| pair[which])));
+    let medians = [0, 1].map(|which| ErrorCurve::new(pairs.iter().map(|pair| pair[which])));
     let mut counts = Vec::new();
     let everyone: Vec<usize> = (0..pairs.len()).collect();
     let goal = medians[1].errors.get(goal_index)?.median(&everyone, &mut counts)?;
@@ -84,14 +84,14 @@ pub fn equal_error<'a>(
     let touches =
         |after: f64| compared.get(after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
     let mut met = |sample: &[usize]| {
-        let met = meet(&medians, sample, goal_index, &mut counts);
+        let met = reach_goal(&medians, sample, goal_index, &mut counts);
         met.map(|(after, path_m)| [touches(after), path_m])
     };
     let found = met(&everyone);
-    let samples = Samples::new(pairs.len(), experiment.seed).each(met);
+    let samples = BootstrapSamples::new(pairs.len(), experiment.seed).each(met);
     let estimate = |of: fn([[f64; 2]; 2]) -> f64| {
         let values = samples.iter().map(|met| of(*met)).collect();
-        let interval = (!samples.is_empty()).then(|| percentiles_95(values));
+        let interval = (!samples.is_empty()).then(|| central_95(values));
         Estimate { value: of(found), interval }
     };
     Some(EqualError {
@@ -110,23 +110,23 @@ pub fn equal_error<'a>(
 /// Touch counts, from the last initial touch on, after which beliefs are compared.
 fn compared(experiment: &Experiment) -> Vec<u32> {
     let counts = experiment.initial_touches..=experiment.touches;
-    counts.filter(|&count| experiment.is_compared(count)).collect()
+    counts.filter(|&count| experiment.is_evaluated(count)).collect()
 }
 
 /// Values at every compared touch count: the numbers of one trial, or those of many trials as
 /// ranks, from which sample medians are computed.
-struct Curve<T> {
+struct ErrorCurve<T> {
     errors: Vec<T>,
     /// Lateral path length since the last initial touch.
     paths_m: Vec<T>,
 }
 
-impl Curve<Ranked> {
-    fn new<'a>(curves: impl Iterator<Item = &'a Curve<f64>> + Clone) -> Self {
+impl ErrorCurve<RankedValues> {
+    fn new<'a>(curves: impl Iterator<Item = &'a ErrorCurve<f64>> + Clone) -> Self {
         let length = curves.clone().next().map_or(0, |curve| curve.errors.len());
-        let ranked = |of: &dyn Fn(&Curve<f64>, usize) -> f64| {
+        let ranked = |of: &dyn Fn(&ErrorCurve<f64>, usize) -> f64| {
             let at = |index| curves.clone().map(|curve| of(curve, index)).collect::<Vec<f64>>();
-            (0..length).map(|index| Ranked::new(&at(index))).collect()
+            (0..length).map(|index| RankedValues::new(&at(index))).collect()
         };
         Self {
             errors: ranked(&|curve, index| curve.errors[index]),
@@ -141,30 +141,31 @@ fn curves(
     rows: &[TrialRow],
     planner: &str,
     measure: &Measure,
-) -> BTreeMap<u32, Curve<f64>> {
+) -> BTreeMap<u32, ErrorCurve<f64>> {
     let counts = compared(experiment);
-    let curve = |row: &TrialRow| -> Option<Curve<f64>> {
-        let errors: Option<Vec<f64>> = counts.iter().map(|&count| measure.of(row, count)).collect();
+    let curve = |row: &TrialRow| -> Option<ErrorCurve<f64>> {
+        let errors: Option<Vec<f64>> =
+            counts.iter().map(|&count| measure.value(row, count)).collect();
         let start_m = row.path_m(experiment.initial_touches)?;
         let paths_m: Option<Vec<f64>> =
             counts.iter().map(|&count| Some(row.path_m(count)? - start_m)).collect();
-        Some(Curve { errors: errors?, paths_m: paths_m? })
+        Some(ErrorCurve { errors: errors?, paths_m: paths_m? })
     };
-    of_planner(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
+    planner_rows(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
 }
 
 /// Returns when the planners of each pair reach the second's median error at `goal_index` in a
 /// sample of the pairs, as the index of the comparison (over a zone, touches after the initial
 /// ones) and the median path length to it, m.
-fn meet(
-    medians: &[Curve<Ranked>; 2],
+fn reach_goal(
+    medians: &[ErrorCurve<RankedValues>; 2],
     sample: &[usize],
     goal_index: usize,
     counts: &mut Vec<u32>,
 ) -> [(f64, f64); 2] {
     let goal = medians[1].errors.get(goal_index).and_then(|error| error.median(sample, counts));
     let goal = goal.unwrap_or(f64::NAN);
-    medians.each_ref().map(|Curve { errors, paths_m }| {
+    medians.each_ref().map(|ErrorCurve { errors, paths_m }| {
         let mut is_met =
             |index: usize| errors[index].median(sample, counts).is_some_and(|error| error <= goal);
         let met = match is_met(goal_index) {
@@ -181,9 +182,9 @@ mod tests {
     use super::*;
 
     /// Trials whose errors and path lengths are the same functions of the count, up to a factor.
-    fn trials(error: impl Fn(f64) -> f64, step_m: f64) -> Vec<Curve<f64>> {
+    fn trials(error: impl Fn(f64) -> f64, step_m: f64) -> Vec<ErrorCurve<f64>> {
         (0..20)
-            .map(|trial| Curve {
+            .map(|trial| ErrorCurve {
                 errors: (0..41)
                     .map(|i| (1.0 + 0.01 * f64::from(trial)) * error(f64::from(i)))
                     .collect(),
@@ -192,19 +193,23 @@ mod tests {
             .collect()
     }
 
-    fn met(ours: &[Curve<f64>], theirs: &[Curve<f64>], goal_index: usize) -> [(f64, f64); 2] {
+    fn reached(
+        ours: &[ErrorCurve<f64>],
+        theirs: &[ErrorCurve<f64>],
+        goal_index: usize,
+    ) -> [(f64, f64); 2] {
         let sample: Vec<usize> = (0..ours.len()).map(|i| i / 2).collect();
-        let medians = [ours, theirs].map(|curves| Curve::new(curves.iter()));
-        meet(&medians, &sample, goal_index, &mut Vec::new())
+        let medians = [ours, theirs].map(|curves| ErrorCurve::new(curves.iter()));
+        reach_goal(&medians, &sample, goal_index, &mut Vec::new())
     }
 
     /// Twice the rate takes half the touches for any sample of trials.
     #[test]
     fn twice_as_fast_needs_half_the_touches() {
         let (fast, slow) = (trials(|n| (-0.2 * n).exp(), 3.0), trials(|n| (-0.1 * n).exp(), 1.0));
-        let [ours, theirs] = met(&fast, &slow, 40);
+        let [ours, theirs] = reached(&fast, &slow, 40);
         assert_eq!((ours, theirs), ((20.0, 60.0), (40.0, 40.0)));
-        let [slower, itself] = met(&slow, &fast, 10);
+        let [slower, itself] = reached(&slow, &fast, 10);
         assert_eq!((slower.0, itself.0), (20.0, 10.0));
     }
 
@@ -212,8 +217,8 @@ mod tests {
     fn a_goal_is_met_where_the_error_stays_below_it() {
         let steady = trials(|_| 2.0, 1.0);
         let rising = trials(|n| if n < 30.0 { 1.0 } else { 1.0 + n }, 1.0);
-        assert_eq!(met(&rising, &steady, 40)[0].0, f64::INFINITY);
+        assert_eq!(reached(&rising, &steady, 40)[0].0, f64::INFINITY);
         let wavy = trials(|n| if n == 7.0 { 5.0 } else { 1.0 }, 1.0);
-        assert_eq!(met(&wavy, &steady, 40)[0].0, 8.0);
+        assert_eq!(reached(&wavy, &steady, 40)[0].0, 8.0);
     }
 }

@@ -37,13 +37,13 @@ pub fn median(values: &[f64]) -> Option<f64> {
 
 /// Values with their ranks, so that the median of a sample is found by counting.
 #[derive(Clone, Debug)]
-pub(super) struct Ranked {
+pub(super) struct RankedValues {
     sorted: Vec<f64>,
     /// Index of each value in the sorted list.
     ranks: Vec<usize>,
 }
 
-impl Ranked {
+impl RankedValues {
     pub(super) fn new(values: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..values.len()).collect();
         order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -85,24 +85,24 @@ pub fn mean_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
         drawn.iter_mut().zip(sample).for_each(|(to, &index)| *to = values[index]);
         mean(&drawn)
     };
-    let means = Samples::new(values.len(), seed).each(mean);
-    (values.len() > 1).then(|| percentiles_95(means))
+    let means = BootstrapSamples::new(values.len(), seed).each(mean);
+    (values.len() > 1).then(|| central_95(means))
 }
 
 /// 95 % interval of the median, computed as in [`mean_interval`].
 pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
-    Samples::new(values.len(), seed).median_interval(values)
+    BootstrapSamples::new(values.len(), seed).median_interval(values)
 }
 
 /// Bootstrap samples: each has as many indices as there are values, drawn with replacement; empty
 /// for a single value.
-pub(super) struct Samples {
+pub(super) struct BootstrapSamples {
     /// Number of values.
     pub(super) count: usize,
     indices: Vec<usize>,
 }
 
-impl Samples {
+impl BootstrapSamples {
     /// Draws the samples; deterministic for a `seed`.
     pub(super) fn new(count: usize, seed: u64) -> Self {
         let mut rng = seed::stream(seed, 0, "bootstrap");
@@ -118,14 +118,14 @@ impl Samples {
 
     /// Interval of the median of `count` values; see [`median_interval`].
     pub(super) fn median_interval(&self, values: &[f64]) -> Option<[f64; 2]> {
-        let (ranked, mut counts) = (Ranked::new(values), Vec::new());
+        let (ranked, mut counts) = (RankedValues::new(values), Vec::new());
         let medians = self.each(|sample| ranked.median(sample, &mut counts).unwrap_or(f64::NAN));
-        (!medians.is_empty()).then(|| percentiles_95(medians))
+        (!medians.is_empty()).then(|| central_95(medians))
     }
 }
 
 /// Returns the bounds of the middle 95 % of `found`, which must not be empty.
-pub fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
+pub fn central_95(mut found: Vec<f64>) -> [f64; 2] {
     found.sort_by(f64::total_cmp);
     let cut = found.len() / 40;
     [found[cut], found[found.len() - 1 - cut]]
@@ -133,7 +133,7 @@ pub fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
 
 /// Paired difference between the errors of two planners in the same trials.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Paired {
+pub struct PairedDifference {
     /// Trials finished by both.
     pub trials: usize,
     /// Mean of error − other error.
@@ -144,7 +144,7 @@ pub struct Paired {
     pub won: f64,
 }
 
-impl Paired {
+impl PairedDifference {
     /// Computes the difference from pairs (error, other error); `None` for an empty slice.
     pub fn new(pairs: &[(f64, f64)], seed: u64) -> Option<Self> {
         let differences: Vec<f64> = pairs.iter().map(|(error, other)| error - other).collect();
@@ -215,7 +215,7 @@ mod tests {
             // Few distinct values, so that many are equal.
             let values: Vec<f64> =
                 (0..count).map(|_| f64::from(rng.random_range(-4..4)) / 3.0).collect();
-            let (ranked, mut counts) = (Ranked::new(&values), Vec::new());
+            let (ranked, mut counts) = (RankedValues::new(&values), Vec::new());
             for size in 0..2 * count {
                 let sample: Vec<usize> = (0..size).map(|_| rng.random_range(0..count)).collect();
                 let drawn: Vec<f64> = sample.iter().map(|&index| values[index]).collect();
@@ -226,10 +226,11 @@ mod tests {
 
     #[test]
     fn pairs_are_compared_in_the_same_trial() {
-        let paired = Paired::new(&[(1.0, 2.0), (5.0, 6.0), (9.0, 9.0), (4.0, 3.0)], 1).unwrap();
+        let paired =
+            PairedDifference::new(&[(1.0, 2.0), (5.0, 6.0), (9.0, 9.0), (4.0, 3.0)], 1).unwrap();
         assert_eq!((paired.trials, paired.mean, paired.won), (4, -0.25, 0.625));
         let [low, high] = paired.interval.unwrap();
         assert!(low <= -0.25 && high >= -0.25 && low >= -1.0 && high <= 1.0);
-        assert_eq!(Paired::new(&[], 1), None);
+        assert_eq!(PairedDifference::new(&[], 1), None);
     }
 }

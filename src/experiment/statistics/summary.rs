@@ -3,9 +3,9 @@
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::statistics::{mean, mean_and_error, median};
-use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
+use crate::experiment::trial::row::{TouchRow, TrialRow, planner_rows};
 use nalgebra::Point3;
-use palpate_explore::planner::Stall;
+use palpate_explore::planner::Fallback;
 use palpate_explore::task::Zone;
 use serde::Serialize;
 
@@ -19,12 +19,12 @@ pub struct CurvePoint {
     /// Trials with a belief after this many touches.
     pub trials: usize,
     /// Statistics of each of [`MEASURES`]; `None` for a measure that no trial has.
-    values: Vec<Option<Summary>>,
+    values: Vec<Option<MeasureStatistics>>,
 }
 
 /// Statistics of a measure over trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
+pub struct MeasureStatistics {
     /// Mean.
     pub mean: f64,
     /// Standard error of the mean; `None` for a single trial.
@@ -33,7 +33,7 @@ pub struct Summary {
     pub median: f64,
 }
 
-impl Summary {
+impl MeasureStatistics {
     fn new(values: &[f64]) -> Option<Self> {
         let median = median(values)?;
         let (mean, error) = mean_and_error(values);
@@ -43,7 +43,7 @@ impl Summary {
 
 impl CurvePoint {
     /// Statistics of a measure; `None` if no trial has it.
-    pub fn of(&self, measure: &Measure) -> Option<&Summary> {
+    pub fn of(&self, measure: &Measure) -> Option<&MeasureStatistics> {
         let index = MEASURES.iter().position(|other| other.id == measure.id)?;
         self.values.get(index)?.as_ref()
     }
@@ -51,7 +51,7 @@ impl CurvePoint {
 
 /// Counts of events in one planner's trials.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Events {
+pub struct EventCounts {
     /// Trials started.
     pub trials: usize,
     /// Trials that ended early.
@@ -72,13 +72,16 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<C
         .filter_map(|touches| {
             let fitted = fitted(rows, planner, touches);
             let of = |measure: &Measure| -> Vec<f64> {
-                fitted.iter().filter_map(|row| measure.of(row, touches)).collect()
+                fitted.iter().filter_map(|row| measure.value(row, touches)).collect()
             };
             (!fitted.is_empty()).then(|| CurvePoint {
                 planner: planner.into(),
                 touches,
                 trials: fitted.len(),
-                values: MEASURES.iter().map(|measure| Summary::new(&of(measure))).collect(),
+                values: MEASURES
+                    .iter()
+                    .map(|measure| MeasureStatistics::new(&of(measure)))
+                    .collect(),
             })
         })
         .collect()
@@ -93,14 +96,19 @@ pub(in crate::experiment) fn fitted<'a>(
     let is_fitted = |row: &&TrialRow| {
         row.touches.get(touches as usize - 1).is_some_and(|touch| touch.fit.is_some())
     };
-    of_planner(rows, planner).filter(is_fitted).collect()
+    planner_rows(rows, planner).filter(is_fitted).collect()
 }
 
 /// Representative value of a measure over a planner's trials after some touches: the median if it
 /// is reported, otherwise the mean; `None` if no trial has the measure.
-pub fn typical(rows: &[TrialRow], planner: &str, touches: u32, measure: &Measure) -> Option<f64> {
+pub fn representative_value(
+    rows: &[TrialRow],
+    planner: &str,
+    touches: u32,
+    measure: &Measure,
+) -> Option<f64> {
     let values: Vec<f64> =
-        of_planner(rows, planner).filter_map(|row| measure.of(row, touches)).collect();
+        planner_rows(rows, planner).filter_map(|row| measure.value(row, touches)).collect();
     match measure.aggregate.has_median() {
         true => median(&values),
         false => (!values.is_empty()).then(|| mean(&values)),
@@ -108,7 +116,7 @@ pub fn typical(rows: &[TrialRow], planner: &str, touches: u32, measure: &Measure
 }
 
 /// Returns the touch count from which a curve meets a goal up to its end; `None` if it does not.
-pub fn met_from(points: &[CurvePoint], is_met: impl Fn(&CurvePoint) -> bool) -> Option<u32> {
+pub fn goal_touches(points: &[CurvePoint], is_met: impl Fn(&CurvePoint) -> bool) -> Option<u32> {
     points.iter().rev().take_while(|point| is_met(point)).last().map(|point| point.touches)
 }
 
@@ -126,9 +134,9 @@ pub fn median_shift_m(zone: &Zone, rows: &[TrialRow]) -> Option<f64> {
 }
 
 /// Counts the events in one planner's trials.
-pub fn events(rows: &[TrialRow], planner: &str) -> Events {
-    let mut events = Events::default();
-    for row in of_planner(rows, planner) {
+pub fn events(rows: &[TrialRow], planner: &str) -> EventCounts {
+    let mut events = EventCounts::default();
+    for row in planner_rows(rows, planner) {
         let count = |condition: fn(&TouchRow) -> bool| {
             row.touches.iter().filter(|touch| condition(touch)).count()
         };
@@ -136,8 +144,8 @@ pub fn events(rows: &[TrialRow], planner: &str) -> Events {
         events.failures += usize::from(row.failure.is_some());
         events.misses += count(|touch| touch.contact.is_none() && !touch.overload);
         events.overloads += count(|touch| touch.overload);
-        events.collapsed += count(|touch| touch.stall == Some(Stall::Collapsed));
-        events.repeated += count(|touch| touch.stall == Some(Stall::Repeated));
+        events.collapsed += count(|touch| touch.stall == Some(Fallback::Collapsed));
+        events.repeated += count(|touch| touch.stall == Some(Fallback::Repeated));
     }
     events
 }

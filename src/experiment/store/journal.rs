@@ -15,7 +15,7 @@ pub const JOURNAL: &str = "touches.jsonl";
 /// A line of the journal: a finished touch, or a fault.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry {
+pub struct JournalEntry {
     /// Time in seconds since 1970.
     pub time_unix_s: f64,
     /// Number of the trial.
@@ -34,7 +34,7 @@ pub struct Entry {
 pub struct Journal {
     path: PathBuf,
     file: File,
-    entries: Vec<Entry>,
+    entries: Vec<JournalEntry>,
 }
 
 impl Journal {
@@ -60,12 +60,12 @@ impl Journal {
 
     /// Finished touches of a trial, in order.
     pub fn touches(&self, trial: u32, planner: &str) -> Vec<TouchRow> {
-        let is_its = |entry: &&Entry| entry.trial == trial && entry.planner == planner;
+        let is_its = |entry: &&JournalEntry| entry.trial == trial && entry.planner == planner;
         self.entries.iter().filter(is_its).filter_map(|entry| entry.touch.clone()).collect()
     }
 
     /// Fault that stopped the run, if it is the last entry.
-    pub fn halted(&self) -> Option<&str> {
+    pub fn halt_reason(&self) -> Option<&str> {
         self.entries.last()?.fault.as_deref()
     }
 
@@ -73,7 +73,7 @@ impl Journal {
     ///
     /// # Errors
     /// If the entry cannot be written.
-    pub fn add(&mut self, entry: Entry) -> Result<(), RunError> {
+    pub fn add(&mut self, entry: JournalEntry) -> Result<(), RunError> {
         let mut line = serde_json::to_vec(&entry).map_err(io_error(&self.path))?;
         line.push(b'\n');
         let written = self.file.write_all(&line).and_then(|()| self.file.sync_data());

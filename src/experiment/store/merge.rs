@@ -1,11 +1,11 @@
 //! Merging of a run's shards into the same bytes as a run in one process.
 
 use super::files::{RunError, io_error};
-use super::provenance::Content;
+use super::provenance::InputHashes;
 use super::rows;
 use super::surface::{self, SURFACE};
 use super::{RunFolder, TRIALS, resolved};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,11 @@ use std::path::{Path, PathBuf};
 /// If a trial is missing, duplicate or of another experiment, `out` already has rows, or a file
 /// cannot be read or written.
 pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunError> {
-    let first = shards.first().ok_or_else(|| Invalid::new("no shards"))?;
+    let first = shards.first().ok_or_else(|| InputError::new("no shards"))?;
     super::require_run(first)?;
     let experiment = resolved::read(first, &[])?;
     let truth = surface::read(&first.join(SURFACE), &experiment)?;
-    let mut content = Content::default();
+    let mut content = InputHashes::default();
     // Rows in order, each with its shard and its byte range.
     let mut places = Vec::new();
     for path in shards {
@@ -35,12 +35,12 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
             );
             return Err(RunError::at(path, problem));
         }
-        let own = Content::read(path)?;
-        own.require_same(&content, path, |_| true)?;
+        let own = InputHashes::read(path)?;
+        own.check_equal(&content, path, |_| true)?;
         content.extend(own);
         rows::scan(&path.join(TRIALS), &experiment, |row, bytes| {
             let id = row.id();
-            if experiment.lists(&id) {
+            if experiment.contains_trial(&id) {
                 places.push(((id, bytes), path.as_path()));
             }
         })?;
@@ -50,9 +50,9 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
     if let Some([((id, _), a), (_, b)]) = pairs.find(|[((a, _), _), ((b, _), _)]| a == b) {
         let (a, b) = (a.display(), b.display());
         let problem = format!("trial {} of {} is in both {a} and {b}", id.trial, id.planner);
-        return Err(Invalid::new(problem).into());
+        return Err(InputError::new(problem).into());
     }
-    let missing = experiment.lacks(places.iter().map(|((id, _), _)| id));
+    let missing = experiment.missing_trials(places.iter().map(|((id, _), _)| id));
     if let Some((trial, planner)) = missing.first() {
         let problem = format!(
             "{} of {} trials are missing, the first is trial {trial} of {planner}: repeat its shard's \
@@ -60,7 +60,7 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
             missing.len(),
             missing.len() + places.len()
         );
-        return Err(Invalid::new(problem).into());
+        return Err(InputError::new(problem).into());
     }
     let (mut folder, there) =
         RunFolder::open_as(out, (&experiment, &truth, content), commit, false)?;

@@ -21,13 +21,13 @@ mod rows;
 mod surface;
 
 pub use files::{RunError, write_whole};
-pub use journal::{Entry, JOURNAL, Journal};
+pub use journal::{JOURNAL, Journal, JournalEntry};
 pub use merge::merge;
 pub use provenance::MANIFEST;
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
 use self::files::{io_error, remove};
-use self::provenance::{CONTENT, Content};
+use self::provenance::{CONTENT, InputHashes};
 use self::surface::{MESH, SURFACE};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::notice;
@@ -49,7 +49,7 @@ pub struct RunFolder {
     path: PathBuf,
     trials: File,
     /// Entry of this program for `manifest.json`, written with the first row.
-    unsigned: Option<serde_json::Value>,
+    pending_manifest: Option<serde_json::Value>,
 }
 
 /// Contents of a run folder.
@@ -81,20 +81,20 @@ impl RunFolder {
         commit: &str,
         fresh: bool,
     ) -> Result<(Self, Vec<TrialId>), RunError> {
-        let content = Content::of(simulation)?;
+        let content = InputHashes::of(simulation)?;
         let parts = (simulation.experiment(), simulation.truth(), content);
         Self::open_as(path, parts, commit, fresh)
     }
 
     fn open_as(
         path: &Path,
-        (experiment, truth, mut content): (&Experiment, &Truth, Content),
+        (experiment, truth, mut content): (&Experiment, &Truth, InputHashes),
         commit: &str,
         fresh: bool,
     ) -> Result<(Self, Vec<TrialId>), RunError> {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
-        refuse_foreign(path)?;
+        check_ownership(path)?;
         let trials = palpate_input::files::append(&file).map_err(io_error(&file))?;
         lock(&trials, path)?;
         let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
@@ -104,22 +104,22 @@ impl RunFolder {
             resolved::write(path, experiment)?;
             clear(path)?;
         }
-        resolved::same_run(path, experiment)?;
+        resolved::check_identity(path, experiment)?;
         let mut done = Vec::new();
         let good_bytes = rows::scan(&file, experiment, |row, _| done.push(row.id()))?;
         if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
             trials.set_len(good_bytes).map_err(io_error(&file))?;
         }
-        let before = Content::read(path)?;
+        let before = InputHashes::read(path)?;
         let has_row = |planner: &str| done.iter().any(|id| id.planner == planner);
-        content.require_same(&before, path, |planner| has_touches || has_row(planner))?;
+        content.check_equal(&before, path, |planner| has_touches || has_row(planner))?;
         content.extend(before);
         surface::write_or_compare(path, experiment, truth)?;
         content.write(path)?;
         resolved::write(path, experiment)?;
-        done.retain(|id| experiment.lists(id));
+        done.retain(|id| experiment.contains_trial(id));
         let unsigned = Some(provenance::manifest(commit, experiment.seed));
-        Ok((Self { path: path.into(), trials, unsigned }, done))
+        Ok((Self { path: path.into(), trials, pending_manifest: unsigned }, done))
     }
 
     /// Appends a row and passes it to the operating system, so that a later kill cannot lose it.
@@ -137,8 +137,8 @@ impl RunFolder {
     }
 
     fn append_line(&mut self, line: &[u8]) -> Result<(), RunError> {
-        if let Some(manifest) = self.unsigned.take() {
-            provenance::sign(&self.path, manifest)?;
+        if let Some(manifest) = self.pending_manifest.take() {
+            provenance::add_manifest(&self.path, manifest)?;
         }
         self.trials.write_all(line).map_err(io_error(&self.path.join(TRIALS)))
     }
@@ -154,12 +154,12 @@ impl RunFolder {
     ///
     /// # Errors
     /// If the file cannot be read back or replaced.
-    pub fn sort(self, experiment: &Experiment) -> Result<Tally, RunError> {
+    pub fn sort(self, experiment: &Experiment) -> Result<RowCounts, RunError> {
         let file = self.path.join(TRIALS);
-        let (mut places, mut tally) = (Vec::new(), Tally::default());
+        let (mut places, mut tally) = (Vec::new(), RowCounts::default());
         rows::scan(&file, experiment, |row, bytes| {
             let id = row.id();
-            if experiment.lists(&id) {
+            if experiment.contains_trial(&id) {
                 tally.trials += 1;
                 tally.failed.extend(row.failure.map(|reason| (id.clone(), reason)));
             }
@@ -180,7 +180,7 @@ impl RunFolder {
 
 /// Counts of a run's rows that its experiment lists.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tally {
+pub struct RowCounts {
     /// Number of trials.
     pub trials: usize,
     /// Failed trials, in order, with the reason.
@@ -199,7 +199,7 @@ impl Run {
         let (mut rows, mut unlisted) = (Vec::new(), 0);
         rows::scan(&path.join(TRIALS), &experiment, |row, _| {
             let id = row.id();
-            match experiment.lists(&id) {
+            match experiment.contains_trial(&id) {
                 true => rows.push((id, row)),
                 false => unlisted += 1,
             }
@@ -211,7 +211,7 @@ impl Run {
 
     /// Notices about what limits the meaning of the numbers.
     pub fn notices(&self) -> Vec<String> {
-        notice::of_run(&self.experiment, &self.truth, &self.rows)
+        notice::run_notices(&self.experiment, &self.truth, &self.rows)
     }
 }
 
@@ -223,7 +223,7 @@ impl Run {
 /// written by another process, or cannot be written.
 pub fn set_report(path: &Path, sets: &[String]) -> Result<(), RunError> {
     require_run(path)?;
-    sets.iter().try_for_each(|set| resolved::only_shown(set))?;
+    sets.iter().try_for_each(|set| resolved::check_report_setting(set))?;
     let experiment = resolved::read(path, sets)?;
     let file = path.join(TRIALS);
     let trials = File::open(&file).map_err(io_error(&file))?;
@@ -267,7 +267,7 @@ fn clear(path: &Path) -> Result<(), RunError> {
 
 /// Checks that a non-empty folder contains a run, or only what a crash at its start leaves: no
 /// rows, and no or a partial `resolved.toml`.
-fn refuse_foreign(path: &Path) -> Result<(), RunError> {
+fn check_ownership(path: &Path) -> Result<(), RunError> {
     let length = |name: &str| {
         let found = fs::metadata(path.join(name)).ok();
         found.filter(fs::Metadata::is_file).map(|found| found.len())
@@ -281,7 +281,7 @@ fn refuse_foreign(path: &Path) -> Result<(), RunError> {
     if resolved::is_ours(path) || has_rows && length(RESOLVED).is_some() {
         return Ok(());
     }
-    let part = palpate_input::files::partial(Path::new(RESOLVED));
+    let part = palpate_input::files::partial_path(Path::new(RESOLVED));
     for entry in fs::read_dir(path).map_err(io_error(path))? {
         let name = entry.map_err(io_error(path))?.file_name();
         let is_empty = name.to_str().and_then(length) == Some(0);

@@ -3,7 +3,7 @@
 
 use super::files::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
-use crate::sim::environment::Shape;
+use crate::sim::environment::Surface;
 use palpate_input::files;
 use palpate_input::words::hex;
 use serde_json::{Value, json};
@@ -27,13 +27,13 @@ const PLANNER: &str = "planner ";
 /// SHA-256 of a run's input files and external planners by key: `scene.object.mesh`,
 /// `scene.arm.model`, `truth.scan`, `planner MODULE:NAME`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Content {
+pub(super) struct InputHashes {
     hashes: BTreeMap<String, String>,
     /// Files of the keys that have one, named as in the experiment.
     files: BTreeMap<String, String>,
 }
 
-impl Content {
+impl InputHashes {
     /// Hashes the inputs of `simulation`.
     ///
     /// # Errors
@@ -41,7 +41,7 @@ impl Content {
     pub(super) fn of(simulation: &Simulation) -> Result<Self, RunError> {
         let mut content = Self::default();
         let experiment = simulation.experiment();
-        if let (Shape::Mesh { report, .. }, Some(object)) =
+        if let (Surface::Mesh { report, .. }, Some(object)) =
             (simulation.environment().shape(), &experiment.scene.object)
         {
             content.add("scene.object.mesh", report.sha256.clone(), Some(&object.mesh));
@@ -98,7 +98,7 @@ impl Content {
     }
 
     /// Checks that common entries are equal; planners without a row, by `has_row`, may differ.
-    pub(super) fn require_same(
+    pub(super) fn check_equal(
         &self,
         before: &Self,
         folder: &Path,
@@ -151,7 +151,7 @@ pub(super) fn manifest(commit: &str, seed: u64) -> Value {
 }
 
 /// Appends `manifest` to the list of programs that wrote a run, unless the last entry is equal.
-pub(super) fn sign(folder: &Path, manifest: Value) -> Result<(), RunError> {
+pub(super) fn add_manifest(folder: &Path, manifest: Value) -> Result<(), RunError> {
     let path = folder.join(MANIFEST);
     let to_value = |text: String| serde_json::from_str::<Vec<Value>>(&text).ok();
     let mut signed =

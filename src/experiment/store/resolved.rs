@@ -1,8 +1,8 @@
 //! `resolved.toml`: the experiment of a run with all defaults.
 
-use super::files::{RunError, same, write_changed};
+use super::files::{RunError, check_equal, write_changed};
 use crate::experiment::experiment::Experiment;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::files;
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
@@ -44,22 +44,22 @@ pub(super) fn read(folder: &Path, sets: &[String]) -> Result<Experiment, RunErro
 
 /// Writes the experiment to a run's folder, unless the file is unchanged.
 pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
-    write_changed(&folder.join(RESOLVED), &saved(experiment, folder))
+    write_changed(&folder.join(RESOLVED), &relative_resolved(experiment, folder))
 }
 
 /// Checks that the run in `folder` has the same identity as `experiment`.
-pub(super) fn same_run(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
+pub(super) fn check_identity(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     let found = read(folder, &[])?;
-    let identity = |experiment: &Experiment| saved(&experiment.identity(), folder);
-    same(folder, RESOLVED, [&identity(&found), &identity(experiment)])
+    let identity = |experiment: &Experiment| relative_resolved(&experiment.row_settings(), folder);
+    check_equal(folder, RESOLVED, [&identity(&found), &identity(experiment)])
 }
 
 /// Checks that a `--set` assignment changes only the report.
-pub(super) fn only_shown(set: &str) -> Result<(), RunError> {
+pub(super) fn check_report_setting(set: &str) -> Result<(), RunError> {
     let key = set.split_once('=').map(|(key, _)| key.trim());
     match key.is_none_or(|key| key == "question" || key.starts_with("report.")) {
         true => Ok(()),
-        false => Err(Invalid::new(format!(
+        false => Err(InputError::new(format!(
             "--set {set}: palpate report changes only `report.…` and `question`; use palpate run for \
              other settings"
         ))
@@ -69,12 +69,12 @@ pub(super) fn only_shown(set: &str) -> Result<(), RunError> {
 
 /// Returns [`resolved`] text with the mesh's path relative to the folder of the file `path`.
 pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
-    saved(experiment, path.parent().unwrap_or(Path::new("")))
+    relative_resolved(experiment, path.parent().unwrap_or(Path::new("")))
 }
 
 /// Returns [`resolved`] text with the paths of mesh and scan relative to the run's folder, so that
 /// both can be moved together.
-fn saved(experiment: &Experiment, folder: &Path) -> String {
+fn relative_resolved(experiment: &Experiment, folder: &Path) -> String {
     let mut experiment = experiment.clone();
     if let Ok(folder) = folder.canonicalize() {
         let moved = |path: &Path| {

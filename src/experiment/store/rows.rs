@@ -41,8 +41,8 @@ pub(super) fn scan(
         number += 1;
         let bad = |message: String| RunError::bad_row(path, number, message);
         let row: TrialRow =
-            serde_json::from_slice(&line).map_err(|error| bad(in_its_line(&error)))?;
-        belongs(&row, experiment).map_err(bad)?;
+            serde_json::from_slice(&line).map_err(|error| bad(line_error(&error)))?;
+        check_row(&row, experiment).map_err(bad)?;
         if !seen.insert(row.id()) {
             return Err(bad(format!("duplicate trial {} of {}", row.trial, row.planner)));
         }
@@ -58,7 +58,7 @@ pub(super) fn copy(from: &mut File, bytes: &Range<u64>, to: &mut impl Write) -> 
 }
 
 /// Describes the error in a line; the parser's own line number is always 1.
-fn in_its_line(error: &serde_json::Error) -> String {
+fn line_error(error: &serde_json::Error) -> String {
     format!("column {}: {}", error.column(), words::json(error))
 }
 
@@ -66,7 +66,7 @@ fn in_its_line(error: &serde_json::Error) -> String {
 ///
 /// # Errors
 /// The reason why it does not fit.
-fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
+fn check_row(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     let (found, wanted) = (row.touches.len(), experiment.touches as usize);
     if row.failure.is_none() && found != wanted {
         return Err(format!("{found} touches of {wanted} without a failure"));
@@ -77,7 +77,7 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     // Coordinates of a target, and length scales of a fit.
     let dimensions = experiment.scene.zone.as_ref().map_or([6, 3], |zone| [zone.dimension(); 2]);
     row.touches.iter().zip(1..).try_for_each(|(touch, count)| {
-        fits(touch, dimensions).map_err(|message| format!("touch {count}: {message}"))
+        check_touch(touch, dimensions).map_err(|message| format!("touch {count}: {message}"))
     })
 }
 
@@ -85,13 +85,13 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
 ///
 /// # Errors
 /// The reason why the touch does not fit.
-fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
+fn check_touch(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
     let numbers = touch.target.numbers();
     let target = numbers.len();
     if target != coordinates {
         return Err(format!("a target has {target} coordinates; needed are {coordinates}"));
     }
-    if let Some((name, value, [low, high])) = impossible(touch) {
+    if let Some((name, value, [low, high])) = out_of_range(touch) {
         return Err(format!("{name} is {value:?}; allowed is {low:?} to {high:?}"));
     }
     let Some(fit) = &touch.fit else { return Ok(()) };
@@ -108,13 +108,13 @@ fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), St
 }
 
 /// Returns the first value of a touch that is out of range, with its name and the range.
-fn impossible(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
+fn out_of_range(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
     let coordinate = |value: f64| ("a coordinate", value, [-FAR_M, FAR_M]);
     let places = [touch.contact, touch.normal, touch.tip].into_iter().flatten().flatten();
     let coordinates = touch.target.numbers().into_iter().chain(places).map(coordinate);
-    let measured = MEASURES
-        .iter()
-        .filter_map(|measure| Some((measure.id, measure.of_touch(touch)?, measure.unit.range)));
+    let measured = MEASURES.iter().filter_map(|measure| {
+        Some((measure.id, measure.value_after_touch(touch)?, measure.unit.range))
+    });
     coordinates.chain(measured).find(|(_, value, [low, high])| !(low..=high).contains(&value))
 }
 
@@ -130,6 +130,6 @@ pub(super) fn order(a: &TrialId, b: &TrialId, experiment: &Experiment) -> Orderi
 
 /// Whether the rows that the experiment lists are in order; other rows may be anywhere.
 pub(super) fn is_sorted(places: &[(TrialId, Range<u64>)], experiment: &Experiment) -> bool {
-    let listed = places.iter().map(|(id, _)| id).filter(|id| experiment.lists(id));
+    let listed = places.iter().map(|(id, _)| id).filter(|id| experiment.contains_trial(id));
     listed.is_sorted_by(|a, b| order(a, b, experiment).is_le())
 }

@@ -1,6 +1,6 @@
 //! `surface.csv`: ground truth of a run on its test grid. `surface.obj`: that of a whole object.
 
-use super::files::{RunError, io_error, same, write_whole};
+use super::files::{RunError, check_equal, io_error, write_whole};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::truth::Truth;
 use palpate_geometry::import::import;
@@ -25,7 +25,7 @@ pub(super) fn write_or_compare(
     for (name, wanted) in [(SURFACE, text(experiment, truth))].into_iter().chain(mesh) {
         let path = folder.join(name);
         match files::text(&path, u64::MAX) {
-            Ok(found) => same(folder, name, [&found, &wanted])?,
+            Ok(found) => check_equal(folder, name, [&found, &wanted])?,
             Err(cause) if cause.kind() == io::ErrorKind::NotFound => write_whole(&path, &wanted)?,
             Err(cause) => return Err(io_error(&path)(cause)),
         }
@@ -67,10 +67,10 @@ pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, RunErr
     let Some(zone) = &experiment.scene.zone else {
         let mesh = path.with_file_name(MESH);
         if !mesh.exists() {
-            return Ok(Truth::around(None));
+            return Ok(Truth::whole_object(None));
         }
         let (mesh, _) = import(&mesh, 1.0).map_err(|error| bad(1, error.to_string()))?;
-        return Ok(Truth::around(Some(&mesh)));
+        return Ok(Truth::whole_object(Some(&mesh)));
     };
     let text = files::text(path, u64::MAX).map_err(io_error(path))?;
     let (mut places, mut heights_m, mut is_reachable) = (Vec::new(), Vec::new(), Vec::new());

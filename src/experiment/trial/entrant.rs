@@ -1,12 +1,12 @@
 //! Names that an experiment may list: planners, and the oracle.
 
-use palpate_explore::planner::{PLANNERS, is_own};
+use palpate_explore::planner::{PLANNERS, is_external};
 
 /// Name of the oracle in an experiment's list of planners.
 pub const ORACLE: &str = "oracle";
 
 /// Names that an experiment may list, each with a description.
-pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
+pub fn known_planners() -> impl Iterator<Item = (&'static str, &'static str)> {
     let oracle =
         "reduces the true error most (uses the ground truth: an upper bound for comparison)";
     PLANNERS.iter().map(|entry| (entry.name, entry.about)).chain([(ORACLE, oracle)])
@@ -14,6 +14,6 @@ pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Names allowed in place of `name`: those [`listed`], and `name` itself if it names an
 /// [external](is_own) planner.
-pub fn allowed(name: &str) -> Vec<&str> {
-    listed().map(|(name, _)| name).chain(is_own(name).then_some(name)).collect()
+pub fn allowed_names(name: &str) -> Vec<&str> {
+    known_planners().map(|(name, _)| name).chain(is_external(name).then_some(name)).collect()
 }

@@ -13,7 +13,7 @@ pub(super) use oracle::{GroundTruth, OracleFactory};
 use self::row::{TouchRow, TrialRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
-use crate::experiment::measure::outline::Outline;
+use crate::experiment::measure::outline::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::planner::{self, PlannerFactory};
@@ -22,7 +22,7 @@ use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 
 /// A finished touch.
-pub struct Touched<'a> {
+pub struct FinishedTouch<'a> {
     /// Number of the touch, from 1.
     pub count: u32,
     /// Outcome of the touch.
@@ -35,7 +35,7 @@ pub struct Touched<'a> {
 
 /// Callback after every touch of a trial, before the next is planned. It cannot change the row, but
 /// a fault that it returns ends the trial.
-pub type TrialObserver<'a> = dyn FnMut(&Touched) -> Result<(), Fault> + 'a;
+pub type TrialObserver<'a> = dyn FnMut(&FinishedTouch) -> Result<(), Fault> + 'a;
 
 /// Runs one trial of a planner from start to end with the touches of `probe`; calls `observer`
 /// after each.
@@ -48,8 +48,8 @@ pub(in crate::experiment) fn run(
     (factory, trial): (&dyn PlannerFactory, u32),
     observer: &mut TrialObserver,
 ) -> TrialRow {
-    let mut row = TrialRow::ended(trial, factory.name(), None);
-    row.failure = explore(experiment, truth, probe, (factory, &mut row), observer).err();
+    let mut row = TrialRow::without_touches(trial, factory.name(), None);
+    row.failure = run_touches(experiment, truth, probe, (factory, &mut row), observer).err();
     row
 }
 
@@ -57,7 +57,7 @@ pub(in crate::experiment) fn run(
 ///
 /// # Errors
 /// The reason why the trial ended before the last touch.
-fn explore(
+fn run_touches(
     experiment: &Experiment,
     truth: &GroundTruth,
     probe: &mut dyn Probe,
@@ -94,7 +94,7 @@ fn explore(
             return Err(format!("touch {count}: planned at {target:?}, {beyond}"));
         };
         let touch = probe.touch(&approach).map_err(|fault| format!("touch {count}: {fault}"))?;
-        let swept = probe.swept();
+        let swept = probe.swept_volume();
         belief.observe(&plan.target, &approach, (&touch, swept.as_ref()));
         let swept = swept.filter(|_| writes_tips || touch == Touch::Miss);
         let contact = match &touch {
@@ -109,7 +109,7 @@ fn explore(
             tip: swept.map(|swept| swept.p_wt.coords.into()),
             time_s: probe.time_s(),
             planned_sd_m: plan.sd_m,
-            stall: plan.stall,
+            stall: plan.fallback,
             fit: None,
             jitter: 0.0,
             metrics: None,
@@ -117,10 +117,10 @@ fn explore(
             shape: None,
         };
         let fitted = match count >= experiment.initial_touches {
-            true => conclude(experiment, truth, &mut belief, (count, &mut touch_row)),
+            true => evaluate(experiment, truth, &mut belief, (count, &mut touch_row)),
             false => Ok(()),
         };
-        let touched = Touched { count, touch: &touch, row: &touch_row, belief: &belief };
+        let touched = FinishedTouch { count, touch: &touch, row: &touch_row, belief: &belief };
         let observed = observer(&touched);
         row.touches.push(touch_row);
         fitted.map_err(|error| format!("fit after touch {count}: {error}"))?;
@@ -133,7 +133,7 @@ fn explore(
 ///
 /// # Errors
 /// If the fit fails.
-fn conclude(
+fn evaluate(
     experiment: &Experiment,
     truth: &GroundTruth,
     belief: &mut Belief,
@@ -146,16 +146,16 @@ fn conclude(
                 row.metrics = field.surface().and_then(|it| truth.truth.compare(it));
             }
             // Only the last row contains the reliability.
-            row.outline = Outline::of(field.presence(), &truth.truth);
+            row.outline = SilhouetteMetrics::of(field.presence(), &truth.truth);
             if let Some(outline) = row.outline.as_mut().filter(|_| count < experiment.touches) {
                 outline.reliability = None;
             }
         }
         Belief::ImplicitSurface(surface) => {
-            let is_compared = fitted.is_ok() && experiment.is_compared(count);
+            let is_compared = fitted.is_ok() && experiment.is_evaluated(count);
             if let Some(surface) = surface.surface().filter(|_| is_compared) {
                 let cells = experiment.space.cells;
-                row.shape = truth.shape.as_ref().map(|shape| shape.judge(surface, cells));
+                row.shape = truth.shape.as_ref().map(|shape| shape.evaluate(surface, cells));
             }
         }
     }

@@ -7,16 +7,16 @@ use crate::experiment::statistics::mean;
 use crate::experiment::trial::entrant::ORACLE;
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
-use crate::sim::probe::exact;
+use crate::sim::probe::exact_probe;
 use palpate_explore::around::ImplicitSurface;
 use palpate_explore::around::surface::steepness;
 use palpate_explore::belief::Belief;
 use palpate_explore::planner::candidates::{Candidates, free_aim};
-use palpate_explore::planner::sample::any_side;
+use palpate_explore::planner::sample::random_aim;
 use palpate_explore::planner::search::Search;
 use palpate_explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use palpate_explore::task::{Aim, Target};
-use palpate_geometry::spread::Spot;
+use palpate_geometry::spread::SurfacePoint;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -38,11 +38,11 @@ const LOOKED_AT: usize = 8;
 impl GroundTruth {
     /// Returns the belief with a touch of a rigid finger at `target`, without a new fit.
     fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
-        let mut probe = exact(Arc::clone(&self.environment));
+        let mut probe = exact_probe(Arc::clone(&self.environment));
         let approach = self.environment.task().approach(target)?;
         let touch = probe.touch(&approach).ok()?;
         let mut after = belief.clone();
-        after.observe(target, &approach, (&touch, probe.swept().as_ref()));
+        after.observe(target, &approach, (&touch, probe.swept_volume().as_ref()));
         Some(after)
     }
 
@@ -54,7 +54,7 @@ impl GroundTruth {
             Belief::ImplicitSurface(surface) => {
                 let mut field = surface.surface()?.field();
                 let spots = self.shape.as_ref()?.samples().iter().step_by(LOOKED_AT);
-                let offset_m = |spot: &Spot| {
+                let offset_m = |spot: &SurfacePoint| {
                     let field = field.at(&spot.point);
                     field.value.abs() / steepness(&field.gradient)
                 };
@@ -89,10 +89,10 @@ impl Planner for Oracle {
         Ok(match belief {
             Belief::HeightField(field) => {
                 let count = self.search.settings.oracle.candidates;
-                let places = self.search.scattered(field.zone(), count);
+                let places = self.search.spread_places(field.zone(), count);
                 let targets = places.into_iter().map(Target::from).collect();
                 match self.best(belief, targets) {
-                    Some(Target::Place(place)) => self.search.conclude(field, place),
+                    Some(Target::Place(place)) => self.search.plan_at(field, place),
                     _ => self.search.anywhere(field.zone()),
                 }
             }
@@ -100,7 +100,7 @@ impl Planner for Oracle {
                 let targets = self.aims(surface).into_iter().map(Target::from).collect();
                 match self.best(belief, targets) {
                     Some(target) => Plan::at(target),
-                    None => Plan::at(any_side(surface.scope(), &mut self.search.rng)),
+                    None => Plan::at(random_aim(surface.scope(), &mut self.search.rng)),
                 }
             }
         })
@@ -128,7 +128,7 @@ impl Oracle {
         let tried = self.search.settings.oracle.candidates;
         let rng = &mut self.search.rng;
         let mut aims = Vec::new();
-        if let Some(candidates) = Candidates::of(surface, rng) {
+        if let Some(candidates) = Candidates::new(surface, rng) {
             let mut field = candidates.surface().field();
             for _ in 0..tried {
                 let at = rng.random_range(0..candidates.all.len());
@@ -137,7 +137,7 @@ impl Oracle {
             }
         }
         while aims.len() < tried as usize {
-            aims.push(any_side(surface.scope(), rng));
+            aims.push(random_aim(surface.scope(), rng));
         }
         aims
     }

@@ -4,14 +4,14 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
 use crate::experiment::trial::belief_shape::shapes;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use crate::experiment::trial::{Touched, TrialObserver};
+use crate::experiment::trial::{FinishedTouch, TrialObserver};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::PlannerFactory;
-use palpate_explore::probe::{Contact, Probe, Swept, Touch};
+use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
 use palpate_explore::task::Approach;
-use palpate_ros::recording::{self, About, Ending, Recorder, Recording};
+use palpate_ros::recording::{self, Recording, RecordingBackend, RecordingMetadata, TrialEnd};
 use std::iter;
 use std::path::{Path, PathBuf};
 
@@ -47,18 +47,18 @@ pub fn run(
     simulation: &Simulation,
     (trial, planner): (u32, &dyn PlannerFactory),
     path: Option<&Path>,
-    made: &[TouchRow],
+    earlier_touches: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> TrialRow {
     let job = (trial, planner);
     let row = match path {
-        Some(path) => record(simulation, job, path, made, observer),
+        Some(path) => record(simulation, job, path, earlier_touches, observer),
         None => simulation.probe(trial).map(|mut probe| {
-            let mut probe = Resumed::new(made.to_vec(), simulation, &mut *probe);
+            let mut probe = ResumedProbe::new(earlier_touches.to_vec(), simulation, &mut *probe);
             simulation.trial_with(&mut probe, planner, trial, observer)
         }),
     };
-    row.unwrap_or_else(|fault| TrialRow::unstarted(trial, planner.name(), &fault))
+    row.unwrap_or_else(|fault| TrialRow::not_started(trial, planner.name(), &fault))
 }
 
 /// # Errors
@@ -70,9 +70,9 @@ fn record(
     made: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> Result<TrialRow, Fault> {
-    let body = simulation.body()?.ok_or_else(|| Fault::lacks("a body that moves"))?;
+    let body = simulation.backend()?.ok_or_else(|| Fault::lacks("a body that moves"))?;
     let seed = simulation.body_seed(trial);
-    let about = About {
+    let about = RecordingMetadata {
         version: env!("CARGO_PKG_VERSION").into(),
         experiment: resolved_beside(simulation.experiment(), path),
         planner: planner.name().into(),
@@ -84,10 +84,10 @@ fn record(
     for (row, count) in made.iter().zip(1..) {
         recording.touched(&recorded(row, count)?, Default::default())?;
     }
-    let recorder = Recorder::new(body, recording.clone());
+    let recorder = RecordingBackend::new(body, recording.clone());
     let mut servo = simulation.servo(Box::new(recorder), seed)?;
     let mut is_interrupted = false;
-    let mut record = |touched: &Touched| {
+    let mut record = |touched: &FinishedTouch| {
         // A touch that ends the trial is recorded, too.
         let observed = observer(touched);
         is_interrupted |= observed.is_err();
@@ -101,9 +101,9 @@ fn record(
         recording.touched(&touch, shapes(touched.belief))?;
         observed
     };
-    let mut probe = Resumed::new(made.to_vec(), simulation, &mut servo);
+    let mut probe = ResumedProbe::new(made.to_vec(), simulation, &mut servo);
     let mut row = simulation.trial_with(&mut probe, planner, trial, &mut record);
-    let ending = Ending { failure: row.failure.clone(), is_interrupted };
+    let ending = TrialEnd { failure: row.failure.clone(), is_interrupted };
     if let Err(fault) = recording.end(servo.time_s().unwrap_or_default(), &ending) {
         row.failure.get_or_insert_with(|| format!("after the last touch: {fault}"));
     }
@@ -114,7 +114,7 @@ fn record(
 ///
 /// # Errors
 /// If its row has no JSON.
-fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
+fn recorded(row: &TouchRow, touch: u32) -> Result<recording::TouchMessage<'_>, Fault> {
     let time_s = row.time_s.unwrap_or_default();
     let outcome = match (row.contact, row.overload) {
         (Some(_), _) => "contact",
@@ -123,7 +123,7 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
     };
     let json = serde_json::to_string(row);
     let json = json.map_err(|error| Fault::Unrecorded { time_s, message: error.to_string() })?;
-    Ok(recording::Touch {
+    Ok(recording::TouchMessage {
         touch,
         time_s,
         target: row.target.numbers().into(),
@@ -135,7 +135,7 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
 }
 
 /// Probe of a continued trial: returns the touches made before, then makes new ones.
-pub struct Resumed<'a> {
+pub struct ResumedProbe<'a> {
     made: std::vec::IntoIter<TouchRow>,
     finger: Finger,
     probe: &'a mut dyn Probe,
@@ -147,7 +147,7 @@ pub struct Resumed<'a> {
     pub fault: Option<Fault>,
 }
 
-impl<'a> Resumed<'a> {
+impl<'a> ResumedProbe<'a> {
     /// Creates a probe that continues with `probe` after the touches `made` of a trial of
     /// `simulation`.
     pub fn new(made: Vec<TouchRow>, simulation: &Simulation, probe: &'a mut dyn Probe) -> Self {
@@ -171,7 +171,7 @@ fn touch(row: &TouchRow, approach: &Approach) -> Touch {
     }
 }
 
-impl Probe for Resumed<'_> {
+impl Probe for ResumedProbe<'_> {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         self.last = self.made.next().map(|row| (row, approach.p_far_w));
         match &self.last {
@@ -184,14 +184,14 @@ impl Probe for Resumed<'_> {
         }
     }
 
-    fn swept(&self) -> Option<Swept> {
+    fn swept_volume(&self) -> Option<SweptVolume> {
         match &self.last {
             // Without a stored tip, only the passage of the finger is known.
             Some((row, p_far_w)) => {
                 let p_wt = row.tip.map_or(*p_far_w, Point3::from);
-                Some(Swept { finger: self.finger.clone(), p_wt })
+                Some(SweptVolume { finger: self.finger.clone(), p_wt })
             }
-            None => self.probe.swept(),
+            None => self.probe.swept_volume(),
         }
     }
 

@@ -2,13 +2,13 @@
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::simulation::Simulation;
-use crate::experiment::trial::Touched;
-use crate::experiment::trial::recorded_trial::Resumed;
+use crate::experiment::trial::FinishedTouch;
+use crate::experiment::trial::recorded_trial::ResumedProbe;
 use crate::experiment::trial::row::TouchRow;
 use palpate_explore::backend::Fault;
 use palpate_input::config::ConfigError;
-use palpate_input::error::Invalid;
-use palpate_ros::recording::{self, Player, Recorded};
+use palpate_input::error::InputError;
+use palpate_ros::recording::{self, RecordedTrial, ReplayBackend};
 use serde::Serialize;
 use std::path::Path;
 
@@ -69,7 +69,7 @@ pub enum Difference {
 /// # Errors
 /// If this version cannot read it.
 pub fn experiment(
-    recorded: &Recorded,
+    recorded: &RecordedTrial,
     path: &Path,
     sets: &[String],
 ) -> Result<Experiment, ConfigError> {
@@ -82,23 +82,23 @@ pub fn experiment(
 /// # Errors
 /// If its planner is unknown, a touch in it cannot be read, or the robot cannot be moved to the
 /// recording's start.
-pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Fault> {
+pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Replay, Fault> {
     let about = &recorded.about;
     let planner = simulation.planner(&about.planner).ok_or_else(|| {
         let name = &about.planner;
-        Invalid::new(format!("planner \"{name}\" is not available in this version"))
+        InputError::new(format!("planner \"{name}\" is not available in this version"))
     })?;
-    let player = Box::new(Player::new(recorded.clone()));
+    let player = Box::new(ReplayBackend::new(recorded.clone()));
     let mut servo = simulation.servo(player, simulation.body_seed(about.trial))?;
-    let mut probe = Resumed::new(made(recorded)?, simulation, &mut servo);
+    let mut probe = ResumedProbe::new(made(recorded)?, simulation, &mut servo);
     let (mut touches, mut differs) = (0, None);
-    let mut compare = |touched: &Touched| {
+    let mut compare = |touched: &FinishedTouch| {
         let Some(then) = recorded.touches.get(touches as usize) else {
             // The recording was cut between a touch's last tick and its row, or ended there.
             return Ok(());
         };
         let now = serde_json::to_string(touched.row).unwrap_or_default();
-        if now == then.row || rewritten(&then.row).is_some_and(|then| now == then) {
+        if now == then.row || upgrade_row(&then.row).is_some_and(|then| now == then) {
             touches += 1;
             return Ok(());
         }
@@ -137,10 +137,10 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Fa
 }
 
 /// Returns the rows of the touches made before the recording started.
-fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, Invalid> {
-    let read = |touch: &recording::Touch| {
+fn made(recorded: &RecordedTrial) -> Result<Vec<TouchRow>, InputError> {
+    let read = |touch: &recording::TouchMessage| {
         serde_json::from_str(&touch.row).map_err(|error| {
-            Invalid::new(format!(
+            InputError::new(format!(
                 "touch {}, made before the recording, has an unreadable row: {error}",
                 touch.touch
             ))
@@ -151,13 +151,13 @@ fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, Invalid> {
 
 /// Returns a recorded row in this version's format: version 0.1 wrote targets without a name.
 /// Returns `None` if it cannot be read.
-fn rewritten(row: &str) -> Option<String> {
+fn upgrade_row(row: &str) -> Option<String> {
     serde_json::to_string(&serde_json::from_str::<TouchRow>(row).ok()?).ok()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::rewritten;
+    use super::upgrade_row;
 
     /// Includes the numbers of an aim, whose direction keeps its digits.
     #[test]
@@ -170,9 +170,9 @@ mod tests {
             ),
         ] {
             let row = |target: &str| format!(r#"{{"target":{target},"contact":[0.1,-0.6,0.7]}}"#);
-            assert_eq!(rewritten(&row(before)), Some(row(now)));
-            assert_eq!(rewritten(&row(now)), Some(row(now)));
+            assert_eq!(upgrade_row(&row(before)), Some(row(now)));
+            assert_eq!(upgrade_row(&row(now)), Some(row(now)));
         }
-        assert_eq!(rewritten("{}"), None);
+        assert_eq!(upgrade_row("{}"), None);
     }
 }

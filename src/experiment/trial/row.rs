@@ -1,10 +1,10 @@
 //! Row of a trial: one line of `trials.jsonl`.
 
 use crate::experiment::measure::metrics::Metrics;
-use crate::experiment::measure::outline::Outline;
+use crate::experiment::measure::outline::SilhouetteMetrics;
 use crate::experiment::measure::shape::ShapeMetrics;
 use palpate_explore::backend::Fault;
-use palpate_explore::planner::Stall;
+use palpate_explore::planner::Fallback;
 use palpate_explore::task::Target;
 use palpate_gp::fit::Fit;
 use schemars::JsonSchema;
@@ -62,7 +62,7 @@ pub struct TouchRow {
     pub planned_sd_m: Option<f64>,
     /// Reason why the planner used its fallback.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stall: Option<Stall>,
+    pub stall: Option<Fallback>,
     /// Fit after this touch; none before the last initial touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<Fit>,
@@ -74,7 +74,7 @@ pub struct TouchRow {
     pub metrics: Option<Metrics>,
     /// Errors of the estimated silhouette; omitted where the object fills its zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outline: Option<Outline>,
+    pub outline: Option<SilhouetteMetrics>,
     /// Errors of the estimated closed surface; omitted for a zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<ShapeMetrics>,
@@ -118,14 +118,18 @@ impl TrialRow {
     }
 
     /// Creates a trial without touches, with the `failure` that ended it, if given.
-    pub(in crate::experiment) fn ended(trial: u32, planner: &str, failure: Option<String>) -> Self {
+    pub(in crate::experiment) fn without_touches(
+        trial: u32,
+        planner: &str,
+        failure: Option<String>,
+    ) -> Self {
         let (touches, verification) = (Vec::new(), Vec::new());
         Self { trial, planner: planner.into(), failure, touches, verification }
     }
 
     /// Creates a trial that a fault ended before its first touch.
-    pub(in crate::experiment) fn unstarted(trial: u32, planner: &str, fault: &Fault) -> Self {
-        Self::ended(trial, planner, Some(format!("before the first touch: {fault}")))
+    pub(in crate::experiment) fn not_started(trial: u32, planner: &str, fault: &Fault) -> Self {
+        Self::without_touches(trial, planner, Some(format!("before the first touch: {fault}")))
     }
 
     /// Travel of the finger over its first `touches` touches, along straight lines: between places
@@ -154,7 +158,7 @@ impl TouchRow {
 }
 
 /// Returns the rows of one planner.
-pub fn of_planner<'a>(
+pub fn planner_rows<'a>(
     rows: &'a [TrialRow],
     planner: &'a str,
 ) -> impl Iterator<Item = &'a TrialRow> {

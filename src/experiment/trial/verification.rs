@@ -6,7 +6,7 @@ use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use nalgebra::Point3;
 use palpate_explore::around::surface::steepness;
 use palpate_explore::belief::{Belief, HeightField};
-use palpate_explore::planner::sample::sampled;
+use palpate_explore::planner::sample::target_from_fractions;
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Target, Task};
 use palpate_gp::math::seed;
@@ -47,9 +47,9 @@ pub(super) fn verify(
             Touch::Contact(contact) => Some(contact.p_wc),
             Touch::Miss | Touch::Overload => None,
         };
-        let error = p_wc.and_then(|p_wc| outside(belief, &p_wc));
+        let error = p_wc.and_then(|p_wc| signed_distance(belief, &p_wc));
         let first = again.and_then(|at| touches[at].contact).map(Point3::from);
-        let before = error.zip(first.and_then(|first| outside(belief, &first)));
+        let before = error.zip(first.and_then(|first| signed_distance(belief, &first)));
         rows.push(VerificationRow {
             target,
             again: again.map(|at| at as u32 + 1),
@@ -77,7 +77,7 @@ fn height(field: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
 
 /// Distance of a point of `W` outside the estimated surface and the standard deviation of a touch;
 /// `None` before the first fit.
-fn outside(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
+fn signed_distance(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
     match belief {
         Belief::HeightField(field) => {
             let (mean_m, sd_m) = height(field, &field.zone().place(p_w))?;
@@ -103,11 +103,11 @@ fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
         Belief::ImplicitSurface(surface) => {
             let (aim, ball) = (target.aim()?, &surface.scope().ball);
             let mut field = surface.surface()?.field();
-            let at = |along_m: f64| aim.p_w + aim.ahead_w.scale(along_m);
+            let at = |along_m: f64| aim.p_w + aim.direction_w.scale(along_m);
             let [from_m, to_m] = ball.chord_m(aim);
             let along_m = first_zero([from_m, to_m], |along_m| field.value(&at(along_m)));
             Some(match along_m {
-                Some(along_m) => (-along_m, outside(belief, &at(along_m))?.1),
+                Some(along_m) => (-along_m, signed_distance(belief, &at(along_m))?.1),
                 None => (0.0, ball.radius_m),
             })
         }
@@ -142,7 +142,7 @@ fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Targ
         let axes = [2, 3].into_iter().zip(&shifts);
         axes.map(|(base, shift)| (radical_inverse(i, base) + shift).fract()).collect()
     };
-    (0..count).map(|_| sampled(belief, &mut next)).collect()
+    (0..count).map(|_| target_from_fractions(belief, &mut next)).collect()
 }
 
 /// Radical inverse of `i` in `base`: its digits mirrored at the radix point.

@@ -63,7 +63,7 @@ pub struct Truth {
     /// Whether a touch with a target inside the zone can reach the surface at each point.
     pub is_reachable: Vec<bool>,
     /// Whether points without a height have no surface; otherwise it is unknown.
-    pub is_whole: bool,
+    pub is_complete: bool,
     /// Surface of a whole object in `W`, for drawing and comparison; `None` for a zone.
     pub mesh: Option<Arc<Mesh>>,
 }
@@ -74,26 +74,26 @@ const TRIANGLES: usize = 20_000;
 
 /// Step between the grid points at which the belief's variance is computed.
 // heuristic: the variance costs the square of the number of touches, the mean only that number.
-const CALIBRATED: usize = 4;
+const CALIBRATION_STEP: usize = 4;
 
 impl Truth {
     /// Samples the environment's surface on a grid of `per_side` points along each side of the
     /// zone; calls `tell` with the name of each step when it starts.
     pub fn sample(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
         let Some(zone) = environment.task().zone() else {
-            return Self::around(environment.mesh());
+            return Self::whole_object(environment.mesh());
         };
         tell("sampling the surface");
         let places = zone.grid(per_side);
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
-        let is_reachable = reach::is_reachable(environment, &places, &heights_m, tell);
-        Self { is_whole: true, ..Self::new(zone, places, heights_m, is_reachable) }
+        let is_reachable = reach::reachable(environment, &places, &heights_m, tell);
+        Self { is_complete: true, ..Self::new(zone, places, heights_m, is_reachable) }
     }
 
     /// Ground truth of a whole object with the surface `mesh`, simplified if it is large; it has no
     /// test points.
-    pub fn around(mesh: Option<&Mesh>) -> Self {
+    pub fn whole_object(mesh: Option<&Mesh>) -> Self {
         let kept = mesh.map(|mesh| match mesh.triangles().len() > TRIANGLES {
             true => {
                 let (vertices, triangles) = coarse(mesh, TRIANGLES);
@@ -117,11 +117,11 @@ impl Truth {
         is_reachable: Vec<bool>,
     ) -> Self {
         let is_edge = places.iter().map(|place| zone.is_edge(place)).collect();
-        Self { places, heights_m, is_edge, is_reachable, is_whole: false, mesh: None }
+        Self { places, heights_m, is_edge, is_reachable, is_complete: false, mesh: None }
     }
 
     /// Number of test points on the surface.
-    pub fn count(&self) -> usize {
+    pub fn surface_count(&self) -> usize {
         self.heights_m.iter().flatten().count()
     }
 
@@ -150,17 +150,18 @@ impl Truth {
 
     /// Compares a belief with the ground truth over the known surface; `None` without one.
     pub fn compare(&self, belief: &Posterior) -> Option<Metrics> {
-        if self.count() == 0 {
+        if self.surface_count() == 0 {
             return None;
         }
         let means = belief.means(self.places.iter().map(Vec::as_slice));
-        let calibrated: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATED).cloned().collect();
+        let calibrated: Vec<Vec<f64>> =
+            self.places.iter().step_by(CALIBRATION_STEP).cloned().collect();
         let variances = belief.variances(&calibrated, &mut []);
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
         let (coverage, nlpd) = calibration(
             self.errors(&means)
-                .filter(|(i, _)| i % CALIBRATED == 0)
-                .map(|(i, error)| (error, variances[i / CALIBRATED] + noise2)),
+                .filter(|(i, _)| i % CALIBRATION_STEP == 0)
+                .map(|(i, error)| (error, variances[i / CALIBRATION_STEP] + noise2)),
         );
         let rmse_where = |holds: &dyn Fn(usize) -> bool| {
             rmse(self.errors(&means).filter(|(i, _)| holds(*i)).map(|(_, error)| error))
@@ -173,7 +174,7 @@ impl Truth {
             unreachable_rmse_m: rmse_where(&|i| !self.is_reachable[i]),
             coverage,
             nlpd,
-            ..Metrics::of(heights_m)
+            ..Metrics::from_heights(heights_m)
         })
     }
 }

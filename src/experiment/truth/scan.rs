@@ -1,11 +1,11 @@
 //! Scan of an object: touches on a grid of targets, without a belief.
 
-use crate::experiment::runner::pool;
+use crate::experiment::runner::thread_pool;
 use crate::sim::simulator::Simulator;
 use palpate_explore::backend::Fault;
 use palpate_explore::probe::Touch;
 use palpate_explore::task::Zone;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -42,7 +42,7 @@ pub fn scan(
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),
-) -> Result<Option<Vec<Result<Touch, Fault>>>, Invalid> {
+) -> Result<Option<Vec<Result<Touch, Fault>>>, InputError> {
     let task = simulator.environment().task();
     let row = |(j, targets): (usize, &[Vec<f64>])| {
         if stop.load(Ordering::Relaxed) {
@@ -62,6 +62,6 @@ pub fn scan(
     };
     let rows: Vec<_> = targets.chunks(columns).enumerate().collect();
     let touches: Option<Vec<Vec<_>>> =
-        pool(threads)?.install(|| rows.into_par_iter().map(row).collect());
+        thread_pool(threads)?.install(|| rows.into_par_iter().map(row).collect());
     Ok(touches.map(|rows| rows.into_iter().flatten().collect()))
 }

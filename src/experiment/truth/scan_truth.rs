@@ -5,8 +5,8 @@ use crate::experiment::truth::Truth;
 use nalgebra::{Matrix3, Point3, Vector3};
 use palpate_explore::task::Zone;
 use palpate_geometry::import::ply::points;
-use palpate_input::config::{Checked, Rules};
-use palpate_input::error::Invalid;
+use palpate_input::config::{Rules, Validate};
+use palpate_input::error::InputError;
 use palpate_input::files;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,15 +35,15 @@ fn neighbours() -> usize {
 
 /// Default search radius in nearest-neighbour distances.
 // heuristic: includes the neighbours on all sides.
-const SPACINGS: f64 = 3.0;
+const RADIUS_SPACINGS: f64 = 3.0;
 
-impl Checked for ScanTruth {
+impl Validate for ScanTruth {
     fn check(&self, rules: &mut Rules) {
         let named = !self.scan.as_os_str().is_empty();
         rules.require("scan", "\"\"", named, || "the name of a cloud.csv or cloud.ply".into());
         let enough = (3..=1000).contains(&self.neighbours);
         rules.require("neighbours", self.neighbours, enough, || "3 to 1000".into());
-        rules.given("within_m", self.within_m, 1e-6..=1.0);
+        rules.optional_number("within_m", self.within_m, 1e-6..=1.0);
     }
 }
 
@@ -62,10 +62,10 @@ impl ScanTruth {
         &self,
         zone: &Zone,
         per_side: usize,
-    ) -> Result<(Truth, usize, Option<f64>), Invalid> {
+    ) -> Result<(Truth, usize, Option<f64>), InputError> {
         let contact = |p_w: &Point3<f64>| (flat(&zone.place(p_w)), zone.height_m(p_w));
         let contacts: Vec<([f64; 2], f64)> = read_cloud(&self.scan)?.iter().map(contact).collect();
-        let within_m = self.within_m.unwrap_or_else(|| SPACINGS * spacing_m(&contacts));
+        let within_m = self.within_m.unwrap_or_else(|| RADIUS_SPACINGS * spacing_m(&contacts));
         let places = zone.grid(per_side);
         let height = |place: [f64; 2], without| {
             height_m(&contacts, place, (within_m, self.neighbours), without)
@@ -120,23 +120,24 @@ fn height_m(
         count += 1;
     }
     // The plane is not extrapolated beyond its contacts.
-    let is_inside =
-        [0, 1].iter().all(|&axis| around[0][axis] <= BESIDE && around[1][axis] >= -BESIDE);
+    let is_inside = [0, 1]
+        .iter()
+        .all(|&axis| around[0][axis] <= EXTRAPOLATION_MAX && around[1][axis] >= -EXTRAPOLATION_MAX);
     if count < least || !is_inside {
         return None;
     }
     // Contacts on a line, as in a one-dimensional zone, do not determine the slope across it.
-    let plane = normal.svd(true, true).solve(&right, FLAT * normal.norm()).ok()?;
+    let plane = normal.svd(true, true).solve(&right, SINGULAR * normal.norm()).ok()?;
     plane.x.is_finite().then_some(plane.x)
 }
 
 /// Allowed distance of a place outside its contacts, as a share of the search radius.
 // heuristic: a tenth is almost no extrapolation.
-const BESIDE: f64 = 0.1;
+const EXTRAPOLATION_MAX: f64 = 0.1;
 
 /// Singular values below this share of the matrix norm count as zero.
 // heuristic: far above rounding.
-const FLAT: f64 = 1e-9;
+const SINGULAR: f64 = 1e-9;
 
 fn flat(place: &[f64]) -> [f64; 2] {
     [0, 1].map(|axis| place.get(axis).copied().unwrap_or(0.0))
@@ -151,32 +152,32 @@ fn distance_m(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 ///
 /// # Errors
 /// If the file cannot be read, or is not a cloud.
-pub fn read_cloud(path: &Path) -> Result<Vec<Point3<f64>>, Invalid> {
-    let unreadable = |cause| Invalid::new(format!("cannot be read: {cause}")).at(path.display());
+pub fn read_cloud(path: &Path) -> Result<Vec<Point3<f64>>, InputError> {
+    let unreadable = |cause| InputError::new(format!("cannot be read: {cause}")).at(path.display());
     let text = files::text(path, u64::MAX).map_err(unreadable)?;
     let cloud = match text.starts_with("ply") {
         true => points(text.as_bytes()).map_err(|error| error.at(path.display()))?,
-        false => of_csv(path, &text)?,
+        false => read_csv(path, &text)?,
     };
     match cloud.is_empty() {
-        true => Err(Invalid::new("the file contains no contact").at(path.display())),
+        true => Err(InputError::new("the file contains no contact").at(path.display())),
         false => Ok(cloud),
     }
 }
 
 /// Error of a file without this column.
-fn no_column(path: &Path, column: &str) -> Invalid {
+fn no_column(path: &Path, column: &str) -> InputError {
     let allowed = "allowed are cloud.csv and cloud.ply of palpate export";
-    Invalid::new(format!("no column {column}")).at(path.display()).mend(allowed)
+    InputError::new(format!("no column {column}")).at(path.display()).remedy(allowed)
 }
 
 /// Error of a line, counted from 1, that does not contain three numbers.
-fn no_point(path: &Path, line: usize, found: &str) -> Invalid {
-    Invalid::new(format!("{found:?}: allowed are x, y and z in metres"))
+fn no_point(path: &Path, line: usize, found: &str) -> InputError {
+    InputError::new(format!("{found:?}: allowed are x, y and z in metres"))
         .at(format!("{}:{line}", path.display()))
 }
 
-fn of_csv(path: &Path, text: &str) -> Result<Vec<Point3<f64>>, Invalid> {
+fn read_csv(path: &Path, text: &str) -> Result<Vec<Point3<f64>>, InputError> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let no_record = |line: usize, error: csv::Error| no_point(path, line, &error.to_string());
     let header = reader.headers().map_err(|error| no_record(1, error))?.clone();

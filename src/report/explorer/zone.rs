@@ -5,7 +5,7 @@ use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{self, Axis, Length};
 use crate::report::relief::Space;
-use crate::report::replay::{self, Grid, Replay, drawn_words};
+use crate::report::replay::{self, Grid, Replay, drawn_caption};
 use crate::report::style;
 use palpate_explore::task::Zone;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -33,7 +33,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
          {help}",
         run.experiment.report.trial,
         run.experiment.initial_touches,
-        drawn_words(run)
+        drawn_caption(run)
     );
     Ok(Shell { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }.html(&data))
 }

@@ -1,19 +1,19 @@
 //! Figure of the remaining deviation and the effect of a touch on it, Fig. 6 of Yi et al. 2016.
 
-use super::Figure;
+use super::ReportFigure;
 use super::curves;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::Area;
-use crate::report::heat_map::{HeatMap, Reading};
+use crate::report::heat_map::{HeatMap, MapValue};
 use crate::report::legend::{Sheet, Swatch, miss_entry};
-use crate::report::replay::{Replay, drawn_words};
-use crate::report::style::{self, INITIAL, LATER};
+use crate::report::replay::{Replay, drawn_caption};
+use crate::report::style::{self, INITIAL, PLANNED};
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
-pub(crate) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
+pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "acquisition", caption, draw };
 
 fn caption(run: &Run) -> String {
     let planner = planner(run).unwrap_or("the planner");
@@ -22,7 +22,7 @@ fn caption(run: &Run) -> String {
          {planner} in trial {}. Circle: largest value found. Crosses: points of contact, which may \
          lie beside their targets.{} Corresponds to Fig. 6 of the paper.",
         run.experiment.report.trial,
-        drawn_words(run)
+        drawn_caption(run)
     )
 }
 
@@ -49,11 +49,11 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 
 /// Returns the standard deviation at `place` that a touch aimed there could still remove.
 fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f64 {
-    belief.explorable().map_or(f64::NAN, |known| known.variance(place, scratch).sqrt())
+    belief.planning_posterior().map_or(f64::NAN, |known| known.variance(place, scratch).sqrt())
 }
 
 /// Returns the place of the largest deviation: the planner's, or else that of `read`.
-fn maximum<'a>(replay: &'a Replay, read: &'a [Reading]) -> Option<&'a [f64]> {
+fn maximum<'a>(replay: &'a Replay, read: &'a [MapValue]) -> Option<&'a [f64]> {
     let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.stall.is_none());
     let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let planned = next.and_then(|next| next.target.place());
@@ -82,7 +82,7 @@ const GAPS_PX: (f64, f64) = (66.0, 40.0);
 
 fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
     let unit = Length::of(zone);
-    let read: Vec<Vec<Reading>> =
+    let read: Vec<Vec<MapValue>> =
         replays.iter().map(|replay| readings(zone.grid(STEPS), replay)).collect();
     let all = read.iter().flatten().map(|(_, sd_m, _)| sd_m * unit.per_m);
     let (_, largest) = Axis::around(all.chain([0.0]), 0.12, 4.0)?.range();
@@ -119,7 +119,7 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
     Some(sheet.canvas.finish())
 }
 
-fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
+fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<MapValue> {
     let mut scratch = Scratch::default();
     let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));
     let read = |(place, is_drawn): (Vec<f64>, bool)| {
@@ -139,7 +139,7 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let [x, z] = [zone.x_m, zone.z_m?].map(|side| side.map(|end| end * unit.per_m));
     let mut entries = vec![
         (Swatch::Cross(INITIAL), "initial touch"),
-        (Swatch::Cross(LATER), "later touch"),
+        (Swatch::Cross(PLANNED), "later touch"),
         (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
     ];
     entries.extend(miss_entry(run));

@@ -1,7 +1,7 @@
 //! Figure of errors against touches, Fig. 4 of Yi et al. 2016.
 
-use super::Figure;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale, metrics};
+use super::ReportFigure;
+use crate::experiment::measure::{Aggregate, MEASURES, Measure, PanelAxis, R, metrics};
 use crate::experiment::statistics::curve_table;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
@@ -11,7 +11,7 @@ use crate::report::legend::{Sheet, Swatch};
 use crate::report::style::{self, FAINT_INK};
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-pub(crate) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
+pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "convergence", caption, draw };
 
 /// Returns Eq. 5 of any positive constant.
 fn constant_r(run: &Run) -> Option<f64> {
@@ -60,9 +60,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let shown: Vec<&Measure> = MEASURES
         .iter()
         .filter(|measure| match measure.scale {
-            Scale::Undrawn => false,
-            Scale::LogBeside(other) => points().any(|point| point.of(other).is_some()),
-            Scale::Linear | Scale::UpToOne | Scale::Log => true,
+            PanelAxis::Undrawn => false,
+            PanelAxis::LogBeside(other) => points().any(|point| point.of(other).is_some()),
+            PanelAxis::Linear | PanelAxis::UpToOne | PanelAxis::Log => true,
         })
         .filter(|measure| points().any(|point| point.of(measure).is_some()))
         .collect();
@@ -106,17 +106,17 @@ fn draw_measure(
         ends.chain([*value]).chain(*beside).collect::<Vec<_>>()
     });
     let y = match measure.scale {
-        Scale::Log | Scale::LogBeside(_) => Axis::log(values),
+        PanelAxis::Log | PanelAxis::LogBeside(_) => Axis::log(values),
         // A band may reach beyond the largest possible value.
-        Scale::UpToOne => {
+        PanelAxis::UpToOne => {
             let up_to_one = values.chain(constant).map(|value| value.min(1.0));
             Axis::around(up_to_one.chain([1.0]), 0.04, 5.0)
         }
-        Scale::Linear | Scale::Undrawn => Axis::around(values, 0.04, 5.0),
+        PanelAxis::Linear | PanelAxis::Undrawn => Axis::around(values, 0.04, 5.0),
     };
     let Some(y) = y else { return };
     let panel = Panel { area, x: x.clone(), y };
-    panel.titled_frame(canvas, &told(measure), "touches", &named(measure));
+    panel.titled_frame(canvas, &statistics_label(measure), "touches", &named(measure));
     if let Some(score) = constant {
         let (low, high) = x.range();
         panel.curve(canvas, &[(low, score), (high, score)], &constant_line());
@@ -138,10 +138,10 @@ fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> 
     let summary = point.of(measure)?;
     let value = if measure.aggregate.has_median() { summary.median } else { summary.mean };
     let beside = match measure.scale {
-        Scale::LogBeside(other) => point.of(other).map(|other| other.median),
+        PanelAxis::LogBeside(other) => point.of(other).map(|other| other.median),
         _ => (measure.aggregate == Aggregate::Both).then_some(summary.mean),
     };
-    let band = curve_table::band(&run.experiment, &run.rows, point, measure);
+    let band = curve_table::uncertainty(&run.experiment, &run.rows, point, measure);
     let in_unit = |value: f64| per_si * value;
     let touches = point.touches.into();
     Some((touches, in_unit(value), beside.map(in_unit), band.map(|ends| ends.map(in_unit))))
@@ -156,9 +156,9 @@ fn named(measure: &Measure) -> String {
 }
 
 /// Returns the statistics that the solid and the dotted line show.
-fn told(measure: &Measure) -> String {
+fn statistics_label(measure: &Measure) -> String {
     match (measure.scale, measure.aggregate) {
-        (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),
+        (PanelAxis::LogBeside(other), _) => format!("median; dotted: {}", other.title),
         (_, Aggregate::Both) => "median; dotted: mean".into(),
         (_, Aggregate::Median) => "median".into(),
         (_, Aggregate::Mean) => "mean".into(),

@@ -1,16 +1,16 @@
 //! Figure of the beliefs of a curve after some touches, Fig. 3 of Yi et al. 2016.
 
-use super::Figure;
+use super::ReportFigure;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::legend::{Sheet, Swatch, miss_entry};
-use crate::report::replay::{self, NOT_REACHED, Replay, drawn_words};
-use crate::report::style::{self, FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
+use crate::report::replay::{self, NO_BELIEF, Replay, drawn_caption};
+use crate::report::style::{self, FAINT_INK, INITIAL, INK, PLANNED, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
-pub(crate) const FIGURE: Figure = Figure { name: "curves", caption, draw };
+pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "curves", caption, draw };
 
 fn caption(run: &Run) -> String {
     format!(
@@ -19,7 +19,7 @@ fn caption(run: &Run) -> String {
          Fig. 3 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
-        drawn_words(run)
+        drawn_caption(run)
     )
 }
 
@@ -53,7 +53,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let panel = Panel { area, ..shape.clone() };
             let canvas = &mut sheet.canvas;
             let replay = Replay::new(run, planner, count)?;
-            let score = replay.as_ref().map_or(NOT_REACHED.into(), Replay::score);
+            let score = replay.as_ref().map_or(NO_BELIEF.into(), Replay::score);
             let is_last_row = row + 1 == planners.len();
             panel.frame(canvas);
             let x_label = if is_last_row { unit.named("x") } else { String::new() };
@@ -100,7 +100,7 @@ pub(super) fn entries(
         (Swatch::Line(style::stroke(INK, 1.6)), "posterior mean"),
         (Swatch::Band(INK), "95 % band"),
         (Swatch::Cross(INITIAL), "initial touch"),
-        (Swatch::Cross(LATER), "later touch"),
+        (Swatch::Cross(PLANNED), "later touch"),
     ];
     entries.into_iter().chain(more).chain(miss_entry(run))
 }

@@ -12,7 +12,7 @@ pub use surfaces::FIGURE as SURFACES;
 use crate::experiment::store::Run;
 
 /// Figure of a run.
-pub struct Figure {
+pub struct ReportFigure {
     /// Name of its files.
     pub name: &'static str,
     /// Caption, with the figure of Yi et al. 2016 that it corresponds to.

@@ -1,19 +1,19 @@
 //! Figure of the beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
 
-use super::Figure;
+use super::ReportFigure;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{Sheet, miss_entry, touch_entries};
 use crate::report::relief::{ON_RELIEF, Relief, ReliefPanel, Space};
-use crate::report::replay::{self, Grid, NOT_REACHED, Replay, drawn_words};
+use crate::report::replay::{self, Grid, NO_BELIEF, Replay, drawn_caption};
 use crate::report::style;
 use nalgebra::Vector3;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
 /// Figure of beliefs next to the true surface.
-pub const FIGURE: Figure = Figure { name: "surfaces", caption, draw };
+pub const FIGURE: ReportFigure = ReportFigure { name: "surfaces", caption, draw };
 
 fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
@@ -28,7 +28,7 @@ fn caption(run: &Run) -> String {
          of the planner.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
-        drawn_words(run)
+        drawn_caption(run)
     )
 }
 
@@ -66,7 +66,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let panel = ReliefPanel::new(unit, sheet.area(column, row as f64), space);
             let canvas = &mut sheet.canvas;
             let replay = Replay::new(run, planner, count)?;
-            let score = replay.as_ref().map_or(NOT_REACHED.into(), Replay::score);
+            let score = replay.as_ref().map_or(NO_BELIEF.into(), Replay::score);
             panel.frame(canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
                 let mut scratch = Scratch::default();

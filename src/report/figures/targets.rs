@@ -1,16 +1,16 @@
 //! Figure of targets and contacts, seen along the approach.
 
-use super::Figure;
+use super::ReportFigure;
 use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::Area;
 use crate::report::legend::{Sheet, Swatch, miss_entry};
 use crate::report::replay;
-use crate::report::style::{self, FAINT_INK, INITIAL, LATER, dot};
+use crate::report::style::{self, FAINT_INK, INITIAL, PLANNED, dot};
 use crate::report::table::digits;
 
-pub(crate) const FIGURE: Figure = Figure { name: "targets", caption, draw };
+pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "targets", caption, draw };
 
 fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
@@ -52,9 +52,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         Axis::linear((low - margin) * unit.per_m, (high + margin) * unit.per_m, 5.0)
     };
     let mut entries = vec![
-        (Swatch::Circle(ring(LATER)), "target"),
+        (Swatch::Circle(ring(PLANNED)), "target"),
         (Swatch::Circle(dot(INITIAL)), "contact of an initial touch"),
-        (Swatch::Circle(dot(LATER)), "contact of a later touch"),
+        (Swatch::Circle(dot(PLANNED)), "contact of a later touch"),
     ];
     entries.extend(miss_entry(run));
     let most = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };

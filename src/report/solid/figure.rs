@@ -3,7 +3,7 @@
 
 use super::panel::{View, inner, scale};
 use super::section::{TRUTH_TRIANGLES, deviation_range};
-use super::{Frame, Sequence};
+use super::{Frame, PlannerSurfaces};
 use crate::report::axes::{Axis, MM, colour_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{MISS, Sheet, touch_entries};
@@ -29,7 +29,11 @@ const PLAIN: f64 = 0.6;
 /// Draws the surfaces after some touch counts from the front and from behind, coloured by their
 /// standard deviation, with the touches on them and the true surface on the right, as SVG; `None`
 /// if there is nothing to draw, or no value to colour by. All have one scale.
-pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> Option<String> {
+pub fn figure(
+    sequences: &[PlannerSurfaces],
+    truth: Option<&Mesh>,
+    counts: &[u32],
+) -> Option<String> {
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
     let frames = sequences.iter().flat_map(|sequence| &sequence.frames);
     let drawn: Vec<&Frame> = frames.filter(|frame| counts.contains(&frame.touches)).collect();
@@ -71,7 +75,12 @@ pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> O
     Some(sheet.canvas.finish())
 }
 
-fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32), axis: &Axis) {
+fn belief(
+    view: &View,
+    canvas: &mut Canvas,
+    (sequence, count): (&PlannerSurfaces, u32),
+    axis: &Axis,
+) {
     let title = format!("{}, {count} touches", sequence.planner);
     let Some(frame) = sequence.frames.iter().find(|frame| frame.touches == count) else {
         return view.title(canvas, &title, "no belief at this count");

@@ -11,14 +11,14 @@ pub use figure::figure;
 pub use reach::picture;
 pub use section::{counts, section};
 
-use crate::report::points::Points;
+use crate::report::points::PointCloud;
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::solids::{Triangles, normals};
 
 /// Touches of a planner with its beliefs after some of them.
 #[derive(Clone, Debug, Default)]
-pub struct Sequence {
+pub struct PlannerSurfaces {
     /// Name of the planner.
     pub planner: String,
     /// Touches, in order.
@@ -61,14 +61,14 @@ pub struct Frame {
 impl Frame {
     /// Returns the vertices with their normals, σ and errors, coloured by σ from 0 to the largest,
     /// and the triangles; `comments` describe the file.
-    pub fn points(&self, comments: Vec<String>) -> Points {
+    pub fn points(&self, comments: Vec<String>) -> PointCloud {
         let (vertices, triangles) = &self.mesh;
         let finite = self.sd_m.iter().copied().filter(|sd_m| sd_m.is_finite());
         let largest_m = finite.fold(f64::MIN_POSITIVE, f64::max);
         // An unknown deviation is shown as the largest.
         let share = |sd_m: f64| if sd_m.is_finite() { sd_m / largest_m } else { 1.0 };
         let deviations = self.sd_m.iter().map(|&sd_m| (sd_m, style::deviation_rgb(share(sd_m))));
-        Points {
+        PointCloud {
             comments,
             points: vertices.iter().copied().zip(normals(vertices, triangles)).collect(),
             deviations: deviations.collect(),

@@ -15,7 +15,7 @@ const SCALE_PX: f64 = 60.0;
 
 /// Returns the camera in front, on the side that a finger touches along −y, or behind.
 fn camera(is_behind: bool) -> Camera {
-    Camera::toward(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 }, 1.0)
+    Camera::from_azimuth(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 }, 1.0)
 }
 
 /// Returns the scale, in pixels per metre, at which `points` fit into a panel from both sides.

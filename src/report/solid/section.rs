@@ -1,7 +1,7 @@
 //! Interactive section of the page: a believed surface touch by touch, to turn and to colour.
 //! Lengths are in millimetres, and meshes are encoded as compact text.
 
-use super::{Frame, Sequence, Touch};
+use super::{Frame, PlannerSurfaces, Touch};
 use crate::report::axes::{self, MM};
 use crate::report::explorer::{self, LEAST_SHARE, PARTS, Shell, encode, encode_log, short};
 use crate::report::style;
@@ -35,8 +35,12 @@ pub fn counts(first: u32, last: u32, planners: usize, triangles: usize) -> Vec<u
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
-pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyhow::Result<String> {
-    let shown: Vec<&Sequence> =
+pub fn section(
+    sequences: &[PlannerSurfaces],
+    truth: Option<&Mesh>,
+    trial: u32,
+) -> anyhow::Result<String> {
+    let shown: Vec<&PlannerSurfaces> =
         sequences.iter().filter(|sequence| !sequence.frames.is_empty()).collect();
     let Some(first) = shown.first() else { return Ok(String::new()) };
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
@@ -74,7 +78,10 @@ const NONE_M: [f64; 2] = [1e-4, 1e-2];
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
-fn data(sequences: &[&Sequence], truth: Option<&Triangles>) -> anyhow::Result<Option<Value>> {
+fn data(
+    sequences: &[&PlannerSurfaces],
+    truth: Option<&Triangles>,
+) -> anyhow::Result<Option<Value>> {
     let frames = || sequences.iter().flat_map(|sequence| &sequence.frames);
     let touches = || sequences.iter().flat_map(|sequence| &sequence.touches);
     let contacts = || touches().filter_map(|touch| touch.contact_w.as_ref());
@@ -85,7 +92,7 @@ fn data(sequences: &[&Sequence], truth: Option<&Triangles>) -> anyhow::Result<Op
     let in_mm = |ends: [f64; 2]| ends.map(|end_m| end_m * MM.per_m);
     let deviations = deviation_range(frames().flat_map(|frame| &frame.sd_m)).unwrap_or(NONE_M);
     let errors = error_range(frames().flat_map(|frame| &frame.error_m));
-    let planner = |sequence: &&Sequence| -> anyhow::Result<Value> {
+    let planner = |sequence: &&PlannerSurfaces| -> anyhow::Result<Value> {
         let frames = sequence.frames.iter().map(|frame| coded(frame, cube, (deviations, errors)));
         let touches = sequence.touches.iter().map(|touch| marked(touch, cube));
         Ok(json!({

@@ -1,15 +1,15 @@
 //! Comparison of the planners of a run with its baselines, in every measure and in touches to equal
 //! error: tables of the page and of files.
 
-use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
-use crate::experiment::statistics::comparison::Comparison;
+use crate::experiment::measure::{Direction, MEASURES, Measure, measures_with_columns};
+use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, digits, titled, with_interval};
 
 /// Returns the table of `comparison.csv`, with a row per planner, baseline and measure after the
 /// last touch.
-pub fn comparison_file(found: &[Comparison]) -> Table {
+pub fn comparison_file(found: &[PairedComparison]) -> Table {
     let mut table = Table::new([
         Column::new("planner").note("Name of the planner."),
         Column::new("baseline").note("Planner that it is compared with."),
@@ -21,7 +21,7 @@ pub fn comparison_file(found: &[Comparison]) -> Table {
         Column::new("won")
             .note("Fraction of the trials in which the planner is better; a tie counts half."),
     ]);
-    for Comparison { planner, baseline, measure, paired } in found {
+    for PairedComparison { planner, baseline, measure, paired } in found {
         let difference = Estimate { value: paired.mean, interval: paired.interval };
         let names = [*planner, *baseline, measure.id].map(Cell::from);
         let numbers = [paired.trials.into(), Cell::estimate(difference), paired.won.into()];
@@ -31,11 +31,11 @@ pub fn comparison_file(found: &[Comparison]) -> Table {
 }
 
 /// Returns a table for each baseline: a row for each measure, a column for each other planner.
-pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
+pub fn comparisons(run: &Run, found: &[PairedComparison]) -> Vec<Table> {
     let table = |baseline: &str| {
         let rows = MEASURES.iter().map(|measure| (titled(measure), measure));
         let cell = |measure: &&Measure, planner: &&String| {
-            let is_it = |it: &&Comparison| {
+            let is_it = |it: &&PairedComparison| {
                 (it.baseline, it.planner, it.measure.id) == (baseline, planner, measure.id)
             };
             found.iter().find(is_it).map(difference)
@@ -47,7 +47,7 @@ pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
 
 /// Returns the note that explains the cells of [`comparisons`].
 pub fn comparisons_note(run: &Run) -> String {
-    let more: Vec<&str> = in_files(&run.rows)
+    let more: Vec<&str> = measures_with_columns(&run.rows)
         .filter(|measure| measure.direction == Direction::More)
         .map(|measure| measure.title)
         .collect();
@@ -60,8 +60,8 @@ pub fn comparisons_note(run: &Run) -> String {
     )
 }
 
-fn difference(comparison: &Comparison) -> Cell {
-    let Comparison { measure, paired, .. } = comparison;
+fn difference(comparison: &PairedComparison) -> Cell {
+    let PairedComparison { measure, paired, .. } = comparison;
     let shown = |value: f64| {
         let value = measure.unit.per_si * value;
         let sign = if value < 0.0 { "\u{2212}" } else { "" };
@@ -69,7 +69,7 @@ fn difference(comparison: &Comparison) -> Cell {
     };
     let mean = with_interval(paired.mean, paired.interval, &shown);
     let words = format!("{mean}, {:.0} %", 100.0 * paired.won);
-    Cell::from(words).judged(paired.interval, 0.0, measure.direction)
+    Cell::from(words).with_verdict(paired.interval, 0.0, measure.direction)
 }
 
 /// Returns the table of `equal_error.csv`, with a row per planner, baseline and error; a count or
@@ -152,7 +152,7 @@ fn effort(equal: &EqualError, most: u32) -> Cell {
         shown(&equal.ratio, &ratio),
         shown(&equal.path_ratio, &ratio),
     );
-    Cell::from(words).judged(equal.ratio.interval, 1.0, Direction::Less)
+    Cell::from(words).with_verdict(equal.ratio.interval, 1.0, Direction::Less)
 }
 
 fn touches(count: f64, most: u32) -> String {

@@ -3,7 +3,7 @@
 
 use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
-use crate::experiment::statistics::summary::{self, CurvePoint, Events, typical};
+use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, shown, titled};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 /// left out.
 pub fn table(run: &Run) -> Table {
     let aggregates: Vec<(&Measure, bool)> = (MEASURES.iter())
-        .filter(|measure| measure.is_tabled)
+        .filter(|measure| measure.in_tables)
         .flat_map(|measure| [(measure, false), (measure, true)])
         .filter(|(measure, is_median)| match is_median {
             true => measure.aggregate.has_median(),
@@ -30,7 +30,7 @@ pub fn table(run: &Run) -> Table {
     let curves: Vec<Vec<CurvePoint>> = (run.experiment.planners.iter())
         .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
         .collect();
-    for count in run.experiment.tabled_touch_counts() {
+    for count in run.experiment.table_touch_counts() {
         for point in curves.iter().flatten().filter(|point| point.touches == count) {
             let start = [Cell::from(count as usize), point.planner.as_str().into()];
             let value = |(measure, is_median): &(&Measure, bool)| match point.of(measure) {
@@ -52,7 +52,7 @@ pub fn note(run: &Run) -> String {
 /// Returns the table for the terminal, followed by the other events.
 pub fn text(run: &Run) -> String {
     let mut text = format!("{}\n{}", run.experiment.name, table(run).text());
-    happened(run).iter().for_each(|line| text += &format!("{line}\n"));
+    event_lines(run).iter().for_each(|line| text += &format!("{line}\n"));
     run.notices().iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
 }
@@ -76,7 +76,7 @@ pub fn file(run: &Run, is_wanted: impl Fn(u32) -> bool) -> Table {
 /// Returns the summary for programs: the columns of `summary.csv` for each planner and tabled touch
 /// count, and the notices.
 pub fn json(run: &Run) -> Value {
-    let counts = run.experiment.tabled_touch_counts();
+    let counts = run.experiment.table_touch_counts();
     let mut rows = file(run, |count| counts.contains(&count)).json();
     let of_point = |row: &mut serde_json::Map<String, Value>| {
         let [planner, touches, trials] =
@@ -89,7 +89,7 @@ pub fn json(run: &Run) -> Value {
         "trials": run.rows.len(),
         "failed": run.rows.iter().filter(|row| row.failure.is_some()).count(),
         "summary": rows.iter_mut().map(of_point).collect::<Vec<_>>(),
-        "notes": notices.into_iter().chain(happened(run)).collect::<Vec<_>>(),
+        "notes": notices.into_iter().chain(event_lines(run)).collect::<Vec<_>>(),
     })
 }
 
@@ -112,7 +112,7 @@ pub fn claims(run: &Run) -> Table {
                 format!("{kind} {}", titled(measure)).into(),
             ];
             let value = |planner: &String| {
-                let value = typical(&run.rows, planner, claim.touches, measure);
+                let value = representative_value(&run.rows, planner, claim.touches, measure);
                 Cell::from(value.map(|value| shown(measure, value)))
             };
             table.rows.push(start.into_iter().chain(planners.iter().map(value)).collect());
@@ -126,8 +126,8 @@ pub const CLAIMS_NOTE: &str =
     "Values reported by Yi et al. 2016, next to those of this run over the trials.";
 
 /// Returns the events in the trials besides their errors, a line for each planner.
-pub fn happened(run: &Run) -> Vec<String> {
-    let of = |planner: &String| told(planner, &summary::events(&run.rows, planner));
+pub fn event_lines(run: &Run) -> Vec<String> {
+    let of = |planner: &String| event_line(planner, &summary::events(&run.rows, planner));
     let unlisted = (run.unlisted > 0).then(|| {
         format!("{} stored trials are not shown: the experiment does not list them", run.unlisted)
     });
@@ -135,7 +135,7 @@ pub fn happened(run: &Run) -> Vec<String> {
 }
 
 /// Returns the events in a planner's trials, in a line; `None` without events.
-fn told(planner: &str, events: &Events) -> Option<String> {
+fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
     let counts = [
         (events.failures, "failed trials"),
         (events.misses, "touches without contact"),

@@ -1,12 +1,12 @@
 //! Fingertip composed of the effects that a scene names, with the frames of its sensor.
 
-use super::effects::electrodes::{Common, Electrodes, Shear};
-use super::effects::fluid::Filter;
-use super::effects::skin::{Pressed, Skin};
+use super::effects::electrodes::{CommonNoise, Electrodes, ShearCoupling};
+use super::effects::fluid::PacFilter;
+use super::effects::skin::{Skin, SkinState};
 use super::effects::timing::{Channel, channel};
-use super::effects::variation::Sensor;
+use super::effects::variation::SensorVariation;
 use super::effects::{EffectStates, Effects};
-use super::load::{Load, PressError};
+use super::load::{ContactLoad, PressError};
 use super::noise::normal;
 use palpate_explore::backend::Fault;
 use palpate_explore::robot::finger::TipMotion;
@@ -27,7 +27,7 @@ const LONGEST_STEP_S: f64 = 1.0;
 pub struct Fingertip {
     skin: Option<Skin>,
     electrodes: Option<Electrodes>,
-    shear: Option<Shear>,
+    shear: Option<ShearCoupling>,
     effects: Effects,
 }
 
@@ -42,7 +42,7 @@ impl Fingertip {
             .map(|(effect, samples)| Electrodes::new(effect, samples, profile.scale()));
         let sheared = effects.friction.as_ref().and(electrodes.as_ref()).zip(samples);
         Self {
-            shear: sheared.map(|(electrodes, samples)| Shear::new(electrodes, samples)),
+            shear: sheared.map(|(electrodes, samples)| ShearCoupling::new(electrodes, samples)),
             skin,
             electrodes,
             effects: effects.clone(),
@@ -50,7 +50,7 @@ impl Fingertip {
     }
 
     /// Creates a fingertip with the constants of one particular `sensor`.
-    pub fn varied(finger: &Finger, effects: &Effects, sensor: &Sensor) -> Self {
+    pub fn with_sensor(finger: &Finger, effects: &Effects, sensor: &SensorVariation) -> Self {
         let own = Effects {
             skin: effects.skin.as_ref().map(|skin| sensor.skin(skin)),
             electrodes: effects.electrodes.as_ref().map(|nominal| sensor.electrodes(nominal)),
@@ -58,7 +58,7 @@ impl Fingertip {
         };
         let mut tip = Self::new(finger, &own);
         if let (Some(electrodes), Some((i, factor))) = (&mut tip.electrodes, sensor.noisy) {
-            electrodes.worsen(i, factor);
+            electrodes.scale_noise(i, factor);
         }
         tip
     }
@@ -80,9 +80,9 @@ impl Fingertip {
 #[derive(Clone, Debug)]
 pub struct FingertipState {
     time_s: f64,
-    pressed: Option<Pressed>,
+    pressed: Option<SkinState>,
     effects: EffectStates,
-    converter: Option<Converter>,
+    converter: Option<AdConverter>,
 }
 
 impl FingertipState {
@@ -96,13 +96,13 @@ impl FingertipState {
         };
         if tip.effects.sends_frames() {
             let untouched = state.signals(tip, 0.0);
-            state.converter = Some(Converter::new(tip, untouched, rng));
+            state.converter = Some(AdConverter::new(tip, untouched, rng));
         }
         state
     }
 
     /// Returns the skin in its last pose.
-    pub fn pressed(&self) -> Option<&Pressed> {
+    pub fn skin_state(&self) -> Option<&SkinState> {
         self.pressed.as_ref()
     }
 
@@ -118,7 +118,7 @@ impl FingertipState {
         object: &MeshBvh,
         motion: &TipMotion,
         dt_s: f64,
-    ) -> Result<Load, Fault> {
+    ) -> Result<ContactLoad, Fault> {
         let time_s = self.time_s;
         let diverged = || {
             let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
@@ -137,7 +137,7 @@ impl FingertipState {
                     }
                 })?
             }
-            _ => Load::default(),
+            _ => ContactLoad::default(),
         };
         self.time_s += dt_s;
         self.effects.on_load(&tip.effects, motion, dt_s, &mut load);
@@ -150,8 +150,8 @@ impl FingertipState {
 
     /// Returns the bytes held by this trial's state; effects that are off hold none.
     pub fn bytes(&self) -> usize {
-        let pressed = self.pressed.as_ref().map_or(0, Pressed::bytes);
-        pressed + self.effects.bytes() + self.converter.as_ref().map_or(0, Converter::bytes)
+        let pressed = self.pressed.as_ref().map_or(0, SkinState::bytes);
+        pressed + self.effects.bytes() + self.converter.as_ref().map_or(0, AdConverter::bytes)
     }
 
     /// Returns the oldest tactile frame that has arrived and was not read yet.
@@ -167,12 +167,12 @@ impl FingertipState {
         let mut conductivity = 1.0;
         if let (Some(thermal), Some(heat)) = (&tip.effects.thermal, &self.effects.thermal) {
             signals.temperature_c = heat.temperature_c;
-            signals.warming_c_s = heat.warming_c_s();
+            signals.warming_c_s = heat.temperature_rate_c_s();
             conductivity = heat.conductivity(thermal);
         }
-        let moved_m = self.pressed.as_ref().map_or(&[][..], Pressed::moved_m);
+        let moved_m = self.pressed.as_ref().map_or(&[][..], SkinState::inward_or_empty_m);
         if let Some(electrodes) = &tip.electrodes {
-            let mut closed = electrodes.closed(moved_m);
+            let mut closed = electrodes.closed_fractions(moved_m);
             if let (Some(shear), Some(bristle)) = (&tip.shear, &self.effects.friction) {
                 shear.add(&bristle.skin_t, &mut closed);
             }
@@ -183,10 +183,10 @@ impl FingertipState {
 }
 
 // heuristic: largest number of unread frames, one second of them; beyond it the oldest is lost.
-const KEPT: usize = 100;
+const FRAMES_MAX: usize = 100;
 
 /// Tolerance in s by which a slot belongs to the end of a step, because sums of time steps round.
-const SOON_S: f64 = 1e-9;
+const SLOT_TOLERANCE_S: f64 = 1e-9;
 
 /// Noise-free values of the channels at one instant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -208,24 +208,24 @@ struct Signals {
 /// noise from their own random stream, so that switching one off does not change the noise of the
 /// others.
 #[derive(Clone, Debug)]
-struct Converter {
+struct AdConverter {
     before: Signals,
     time_s: f64,
     frames: u64,
     slot: usize,
     frame: Frame,
-    common: Common,
+    common: CommonNoise,
     electrodes_rng: ChaCha8Rng,
     fluid_rng: ChaCha8Rng,
     thermal_rng: ChaCha8Rng,
     vibration_rng: ChaCha8Rng,
     slip_rng: ChaCha8Rng,
-    filter: Filter,
+    filter: PacFilter,
     queue: VecDeque<Frame>,
     ready: usize,
 }
 
-impl Converter {
+impl AdConverter {
     fn new(tip: &Fingertip, before: Signals, rng: &ChaCha8Rng) -> Self {
         let stream = |number| {
             let mut rng = rng.clone();
@@ -233,22 +233,23 @@ impl Converter {
             rng
         };
         let mut electrodes_rng = stream(1);
-        let first =
-            |electrodes: &Electrodes| electrodes.next(&Common::default(), 0.0, &mut electrodes_rng);
+        let first = |electrodes: &Electrodes| {
+            electrodes.next(&CommonNoise::default(), 0.0, &mut electrodes_rng)
+        };
         Self {
             before,
             time_s: 0.0,
             frames: 0,
             slot: 0,
             frame: Frame::default(),
-            common: tip.electrodes.as_ref().map_or_else(Common::default, first),
+            common: tip.electrodes.as_ref().map_or_else(CommonNoise::default, first),
             electrodes_rng,
             fluid_rng: stream(2),
             thermal_rng: stream(3),
             vibration_rng: stream(4),
             slip_rng: stream(5),
-            filter: Filter::default(),
-            queue: VecDeque::with_capacity(KEPT + batch_frames(tip)),
+            filter: PacFilter::default(),
+            queue: VecDeque::with_capacity(FRAMES_MAX + batch_frames(tip)),
             ready: 0,
         }
     }
@@ -273,7 +274,7 @@ impl Converter {
             }
             let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
             let slot_s = slots as f64 / SLOTS_HZ;
-            if slot_s > time_s + SOON_S {
+            if slot_s > time_s + SLOT_TOLERANCE_S {
                 break;
             }
             let part = ((slot_s - start_s) / (time_s - start_s)).clamp(0.0, 1.0);
@@ -281,7 +282,7 @@ impl Converter {
             self.slot += 1;
             if self.slot == SLOTS {
                 self.finish(tip, slot_s);
-                if slot_s + SOON_S < time_s {
+                if slot_s + SLOT_TOLERANCE_S < time_s {
                     self.note_slip(tip, now);
                 }
             }
@@ -361,7 +362,7 @@ impl Converter {
             self.common = electrodes.next(&self.common, FRAME_S, &mut self.electrodes_rng);
         }
         let batch = batch_frames(tip);
-        if self.queue.len() >= KEPT + batch {
+        if self.queue.len() >= FRAMES_MAX + batch {
             self.queue.pop_front();
             self.ready = self.ready.saturating_sub(1);
         }

@@ -37,13 +37,13 @@ pub struct Column {
 
 /// Response of a column to compression and pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Response {
+pub struct ColumnResponse {
     /// u: inward motion of the skin's inner side, in metres.
     pub inward_m: f64,
     /// Stress between skin and object, in Pa.
     pub stress_pa: f64,
     /// −∂u/∂p, in metres per Pa.
-    pub softness_m_pa: f64,
+    pub compliance_m_pa: f64,
     /// W, in J/m².
     pub energy_j_m2: f64,
 }
@@ -51,13 +51,13 @@ pub struct Response {
 impl Column {
     /// Minimises W + p u over u.
     #[inline]
-    pub fn respond(&self, indentation_m: f64, gap_m: f64, pressure_pa: f64) -> Response {
+    pub fn respond(&self, indentation_m: f64, gap_m: f64, pressure_pa: f64) -> ColumnResponse {
         let bulged_m = -pressure_pa / self.inflate_pa_m;
         if indentation_m <= bulged_m {
-            return Response {
+            return ColumnResponse {
                 inward_m: bulged_m,
                 stress_pa: 0.0,
-                softness_m_pa: 1.0 / self.inflate_pa_m,
+                compliance_m_pa: 1.0 / self.inflate_pa_m,
                 energy_j_m2: 0.5 * self.inflate_pa_m * bulged_m * bulged_m,
             };
         }
@@ -70,10 +70,10 @@ impl Column {
             inward_m = (drive_pa + self.core_pa_m * gap_m) / stiffness_pa_m;
         }
         let (squeezed_m, core_m) = (indentation_m - inward_m, (inward_m - gap_m).max(0.0));
-        Response {
+        ColumnResponse {
             inward_m,
             stress_pa: self.skin_pa_m * squeezed_m,
-            softness_m_pa: 1.0 / stiffness_pa_m,
+            compliance_m_pa: 1.0 / stiffness_pa_m,
             energy_j_m2: 0.5
                 * (self.skin_pa_m * squeezed_m * squeezed_m
                     + membrane_pa_m * inward_m * inward_m
@@ -107,7 +107,7 @@ pub(super) struct SkinContact {
     pub normal_t: Vector3<f64>,
     /// Cosine of the angle between ray and normal.
     pub cosine: f64,
-    pub response: Response,
+    pub response: ColumnResponse,
 }
 
 /// Elastic foundation; constant.
@@ -134,7 +134,7 @@ impl Foundation {
         let pressure_pa = self.pressure_pa(touches, free_m2);
         let free = self.column.respond(f64::NEG_INFINITY, 0.0, pressure_pa);
         for (inward_m, sample) in inward_m.iter_mut().zip(samples) {
-            *inward_m = if sample.layers.wet { free.inward_m } else { 0.0 };
+            *inward_m = if sample.layers.has_fluid { free.inward_m } else { 0.0 };
         }
         let mut energy_j = free.energy_j_m2 * free_m2;
         if self.cavity_pa_m3 > 0.0 {
@@ -168,7 +168,7 @@ impl Foundation {
                     continue;
                 }
                 volume_m3 += touch.section_m2 * touch.response.inward_m;
-                softness += touch.section_m2 * touch.response.softness_m_pa;
+                softness += touch.section_m2 * touch.response.compliance_m_pa;
             }
             (volume_m3, softness)
         };

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 /// Contact load in one pose, in `T`; all zero without contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Load {
+pub struct ContactLoad {
     /// Force on the finger.
     pub force_n: Vector3<f64>,
     /// Torque on the finger about the origin of `T`.
@@ -24,7 +24,7 @@ pub struct Load {
     /// Energy stored in skin and fluid.
     pub energy_j: f64,
     /// Whether the gap is closed somewhere, so that the core carries load.
-    pub on_core: bool,
+    pub is_core_loaded: bool,
 }
 
 /// Error of a pose that has no load.

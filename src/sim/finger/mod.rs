@@ -22,4 +22,4 @@ pub mod shell;
 
 pub use effects::Effects;
 pub use fingertip::{Fingertip, FingertipState};
-pub use load::Load;
+pub use load::ContactLoad;

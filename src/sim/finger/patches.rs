@@ -4,7 +4,7 @@ use super::samples::SkinSample;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_geometry::bvh::MeshBvh;
-use palpate_geometry::bvh::Nearby;
+use palpate_geometry::bvh::MeshParts;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::sweep::Capsule;
 use std::f64::consts::TAU;
@@ -26,7 +26,7 @@ const INNER: f64 = 0.5;
 const MARGIN: f64 = 0.1;
 
 /// Factor below 1 by more than rounding.
-const HELD: f64 = 0.999;
+const BELOW_ONE: f64 = 0.999;
 
 /// Patches of all rays of a skin.
 #[derive(Clone, Debug)]
@@ -57,11 +57,11 @@ struct Ball {
 /// Patches that were within the margin of an object in some pose: all that can meet it until the
 /// finger has moved by the margin. It is the memory of one trial.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Vicinity {
+pub(super) struct NearbyPatches {
     mesh: Option<Arc<Mesh>>,
     x_wt: Isometry3<f64>,
     /// Patches, each with the parts of the object within the margin of it.
-    near: Vec<(usize, Nearby)>,
+    near: Vec<(usize, MeshParts)>,
     /// Whether the object was within the margin of the inner capsule.
     is_deep: bool,
 }
@@ -104,8 +104,8 @@ impl Patches {
     }
 
     /// Allocates memory for [`near`](Self::near).
-    pub fn vicinity(&self) -> Vicinity {
-        Vicinity { near: Vec::with_capacity(self.patches.len()), ..Vicinity::default() }
+    pub fn vicinity(&self) -> NearbyPatches {
+        NearbyPatches { near: Vec::with_capacity(self.patches.len()), ..NearbyPatches::default() }
     }
 
     /// Returns the bytes held.
@@ -120,10 +120,10 @@ impl Patches {
         &'a self,
         bvh: &'a MeshBvh,
         x_wt: &'a Isometry3<f64>,
-        vicinity: &'a mut Vicinity,
-    ) -> (f64, impl Iterator<Item = (&'a Range<usize>, &'a Nearby)>) {
-        if !vicinity.holds(self, bvh, x_wt) {
-            self.look(bvh, x_wt, vicinity);
+        vicinity: &'a mut NearbyPatches,
+    ) -> (f64, impl Iterator<Item = (&'a Range<usize>, &'a MeshParts)>) {
+        if !vicinity.is_valid(self, bvh, x_wt) {
+            self.find_nearby(bvh, x_wt, vicinity);
         }
         let is_deep = vicinity.is_deep && self.is_deep(bvh, x_wt, 0.0);
         let near = vicinity.near.iter().map(|(i, near)| (&self.patches[*i], near));
@@ -136,7 +136,7 @@ impl Patches {
     }
 
     /// Finds the patches within the margin.
-    fn look(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, vicinity: &mut Vicinity) {
+    fn find_nearby(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, vicinity: &mut NearbyPatches) {
         let margin_m = self.margin_m;
         vicinity.mesh = Some(bvh.mesh().clone());
         vicinity.x_wt = *x_wt;
@@ -160,23 +160,23 @@ impl Patches {
     fn is_deep(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
         let Capsule { p0_w, p1_w, radius_m } = self.inner;
         let radius_m = radius_m + margin_m;
-        bvh.enters(&Capsule { p0_w: x_wt * p0_w, p1_w: x_wt * p1_w, radius_m })
+        bvh.intersects(&Capsule { p0_w: x_wt * p0_w, p1_w: x_wt * p1_w, radius_m })
     }
 }
 
-impl Vicinity {
+impl NearbyPatches {
     /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
-        self.near.capacity() * size_of::<(usize, Nearby)>()
+        self.near.capacity() * size_of::<(usize, MeshParts)>()
     }
 
     /// Returns whether the finger is still within the margin of the pose in which the patches were
     /// found.
-    fn holds(&self, patches: &Patches, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> bool {
+    fn is_valid(&self, patches: &Patches, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> bool {
         let is_same = self.mesh.as_ref().is_some_and(|mesh| Arc::ptr_eq(mesh, bvh.mesh()));
         let way = x_wt.translation.vector - self.x_wt.translation.vector;
         let turn_rad = self.x_wt.rotation.angle_to(&x_wt.rotation);
-        is_same && way.norm() + patches.reach_m * turn_rad < HELD * patches.margin_m
+        is_same && way.norm() + patches.reach_m * turn_rad < BELOW_ONE * patches.margin_m
     }
 }
 
@@ -197,13 +197,13 @@ impl Ball {
     }
 
     /// Returns the parts of the object that may be within `margin_m` of the ball.
-    fn nearby(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> Nearby {
+    fn nearby(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> MeshParts {
         bvh.nearby(&(x_wt * self.centre), self.radius_m + margin_m)
     }
 
     /// Returns whether the object, of which only the parts in `near` can be close, is within
     /// `margin_m` of the ball.
-    fn meets(&self, bvh: &MeshBvh, near: &Nearby, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
+    fn meets(&self, bvh: &MeshBvh, near: &MeshParts, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
         bvh.touches_near(near, &(x_wt * self.centre), self.radius_m + margin_m)
     }
 }

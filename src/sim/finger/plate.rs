@@ -1,7 +1,7 @@
 //! Finger pressed on a flat plate.
 
-use super::effects::skin::{Pressed, Skin, SkinEffect};
-use super::load::{Load, PressError};
+use super::effects::skin::{Skin, SkinEffect, SkinState};
+use super::load::{ContactLoad, PressError};
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_explore::robot::finger::shape::Finger;
@@ -29,15 +29,15 @@ const PRESSES: u32 = 200;
 const DEPTH_HALVINGS: u32 = 30;
 
 /// Fingertip over a flat plate.
-pub struct Plate {
+pub struct PlateContact {
     /// Skin of the fingertip.
     pub skin: Skin,
     /// Skin in its last pose.
-    pub pressed: Pressed,
+    pub pressed: SkinState,
     bvh: MeshBvh,
 }
 
-impl Plate {
+impl PlateContact {
     /// Creates the BioTac with this skin; `None` if the plate cannot be built.
     pub fn new(skin: &SkinEffect, cavity_pa_m3: f64) -> Option<Self> {
         Self::of(Skin::new(&Profile::biotac(&Finger::default()), skin, cavity_pa_m3))
@@ -53,7 +53,11 @@ impl Plate {
 
     /// Returns the load with the plate across the direction `towards_t` and the origin of `T`
     /// `height_m` above it.
-    fn press(&mut self, towards_t: &Vector3<f64>, height_m: f64) -> Result<Load, PressError> {
+    fn press(
+        &mut self,
+        towards_t: &Vector3<f64>,
+        height_m: f64,
+    ) -> Result<ContactLoad, PressError> {
         self.skin.press(&self.bvh, &pose(towards_t, height_m), &mut self.pressed)
     }
 
@@ -108,7 +112,7 @@ impl Plate {
         &mut self,
         towards_t: &Vector3<f64>,
         normal_force_n: f64,
-    ) -> Result<Load, PressError> {
+    ) -> Result<ContactLoad, PressError> {
         let height_m = self.height_m(towards_t, normal_force_n)?;
         self.press(towards_t, height_m)
     }
@@ -131,7 +135,7 @@ pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
 /// Returns the largest slope of force over depth, in N/m, with a flat plate pressed on the skin
 /// across `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
 pub fn largest_stiffness_n_m(skin: &Skin, towards_t: &Vector3<f64>, force_n: f64) -> f64 {
-    let Some(mut plate) = Plate::of(skin.clone()) else { return 0.0 };
+    let Some(mut plate) = PlateContact::of(skin.clone()) else { return 0.0 };
     let top_m = plate.top_m(towards_t);
     let mut pushed_n =
         |depth_m: f64| Some(-plate.press(towards_t, top_m - depth_m).ok()?.force_n.dot(towards_t));

@@ -5,7 +5,7 @@ mod robot;
 mod scenery;
 mod text;
 
-use super::environment::{CLEARANCE_M, Environment, Shape};
+use super::environment::{CLEARANCE_M, Environment, Surface};
 use super::scene::Scene;
 use super::solver::{Collision, Integrator, Sdf};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -24,7 +24,7 @@ const GROUND_M: f64 = 0.01;
 
 /// Purpose of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mode {
+pub enum ModelPurpose {
     /// Model for viewing: everything in the scene.
     Picture,
     /// Model for stepping: only the moving parts. Shapes would cost time at every step, and the
@@ -49,28 +49,28 @@ const SENSOR: &str = r#"  <sensor>
 /// picture also has the object at its pose on a vertical board, the floor, a camera and lights.
 /// Returns `None` for a scene without a mesh, and for a stage that turns the finger, which has no
 /// model.
-pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
+pub fn scene(environment: &Environment, mode: ModelPurpose) -> Option<String> {
     let mesh = environment.mesh()?;
     let chain = environment.chain()?;
     let has_model = match environment.scene().arm {
         Some(_) => environment.arm_mjcf().is_some(),
-        None => !chain.turns(),
+        None => !chain.has_revolute(),
     };
     if !has_model {
         return None;
     }
-    let shown = mode == Mode::Picture;
+    let shown = mode == ModelPurpose::Picture;
     let collides = !shown && environment.scene().collides();
     let bumps = !shown && environment.scene().effects.collision.is_some();
     let scenery = match shown {
         true => scenery::scenery(mesh, environment.task(), &chain),
-        false if bumps => obstacle(environment)? + &table(environment.scene()),
-        false if collides => obstacle(environment)?,
+        false if bumps => collision_geometry(environment)? + &table(environment.scene()),
+        false if collides => collision_geometry(environment)?,
         false => String::new(),
     };
     let step_s = match mode {
-        Mode::Picture => PICTURE_STEP_S,
-        Mode::Dynamic { step_s } => step_s,
+        ModelPurpose::Picture => PICTURE_STEP_S,
+        ModelPurpose::Dynamic { step_s } => step_s,
     };
     let is_soft = shown && environment.scene().effects.skin.is_some();
     let skin = match is_soft {
@@ -105,7 +105,7 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
 /// convex hull of its mesh (computed by MuJoCo, so every hollow is filled), or as the signed
 /// distance field of its mesh, interpolated in MuJoCo's octree, with the options of the contact
 /// search.
-fn obstacle(environment: &Environment) -> Option<String> {
+fn collision_geometry(environment: &Environment) -> Option<String> {
     let solver = &environment.scene().solver;
     let (kind, option) = match solver.collision.unwrap_or_default() {
         Collision::HeightField => return height_field(environment),
@@ -130,7 +130,7 @@ fn obstacle(environment: &Environment) -> Option<String> {
 /// can meet from targets in the zone; places where the approach meets nothing get the lowest
 /// height.
 fn height_field(environment: &Environment) -> Option<String> {
-    let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
+    let Surface::Mesh { bvh, .. } = environment.shape() else { return None };
     let (scene, zone) = (environment.scene(), environment.task().zone()?);
     let margin_m = scene.finger.radius_m + scene.finger.length_m;
     let side = |[low, high]: [f64; 2]| [low - margin_m, high + margin_m];

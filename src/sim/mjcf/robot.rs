@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 const STAGE: &str = include_str!("../../../models/stage.xml");
 
 /// Attributes by which the robot models mark shapes that collide with nothing.
-const PASSING: &str = r#"contype="0" conaffinity="0""#;
+const NO_COLLISION: &str = r#"contype="0" conaffinity="0""#;
 
 /// Returns the robot's model without its outermost tags, with its base and tool filled in. The
 /// finger's hull collides with the object if it `collides`; the links collide with everything if
@@ -33,10 +33,10 @@ pub(super) fn robot(
         (false, true) => TABLE,
         (false, false) => "",
     };
-    let links = if bumps { LINK } else { PASSING };
+    let links = if bumps { LINK } else { NO_COLLISION };
     inner
         .map_or("", |(inner, _)| inner)
-        .replace(PASSING, links)
+        .replace(NO_COLLISION, links)
         .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
         .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, (contact, is_soft)))
 }

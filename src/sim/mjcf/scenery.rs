@@ -12,7 +12,7 @@ const RIM_M: f64 = 0.1;
 
 /// Direction from the middle of the scene to the camera beside the finger, which also shows the
 /// object's front.
-const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
+const CAMERA_DIRECTION: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
 
 /// Returns the scenery with two cameras: `front` shows the object from the front and above, `whole`
 /// shows the whole scene from beside the finger.
@@ -47,13 +47,14 @@ pub(super) fn scenery(mesh: &Mesh, task: &Task, chain: &Chain) -> String {
     let middle = x_wz * middle_z;
     let front = middle + x_wz.rotation * Vector3::new(0.9, 2.2, 0.7) * (4.0 * half.norm());
     // From the robot's foot to the object, or the object alone if the stage carries the finger.
-    let foot = if chain.turns() { Point3::from(chain.base.translation.vector) } else { middle };
+    let foot =
+        if chain.has_revolute() { Point3::from(chain.base.translation.vector) } else { middle };
     let between = nalgebra::center(&foot, &middle) + Vector3::z() * (0.3 * (foot - middle).norm());
     let size = (foot - middle).norm() + 4.0 * half.norm();
-    let whole = between + BESIDE * size;
+    let whole = between + CAMERA_DIRECTION * size;
     // View direction of the viewer's free camera, which starts in the same place.
-    let azimuth = (-BESIDE.y).atan2(-BESIDE.x).to_degrees();
-    let elevation = (-BESIDE.z).atan2(BESIDE.xy().norm()).to_degrees();
+    let azimuth = (-CAMERA_DIRECTION.y).atan2(-CAMERA_DIRECTION.x).to_degrees();
+    let elevation = (-CAMERA_DIRECTION.z).atan2(CAMERA_DIRECTION.xy().norm()).to_degrees();
     let asset = mesh_asset(mesh, "object");
     format!(
         r#"  <statistic center="{between}" extent="{size}"/>

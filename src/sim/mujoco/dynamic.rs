@@ -1,6 +1,6 @@
 //! Dynamic backend: an arm or stage with masses, servos and friction that carries the finger.
 
-use super::{Models, Plant};
+use super::{CompiledModels, Plant};
 use crate::sim::Environment;
 use crate::sim::simulated_finger::SimulatedFinger;
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, Reading, Sample, Wrench};
@@ -10,11 +10,11 @@ use std::sync::Arc;
 
 // heuristic: a state has diverged this far beyond a joint's limits, rad or m (the stops are 0.05
 // rad beyond, and are compliant), or this many times faster than its limit.
-const BEYOND: f64 = 0.2;
-const FASTER: f64 = 5.0;
+const LIMIT_EXCESS_MAX: f64 = 0.2;
+const SPEED_RATIO_MAX: f64 = 5.0;
 
 /// Backend of a [`Plant`] whose fingertip has a skin, if the scene has one.
-pub struct Dynamic {
+pub struct DynamicBackend {
     chain: Chain,
     capabilities: Capabilities,
     plant: Plant,
@@ -26,16 +26,16 @@ pub struct Dynamic {
     reading: Reading,
 }
 
-impl Dynamic {
+impl DynamicBackend {
     /// Creates the backend at the chain's home.
     ///
     /// # Errors
     /// If the environment has no object.
-    pub fn new(environment: &Arc<Environment>, models: &Models) -> Result<Self, Fault> {
+    pub fn new(environment: &Arc<Environment>, models: &CompiledModels) -> Result<Self, Fault> {
         let chain = environment.chain().ok_or_else(|| Fault::lacks("an object"))?;
         let period_s = environment.scene().period_s();
         let mut body = Self {
-            capabilities: Capabilities::of(&chain, period_s),
+            capabilities: Capabilities::simulated(&chain, period_s),
             plant: Plant::new(Arc::clone(&models.plant))?,
             finger: SimulatedFinger::new(Arc::clone(environment), 0),
             wrench: Wrench::default(),
@@ -52,7 +52,8 @@ impl Dynamic {
         let (q, qdot) = (self.plant.q(), self.plant.qdot());
         let plausible = self.chain.joints.iter().zip(q.iter().zip(qdot)).all(|(joint, (q, v))| {
             let [low, high] = joint.q_limits;
-            (low - BEYOND..=high + BEYOND).contains(q) && v.abs() <= FASTER * joint.qdot_limit
+            (low - LIMIT_EXCESS_MAX..=high + LIMIT_EXCESS_MAX).contains(q)
+                && v.abs() <= SPEED_RATIO_MAX * joint.qdot_limit
         });
         if plausible {
             return Ok(());
@@ -69,7 +70,9 @@ impl Dynamic {
         reading.qdot.clear();
         reading.qdot.extend_from_slice(plant.qdot());
         match &mut self.finger {
-            Some(finger) => finger.report(&plant.mount(), self.capabilities.period_s, reading),
+            Some(finger) => {
+                finger.write_reading(&plant.mount_wrench(), self.capabilities.period_s, reading)
+            }
             None => {
                 reading.samples.clear();
                 reading.samples.extend(plant.contact().map(Sample::Ideal));
@@ -78,7 +81,7 @@ impl Dynamic {
     }
 }
 
-impl Backend for Dynamic {
+impl Backend for DynamicBackend {
     fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }

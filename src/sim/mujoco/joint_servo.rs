@@ -18,7 +18,7 @@ const INTEGRAL_PER_S: f64 = 50.0;
 /// twice the smallest inertia of a joint.
 pub(super) struct JointServo {
     /// Integral of the velocity error, rad or m.
-    lag: Joints,
+    velocity_error_integral: Joints,
     /// Gains, N·m·s/rad or N·s/m.
     kv: Joints,
     /// Largest motor torque or force, N·m or N.
@@ -27,14 +27,14 @@ pub(super) struct JointServo {
 
 impl JointServo {
     pub(super) fn new(kv: Joints, limit: Joints) -> Self {
-        Self { lag: Joints::zeros(), kv, limit }
+        Self { velocity_error_integral: Joints::zeros(), kv, limit }
     }
 
     /// Sets the state reached after a long time under `load`.
-    pub(super) fn hold(&mut self, load: &[f64]) {
-        self.lag = Joints::zeros();
+    pub(super) fn set_steady_state(&mut self, load: &[f64]) {
+        self.velocity_error_integral = Joints::zeros();
         for (i, load) in load.iter().enumerate().take(MAX_JOINTS) {
-            self.lag[i] = load / (self.kv[i] * INTEGRAL_PER_S);
+            self.velocity_error_integral[i] = load / (self.kv[i] * INTEGRAL_PER_S);
         }
     }
 
@@ -51,8 +51,8 @@ impl JointServo {
         let error = command - qdot;
         let saturated = force.abs() >= self.limit[i] && error * force > 0.0;
         let grown = if saturated { 0.0 } else { error * step_s };
-        let mean = self.lag[i] + 0.5 * grown;
-        self.lag[i] += grown;
+        let mean = self.velocity_error_integral[i] + 0.5 * grown;
+        self.velocity_error_integral[i] += grown;
         command + INTEGRAL_PER_S * mean
     }
 }

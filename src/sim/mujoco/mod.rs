@@ -9,18 +9,18 @@ mod plant;
 #[cfg(feature = "viewer")]
 pub mod window;
 
-pub use dynamic::Dynamic;
-pub use models::{Models, StepLimit, Substeps};
+pub use dynamic::DynamicBackend;
+pub use models::{CompiledModels, StepLimit, Substeps};
 pub use plant::Plant;
 
 use mujoco_rs::wrappers::MjModel;
 use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::sync::Once;
 
 /// Returns the error of a model that lacks a `part` of a robot with a finger.
-fn lacking(part: &str) -> Invalid {
-    Invalid::new(format!("the MuJoCo model lacks {part}"))
+fn lacking(part: &str) -> InputError {
+    InputError::new(format!("the MuJoCo model lacks {part}"))
 }
 
 /// Returns the version of the linked library.
@@ -37,7 +37,7 @@ const SPURIOUS: &str = "unknown error in attribute";
 ///
 /// # Errors
 /// If MuJoCo refuses it.
-pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
+pub fn compile(mjcf: &str) -> Result<MjModel, InputError> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         // A diverging trial is a fault in its row, not a line in MUJOCO_LOG.TXT.
@@ -51,7 +51,7 @@ pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
             true => std::thread::scope(|scope| scope.spawn(read).join().unwrap_or(Err(cause))),
             false => Err(cause),
         })
-        .map_err(|cause| Invalid::new(format!("MuJoCo refuses the scene: {cause}")))?;
+        .map_err(|cause| InputError::new(format!("MuJoCo refuses the scene: {cause}")))?;
     joint_servo::embed(&mut model);
     Ok(model)
 }

@@ -3,32 +3,32 @@
 
 use super::{Plant, compile, lacking};
 use crate::sim::Environment;
-use crate::sim::environment::{Shape, invalid};
+use crate::sim::environment::{Surface, invalid};
 use crate::sim::finger::plate;
-use crate::sim::mjcf::{self, Mode};
+use crate::sim::mjcf::{self, ModelPurpose};
 use crate::sim::solver::Collision;
 use mujoco_rs::wrappers::MjModel;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::fmt::{Display, Formatter, Result as Written};
 use std::sync::Arc;
 
 /// Compiled models, shared by the trials of an experiment.
 #[derive(Clone, Debug)]
-pub struct Models {
+pub struct CompiledModels {
     /// Model of the arm or stage.
     pub plant: Arc<MjModel>,
     /// Division of the scene's time step, with its reason; `None` if it was not divided.
     pub substeps: Option<Substeps>,
 }
 
-impl Models {
+impl CompiledModels {
     /// Compiles the models with the scene's time step, or a fraction of it if that is too long for
     /// the skin.
     ///
     /// # Errors
     /// If MuJoCo refuses the scene, no step is short enough for its skin, or the scene's collision
     /// needs a closed mesh and the object has none.
-    pub fn new(environment: &Environment) -> Result<Self, Invalid> {
+    pub fn new(environment: &Environment) -> Result<Self, InputError> {
         let step_s = environment.scene().solver.step_s;
         let whole = Self::at(environment, step_s)?;
         let Some(limit) = StepLimit::of(environment, &whole.plant)? else { return Ok(whole) };
@@ -39,7 +39,7 @@ impl Models {
                 let divided = Self::at(environment, step_s / f64::from(count))?;
                 Ok(Self { substeps: Some(Substeps { count, step_s, limit }), ..divided })
             }
-            _ => Err(Invalid::new(format!(
+            _ => Err(InputError::new(format!(
                 "solver.step_s = {step_s} is too long, and no allowed substep is short enough: {limit}"
             ))),
         }
@@ -50,20 +50,20 @@ impl Models {
     /// # Errors
     /// If MuJoCo refuses the scene, or the scene's collision needs a closed mesh and the object has
     /// none.
-    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, Invalid> {
+    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, InputError> {
         check_inside(environment)?;
-        let text = mjcf::scene(environment, Mode::Dynamic { step_s });
+        let text = mjcf::scene(environment, ModelPurpose::Dynamic { step_s });
         let plant = Arc::new(compile(&text.ok_or_else(|| lacking("an object"))?)?);
         Ok(Self { plant, substeps: None })
     }
 }
 
 /// Checks that the mesh is closed if signed distances are needed.
-fn check_inside(environment: &Environment) -> Result<(), Invalid> {
-    let Shape::Mesh { report, .. } = environment.shape() else { return Ok(()) };
+fn check_inside(environment: &Environment) -> Result<(), InputError> {
+    let Surface::Mesh { report, .. } = environment.shape() else { return Ok(()) };
     let edges = report.border_edges.count + report.non_manifold_edges.count;
     match environment.scene().solver.collision {
-        Some(Collision::Sdf) if edges > 0 => Err(Invalid::new(format!(
+        Some(Collision::Sdf) if edges > 0 => Err(InputError::new(format!(
             "solver.collision = \"sdf\" needs a closed mesh, but this one has {edges} edges that are \
              not shared by two triangles"
         ))),
@@ -107,14 +107,14 @@ impl StepLimit {
     ///
     /// # Errors
     /// If the model is not one of a robot with a finger.
-    pub fn of(environment: &Environment, model: &Arc<MjModel>) -> Result<Option<Self>, Invalid> {
+    pub fn of(environment: &Environment, model: &Arc<MjModel>) -> Result<Option<Self>, InputError> {
         let scene = environment.scene();
         let skin = environment.fingertip().and_then(|tip| tip.skin());
         let (Some(skin), Some(chain)) = (skin, environment.chain()) else { return Ok(None) };
         let mut plant = Plant::new(Arc::clone(model)).map_err(invalid)?;
         plant.reset(chain.start()).map_err(|_| lacking("a home"))?;
         let mass_kg = plant.tip_mass_kg();
-        let towards_t = scene.finger.ahead_t();
+        let towards_t = scene.finger.direction_t();
         let force_n = scene.touch.force_limit_n;
         let stiffness_n_m = plate::largest_stiffness_n_m(skin, &towards_t, force_n);
         let limit_s = (mass_kg / stiffness_n_m).sqrt();

@@ -10,7 +10,7 @@ use nalgebra::{
 use palpate_explore::backend::{Fault, IdealContact, Wrench};
 use palpate_explore::robot::arm::Joints;
 use palpate_explore::robot::arm::chain::MAX_JOINTS;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::sync::Arc;
 
 /// Plant: a compiled model of [`mjcf::scene`](crate::sim::mjcf::scene), shared, with one state of
@@ -76,7 +76,7 @@ impl Plant {
         let x_tm = local(tip).inv_mul(&local(mount));
         let staged = model.opt().integrator == MjtIntegrator::mjINT_RK4 as i32;
         let data = MjData::try_new(Arc::clone(&model))
-            .map_err(|_| Invalid::new("no memory for the state of the body"))?;
+            .map_err(|_| InputError::new("no memory for the state of the body"))?;
         Ok(Self {
             data,
             servo: JointServo::new(kv, limit),
@@ -99,14 +99,14 @@ impl Plant {
         self.contact = None;
         self.data.qpos_mut().copy_from_slice(q);
         self.data.forward();
-        self.servo.hold(self.data.qfrc_bias());
+        self.servo.set_steady_state(self.data.qfrc_bias());
         self.check()
     }
 
     /// Brakes for the next step: the brakes hold the arm's weight and damp its motion like the
     /// servos without their integral. Their friction is not modelled.
     pub fn brake(&mut self) {
-        self.servo.hold(self.data.qfrc_bias());
+        self.servo.set_steady_state(self.data.qfrc_bias());
     }
 
     /// Advances by one time step with the velocities commanded to the servos (rad/s or m/s) and
@@ -169,7 +169,7 @@ impl Plant {
     }
 
     /// Returns the motor outputs during the last step, N·m or N.
-    pub fn motors(&self) -> &[f64] {
+    pub fn motor_efforts(&self) -> &[f64] {
         self.data.actuator_force()
     }
 
@@ -214,7 +214,7 @@ impl Plant {
     /// about its origin: the load of everything beyond the sensor, that is, the wrench on the
     /// fingertip plus the weight and inertia of adapter and finger. It is zero in a scene without
     /// the sensor.
-    pub fn mount(&self) -> Wrench {
+    pub fn mount_wrench(&self) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
         // MuJoCo gives the force of the link on the finger; the sensor reads the opposite.
         let (force_n, torque_nm) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));

@@ -1,13 +1,13 @@
 //! Comparison of a scene's variants with a reference, and selection of the cheapest within a
 //! tolerance.
 
-use super::convergence::{Order, in_contact, in_samples, in_time_step};
+use super::convergence::{ConvergenceOrder, in_contact, in_samples, in_time_step};
 use super::level::converging;
-use super::switches::{switched, switches};
+use super::switches::{switches, toggle};
 use super::tolerance::{Criterion, Origin, Tolerance};
-use super::touches::{Touches, Trials, wall_times_s};
-use super::variant::{ALLOWED, Variant};
-use super::verdict::{Relevance, advantages_m, difference};
+use super::touches::{TargetTrials, TouchResults, wall_times_s};
+use super::variant::{EXCEEDANCE_MAX, Variant};
+use super::verdict::{Relevance, difference, paired_differences_m};
 use crate::experiment::statistics::{median, median_interval};
 use crate::sim::Scene;
 use anyhow::{Context, bail};
@@ -20,7 +20,7 @@ const HELD_OUT: u32 = 1_000_000;
 
 /// Number of measurements per variant.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort {
+pub struct MeasurementCounts {
     /// Touches compared.
     pub touches: usize,
     /// Touches timed, each next to one of the reference; 0 times each target once.
@@ -35,7 +35,7 @@ pub struct Effort {
 
 /// A reference and the variants compared with it.
 #[derive(Serialize)]
-pub struct Comparison {
+pub struct AccuracyComparison {
     /// Reference variant.
     pub reference: Variant,
     /// Other variants.
@@ -48,18 +48,18 @@ pub struct Comparison {
     #[serde(skip)]
     scene: Scene,
     #[serde(skip)]
-    effort: Effort,
+    effort: MeasurementCounts,
     #[serde(skip)]
-    trials: Trials,
+    trials: TargetTrials,
     #[serde(skip)]
-    touches: Vec<Touches>,
+    touches: Vec<TouchResults>,
     #[serde(skip)]
     advantages_m: Vec<Option<f64>>,
 }
 
 /// Cheapest scene within a tolerance.
 #[derive(Serialize)]
-pub struct Cheapest {
+pub struct CheapestScene {
     /// Scene settings.
     #[serde(skip)]
     pub scene: Scene,
@@ -71,7 +71,7 @@ pub struct Cheapest {
     pub is_confirmed: bool,
 }
 
-impl Comparison {
+impl AccuracyComparison {
     /// Measures the reference. The default margin of a verdict is the bound of its interval nearest
     /// to zero: a smaller change cannot reverse it.
     ///
@@ -80,15 +80,15 @@ impl Comparison {
     /// undecided.
     pub fn new(
         (reference, scene): (Variant, Scene),
-        effort: Effort,
+        effort: MeasurementCounts,
         criterion: Option<Criterion>,
     ) -> anyhow::Result<Self> {
-        let trials = Trials::new(&scene, effort.touches, effort.seed.into());
+        let trials = TargetTrials::new(&scene, effort.touches, effort.seed.into());
         let (mut reference, touches) = reference.measured(&scene, &trials, None, None)?;
         let rounds = if effort.pairs == 0 { effort.touches } else { effort.pairs };
         reference.wall_s = median(&wall_times_s([&scene], &trials.targets(), rounds)?.concat());
-        let advantages_m = advantages(&scene, effort)?;
-        reference.verdict_m = difference(&advantages_m, None);
+        let advantages_m = paired_differences(&scene, effort)?;
+        reference.verdict_m = difference(&paired_differences_m, None);
         let criterion = match criterion {
             Some(Criterion::Verdict(m)) => Some(Criterion::Verdict(Some(margin_m(m, &reference)?))),
             other => other,
@@ -103,7 +103,7 @@ impl Comparison {
             effort,
             trials,
             touches,
-            advantages_m,
+            paired_differences_m,
         })
     }
 
@@ -112,7 +112,7 @@ impl Comparison {
     /// # Errors
     /// If its scene cannot be built.
     pub fn add(&mut self, (variant, scene): (Variant, Scene)) -> anyhow::Result<()> {
-        let mut variant = self.measured(variant, &scene)?;
+        let mut variant = self.measure(variant, &scene)?;
         variant.relevance = self.relevance(&variant).filter(|_| variant.effect.is_some());
         self.variants.push(variant);
         self.scenes.push(scene);
@@ -120,8 +120,8 @@ impl Comparison {
     }
 
     /// Measures a variant; a variant with invalid settings stays unmeasured.
-    fn measured(&self, variant: Variant, scene: &Scene) -> anyhow::Result<Variant> {
-        if !Rules::hold(scene) {
+    fn measure(&self, variant: Variant, scene: &Scene) -> anyhow::Result<Variant> {
+        if !Rules::is_satisfied(scene) {
             return Ok(variant);
         }
         let tolerance = match &self.criterion {
@@ -136,16 +136,16 @@ impl Comparison {
                 .map(|[reference_s, wall_s]| (*wall_s, wall_s / reference_s))
                 .unzip(),
         };
-        let advantages_m = advantages(scene, self.effort)?;
+        let advantages_m = paired_differences(scene, self.effort)?;
         // If many trials fail, the remaining ones are not comparable.
         let ended = self.advantages_m.iter().flatten().count() as f64;
-        let change = difference(&advantages_m, Some(&self.advantages_m))
-            .filter(|change| change.trials as f64 >= (1.0 - ALLOWED) * ended);
+        let change = difference(&paired_differences_m, Some(&self.advantages_m))
+            .filter(|change| change.trials as f64 >= (1.0 - EXCEEDANCE_MAX) * ended);
         Ok(Variant {
             wall_s: median(&walls_s),
             time_ratio: median(&ratios),
             time_ratio_interval: median_interval(&ratios, 0),
-            verdict_m: difference(&advantages_m, None),
+            verdict_m: difference(&paired_differences_m, None),
             verdict_change_m: change,
             ..variant
         })
@@ -157,8 +157,8 @@ impl Comparison {
         let needed = Some(Relevance::Needed);
         match self.criterion? {
             Criterion::Touches(_) => match variant.beyond.map(|beyond| beyond.interval) {
-                Some([_, high]) if high < ALLOWED => Some(Relevance::NotNeeded),
-                Some([low, _]) if low <= ALLOWED => Some(Relevance::Undecided),
+                Some([_, high]) if high < EXCEEDANCE_MAX => Some(Relevance::NotNeeded),
+                Some([low, _]) if low <= EXCEEDANCE_MAX => Some(Relevance::Undecided),
                 _ => needed,
             },
             Criterion::Verdict(margin_m) => variant
@@ -169,7 +169,7 @@ impl Comparison {
 
     /// Returns the fastest variant with 95 % of its touches within the tolerance.
     pub fn cheapest(&self, tolerance: &Tolerance, origin: Origin) -> Option<(Variant, Scene)> {
-        let is_within = |variant: &Variant| variant.stays_within(tolerance, origin);
+        let is_within = |variant: &Variant| variant.is_within(tolerance, origin);
         let time_s = |variant: &Variant| variant.wall_s.unwrap_or(f64::INFINITY);
         let within = self.variants.iter().zip(&self.scenes).filter(|(it, _)| is_within(it));
         let cheapest = within.min_by(|(a, _), (b, _)| time_s(a).total_cmp(&time_s(b)));
@@ -188,7 +188,7 @@ impl Comparison {
     ///
     /// # Errors
     /// If a scene cannot be built.
-    pub fn without_unneeded(&self) -> anyhow::Result<Option<(Variant, Scene)>> {
+    pub fn without_unneeded_effects(&self) -> anyhow::Result<Option<(Variant, Scene)>> {
         let is_spare = |variant: &Variant| self.relevance(variant) == Some(Relevance::NotNeeded);
         let mut spare: Vec<&Variant> = self.variants.iter().filter(|it| is_spare(it)).collect();
         let ratio = |variant: &Variant| variant.time_ratio.unwrap_or(f64::NAN);
@@ -201,8 +201,8 @@ impl Comparison {
             };
             let mut on = switches().into_iter().filter(|switch| switch.is_on(scene));
             let Some(switch) = on.find(|switch| switch.name == *effect) else { continue };
-            let less = switched(scene, &switch);
-            let variant = self.measured(Variant::named(name), &less)?;
+            let less = toggle(scene, &switch);
+            let variant = self.measure(Variant::named(name), &less)?;
             best = is_spare(&variant).then_some((variant, less)).or(best);
         }
         Ok(best)
@@ -217,8 +217,8 @@ impl Comparison {
         (selected, scene): (Variant, Scene),
         origin: Origin,
         count: Option<u16>,
-    ) -> anyhow::Result<Cheapest> {
-        let mut effort = Effort { seed: self.effort.seed + HELD_OUT, ..self.effort };
+    ) -> anyhow::Result<CheapestScene> {
+        let mut effort = MeasurementCounts { seed: self.effort.seed + HELD_OUT, ..self.effort };
         match self.criterion {
             Some(Criterion::Verdict(_)) => effort.trials = count.map_or(effort.trials, u32::from),
             _ => effort.touches = count.map_or(effort.touches, usize::from),
@@ -226,14 +226,14 @@ impl Comparison {
         let reference = (self.reference.clone(), self.scene.clone());
         let fresh = Self::new(reference, effort, self.criterion)?;
         let unmeasured = Variant::named(selected.name.clone());
-        let mut held_out = fresh.measured(unmeasured, &scene)?;
+        let mut held_out = fresh.measure(unmeasured, &scene)?;
         let ratio = held_out.wall_s.zip(fresh.reference.wall_s).map(|(wall, other)| wall / other);
         held_out.time_ratio = held_out.time_ratio.or(ratio);
         let is_confirmed = match &self.criterion {
-            Some(Criterion::Touches(it)) => held_out.stays_within(it, origin),
+            Some(Criterion::Touches(it)) => held_out.is_within(it, origin),
             _ => self.relevance(&held_out) == Some(Relevance::NotNeeded),
         };
-        Ok(Cheapest { scene, selected, held_out, is_confirmed })
+        Ok(CheapestScene { scene, selected, held_out, is_confirmed })
     }
 
     /// Orders of convergence of the levels of `scene`: in the time step, in the number of skin
@@ -241,7 +241,7 @@ impl Comparison {
     ///
     /// # Errors
     /// If a scene cannot be built or simulated.
-    pub fn orders(&self, scene: &Scene) -> anyhow::Result<Vec<Order>> {
+    pub fn orders(&self, scene: &Scene) -> anyhow::Result<Vec<ConvergenceOrder>> {
         let loads = self.touches.iter().flat_map(|touches| touches.loads.iter().flatten());
         let poses: Vec<TipMotion> = loads.map(|load| load.motion).collect();
         let in_time_step = in_time_step(scene, &self.trials)?;
@@ -261,8 +261,11 @@ impl Comparison {
     }
 }
 
-fn advantages(scene: &Scene, effort: Effort) -> anyhow::Result<Vec<Option<f64>>> {
-    advantages_m(scene, effort.seed..effort.seed + effort.trials, effort.trial_touches)
+fn paired_differences(
+    scene: &Scene,
+    effort: MeasurementCounts,
+) -> anyhow::Result<Vec<Option<f64>>> {
+    paired_differences_m(scene, effort.seed..effort.seed + effort.trials, effort.trial_touches)
 }
 
 fn margin_m(stated: Option<f64>, reference: &Variant) -> anyhow::Result<f64> {

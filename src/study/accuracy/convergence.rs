@@ -1,11 +1,11 @@
 //! Order of convergence of the force error with the resolution, all other settings fixed.
 
-use super::level::{Level, Senses};
-use super::touches::{Trials, noise_free};
+use super::level::{FidelityLevel, SensorModel};
+use super::touches::{TargetTrials, noise_free};
 use crate::experiment::statistics::mean;
-use crate::sim::environment::Shape;
-use crate::sim::probe::rest;
-use crate::sim::scene::Body;
+use crate::sim::environment::Surface;
+use crate::sim::probe::resting_pose;
+use crate::sim::scene::SimulatorKind;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use palpate_explore::backend::Command;
@@ -41,7 +41,7 @@ const NEAR_M: f64 = 3e-3;
 
 /// Convergence of the mean force error.
 #[derive(Clone, Debug, Serialize)]
-pub struct Order {
+pub struct ConvergenceOrder {
     /// Name of the resolution.
     pub name: &'static str,
     /// Unit of the resolution.
@@ -54,7 +54,7 @@ pub struct Order {
     pub expected: f64,
 }
 
-impl Order {
+impl ConvergenceOrder {
     /// Computes the order at which the forces at some resolutions converge to those at the last;
     /// `None` if there are no forces.
     fn new(
@@ -88,9 +88,17 @@ impl Order {
 ///
 /// # Errors
 /// If the touches cannot be made.
-pub fn in_time_step(scene: &Scene, trials: &Trials) -> anyhow::Result<Option<Order>> {
-    Order::new(["time step", "ticks per second"], &TICKS_PER_S, |ticks_per_s| {
-        let level = Level::new(Body::Kinematic, Senses::Dry, STEPPED_SAMPLES, 1.0 / ticks_per_s);
+pub fn in_time_step(
+    scene: &Scene,
+    trials: &TargetTrials,
+) -> anyhow::Result<Option<ConvergenceOrder>> {
+    ConvergenceOrder::new(["time step", "ticks per second"], &TICKS_PER_S, |ticks_per_s| {
+        let level = FidelityLevel::new(
+            SimulatorKind::Kinematic,
+            SensorModel::Dry,
+            STEPPED_SAMPLES,
+            1.0 / ticks_per_s,
+        );
         let environment = Arc::new(Environment::build(noise_free(&level.apply(scene)))?);
         let touches = trials.touch(&environment)?;
         let loads = touches.iter().flat_map(|touches| &touches.loads);
@@ -103,11 +111,16 @@ pub fn in_time_step(scene: &Scene, trials: &Trials) -> anyhow::Result<Option<Ord
 ///
 /// # Errors
 /// If a scene cannot be built.
-pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<Order>> {
-    Order::new(["points of the skin"; 2], &SAMPLES, |samples| {
-        let level = Level::new(Body::Kinematic, Senses::Fluid, samples as usize, 0.01);
+pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<ConvergenceOrder>> {
+    ConvergenceOrder::new(["points of the skin"; 2], &SAMPLES, |samples| {
+        let level = FidelityLevel::new(
+            SimulatorKind::Kinematic,
+            SensorModel::Fluid,
+            samples as usize,
+            0.01,
+        );
         let environment = Environment::build(level.apply(scene))?;
-        let (Some(skin), Shape::Mesh { bvh, .. }) =
+        let (Some(skin), Surface::Mesh { bvh, .. }) =
             (environment.fingertip().and_then(|tip| tip.skin()), environment.shape())
         else {
             return Ok(None);
@@ -127,14 +140,15 @@ pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<O
 ///
 /// # Errors
 /// If the scene cannot be built or simulated.
-pub fn in_contact(scene: &Scene) -> anyhow::Result<Option<Order>> {
-    let level = Level::new(Body::Dynamic, Senses::Dry, STEPPED_SAMPLES, PERIOD_S);
+pub fn in_contact(scene: &Scene) -> anyhow::Result<Option<ConvergenceOrder>> {
+    let level =
+        FidelityLevel::new(SimulatorKind::Dynamic, SensorModel::Dry, STEPPED_SAMPLES, PERIOD_S);
     if !level.is_built() {
         return Ok(None);
     }
     let mut scene = noise_free(&level.apply(scene));
     scene.arm = None;
-    Order::new(["step in contact", "steps per second"], &STEPS_PER_S, |steps_per_s| {
+    ConvergenceOrder::new(["step in contact", "steps per second"], &STEPS_PER_S, |steps_per_s| {
         scene.solver.step_s = 1.0 / steps_per_s;
         pressed(&Arc::new(Environment::build(scene.clone())?))
     })
@@ -147,13 +161,13 @@ fn pressed(environment: &Arc<Environment>) -> anyhow::Result<Option<Vec<f64>>> {
     let middle = zone.at(&[0.5, 0.5]).into();
     let Some(approach) = environment.task().approach(&middle) else { return Ok(None) };
     let (Some(chain), Some(rest), Some(mut body)) =
-        (environment.chain(), rest(environment, &approach), simulator.body()?)
+        (environment.chain(), resting_pose(environment, &approach), simulator.body()?)
     else {
         return Ok(None);
     };
     let home_w = chain.forward(&chain.home).translation.vector;
     let ahead_w = approach.direction_w();
-    let gap_m = (rest.p_wt.coords - home_w).dot(&ahead_w);
+    let gap_m = (resting_pose.p_wt.coords - home_w).dot(&ahead_w);
     let far_m = (gap_m - NEAR_M).max(0.0);
     let ticks = |way_m: f64, speed_m_s: f64| (way_m / (speed_m_s * PERIOD_S)).round() as usize;
     let mut go = |speed_m_s: f64, count: usize| {

@@ -1,11 +1,11 @@
 //! Deviations between the touches of two scenes, and their statistics.
 
-use super::touches::Touches;
+use super::touches::TouchResults;
 use crate::experiment::statistics::{mean, mean_interval};
 use serde::Serialize;
 
 /// Probability on each side of a 95 % interval.
-const TAIL: f64 = 0.025;
+const TAIL_PROBABILITY: f64 = 0.025;
 
 /// Tolerance for whole numbers, far above rounding errors.
 const ROUNDING: f64 = 1e-9;
@@ -36,15 +36,15 @@ impl Quantity {
 
     /// Returns the deviation of each touch, per trial: infinite if only one of the two has the
     /// quantity, `None` if neither has.
-    pub fn deviations(self, a: &[Touches], b: &[Touches]) -> Vec<Vec<Option<f64>>> {
-        let of_trial = |(a, b): (&Touches, &Touches)| {
+    pub fn deviations(self, a: &[TouchResults], b: &[TouchResults]) -> Vec<Vec<Option<f64>>> {
+        let of_trial = |(a, b): (&TouchResults, &TouchResults)| {
             let pairs = self.values(a).into_iter().zip(self.values(b));
             pairs.map(|(a, b)| self.deviation(a, b)).collect()
         };
         a.iter().zip(b).map(of_trial).collect()
     }
 
-    fn values(self, touches: &Touches) -> Vec<Option<Vec<f64>>> {
+    fn values(self, touches: &TouchResults) -> Vec<Option<Vec<f64>>> {
         let loads = touches.loads.iter().map(Option::as_ref);
         match self {
             Self::Contact => (touches.contacts.iter())
@@ -70,7 +70,7 @@ impl Quantity {
 
 /// Mean, 95 % quantile and maximum of errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct ErrorStatistics {
     /// Mean.
     pub mean: f64,
     /// 95 % bootstrap interval of the mean.
@@ -81,7 +81,7 @@ pub struct Spread {
     pub max: f64,
 }
 
-impl Spread {
+impl ErrorStatistics {
     /// Returns the spread of the finite values, or `None` without any.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
@@ -96,7 +96,7 @@ impl Spread {
 
 /// Share of touches with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Share {
+pub struct TouchShare {
     /// Touches counted.
     pub count: usize,
     /// All touches.
@@ -105,7 +105,7 @@ pub struct Share {
     pub interval: [f64; 2],
 }
 
-impl Share {
+impl TouchShare {
     /// Returns the share over the touches of several trials; `None` if there are no touches.
     ///
     /// The interval is that of Clopper and Pearson 1934 for the effective number of touches,
@@ -144,7 +144,7 @@ fn lower(k: f64, n: f64) -> f64 {
     let (mut low, mut high) = (0.0, if k > 0.0 { k / n } else { 0.0 });
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if at_least(k, n, middle) < TAIL {
+        if at_least(k, n, middle) < TAIL_PROBABILITY {
             low = middle;
         } else {
             high = middle;

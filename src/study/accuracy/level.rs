@@ -2,7 +2,7 @@
 
 use crate::sim::Scene;
 use crate::sim::finger::effects::skin::SkinModel;
-use crate::sim::scene::Body;
+use crate::sim::scene::SimulatorKind;
 use crate::sim::solver::Collision;
 use crate::sim::solver::Integrator;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Part of the finger that a level simulates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Senses {
+pub enum SensorModel {
     /// Rigid hull.
     Rigid,
     /// Soft skin without fluid; the contact point is exact.
@@ -23,11 +23,11 @@ pub enum Senses {
 
 /// A fidelity level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Level {
+pub struct FidelityLevel {
     /// Simulated body.
-    pub body: Body,
+    pub body: SimulatorKind,
     /// Simulated part of the finger.
-    pub senses: Senses,
+    pub senses: SensorModel,
     /// Points of the skin's foundation; 0 for another skin model.
     pub samples: usize,
     /// Cells along and around a thin-shell skin.
@@ -44,75 +44,80 @@ pub struct Level {
 
 /// Fastest approach of a rigid finger with masses: above about 5 mm/s it ends in an overload even
 /// if stopped at once (`docs/physics.md`).
-const RIGID_M_S: f64 = 0.005;
+const RIGID_APPROACH_M_S: f64 = 0.005;
 
-const fn kinematic(senses: Senses, samples: usize, period_s: f64) -> Level {
-    Level::new(Body::Kinematic, senses, samples, period_s)
+const fn kinematic(senses: SensorModel, samples: usize, period_s: f64) -> FidelityLevel {
+    FidelityLevel::new(SimulatorKind::Kinematic, senses, samples, period_s)
 }
 
-const fn dynamic(samples: usize, period_s: f64) -> Level {
-    Level::new(Body::Dynamic, Senses::Full, samples, period_s)
+const fn dynamic(samples: usize, period_s: f64) -> FidelityLevel {
+    FidelityLevel::new(SimulatorKind::Dynamic, SensorModel::Full, samples, period_s)
 }
 
-const fn rigid(collision: Collision) -> Level {
-    let level = Level::new(Body::Dynamic, Senses::Rigid, 0, 0.002);
-    Level { collision: Some(collision), ..level }
+const fn rigid(collision: Collision) -> FidelityLevel {
+    let level = FidelityLevel::new(SimulatorKind::Dynamic, SensorModel::Rigid, 0, 0.002);
+    FidelityLevel { collision: Some(collision), ..level }
 }
 
-const fn shell(cells: [usize; 2], period_s: f64) -> Level {
-    Level { shell: Some(cells), ..kinematic(Senses::Full, 0, period_s) }
+const fn shell(cells: [usize; 2], period_s: f64) -> FidelityLevel {
+    FidelityLevel { shell: Some(cells), ..kinematic(SensorModel::Full, 0, period_s) }
 }
 
 /// All levels. The last six approach the last, the reference, in points and time step together;
 /// their distances from it show whether they converge. They start with ticks shorter than a tactile
 /// frame, because longer ticks see every frame at the instant of sampling.
-pub const LEVELS: &[Level] = &[
-    Level::new(Body::Cast, Senses::Rigid, 0, 0.01),
+pub const LEVELS: &[FidelityLevel] = &[
+    FidelityLevel::new(SimulatorKind::Cast, SensorModel::Rigid, 0, 0.01),
     rigid(Collision::Hull),
     rigid(Collision::HeightField),
     rigid(Collision::Sdf),
-    kinematic(Senses::Dry, 60, 0.01),
-    kinematic(Senses::Dry, 125, 0.01),
-    kinematic(Senses::Dry, 500, 0.01),
-    kinematic(Senses::Dry, 2000, 0.01),
-    kinematic(Senses::Fluid, 125, 0.01),
-    kinematic(Senses::Fluid, 500, 0.01),
-    kinematic(Senses::Fluid, 2000, 0.01),
-    kinematic(Senses::Full, 60, 0.01),
-    kinematic(Senses::Full, 125, 0.01),
-    kinematic(Senses::Full, 250, 0.01),
-    kinematic(Senses::Full, 500, 0.02),
-    kinematic(Senses::Full, 500, 0.01),
-    kinematic(Senses::Full, 500, 0.005),
-    kinematic(Senses::Full, 500, 0.002),
-    kinematic(Senses::Full, 500, 0.001),
+    kinematic(SensorModel::Dry, 60, 0.01),
+    kinematic(SensorModel::Dry, 125, 0.01),
+    kinematic(SensorModel::Dry, 500, 0.01),
+    kinematic(SensorModel::Dry, 2000, 0.01),
+    kinematic(SensorModel::Fluid, 125, 0.01),
+    kinematic(SensorModel::Fluid, 500, 0.01),
+    kinematic(SensorModel::Fluid, 2000, 0.01),
+    kinematic(SensorModel::Full, 60, 0.01),
+    kinematic(SensorModel::Full, 125, 0.01),
+    kinematic(SensorModel::Full, 250, 0.01),
+    kinematic(SensorModel::Full, 500, 0.02),
+    kinematic(SensorModel::Full, 500, 0.01),
+    kinematic(SensorModel::Full, 500, 0.005),
+    kinematic(SensorModel::Full, 500, 0.002),
+    kinematic(SensorModel::Full, 500, 0.001),
     dynamic(500, 0.002),
-    Level { on_pa10: true, ..dynamic(500, 0.002) },
+    FidelityLevel { on_pa10: true, ..dynamic(500, 0.002) },
     dynamic(500, 0.001),
-    Level { integrator: Integrator::Implicit, ..dynamic(500, 0.001) },
-    Level { integrator: Integrator::Euler, ..dynamic(500, 0.001) },
-    Level { integrator: Integrator::Rk4, ..dynamic(500, 0.001) },
+    FidelityLevel { integrator: Integrator::Implicit, ..dynamic(500, 0.001) },
+    FidelityLevel { integrator: Integrator::Euler, ..dynamic(500, 0.001) },
+    FidelityLevel { integrator: Integrator::Rk4, ..dynamic(500, 0.001) },
     dynamic(500, 0.0005),
     shell([12, 8], 0.01),
     shell([24, 16], 0.01),
     shell([24, 16], 0.002),
     shell([36, 24], 0.002),
-    kinematic(Senses::Full, 1000, 0.005),
-    kinematic(Senses::Full, 2000, 0.002),
-    kinematic(Senses::Full, 4000, 0.001),
-    kinematic(Senses::Full, 8000, 0.0005),
-    kinematic(Senses::Full, 16000, 0.00025),
-    kinematic(Senses::Full, 32000, 0.00025),
+    kinematic(SensorModel::Full, 1000, 0.005),
+    kinematic(SensorModel::Full, 2000, 0.002),
+    kinematic(SensorModel::Full, 4000, 0.001),
+    kinematic(SensorModel::Full, 8000, 0.0005),
+    kinematic(SensorModel::Full, 16000, 0.00025),
+    kinematic(SensorModel::Full, 32000, 0.00025),
 ];
 
 /// Levels that converge to the reference.
-pub fn converging() -> impl Iterator<Item = Level> {
+pub fn converging() -> impl Iterator<Item = FidelityLevel> {
     LEVELS[LEVELS.len() - 6..LEVELS.len() - 1].iter().copied()
 }
 
-impl Level {
+impl FidelityLevel {
     /// Creates a level with the settings that every body has.
-    pub const fn new(body: Body, senses: Senses, samples: usize, period_s: f64) -> Self {
+    pub const fn new(
+        body: SimulatorKind,
+        senses: SensorModel,
+        samples: usize,
+        period_s: f64,
+    ) -> Self {
         Self {
             body,
             senses,
@@ -127,7 +132,7 @@ impl Level {
 
     /// Whether this build can simulate the level.
     pub fn is_built(&self) -> bool {
-        cfg!(feature = "mujoco") || self.body != Body::Dynamic
+        cfg!(feature = "mujoco") || self.body != SimulatorKind::Dynamic
     }
 
     /// Returns `scene` with this level's changes; other settings are kept.
@@ -136,7 +141,7 @@ impl Level {
         scene.body = self.body;
         scene.touch.period_s = Some(self.period_s);
         let solver = &mut scene.solver;
-        if self.body == Body::Dynamic {
+        if self.body == SimulatorKind::Dynamic {
             solver.step_s = self.period_s;
             solver.integrator = self.integrator;
         }
@@ -146,12 +151,12 @@ impl Level {
             scene.arm.get_or_insert_default();
         }
         if self.collision.is_some() {
-            scene.touch.approach_m_s = RIGID_M_S;
+            scene.touch.approach_m_s = RIGID_APPROACH_M_S;
         }
         let effects = &mut scene.effects;
-        keep(&mut effects.skin, self.senses != Senses::Rigid);
-        keep(&mut effects.fluid, self.senses >= Senses::Fluid);
-        keep(&mut effects.electrodes, self.senses == Senses::Full);
+        set_effect(&mut effects.skin, self.senses != SensorModel::Rigid);
+        set_effect(&mut effects.fluid, self.senses >= SensorModel::Fluid);
+        set_effect(&mut effects.electrodes, self.senses == SensorModel::Full);
         match (&mut effects.skin, self.shell) {
             (Some(skin), Some(cells)) => {
                 skin.model = SkinModel::Shell;
@@ -172,7 +177,7 @@ impl Level {
     /// Name in tables.
     pub fn name(&self) -> String {
         let mut words = vec![self.body.name().to_string()];
-        if self.body != Body::Cast {
+        if self.body != SimulatorKind::Cast {
             words.push(self.senses.name().into());
             words.extend(self.collision.map(|collision| collision.name().into()));
             words.extend((self.samples > 0).then(|| self.samples.to_string()));
@@ -185,12 +190,12 @@ impl Level {
         if self.on_pa10 {
             words.push("PA-10".into());
         }
-        words.extend(self.collision.map(|_| format!("at {} mm/s", 1e3 * RIGID_M_S)));
+        words.extend(self.collision.map(|_| format!("at {} mm/s", 1e3 * RIGID_APPROACH_M_S)));
         words.join(" ")
     }
 }
 
-impl Senses {
+impl SensorModel {
     /// Name in tables and legends.
     pub fn name(self) -> &'static str {
         match self {
@@ -202,6 +207,6 @@ impl Senses {
     }
 }
 
-fn keep<T: Default>(effect: &mut Option<T>, wanted: bool) {
+fn set_effect<T: Default>(effect: &mut Option<T>, wanted: bool) {
     *effect = wanted.then(|| effect.take().unwrap_or_default());
 }

@@ -2,38 +2,42 @@
 
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
-use crate::sim::finger::effects::effect::Switch;
-use crate::sim::scene::Body;
+use crate::sim::finger::effects::effect::EffectSwitch;
+use crate::sim::scene::SimulatorKind;
 use palpate_input::config::Rules;
 
 /// Returns all switches of a scene: the effects in the order of their table, then arm and masses.
-pub fn switches() -> Vec<Switch<Scene>> {
-    let mut all: Vec<_> = Effects::switches().into_iter().map(of_scene).collect();
-    all.push(Switch::table().within("arm", |scene: &Scene| &scene.arm, |scene| &mut scene.arm));
+pub fn switches() -> Vec<EffectSwitch<Scene>> {
+    let mut all: Vec<_> = Effects::switches().into_iter().map(for_scene).collect();
+    all.push(EffectSwitch::table().within(
+        "arm",
+        |scene: &Scene| &scene.arm,
+        |scene| &mut scene.arm,
+    ));
     #[cfg(feature = "mujoco")]
-    all.push(Switch::new(
+    all.push(EffectSwitch::new(
         "masses",
-        |scene: &Scene| scene.body == Body::Dynamic,
-        |scene, on| scene.body = if on { Body::Dynamic } else { Body::Kinematic },
+        |scene: &Scene| scene.body == SimulatorKind::Dynamic,
+        |scene, on| scene.body = if on { SimulatorKind::Dynamic } else { SimulatorKind::Kinematic },
     ));
     all
 }
 
 /// Returns `scene` with one switch toggled, and without the effects that then have nothing to act
 /// on.
-pub fn switched(scene: &Scene, switch: &Switch<Scene>) -> Scene {
+pub fn toggle(scene: &Scene, switch: &EffectSwitch<Scene>) -> Scene {
     let mut scene = scene.clone();
     let (was_soft, was_on) = (scene.effects.skin.is_some(), switch.is_on(&scene));
-    let had_masses = scene.body == Body::Dynamic;
+    let had_masses = scene.body == SimulatorKind::Dynamic;
     switch.set(&mut scene, !was_on);
-    scene.effects.drop_unsupported();
+    scene.effects.remove_orphans();
     // A finger without its skin is a rigid hull; body `cast` is the simplest simulation of its
     // touches.
     if was_soft && scene.effects.skin.is_none() {
-        scene.body = Body::Cast;
+        scene.body = SimulatorKind::Cast;
     }
     let Scene { body, effects, solver, .. } = &mut scene;
-    if had_masses && *body != Body::Dynamic {
+    if had_masses && *body != SimulatorKind::Dynamic {
         effects.collision = None;
         (solver.collision, solver.sdf) = (None, None);
     }
@@ -41,14 +45,14 @@ pub fn switched(scene: &Scene, switch: &Switch<Scene>) -> Scene {
 }
 
 /// Returns `scene` with every effect that its body supports.
-pub fn full(scene: &Scene) -> Scene {
-    let effects = || Effects::switches().into_iter().map(of_scene);
+pub fn with_all_effects(scene: &Scene) -> Scene {
+    let effects = || Effects::switches().into_iter().map(for_scene);
     effects().fold(scene.clone(), |scene, switch| {
-        let with = if switch.is_on(&scene) { scene.clone() } else { switched(&scene, &switch) };
-        if Rules::hold(&with) { with } else { scene }
+        let with = if switch.is_on(&scene) { scene.clone() } else { toggle(&scene, &switch) };
+        if Rules::is_satisfied(&with) { with } else { scene }
     })
 }
 
-fn of_scene(switch: Switch<Effects>) -> Switch<Scene> {
+fn for_scene(switch: EffectSwitch<Effects>) -> EffectSwitch<Scene> {
     switch.within("", |scene: &Scene| &scene.effects, |scene| &mut scene.effects)
 }

@@ -50,7 +50,7 @@ impl Tolerance {
     }
 
     /// Formats an error, given in m, N or counts, in the tolerance's unit.
-    pub fn shown(&self, error: f64) -> String {
+    pub fn format(&self, error: f64) -> String {
         format!("{:.3} {}", error / self.si_per_unit, self.unit)
     }
 }

@@ -1,12 +1,12 @@
 //! Touches of a scene without sensor noise, so that only the model differs: contacts, loads, times.
 
 use crate::experiment::truth::Truth;
-use crate::sim::environment::Shape;
+use crate::sim::environment::Surface;
 use crate::sim::finger::FingertipState;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use palpate_explore::backend::Fault;
-use palpate_explore::backend::trace::{Tick, Ticks, Trace};
+use palpate_explore::backend::trace::{Tick, Ticks, TracedBackend};
 use palpate_explore::belief::HeightField;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
@@ -31,16 +31,16 @@ const TRIAL: usize = 10;
 
 /// Distance from the deepest point within which the finger counts as at rest: far above rounding,
 /// far below one tick of any approach.
-const STILL_M: f64 = 1e-7;
+const REST_TOLERANCE_M: f64 = 1e-7;
 
 /// Targets, grouped in trials of ten.
 #[derive(Clone, Debug)]
-pub struct Trials {
+pub struct TargetTrials {
     targets: Vec<Vec<Target>>,
     first: u64,
 }
 
-impl Trials {
+impl TargetTrials {
     /// Creates `count` evenly spread targets in the scene's zone; the first trial has number
     /// `first`. Each `first` gives another sequence of targets.
     pub fn new(scene: &Scene, count: usize, first: u64) -> Self {
@@ -57,7 +57,7 @@ impl Trials {
     ///
     /// # Errors
     /// If the body cannot be simulated or moved to its start.
-    pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<Touches>> {
+    pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<TouchResults>> {
         let simulator = Simulator::new(Arc::clone(environment))?;
         let trials = self.targets.par_iter().enumerate();
         Ok(trials
@@ -78,7 +78,7 @@ pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
 
 /// Results of the touches of one trial.
 #[derive(Debug, Default)]
-pub struct Touches {
+pub struct TouchResults {
     /// Contact of each touch; `None` after a miss or a fault.
     pub contacts: Vec<Option<Contact>>,
     /// Load on the finger when each contact was read.
@@ -93,16 +93,20 @@ pub struct Touches {
 ///
 /// # Errors
 /// If the body cannot be moved to its start.
-pub fn touch_all(simulator: &Simulator, targets: &[Target], seed: u64) -> Result<Touches, Fault> {
+pub fn touch_all(
+    simulator: &Simulator,
+    targets: &[Target],
+    seed: u64,
+) -> Result<TouchResults, Fault> {
     let environment = simulator.environment();
     let (mut probe, ticks): (Box<dyn Probe>, _) = match (simulator.body()?, environment.chain()) {
         (Some(body), Some(chain)) => {
-            let (trace, ticks) = Trace::new(body, chain);
+            let (trace, ticks) = TracedBackend::new(body, chain);
             (Box::new(simulator.servo(Box::new(trace), seed)?), ticks)
         }
         _ => (simulator.probe(seed)?, Ticks::default()),
     };
-    let mut touches = Touches::default();
+    let mut touches = TouchResults::default();
     for target in targets {
         let outcome = environment.task().approach(target).map(|approach| probe.touch(&approach));
         touches.faults += usize::from(matches!(outcome, Some(Err(_))));
@@ -157,13 +161,13 @@ pub fn noise_free(scene: &Scene) -> Scene {
 /// the end of its rest on the object; `None` without a skin or a contact.
 pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
     let environment = simulator.environment();
-    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
+    let (tip, Surface::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
         return None;
     };
     let zone = environment.task().zone()?;
     let height_m = |tick: &Tick| zone.height_m(&tick.motion.x_wt.translation.vector.into());
     let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);
-    let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + STILL_M)?;
+    let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + REST_TOLERANCE_M)?;
     let mut state = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
     let mut before_s = ticks.first()?.time_s;
     let (mut rest, mut now) = (None, Frame::default());
@@ -232,7 +236,7 @@ pub fn finger_bytes(environment: &Environment) -> usize {
 pub fn surface_rmse_m(
     environment: &Environment,
     targets: &[Target],
-    touches: &[Touches],
+    touches: &[TouchResults],
 ) -> Option<f64> {
     let zone = environment.task().zone()?.clone();
     let mut belief = HeightField::new(zone, GpSettings::default());

@@ -1,13 +1,13 @@
 //! A variant of a scene: its errors and its cost.
 
-use super::deviation::{Quantity, Share, Spread};
-use super::level::{LEVELS, Level};
-use super::switches::{switched, switches};
+use super::deviation::{ErrorStatistics, Quantity, TouchShare};
+use super::level::{FidelityLevel, LEVELS};
+use super::switches::{switches, toggle};
 use super::tolerance::{Origin, Tolerance};
-use super::touches::{Touches, Trials, finger_bytes, noise_free, surface_rmse_m};
+use super::touches::{TargetTrials, TouchResults, finger_bytes, noise_free, surface_rmse_m};
 use super::verdict::Relevance;
-use crate::experiment::statistics::{Paired, median};
-use crate::sim::environment::Shape;
+use crate::experiment::statistics::{PairedDifference, median};
+use crate::sim::environment::Surface;
 use crate::sim::{Environment, Scene};
 use palpate_explore::probe::Contact;
 use palpate_input::config::Rules;
@@ -15,10 +15,10 @@ use serde::Serialize;
 use std::sync::Arc;
 
 /// Share of the touches that may exceed a tolerance.
-pub const ALLOWED: f64 = 0.05;
+pub const EXCEEDANCE_MAX: f64 = 0.05;
 
 /// Name of the unchanged scene among its variants.
-const AS_IT_IS: &str = "the unchanged scene";
+const UNCHANGED: &str = "the unchanged scene";
 
 /// A variant of a scene, compared with its reference: the finest level for a level, the unchanged
 /// scene for a switched effect.
@@ -27,7 +27,7 @@ pub struct Variant {
     /// Name in tables.
     pub name: String,
     /// Fidelity level, if the variant is one.
-    pub level: Option<Level>,
+    pub level: Option<FidelityLevel>,
     /// Switched effect, if the variant is one.
     pub effect: Option<String>,
     /// Number of targets touched.
@@ -37,15 +37,15 @@ pub struct Variant {
     /// Touches that ended in a fault.
     pub faults: usize,
     /// Distance of the contacts from the true surface.
-    pub off_truth_m: Option<Spread>,
+    pub off_truth_m: Option<ErrorStatistics>,
     /// Distance of the contacts from those of the reference.
-    pub contact_m: Option<Spread>,
+    pub contact_m: Option<ErrorStatistics>,
     /// Difference of the force.
-    pub force_n: Option<Spread>,
+    pub force_n: Option<ErrorStatistics>,
     /// Difference of the rise in static pressure.
-    pub pdc_counts: Option<Spread>,
+    pub pdc_counts: Option<ErrorStatistics>,
     /// Root mean square difference over the electrodes.
-    pub electrode_counts: Option<Spread>,
+    pub electrode_counts: Option<ErrorStatistics>,
     /// Error of the surface fitted to all touches.
     pub surface_rmse_m: Option<f64>,
     /// Median wall time of a touch.
@@ -59,11 +59,11 @@ pub struct Variant {
     /// Memory of the finger, bytes.
     pub finger_bytes: usize,
     /// RMSE of `active` minus that of `random`, m.
-    pub verdict_m: Option<Paired>,
+    pub verdict_m: Option<PairedDifference>,
     /// `verdict_m` minus that of the unchanged scene, paired by trial.
-    pub verdict_change_m: Option<Paired>,
+    pub verdict_change_m: Option<PairedDifference>,
     /// Touches beyond the tolerance.
-    pub beyond: Option<Share>,
+    pub beyond: Option<TouchShare>,
     /// Whether the scene needs the switched effect.
     pub relevance: Option<Relevance>,
 }
@@ -72,23 +72,23 @@ impl Variant {
     /// Returns the reference (the finest level), then the unchanged `scene` and every other level
     /// that this build can simulate.
     pub fn levels(scene: &Scene) -> Vec<(Self, Scene)> {
-        let of_level = |level: &Level| {
+        let of_level = |level: &FidelityLevel| {
             let variant = Self { level: Some(*level), ..Self::named(level.name()) };
             (variant, level.apply(scene))
         };
         let mut variants: Vec<_> = LEVELS.iter().filter(|it| it.is_built()).map(of_level).collect();
         variants.rotate_right(1);
-        variants.insert(1, (Self::named(AS_IT_IS.into()), scene.clone()));
+        variants.insert(1, (Self::named(UNCHANGED.into()), scene.clone()));
         variants
     }
 
     /// Returns the reference (the unchanged `scene`), then the scene with each effect switched
     /// alone: effects that it has, and others that its body supports.
     pub fn effects(scene: &Scene) -> Vec<(Self, Scene)> {
-        let mut variants = vec![(Self::named(AS_IT_IS.into()), scene.clone())];
+        let mut variants = vec![(Self::named(UNCHANGED.into()), scene.clone())];
         for switch in switches() {
-            let (is_on, other) = (switch.is_on(scene), switched(scene, &switch));
-            if is_on || Rules::hold(&other) {
+            let (is_on, other) = (switch.is_on(scene), toggle(scene, &switch));
+            if is_on || Rules::is_satisfied(&other) {
                 let name = format!("{} {}", if is_on { "without" } else { "with" }, switch.name);
                 let effect = Some(switch.name);
                 variants.push((Self { effect, ..Self::named(name) }, other));
@@ -107,19 +107,20 @@ impl Variant {
     pub(super) fn measured(
         self,
         scene: &Scene,
-        trials: &Trials,
-        reference: Option<&[Touches]>,
+        trials: &TargetTrials,
+        reference: Option<&[TouchResults]>,
         tolerance: Option<&Tolerance>,
-    ) -> anyhow::Result<(Self, Vec<Touches>)> {
+    ) -> anyhow::Result<(Self, Vec<TouchResults>)> {
         let environment = Arc::new(Environment::build(noise_free(scene))?);
         let touches = trials.touch(&environment)?;
         let reference = reference.unwrap_or(&touches);
         let deviations = |quantity: Quantity| quantity.deviations(&touches, reference);
-        let spread = |quantity| Spread::of(deviations(quantity).concat().into_iter().flatten());
+        let spread =
+            |quantity| ErrorStatistics::of(deviations(quantity).concat().into_iter().flatten());
         let beyond = tolerance.and_then(|tolerance| {
             let is_beyond = |error: &Option<f64>| error.is_some_and(|it| it > tolerance.size());
             let trials = deviations(tolerance.quantity).into_iter();
-            Share::of(
+            TouchShare::of(
                 &trials.map(|trial| trial.iter().map(is_beyond).collect()).collect::<Vec<_>>(),
             )
         });
@@ -132,7 +133,7 @@ impl Variant {
             touches: touches.iter().map(|touches| touches.contacts.len()).sum(),
             contacts: contacts.len(),
             faults: touches.iter().map(|touches| touches.faults).sum(),
-            off_truth_m: Spread::of(off_truth_m),
+            off_truth_m: ErrorStatistics::of(off_truth_m),
             contact_m: spread(Quantity::Contact),
             force_n: spread(Quantity::Force),
             pdc_counts: spread(Quantity::Pressure),
@@ -166,10 +167,10 @@ impl Variant {
     }
 
     /// Whether 95 % of the touches are within the tolerance; a touch without a counterpart is not.
-    pub fn stays_within(&self, tolerance: &Tolerance, origin: Origin) -> bool {
+    pub fn is_within(&self, tolerance: &Tolerance, origin: Origin) -> bool {
         let is_within = |error: f64| error <= tolerance.size();
         match self.beyond.filter(|_| origin != Origin::Truth) {
-            Some(beyond) => beyond.count as f64 <= ALLOWED * (beyond.of - 1) as f64,
+            Some(beyond) => beyond.count as f64 <= EXCEEDANCE_MAX * (beyond.of - 1) as f64,
             None => self.p95(tolerance.quantity, origin).is_some_and(is_within),
         }
     }
@@ -181,7 +182,7 @@ fn off_surface_m(environment: &Environment, contact: &Contact) -> Option<f64> {
     let p_wc = contact.p_wc;
     match (environment.nearest_true_point(&p_wc), environment.shape()) {
         (Some(nearest), _) => Some((nearest - p_wc).norm()),
-        (None, Shape::Mesh { bvh, .. }) => Some(bvh.closest_point(&p_wc).distance_m),
-        (None, Shape::Function(_)) => None,
+        (None, Surface::Mesh { bvh, .. }) => Some(bvh.closest_point(&p_wc).distance_m),
+        (None, Surface::Function(_)) => None,
     }
 }

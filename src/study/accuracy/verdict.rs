@@ -1,6 +1,6 @@
 //! Comparison of two planners in a scene, and the relevance of a change in it.
 
-use crate::experiment::statistics::Paired;
+use crate::experiment::statistics::PairedDifference;
 use crate::experiment::truth::Truth;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::{Environment, Scene};
@@ -51,7 +51,7 @@ impl Relevance {
 ///
 /// # Errors
 /// If the scene cannot be built.
-pub fn advantages_m(
+pub fn paired_differences_m(
     scene: &Scene,
     trials: Range<u32>,
     touches: u32,
@@ -63,10 +63,10 @@ pub fn advantages_m(
     };
     let environment = Arc::new(Environment::build(scene.clone())?);
     let truth = Truth::sample(&environment, GRID, &|_| ());
-    let experiment = Experiment::on(scene, &names, trials.end, touches);
+    let experiment = Experiment::with_defaults(scene, &names, trials.end, touches);
     let is_known = truth.is_known();
     let Some(simulation) =
-        Simulation::against(experiment, environment, truth).ok().filter(|_| is_known)
+        Simulation::with_truth(experiment, environment, truth).ok().filter(|_| is_known)
     else {
         return Ok(Vec::new());
     };
@@ -79,8 +79,8 @@ pub fn advantages_m(
 }
 
 /// Mean of `a`, or of its excess over `b` in the trials in which both are known.
-pub fn difference(a: &[Option<f64>], b: Option<&[Option<f64>]>) -> Option<Paired> {
+pub fn difference(a: &[Option<f64>], b: Option<&[Option<f64>]>) -> Option<PairedDifference> {
     let other = |i: usize| b.map_or(Some(0.0), |b| b[i]);
     let pairs = a.iter().enumerate().filter_map(|(i, a)| (*a).zip(other(i)));
-    Paired::new(&pairs.collect::<Vec<_>>(), 0)
+    PairedDifference::new(&pairs.collect::<Vec<_>>(), 0)
 }

@@ -1,9 +1,9 @@
 //! Stored baseline of a regression test: a file of JSON lines, a header and a line per trial.
 
-use super::judged::JUDGED;
+use super::judged::CHECK_MEASURES;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::files;
 use palpate_input::words::hex;
 use serde::de::IgnoredAny;
@@ -47,7 +47,7 @@ pub struct Header {
 /// Results of a trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Line {
+pub struct TrialLine {
     /// Number of the trial.
     pub trial: u32,
     /// Name of the planner.
@@ -63,17 +63,17 @@ pub struct Line {
 
 /// A stored baseline.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Baseline {
+pub struct StoredBaseline {
     /// First line of the file.
     pub header: Header,
     /// One line per trial.
-    pub lines: Vec<Line>,
+    pub lines: Vec<TrialLine>,
 }
 
-impl Line {
+impl TrialLine {
     /// Creates the line of a finished trial of `experiment`.
     pub fn of(row: &TrialRow, experiment: &Experiment) -> Self {
-        let values = JUDGED
+        let values = CHECK_MEASURES
             .iter()
             .filter_map(|judged| Some((judged.id.to_owned(), (judged.of)(row, experiment)?)))
             .collect();
@@ -98,8 +98,8 @@ fn hash(row: &TrialRow) -> String {
 
 /// Returns the SHA-256 of the settings that decide the rows of `experiment`. Paths of files do not
 /// count; the contents of the object's file do.
-pub fn settings(experiment: &Experiment) -> String {
-    let mut identity = experiment.identity();
+pub fn settings_hash(experiment: &Experiment) -> String {
+    let mut identity = experiment.row_settings();
     let mut object = Vec::new();
     if let Some(it) = &mut identity.scene.object {
         object = std::fs::read(&it.mesh).unwrap_or_default();
@@ -109,7 +109,7 @@ pub fn settings(experiment: &Experiment) -> String {
     hex(Sha256::new().chain_update(text).chain_update(object).finalize())
 }
 
-impl Baseline {
+impl StoredBaseline {
     /// Creates the baseline of all trials of an experiment, with its reason.
     pub fn new(simulation: &Simulation, rows: &[TrialRow], why: &str) -> Self {
         let experiment = simulation.experiment();
@@ -118,7 +118,7 @@ impl Baseline {
             palpate: env!("CARGO_PKG_VERSION").into(),
             why: why.into(),
             differs: Vec::new(),
-            settings: settings(experiment),
+            settings: settings_hash(experiment),
             seed: experiment.seed,
             initial_touches: experiment.initial_touches,
             touches: experiment.touches,
@@ -127,7 +127,7 @@ impl Baseline {
             planners: experiment.planners.clone(),
             cost: IgnoredAny,
         };
-        let lines = rows.iter().map(|row| Line::of(row, experiment)).collect();
+        let lines = rows.iter().map(|row| TrialLine::of(row, experiment)).collect();
         Self { header, lines }
     }
 
@@ -135,15 +135,16 @@ impl Baseline {
     ///
     /// # Errors
     /// If the file cannot be read, or a line is invalid.
-    pub fn read(path: &Path) -> Result<Self, Invalid> {
-        let text = files::text(path, files::TEXT_MAX).map_err(|error| Invalid::io(path, error))?;
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let text =
+            files::text(path, files::TEXT_MAX).map_err(|error| InputError::io(path, error))?;
         let bad = |i: usize| {
             let place = format!("{}:{}", path.display(), i + 1);
-            move |error: serde_json::Error| Invalid::new(error.to_string()).at(place)
+            move |error: serde_json::Error| InputError::new(error.to_string()).at(place)
         };
         let mut lines = text.lines().enumerate();
         let empty = || {
-            Invalid::new("the file is empty; write a baseline with --bless REASON")
+            InputError::new("the file is empty; write a baseline with --bless REASON")
                 .at(path.display())
         };
         let (_, first) = lines.next().ok_or_else(empty)?;
@@ -169,7 +170,7 @@ impl Baseline {
     ///
     /// # Errors
     /// The first setting that differs.
-    pub fn check_pairs(&self, path: &Path, experiment: &Experiment) -> Result<(), Invalid> {
+    pub fn check_pairs(&self, path: &Path, experiment: &Experiment) -> Result<(), InputError> {
         let header = &self.header;
         for (field, found, wanted) in [
             ("seed", header.seed, experiment.seed),
@@ -182,14 +183,14 @@ impl Baseline {
                     "`{field}` is {found} in the baseline and {wanted} in the experiment, so trials do not pair"
                 );
                 let mend = "write a new baseline with --bless REASON";
-                return Err(Invalid::new(problem).at(path.display()).mend(mend));
+                return Err(InputError::new(problem).at(path.display()).remedy(mend));
             }
         }
         Ok(())
     }
 
     /// Finds the line of a trial.
-    pub fn line(&self, trial: u32, planner: &str) -> Option<&Line> {
+    pub fn line(&self, trial: u32, planner: &str) -> Option<&TrialLine> {
         self.lines.iter().find(|line| line.trial == trial && line.planner == planner)
     }
 }

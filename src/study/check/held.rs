@@ -1,29 +1,29 @@
 //! Regression test: repeats trials until each planner's verdict is decided.
 
-use super::baseline::{Baseline, Line, settings};
-use super::judged::{JUDGED, Judged, Verdict};
-use super::sequence::Sequence;
+use super::baseline::{StoredBaseline, TrialLine, settings_hash};
+use super::judged::{CHECK_MEASURES, CheckMeasure, Verdict};
+use super::sequence::ConfidenceSequence;
 use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Progress};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Result of a regression test.
 #[derive(Debug)]
-pub struct Held {
+pub struct CheckResult {
     /// Results of each planner of the experiment or the baseline.
-    pub planners: Vec<Planner>,
+    pub planners: Vec<PlannerResult>,
     /// Whether the settings equal those of the baseline.
     pub same_settings: bool,
     /// Whether the test was stopped before all verdicts were decided.
     pub is_stopped: bool,
     /// Lines of the trials run.
-    pub rows: Vec<Line>,
+    pub rows: Vec<TrialLine>,
 }
 
 /// Result of a planner.
 #[derive(Debug)]
-pub struct Planner {
+pub struct PlannerResult {
     /// Name of the planner.
     pub name: String,
     /// Verdict on the planner.
@@ -33,10 +33,10 @@ pub struct Planner {
     /// Number of trials that failed but did not in the baseline, and the first reason.
     pub failed: Option<(usize, String)>,
     /// Result per measure; empty if no trial pairs, or all rows are identical.
-    pub judgements: Vec<Judgement>,
+    pub judgements: Vec<MeasureResult>,
 }
 
-impl Held {
+impl CheckResult {
     /// Worst verdict of all planners.
     pub fn verdict(&self) -> Verdict {
         self.planners.iter().map(|planner| planner.verdict).max().unwrap_or(Verdict::Missing)
@@ -48,19 +48,19 @@ impl Held {
 ///
 /// # Errors
 /// If the threads cannot be started.
-pub fn hold(
+pub fn run_check(
     simulation: &Simulation,
-    baseline: &Baseline,
-    rules: &Rules,
+    baseline: &StoredBaseline,
+    rules: &CheckOptions,
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Held, Invalid> {
+) -> Result<CheckResult, InputError> {
     let experiment = simulation.experiment();
     let names = &experiment.planners;
     let mut open: Vec<&str> = names.iter().map(String::as_str).collect();
     open.retain(|name| baseline.header.planners.iter().any(|known| known == name));
-    let mut rows: Vec<Line> = Vec::new();
+    let mut rows: Vec<TrialLine> = Vec::new();
     let last = experiment.trials.min(baseline.header.trials);
     let mut first = 0;
     while first < last && !open.is_empty() && !stop.load(Ordering::Relaxed) {
@@ -70,8 +70,8 @@ pub fn hold(
         let jobs: Vec<_> = (first..until)
             .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
             .collect();
-        let made = runner::rows(simulation, jobs, threads, stop, progress)?;
-        rows.extend(made.iter().map(|row| Line::of(row, experiment)));
+        let made = runner::run_in_memory(simulation, jobs, threads, stop, progress)?;
+        rows.extend(made.iter().map(|row| TrialLine::of(row, experiment)));
         // The first rows only show whether anything differs; intervals are evaluated per batch.
         let is_open = |verdict| match until < batch {
             true => verdict != Verdict::Identical,
@@ -83,12 +83,16 @@ pub fn hold(
     let others = baseline.header.planners.iter().filter(|name| !names.contains(name));
     let planners =
         names.iter().chain(others).map(|name| planner_of(baseline, rules, &rows, name)).collect();
-    let same_settings = baseline.header.settings == settings(experiment);
-    Ok(Held { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
+    let same_settings = baseline.header.settings == settings_hash(experiment);
+    Ok(CheckResult { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
 }
 
 /// Returns a line for each planner in `new` that differs from `old`, with the difference.
-pub fn differs(old: &Baseline, new: &Baseline, rules: &Rules) -> Vec<String> {
+pub fn differences(
+    old: &StoredBaseline,
+    new: &StoredBaseline,
+    rules: &CheckOptions,
+) -> Vec<String> {
     let (known, names) = (&old.header.planners, &new.header.planners);
     let told = names.iter().filter_map(|name| {
         if !known.contains(name) {
@@ -103,8 +107,13 @@ pub fn differs(old: &Baseline, new: &Baseline, rules: &Rules) -> Vec<String> {
     told.chain(gone.map(|name| format!("{name}: removed"))).collect()
 }
 
-fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> Planner {
-    let pairs: Vec<(&Line, &Line)> = rows
+fn planner_of(
+    baseline: &StoredBaseline,
+    rules: &CheckOptions,
+    rows: &[TrialLine],
+    name: &str,
+) -> PlannerResult {
+    let pairs: Vec<(&TrialLine, &TrialLine)> = rows
         .iter()
         .filter(|row| row.planner == name)
         .filter_map(|row| Some((row, baseline.line(row.trial, name)?)))
@@ -119,11 +128,12 @@ fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> 
     let is_identical = trials > 0 && pairs.iter().all(|(new, old)| new.row == old.row);
     let mut judgements = Vec::new();
     if trials > 0 && !is_identical {
-        let differences = JUDGED.iter().filter_map(|judged| {
-            let value = |line: &Line| line.values.get(judged.id).copied();
+        let differences = CHECK_MEASURES.iter().filter_map(|judged| {
+            let value = |line: &TrialLine| line.values.get(judged.id).copied();
             // Measures without any value are left out.
             let is_known = pairs.iter().any(|(new, old)| value(new).or(value(old)).is_some());
-            let difference = |(new, old): &(&Line, &Line)| Some(value(new)? - value(old)?);
+            let difference =
+                |(new, old): &(&TrialLine, &TrialLine)| Some(value(new)? - value(old)?);
             is_known.then(|| (judged, pairs.iter().filter_map(difference).collect()))
         });
         judgements = rules.judge(&differences.collect::<Vec<_>>());
@@ -131,27 +141,27 @@ fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> 
     let verdict = match (is_identical, &failed) {
         (true, _) => Verdict::Identical,
         (false, Some(_)) => Verdict::Missing,
-        (false, None) => of_planner(&judgements),
+        (false, None) => planner_verdict(&judgements),
     };
-    Planner { name: name.into(), verdict, trials, failed, judgements }
+    PlannerResult { name: name.into(), verdict, trials, failed, judgements }
 }
 
 /// Result of one measure of one planner, new against old in the same trials.
 #[derive(Clone, Debug)]
-pub struct Judgement {
+pub struct MeasureResult {
     /// Tested measure.
-    pub judged: &'static Judged,
+    pub judged: &'static CheckMeasure,
     /// Confidence sequence of the differences, new − old.
-    pub sequence: Sequence,
+    pub sequence: ConfidenceSequence,
     /// Verdict on the measure.
     pub verdict: Verdict,
     /// Trials needed to detect a difference of the tolerance, estimated from the spread so far.
-    pub wanted: Option<usize>,
+    pub trials_needed: Option<usize>,
 }
 
 /// Parameters of the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rules {
+pub struct CheckOptions {
     /// Largest relative increase in error that still passes.
     pub tolerance: f64,
     /// Probability of a false verdict on a planner's first measure, at any time. The other measures
@@ -163,14 +173,19 @@ pub struct Rules {
     pub batch: usize,
 }
 
-impl Default for Rules {
+impl Default for CheckOptions {
     fn default() -> Self {
         Self { tolerance: 0.05, alpha: 0.05, first: 4, batch: 10 }
     }
 }
 
-impl Rules {
-    fn verdict(&self, judged: &Judged, sequence: &Sequence, is_sure: bool) -> Verdict {
+impl CheckOptions {
+    fn verdict(
+        &self,
+        judged: &CheckMeasure,
+        sequence: &ConfidenceSequence,
+        is_sure: bool,
+    ) -> Verdict {
         let [low, high] = sequence.interval;
         match () {
             () if sequence.count == 0 => Verdict::Missing,
@@ -184,17 +199,17 @@ impl Rules {
 
     /// Evaluates a planner's measures from the differences of its trials; the first measure
     /// decides.
-    pub fn judge(&self, differences: &[(&'static Judged, Vec<f64>)]) -> Vec<Judgement> {
-        let sequences: Vec<Sequence> = differences
+    pub fn judge(&self, differences: &[(&'static CheckMeasure, Vec<f64>)]) -> Vec<MeasureResult> {
+        let sequences: Vec<ConfidenceSequence> = differences
             .iter()
-            .map(|(_, values)| Sequence::new(values, self.batch, self.alpha))
+            .map(|(_, values)| ConfidenceSequence::new(values, self.batch, self.alpha))
             .collect();
-        let sure = self.sure(&sequences);
+        let sure = self.significant(&sequences);
         let all = differences.iter().zip(&sequences).zip(&sure);
-        all.map(|(((judged, _), sequence), &is_sure)| Judgement {
+        all.map(|(((judged, _), sequence), &is_sure)| MeasureResult {
             judged,
             verdict: self.verdict(judged, sequence, is_sure),
-            wanted: sequence.wanted(judged.allowed(self.tolerance), self.alpha),
+            trials_needed: sequence.wanted(judged.allowed(self.tolerance), self.alpha),
             sequence: *sequence,
         })
         .collect()
@@ -202,7 +217,7 @@ impl Rules {
 
     /// Whether each measure's difference is significant: the first alone, the others with
     /// Holm's correction (Holm 1979).
-    fn sure(&self, sequences: &[Sequence]) -> Vec<bool> {
+    fn significant(&self, sequences: &[ConfidenceSequence]) -> Vec<bool> {
         let mut order: Vec<usize> = (1..sequences.len()).collect();
         order.sort_by(|&a, &b| sequences[a].p.total_cmp(&sequences[b].p));
         let mut sure = vec![false; sequences.len()];
@@ -222,8 +237,8 @@ impl Rules {
 
 /// Returns the verdict on a planner: that of its first measure, or a worse one if any measure is
 /// worse or missing.
-pub fn of_planner(judgements: &[Judgement]) -> Verdict {
+pub fn planner_verdict(judgements: &[MeasureResult]) -> Verdict {
     let first = judgements.first().map_or(Verdict::Missing, |first| first.verdict);
-    let is_bad = |judgement: &&Judgement| judgement.verdict >= Verdict::Worse;
+    let is_bad = |judgement: &&MeasureResult| judgement.verdict >= Verdict::Worse;
     judgements.iter().find(is_bad).map_or(first, |bad| bad.verdict.max(first))
 }

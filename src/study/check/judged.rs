@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// Measure of a trial; smaller is better.
 #[derive(Debug)]
-pub struct Judged {
+pub struct CheckMeasure {
     /// Name in files.
     pub id: &'static str,
     /// Title for readers.
@@ -21,16 +21,16 @@ pub struct Judged {
 }
 
 /// Lower bound on errors and path lengths before taking the logarithm.
-const LEAST: f64 = 1e-12;
+const LOG_FLOOR: f64 = 1e-12;
 
 fn log(value: f64) -> f64 {
-    value.max(LEAST).ln()
+    value.max(LOG_FLOOR).ln()
 }
 
 /// Error of a trial in metres: the RMSE over a zone, the Chamfer distance around a whole object;
 /// `None` if it was not computed.
 fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
-    RMSE.of(row, touches).or_else(|| CHAMFER.of(row, touches))
+    RMSE.value(row, touches).or_else(|| CHAMFER.value(row, touches))
 }
 
 fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Option<f64> {
@@ -41,30 +41,32 @@ fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Optio
 
 /// Measures of the test. The first decides: the mean over the touches detects a loss that the last
 /// touch hides, and needs the fewest trials of all measures.
-pub static JUDGED: &[Judged] = &[
-    Judged::log("mean_log_rmse", "mean log error over the touches", |row, of| {
+pub static CHECK_MEASURES: &[CheckMeasure] = &[
+    CheckMeasure::log("mean_log_rmse", "mean log error over the touches", |row, of| {
         let after = of.initial_touches.max(1)..=of.touches;
         let whole = row.touches.len() >= of.touches as usize;
         let logs = after.filter_map(|n| error_m(row, n).map(log));
         let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
         (whole && count > 0.0).then(|| sum / count)
     }),
-    Judged::log("log_rmse", "error after the last touch", |row, of| {
+    CheckMeasure::log("log_rmse", "error after the last touch", |row, of| {
         error_m(row, of.touches).map(log)
     }),
-    Judged::log("log_1_minus_centred_r", "1 − centred R after the last touch", |row, of| {
-        CENTRED_R.of(row, of.touches).map(|r| log(1.0 - r))
-    }),
-    Judged::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
-    Judged::share("missed", "share of touches without contact", |row, of| {
+    CheckMeasure::log(
+        "log_1_minus_centred_r",
+        "1 − centred R after the last touch",
+        |row, of| CENTRED_R.value(row, of.touches).map(|r| log(1.0 - r)),
+    ),
+    CheckMeasure::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
+    CheckMeasure::share("missed", "share of touches without contact", |row, of| {
         share(row, of, |touch| touch.contact.is_none())
     }),
-    Judged::share("stalled", "share of fallback plans", |row, of| {
+    CheckMeasure::share("stalled", "share of fallback plans", |row, of| {
         share(row, of, |touch| touch.stall.is_some())
     }),
 ];
 
-impl Judged {
+impl CheckMeasure {
     const fn log(
         id: &'static str,
         title: &'static str,

@@ -9,6 +9,6 @@ pub mod held;
 pub mod judged;
 pub mod sequence;
 
-pub use baseline::Baseline;
-pub use held::{Held, Judgement, Planner, Rules, differs, hold};
+pub use baseline::StoredBaseline;
+pub use held::{CheckOptions, CheckResult, MeasureResult, PlannerResult, differences, run_check};
 pub use judged::Verdict;

@@ -17,11 +17,11 @@ use crate::experiment::statistics::{mean, mean_and_error};
 const G: f64 = 1.0;
 
 /// Upper bound on the number of trials.
-const MOST: usize = 100_000;
+const TRIALS_MAX: usize = 100_000;
 
 /// Confidence sequence of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sequence {
+pub struct ConfidenceSequence {
     /// Number of values.
     pub count: usize,
     /// Mean of the values.
@@ -36,7 +36,7 @@ pub struct Sequence {
     pub p: f64,
 }
 
-impl Sequence {
+impl ConfidenceSequence {
     /// Computes the sequence of `values` in order of arrival, with miss probability `alpha`,
     /// evaluated after every `batch` values and at the end.
     pub fn new(values: &[f64], batch: usize, alpha: f64) -> Self {
@@ -66,7 +66,7 @@ impl Sequence {
     /// the number exceeds 100 000.
     pub fn wanted(&self, half: f64, alpha: f64) -> Option<usize> {
         let sd = self.sd?;
-        (2..MOST).find(|&n| sd * width(n, alpha) <= half * (n as f64).sqrt())
+        (2..TRIALS_MAX).find(|&n| sd * width(n, alpha) <= half * (n as f64).sqrt())
     }
 }
 

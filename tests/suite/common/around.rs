@@ -5,13 +5,13 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::trial::row::TrialRow;
-use palpate::explore::around::{ImplicitSurface, Scope, SpaceSettings};
-use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::explore::around::{ImplicitSurface, Scope, SpatialGpSettings};
+use palpate::explore::probe::{Contact, SweptVolume, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::robot::Finger;
 use palpate::sim::Environment;
-use palpate::sim::environment::Shape;
+use palpate::sim::environment::Surface;
 use palpate::task::touch::TouchSettings;
 use palpate::task::{Aim, Approach, Ball, Task};
 use std::sync::Arc;
@@ -32,9 +32,9 @@ pub fn simulation(field: Field, settings: &str) -> Simulation {
     let experiment: Experiment = toml::from_str(&text).unwrap();
     let vertices_of = mesh(field);
     let (_, report) = Mesh::new(vertices_of.vertices(), vertices_of.triangles()).unwrap();
-    let shape = Shape::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
-    let environment = Environment::around(experiment.scene.clone(), shape).unwrap();
-    Simulation::within(experiment, Arc::new(environment)).unwrap()
+    let shape = Surface::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
+    let environment = Environment::with_shape(experiment.scene.clone(), shape).unwrap();
+    Simulation::in_environment(experiment, Arc::new(environment)).unwrap()
 }
 
 pub fn trial(simulation: &Simulation, name: &str) -> TrialRow {
@@ -44,10 +44,10 @@ pub fn trial(simulation: &Simulation, name: &str) -> TrialRow {
 }
 
 pub fn belief(ball_m: f64, radius_m: f64) -> ImplicitSurface {
-    belief_with(SpaceSettings::default(), ball_m, radius_m)
+    belief_with(SpatialGpSettings::default(), ball_m, radius_m)
 }
 
-pub fn belief_with(settings: SpaceSettings, ball_m: f64, radius_m: f64) -> ImplicitSurface {
+pub fn belief_with(settings: SpatialGpSettings, ball_m: f64, radius_m: f64) -> ImplicitSurface {
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
     let task = Task::new(ball, TouchSettings::default(), &finger).unwrap();
@@ -67,7 +67,7 @@ pub fn meet(
     let touch =
         met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact { p_wc, normal_w }));
     let radius_m = belief.scope().radius_m;
-    let swept = Swept { finger: Finger { radius_m, ..Finger::default() }, p_wt };
+    let swept = SweptVolume { finger: Finger { radius_m, ..Finger::default() }, p_wt };
     let approach = approach(belief, aim);
     belief.observe(aim, &approach, (&touch, Some(&swept)));
 }

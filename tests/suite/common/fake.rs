@@ -78,7 +78,7 @@ pub struct FakeBody {
 /// Creates a body with ticks of 2 ms.
 pub fn body_of(chain: &Chain, world: World) -> (FakeBody, Fake) {
     let log = Fake::default();
-    let mut capabilities = Capabilities::of(chain, 0.002);
+    let mut capabilities = Capabilities::simulated(chain, 0.002);
     capabilities.real_time = world.real_time;
     let (chain, reading) = (chain.clone(), Reading::default());
     (FakeBody { chain, capabilities, world, log: log.clone(), tick: 0, reading }, log)

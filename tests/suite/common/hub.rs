@@ -1,6 +1,6 @@
 //! An in-process transport with any number of ends on either side.
 
-use palpate::error::Invalid;
+use palpate::error::InputError;
 use palpate::ros::message::TriggerResponse;
 use palpate::ros::topics::{Service, Side, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
@@ -78,7 +78,7 @@ impl Transport for Memory {
         })
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+    fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
         let packet = packet.clone();
         let delivery = Delivery::Packet { packet, sender: self.id, received: Instant::now() };
         self.to(self.others(), &delivery);
@@ -102,7 +102,7 @@ impl Transport for Memory {
         self.hub.lock().all.iter().any(is_other)
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+    fn call(&mut self, service: &Service) -> Result<(), InputError> {
         let delivery = Delivery::Call { service: service.clone(), call: self.id };
         self.to(self.others(), &delivery);
         Ok(())
@@ -113,7 +113,7 @@ impl Transport for Memory {
         service: &Service,
         call: u64,
         answer: TriggerResponse,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         let delivery = Delivery::Answered { service: service.clone(), answer };
         self.to(|end| end.id == call, &delivery);
         Ok(())

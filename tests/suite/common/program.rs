@@ -51,12 +51,12 @@ pub fn command(folder: &Path, arguments: &[&str]) -> Command {
 }
 
 pub fn palpate(folder: &Path, arguments: &[&str]) -> Output {
-    ended(&mut command(folder, arguments), &arguments.join(" "))
+    run_to_end(&mut command(folder, arguments), &arguments.join(" "))
 }
 
 /// Runs a program with short output; a program that does not end is killed and fails the test.
 #[track_caller]
-pub fn ended(command: &mut Command, case: &str) -> Output {
+pub fn run_to_end(command: &mut Command, case: &str) -> Output {
     let mut child =
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
     let patience = Instant::now() + Duration::from_secs(60);
@@ -71,7 +71,7 @@ pub fn ended(command: &mut Command, case: &str) -> Output {
 }
 
 /// Returns the stderr of a program without the names of slow steps, which depend on the machine.
-pub fn said(output: &Output) -> String {
+pub fn stderr(output: &Output) -> String {
     let all = String::from_utf8_lossy(&output.stderr);
     let lines = all.lines().filter(|line| !line.ends_with(" ..."));
     lines.map(|line| format!("{line}\n")).collect()
@@ -81,7 +81,7 @@ pub fn said(output: &Output) -> String {
 #[track_caller]
 pub fn succeeds(folder: &Path, arguments: &[&str]) -> String {
     let output = palpate(folder, arguments);
-    assert!(output.status.success(), "{arguments:?}: {:?} {}", output.status, said(&output));
+    assert!(output.status.success(), "{arguments:?}: {:?} {}", output.status, stderr(&output));
     String::from_utf8_lossy(&output.stdout).into()
 }
 
@@ -89,7 +89,7 @@ pub fn succeeds(folder: &Path, arguments: &[&str]) -> String {
 #[track_caller]
 pub fn fails(folder: &Path, arguments: &[&str], says: &[&str]) -> String {
     let output = palpate(folder, arguments);
-    let message = said(&output);
+    let message = stderr(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     assert!(message.starts_with("error: "), "{arguments:?}: {message}");
     for word in says {

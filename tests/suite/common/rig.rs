@@ -5,11 +5,11 @@ use crate::common::hub::{Hub, Memory};
 use nalgebra::Point3;
 use palpate::backend::pace;
 use palpate::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
-use palpate::error::Invalid;
+use palpate::error::InputError;
 use palpate::explore::probe::{Probe, Touch};
 use palpate::robot::arm::ArmSettings;
 use palpate::robot::arm::Chain;
-use palpate::ros::arm::Lab;
+use palpate::ros::arm::RosArm;
 use palpate::ros::message::TriggerResponse;
 use palpate::ros::settings::BackendSettings;
 use palpate::ros::topics::{Service, Side, Topic};
@@ -92,7 +92,7 @@ impl Transport for Wired {
         self.end.waker()
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+    fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
         match self.wire.cuts_sent.load(Ordering::Relaxed) {
             true => Ok(()),
             false => self.end.send(packet),
@@ -116,14 +116,19 @@ impl Transport for Wired {
         self.end.is_served(service)
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+    fn call(&mut self, service: &Service) -> Result<(), InputError> {
         match self.wire.cuts_sent.load(Ordering::Relaxed) {
             true => Ok(()),
             false => self.end.call(service),
         }
     }
 
-    fn answer(&mut self, service: &Service, call: u64, it: TriggerResponse) -> Result<(), Invalid> {
+    fn answer(
+        &mut self,
+        service: &Service,
+        call: u64,
+        it: TriggerResponse,
+    ) -> Result<(), InputError> {
         self.end.answer(service, call, it)
     }
 }
@@ -186,14 +191,14 @@ impl Rig {
         Self { simulator, settings, hub, stop, thread, events, track, wire }
     }
 
-    pub fn lab(&self) -> Result<Arc<Lab>, LinkFault> {
+    pub fn lab(&self) -> Result<Arc<RosArm>, LinkFault> {
         let (end, wire) = (self.hub.end(Side::Explorer), self.wire.clone());
         let connect = Box::new(move || Ok(Box::new(Wired { end, wire }) as _));
-        Lab::connect(&self.settings, &self.simulator.environment().chain().unwrap(), connect)
+        RosArm::connect(&self.settings, &self.simulator.environment().chain().unwrap(), connect)
     }
 
     /// Touches places at these fractions of the zone, until one fails.
-    pub fn touch(&self, lab: &Arc<Lab>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
+    pub fn touch(&self, lab: &Arc<RosArm>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
         let task = self.simulator.environment().task();
         let body = Box::new(lab.body());
         let mut servo = match self.simulator.servo_within(body, 0, &self.settings.interlocks) {

@@ -92,7 +92,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
             mean: 0.0,
         },
         log_likelihood: 0.0,
-        left_sd: None,
+        nystrom_residual_sd: None,
         factorisations: 1,
         scanned_at: 0,
         stop: Stop::Converged,

@@ -87,9 +87,9 @@ pub fn sphere_mesh(centre: Point3<f64>, radius: f64, cells: u32) -> Mesh {
 }
 
 /// Uniform random numbers in -1..1.
-pub struct Dice(pub u64);
+pub struct UniformRandom(pub u64);
 
-impl Dice {
+impl UniformRandom {
     pub fn roll(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use ndshape::{RuntimeShape, Shape};
 use palpate::geometry::mesh::Mesh;
 use palpate::geometry::solids::Triangles;
-use palpate::report::solid::{Frame, Sequence, Touch};
+use palpate::report::solid::{Frame, PlannerSurfaces, Touch};
 
 /// Radius of the ring's centre line about y, and of its tube.
 const RING_M: f64 = 0.045;
@@ -84,7 +84,7 @@ fn frame(touches: &[Touch], most: usize, cell_m: f64) -> Frame {
 
 /// A planner's touches from all sides, with a miss every seventh time, and its beliefs after each
 /// from the fourth on.
-pub fn sequence(planner: &str, most: usize, cell_m: f64) -> Sequence {
+pub fn sequence(planner: &str, most: usize, cell_m: f64) -> PlannerSurfaces {
     let touches: Vec<Touch> = (0..most)
         .map(|i| {
             // Golden angles spread directions evenly, from a different start for each planner.
@@ -103,5 +103,5 @@ pub fn sequence(planner: &str, most: usize, cell_m: f64) -> Sequence {
         })
         .collect();
     let frames = (4..=most).map(|count| frame(&touches[..count], most, cell_m)).collect();
-    Sequence { planner: planner.into(), touches, frames }
+    PlannerSurfaces { planner: planner.into(), touches, frames }
 }

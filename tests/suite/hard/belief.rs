@@ -3,7 +3,7 @@
 use super::case::{Case, Outcome, all, case, require};
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Observations, Posterior};
+use palpate::gp::{MeanModel, Observations, Posterior};
 use palpate::gp::{SearchBox, TouchNoise};
 use palpate::math::optimize::Stop;
 
@@ -147,7 +147,7 @@ fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
     let rms = (heights.iter().map(|y| y * y).sum::<f64>() / heights.len() as f64).sqrt();
     let scale = if rms > 0.0 { rms } else { 4.0 };
     let search = SearchBox {
-        mean: Mean::Data,
+        mean: MeanModel::Data,
         length_scales: vec![(0.02, 4.0).into()],
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-12 * scale, 1e3 * scale).into(),

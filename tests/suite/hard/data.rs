@@ -9,7 +9,7 @@ use palpate::gp::covariance::CovarianceError;
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
+use palpate::gp::{MeanModel, Observations, Posterior, SearchBox, TouchNoise};
 use palpate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;
@@ -31,7 +31,7 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
     let rms = (squares / touches.len().max(1) as f64).sqrt();
     let scale = if rms > 0.0 { rms } else { side };
     SearchBox {
-        mean: Mean::Zero,
+        mean: MeanModel::Zero,
         length_scales: vec![(0.005 * side, side).into()],
         noise_ratio: (1e-4, noisiest).into(),
         signal_sd: (1e-3 * scale, 1e3 * scale).into(),
@@ -213,7 +213,7 @@ fn smooth_data_are_followed_whatever_their_unit_offset_or_number() {
 #[test]
 fn an_offset_of_a_million_wants_a_mean_and_gets_it() {
     let touches = data(spread(40).into_iter().map(|x| (x, 1e6 + toy(x))));
-    for mean in [Mean::Data, Mean::Constant] {
+    for mean in [MeanModel::Data, MeanModel::Constant] {
         let range =
             SearchBox { mean, signal_sd: (1e-3, 1e3).into(), ..search_box(&touches, 4.0, 1e-2) };
         let fit = range.fit(&KERNEL, &touches);

@@ -11,7 +11,7 @@ use palpate::robot::finger::Finger;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::samples::spread;
-use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
+use palpate::sim::finger::{ContactLoad, Effects, Fingertip, FingertipState};
 
 /// A finger over a wall, its tip pointing at it as in a touch.
 pub struct FingerOnWall {
@@ -65,7 +65,7 @@ impl FingerOnWall {
         state: &mut FingertipState,
         motion: &TipMotion,
         dt_s: f64,
-    ) -> Result<Load, Fault> {
+    ) -> Result<ContactLoad, Fault> {
         state.step(&self.tip, &self.wall, motion, dt_s)
     }
 
@@ -96,7 +96,7 @@ pub fn with_finger_of_size(
 }
 
 /// Whether every number of a load is finite.
-pub fn is_finite(load: &Load) -> bool {
+pub fn is_finite(load: &ContactLoad) -> bool {
     let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
     vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
         && load.energy_j.is_finite()

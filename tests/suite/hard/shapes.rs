@@ -6,7 +6,7 @@ use super::solids::{both, mesh, needle, sheet, wall};
 use super::wall::scene;
 use nalgebra::Point3;
 use palpate::geometry::mesh::Mesh;
-use palpate::geometry::solids::{ball, block};
+use palpate::geometry::solids::{box_mesh, sphere_mesh};
 use palpate::sim::Scene;
 
 pub const CASES: &[Case] = &[
@@ -91,7 +91,7 @@ pub const CASES: &[Case] = &[
         "thickness mm",
         (&[5.0, 1.0, 0.1, 1e-2, 1e-4], 5),
         |mm, period_s| {
-            let plate = block([-0.05, -1e-3 * mm, -0.05], [0.05, 0.0, 0.05]);
+            let plate = box_mesh([-0.05, -1e-3 * mm, -0.05], [0.05, 0.0, 0.05]);
             same_as_wall(mesh(plate, [0.0; 3]), period_s, 1e-5)
         },
     ),
@@ -148,15 +148,15 @@ pub fn graze(overlap_mm: f64, scene: Scene) -> Outcome {
 
 pub fn slot(width_mm: f64, scene: Scene) -> Outcome {
     let half = 0.5e-3 * width_mm;
-    let left = block([-0.03, -0.03, -0.03], [-half, 0.0, 0.03]);
-    let right = block([half, -0.03, -0.03], [0.03, 0.0, 0.03]);
+    let left = box_mesh([-0.03, -0.03, -0.03], [-half, 0.0, 0.03]);
+    let right = box_mesh([half, -0.03, -0.03], [0.03, 0.0, 0.03]);
     // With both edges in contact, the centre of pressure lies between them.
     on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 1.0 + 0.5 * width_mm)
 }
 
 pub fn twins(lower_mm: f64, scene: Scene) -> Outcome {
     let [left, right] = [[-0.005, -0.01], [0.005, -0.01 - 1e-3 * lower_mm]]
-        .map(|[x, y]| ball(Point3::new(x, y, 0.0), 0.004, 24));
+        .map(|[x, y]| sphere_mesh(Point3::new(x, y, 0.0), 0.004, 24));
     on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 5.5)
 }
 
@@ -196,7 +196,7 @@ fn inverted(share: f64, period_s: f64) -> Outcome {
 
 fn sizes(radius_m: f64, period_s: f64) -> Outcome {
     let rings = if radius_m > 0.5 { 300 } else { 40 };
-    let mesh = mesh(ball(Point3::new(0.0, -radius_m, 0.0), radius_m, rings), [0.0; 3]);
+    let mesh = mesh(sphere_mesh(Point3::new(0.0, -radius_m, 0.0), radius_m, rings), [0.0; 3]);
     on(mesh, [0.0; 2], period_s, 1.0)
 }
 
@@ -208,7 +208,7 @@ fn far(distance_m: f64, period_s: f64) -> Outcome {
             zone.x_m = zone.x_m.map(|x| x + by_m);
             zone.datum_y_m = Some(zone.datum_y_m() + by_m);
         }
-        let solid = ball(Point3::new(0.0, -0.02, 0.0), 0.02, 40);
+        let solid = sphere_mesh(Point3::new(0.0, -0.02, 0.0), 0.02, 40);
         mesh(solid, [by_m, by_m, 0.0]).map(|mesh| touch_solid(scene, mesh, &[by_m, 0.0]))
     });
     let (Some(near), Some(far)) = (near, far) else { return Outcome::Wrong("no mesh".into()) };

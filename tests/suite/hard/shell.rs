@@ -6,7 +6,7 @@ use super::finger_on_wall::{FingerOnWall, is_finite, with_finger};
 use super::force_law::{effects, laws_of, poses};
 use super::solids::{both, mesh, needle};
 use palpate::backend::Fault;
-use palpate::geometry::solids::block;
+use palpate::geometry::solids::box_mesh;
 use palpate::sim::finger::Effects;
 use palpate::sim::finger::effects::skin::SkinModel;
 
@@ -55,7 +55,7 @@ pub const CASES: &[Case] = &[
         (&[3.0, 1.0, 0.3, 0.1, 0.01, 0.001], 6),
         |width_mm, _| {
             let half_m = 0.5e-3 * width_mm;
-            let blade = block([-half_m, -0.02, -0.05], [half_m, 0.0, 0.05]);
+            let blade = box_mesh([-half_m, -0.02, -0.05], [half_m, 0.0, 0.05]);
             pushed_into(blade)
         },
     ),
@@ -73,8 +73,8 @@ pub const CASES: &[Case] = &[
         (&[14.0, 10.0, 6.0, 3.0, 1.0, 0.1], 6),
         |apart_mm, _| {
             let half_m = 0.5e-3 * apart_mm;
-            let left = block([-0.03, -0.03, -0.03], [-half_m, 0.0, 0.03]);
-            pushed_into(both(left, block([half_m, -0.03, -0.03], [0.03, 0.0, 0.03])))
+            let left = box_mesh([-0.03, -0.03, -0.03], [-half_m, 0.0, 0.03]);
+            pushed_into(both(left, box_mesh([half_m, -0.03, -0.03], [0.03, 0.0, 0.03])))
         },
     ),
     case(

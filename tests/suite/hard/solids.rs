@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use palpate::geometry::mesh::Mesh;
-use palpate::geometry::solids::{Triangles, block};
+use palpate::geometry::solids::{Triangles, box_mesh};
 
 /// A box of `half_m` to each side of the origin and of the same depth, its face at y = 0.
 pub fn wall(half_m: f64) -> Triangles {
-    block([-half_m, -half_m, -half_m], [half_m, 0.0, half_m])
+    box_mesh([-half_m, -half_m, -half_m], [half_m, 0.0, half_m])
 }
 
 /// Returns the union of two solids.

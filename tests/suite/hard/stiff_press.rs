@@ -12,7 +12,7 @@ use palpate::backend::{Backend, Command, Fault, Reading};
 use palpate::explore::control::{Controller, Goal};
 use palpate::robot::arm::ArmSettings;
 use palpate::sim::Environment;
-use palpate::sim::mujoco::{Dynamic, Models};
+use palpate::sim::mujoco::{CompiledModels, DynamicBackend};
 use palpate::task::Zone;
 use std::sync::Arc;
 
@@ -162,8 +162,9 @@ impl WallPress {
 
     /// Force with steps of `step_s`, pressed for `pressed_s`.
     fn force(&self, step_s: f64, pressed_s: f64) -> Result<PressForce, String> {
-        let models = Models::at(&self.environment, step_s).map_err(|error| error.to_string())?;
-        let mut body = Dynamic::new(&self.environment, &models).map_err(|_| "no body")?;
+        let models =
+            CompiledModels::at(&self.environment, step_s).map_err(|error| error.to_string())?;
+        let mut body = DynamicBackend::new(&self.environment, &models).map_err(|_| "no body")?;
         let resting_s = self.way_m / APPROACH_M_S + pressed_s - LOOK_S;
         let (mut peak_n, mut resting) = (0.0_f64, Vec::new());
         self.press(&mut body, pressed_s, &mut |reading| {
@@ -220,7 +221,7 @@ fn force_deviation(
     pressed_s: f64,
 ) -> Result<ForceDeviation, String> {
     let press = WallPress::new(times, step_s, arm).ok_or("nothing to press")?;
-    let models = Models::new(&press.environment).map_err(|error| error.to_string())?;
+    let models = CompiledModels::new(&press.environment).map_err(|error| error.to_string())?;
     let limited_s = models.plant.opt().timestep;
     let run = press.force(if divided { limited_s } else { step_s }, pressed_s)?;
     let exact = press.force(limited_s / FINER, pressed_s)?;
@@ -295,8 +296,8 @@ fn long(ticks: f64) -> Outcome {
     };
     let run = || -> Result<Outcome, Fault> {
         let lost = Fault::Lost { time_s: 0.0 };
-        let models = Models::at(&press.environment, 0.002).map_err(|_| lost.clone())?;
-        let mut body = Dynamic::new(&press.environment, &models)?;
+        let models = CompiledModels::at(&press.environment, 0.002).map_err(|_| lost.clone())?;
+        let mut body = DynamicBackend::new(&press.environment, &models)?;
         let chain = press.environment.chain().ok_or(lost)?;
         let mut last = Reading::default();
         press.press(&mut body, REST_S, &mut |reading| last.clone_from(reading))?;

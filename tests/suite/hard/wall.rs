@@ -9,7 +9,7 @@ use palpate::robot::finger::Finger;
 use palpate::sim::Scene;
 use palpate::sim::finger::Effects;
 use palpate::sim::finger::effects::timing::TimingEffect;
-use palpate::sim::scene::Body;
+use palpate::sim::scene::SimulatorKind;
 use palpate::sim::simulator::Simulator;
 use palpate::study::accuracy::touches::noise_free;
 use palpate::task::Zone;
@@ -131,7 +131,7 @@ pub fn scene(period_s: f64) -> Scene {
     let mut effects = Effects { skin: Some(Default::default()), ..Effects::default() };
     effects.fluid = Some(Default::default());
     Scene {
-        body: Body::Kinematic,
+        body: SimulatorKind::Kinematic,
         function: None,
         around: None,
         zone: Some(Zone::new([-0.05, 0.05], Some([-0.05, 0.05]))),

@@ -2,7 +2,7 @@
 //! gradient, and positive in swept free space. Also the prior mean: a body around the contacts.
 
 use super::settings::PriorShape;
-use crate::probe::{Contact, Swept, Touch};
+use crate::probe::{Contact, SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
@@ -12,14 +12,14 @@ use palpate_gp::{Observation, Observations, Slope};
 
 /// All contacts and swept volumes.
 #[derive(Clone, Debug, Default)]
-pub struct Evidence {
+pub struct TouchEvidence {
     contacts: Vec<Contact>,
-    ways: Vec<Way>,
+    ways: Vec<SweptPath>,
 }
 
 /// Path of a fingertip that was free up to its end.
 #[derive(Clone, Debug)]
-struct Way {
+struct SweptPath {
     /// End point and direction.
     end: Aim,
     length_m: f64,
@@ -30,10 +30,10 @@ struct Way {
     is_met: bool,
 }
 
-impl Way {
+impl SweptPath {
     /// Distance of `p_w` from its hull.
-    fn away_m(&self, p_w: &Point3<f64>) -> f64 {
-        let start_w = self.end.p_w - self.end.ahead_w.scale(self.length_m);
+    fn distance_m(&self, p_w: &Point3<f64>) -> f64 {
+        let start_w = self.end.p_w - self.end.direction_w.scale(self.length_m);
         (nearest_on_segment(p_w, &start_w, &self.end.p_w) - p_w).norm() - self.radius_m
     }
 
@@ -49,7 +49,7 @@ impl Way {
         (0..count).map(move |i| {
             let share = f64::from(i) / f64::from(count);
             let back_m = first_m + share * (last_m - first_m);
-            self.end.p_w - self.end.ahead_w.scale(back_m)
+            self.end.p_w - self.end.direction_w.scale(back_m)
         })
     }
 }
@@ -58,13 +58,13 @@ impl Way {
 /// contacts: the field is close to a distance, but not exact; a heuristic.
 const SURE: f64 = 0.1;
 
-impl Evidence {
+impl TouchEvidence {
     /// Adds a touch and, if known, its swept volume, as `places` balls along the path.
     pub fn observe(
         &mut self,
         approach: &Approach,
         touch: &Touch,
-        swept: Option<&Swept>,
+        swept: Option<&SweptVolume>,
         places: u32,
     ) {
         let places = match touch {
@@ -76,10 +76,10 @@ impl Evidence {
             // The point of contact of an interrupted touch is unknown.
             Touch::Overload => 0,
         };
-        let Some(Swept { finger, p_wt }) = swept else { return };
+        let Some(SweptVolume { finger, p_wt }) = swept else { return };
         let ahead_w = approach.direction_w();
-        self.ways.push(Way {
-            end: Aim { p_w: *p_wt, ahead_w },
+        self.ways.push(SweptPath {
+            end: Aim { p_w: *p_wt, direction_w: ahead_w },
             length_m: (p_wt - approach.p_near_w).dot(&ahead_w),
             radius_m: finger.radius_m,
             places,
@@ -93,9 +93,9 @@ impl Evidence {
     }
 
     /// Distance of `p_w` from all contacts and all swept paths.
-    pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
+    pub fn distance_to_evidence_m(&self, p_w: &Point3<f64>) -> f64 {
         let met = self.contacts().map(|contact| (contact - p_w).norm());
-        met.chain(self.ways.iter().map(|way| way.away_m(p_w))).fold(f64::INFINITY, f64::min)
+        met.chain(self.ways.iter().map(|way| way.distance_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns centres and radii of the swept balls inside `ball`.
@@ -110,7 +110,7 @@ impl Evidence {
     /// distribution between them. `noise_m` is the unit of the noise.
     pub fn observations(
         &self,
-        (prior, ball): (&Prior, &Ball),
+        (prior, ball): (&PriorMean, &Ball),
         normals: bool,
         noise_m: f64,
     ) -> Observations {
@@ -120,14 +120,14 @@ impl Evidence {
             let gradient = normal_w - field.gradient;
             let slope = normals.then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
             let place = p_w.coords.as_slice();
-            all.take_in(&Observation { place, height: -field.value, noise: 1.0, slope });
+            all.push(&Observation { place, height: -field.value, noise: 1.0, slope });
         }
         for (p_w, radius_m) in self.free(ball) {
             let distances_m = self.contacts().map(|contact| (contact - p_w).norm());
             let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
             let least_m = radius_m.min(nearest_m);
             let sd_m = ((nearest_m - least_m) / 12f64.sqrt()).max(SURE * nearest_m);
-            all.take_in(&Observation {
+            all.push(&Observation {
                 place: p_w.coords.as_slice(),
                 height: nearest_m - prior.field(&p_w).value,
                 noise: (sd_m / noise_m).max(1.0),
@@ -140,7 +140,7 @@ impl Evidence {
 
 /// Prior mean of the field over space.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Prior {
+pub struct PriorMean {
     /// Centre in `W` and half axes along those of `W`; `None` for a field of zeros.
     body: Option<(Point3<f64>, Vector3<f64>)>,
 }
@@ -152,7 +152,7 @@ const THINNEST: f64 = 0.1;
 /// Radius of the sphere before two contacts exist, as a fraction of the ball's radius; a heuristic.
 const UNKNOWN: f64 = 0.5;
 
-impl Prior {
+impl PriorMean {
     /// Creates the prior around `contacts`, in the `ball` around them.
     pub fn about<'a>(
         shape: PriorShape,

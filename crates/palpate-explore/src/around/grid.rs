@@ -72,7 +72,7 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
     }
 
     /// Returns the value at a corner; never inside on the border of the box.
-    fn ask(&mut self, corner: [usize; 3]) -> f32 {
+    fn evaluate(&mut self, corner: [usize; 3]) -> f32 {
         let index = self.index(corner);
         if self.values[index].is_nan() {
             let steps = Vector3::from(corner.map(|i| i as f64));
@@ -89,7 +89,7 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
         corners(block, side).fold(
             [f32::INFINITY, f32::NEG_INFINITY],
             |[least, greatest], corner| {
-                let value = self.ask(corner);
+                let value = self.evaluate(corner);
                 [least.min(value), greatest.max(value)]
             },
         )
@@ -119,7 +119,7 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
 
 /// Returns those of `triangles` that are connected to the vertex nearest to one of `contacts`: a
 /// field may have zeros far from all contacts.
-pub fn touched(
+pub fn touched_components(
     vertices: &[Point3<f64>],
     triangles: Vec<[u32; 3]>,
     contacts: &[Point3<f64>],

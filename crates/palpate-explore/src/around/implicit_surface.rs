@@ -1,11 +1,11 @@
 //! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
 //! inside (Williams & Fitzgibbon 2007).
 
-use super::evidence::{Evidence, Prior};
+use super::evidence::{PriorMean, TouchEvidence};
 use super::scope::Scope;
-use super::settings::SpaceSettings;
+use super::settings::SpatialGpSettings;
 use super::surface::Surface;
-use crate::probe::{Swept, Touch};
+use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach};
 use nalgebra::Point3;
 use palpate_gp::covariance::CovarianceError;
@@ -14,15 +14,17 @@ use palpate_gp::kernel;
 use palpate_gp::kernel::{Kernel, Matern52};
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::math::optimize::compass;
-use palpate_gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Range, Scale};
+use palpate_gp::{
+    Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
+};
 
 /// Belief of one trial around a whole object.
 #[derive(Clone)]
 pub struct ImplicitSurface {
     scope: Scope,
-    settings: SpaceSettings,
+    settings: SpatialGpSettings,
     kernel: &'static dyn Kernel,
-    evidence: Evidence,
+    evidence: TouchEvidence,
     asked: Vec<Aim>,
     fit: Option<Fit>,
     surface: Option<Surface>,
@@ -48,9 +50,9 @@ const STEP_LAST: f64 = 0.1;
 
 impl ImplicitSurface {
     /// Creates a belief without data.
-    pub fn new(scope: Scope, settings: SpaceSettings) -> Self {
+    pub fn new(scope: Scope, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
-        let (evidence, asked) = (Evidence::default(), Vec::new());
+        let (evidence, asked) = (TouchEvidence::default(), Vec::new());
         Self { scope, settings, kernel, evidence, asked, fit: None, surface: None }
     }
 
@@ -60,7 +62,7 @@ impl ImplicitSurface {
         &mut self,
         aim: &Aim,
         approach: &Approach,
-        (touch, swept): (&Touch, Option<&Swept>),
+        (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
         self.asked.push(*aim);
         self.evidence.observe(approach, touch, swept, self.settings.free_places);
@@ -94,12 +96,12 @@ impl ImplicitSurface {
 
     fn conclude(
         &mut self,
-        prior: Prior,
+        prior: PriorMean,
         observations: Observations,
         fit: Fit,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
         let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), observations)?;
-        posterior.widen(self.settings.widening);
+        posterior.inflate(self.settings.widening);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
         let met = (self.contacts(), offset_m);
         let surface = Surface::new(&self.scope, prior, posterior, met);
@@ -107,9 +109,9 @@ impl ImplicitSurface {
     }
 
     /// Returns the observations, in units of the noise of `last`.
-    fn observations(&self, last: Option<&Hyperparameters>) -> (Prior, Observations) {
-        let ball = self.scope.met(self.contacts());
-        let prior = Prior::about(self.settings.prior, &ball, self.contacts());
+    fn observations(&self, last: Option<&Hyperparameters>) -> (PriorMean, Observations) {
+        let ball = self.scope.estimated_ball(self.contacts());
+        let prior = PriorMean::about(self.settings.prior, &ball, self.contacts());
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
         let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
         let observations = self.evidence.observations((&prior, &ball), self.normals(), noise_m);
@@ -126,8 +128,8 @@ impl ImplicitSurface {
         start: Option<&Hyperparameters>,
         observations: &Observations,
     ) -> Result<Fit, CovarianceError> {
-        let radius_m = self.scope.met(self.contacts()).radius_m;
-        let SpaceSettings { length_scale, noise, slope_noise, .. } = &self.settings;
+        let radius_m = self.scope.estimated_ball(self.contacts()).radius_m;
+        let SpatialGpSettings { length_scale, noise, slope_noise, .. } = &self.settings;
         let lengths_m = length_scale.map(|share| share * radius_m);
         let mut ranges = vec![lengths_m, *noise];
         ranges.extend(self.normals().then_some(*slope_noise));
@@ -143,9 +145,11 @@ impl ImplicitSurface {
         begin.truncate(ranges.len());
         // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
-        let signal_sd =
-            Scale::Best(Range::from((SIGNAL_RANGE[0] * radius_m, SIGNAL_RANGE[1] * radius_m)));
-        let mut likelihood = Likelihood::new(self.kernel, Mean::Zero, observations);
+        let signal_sd = SignalModel::Best(Range::from((
+            SIGNAL_RANGE[0] * radius_m,
+            SIGNAL_RANGE[1] * radius_m,
+        )));
+        let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
         let cube = (observations.order() as f64).powi(3);
         // Each fit starts with a different parameter, so that short fits cover all of them.
         let axis = observations.len() % begin.len();
@@ -161,7 +165,7 @@ impl ImplicitSurface {
             kernel: None,
             hyperparameters: Hyperparameters::new(signal_sd, vec![length_m; 3], ratio, 0.0),
             log_likelihood: found.value,
-            left_sd: None,
+            nystrom_residual_sd: None,
             factorisations: found.evaluations,
             scanned_at: observations.len(),
             stop: found.stop,
@@ -180,11 +184,11 @@ impl ImplicitSurface {
 
     /// Distance of `p_w` from all contacts and swept paths.
     pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
-        self.evidence.hole_m(p_w)
+        self.evidence.distance_to_evidence_m(p_w)
     }
 
     /// All aims so far.
-    pub fn asked(&self) -> &[Aim] {
+    pub fn aims(&self) -> &[Aim] {
         &self.asked
     }
 

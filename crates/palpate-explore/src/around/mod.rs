@@ -9,5 +9,5 @@ pub mod surface;
 
 pub use implicit_surface::ImplicitSurface;
 pub use scope::Scope;
-pub use settings::SpaceSettings;
+pub use settings::SpatialGpSettings;
 pub use surface::Surface;

@@ -31,16 +31,16 @@ impl Scope {
 
     /// Returns the ball around `contacts`, which estimates the object's size; the ball of the scope
     /// before there are two contacts.
-    pub fn met<'a>(&self, contacts: impl Iterator<Item = &'a Point3<f64>>) -> Ball {
+    pub fn estimated_ball<'a>(&self, contacts: impl Iterator<Item = &'a Point3<f64>>) -> Ball {
         let spanned = extent(contacts).filter(|[low, high]| low != high);
         let Some(spanned) = spanned else { return self.ball };
-        let about = Ball::about(spanned, self.ball.lowest_m);
+        let about = Ball::around_box(spanned, self.ball.lowest_m);
         let radius_m = about.radius_m.max(self.radius_m).min(self.ball.radius_m);
         Ball { radius_m, ..about }
     }
 
     /// Whether the finger can reach the aim.
     pub fn reaches(&self, aim: &Aim) -> bool {
-        self.task.may_reach(aim) && self.task.reaches(aim)
+        self.task.is_probably_reachable(aim) && self.task.is_reachable(aim)
     }
 }

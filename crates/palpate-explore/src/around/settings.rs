@@ -1,13 +1,13 @@
 //! Settings of the Gaussian process over space.
 
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Table `[gp]` for a whole object: settings of the Gaussian process over space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct SpaceSettings {
+pub struct SpatialGpSettings {
     /// Kernel name.
     pub kernel: String,
     /// Prior mean of the field.
@@ -53,7 +53,7 @@ pub enum PriorShape {
 /// Supported kernels; a squared exponential makes the surface fold.
 pub const KERNELS: [&str; 2] = ["matern_52", "matern_32"];
 
-impl Default for SpaceSettings {
+impl Default for SpatialGpSettings {
     /// Heuristics, tuned on the tuning half of the suite; see docs/whole-objects.md.
     fn default() -> Self {
         Self {
@@ -72,7 +72,7 @@ impl Default for SpaceSettings {
     }
 }
 
-impl Checked for SpaceSettings {
+impl Validate for SpatialGpSettings {
     fn check(&self, rules: &mut Rules) {
         rules.one_of("kernel", &self.kernel, &KERNELS);
         rules.interval("length_scale", self.length_scale, 1e-2..=100.0);
@@ -80,7 +80,7 @@ impl Checked for SpaceSettings {
         rules.interval("slope_noise", self.slope_noise, 1e-6..=100.0);
         rules.number("free_places", self.free_places.into(), 0.0..=16.0);
         rules.number("widening", self.widening, 0.1..=10.0);
-        rules.given("offset_m", self.offset_m, 0.0..=0.1);
+        rules.optional_number("offset_m", self.offset_m, 0.0..=0.1);
         rules.number("compared_every", self.compared_every.into(), 1.0..=1e6);
         rules.number("cells", self.cells.into(), 8.0..=256.0);
     }

@@ -1,7 +1,7 @@
 //! Estimated surface: the zero set of a Gaussian process over space.
 
-use super::evidence::Prior;
-use super::grid::{touched, zero_set};
+use super::evidence::PriorMean;
+use super::grid::{touched_components, zero_set};
 use super::scope::Scope;
 use crate::task::Ball;
 use nalgebra::{Point3, Vector3};
@@ -15,7 +15,7 @@ use palpate_gp::means::MeanField;
 /// distance near its surface.
 #[derive(Clone)]
 pub struct Surface {
-    prior: Prior,
+    prior: PriorMean,
     posterior: Posterior,
     contacts: Vec<Point3<f64>>,
     /// Standard deviation of the error common to all contacts.
@@ -44,7 +44,7 @@ const STEPS: usize = 2;
 impl Surface {
     pub(super) fn new<'a>(
         scope: &Scope,
-        prior: Prior,
+        prior: PriorMean,
         posterior: Posterior,
         (contacts, offset_m): (impl Iterator<Item = &'a Point3<f64>>, f64),
     ) -> Self {
@@ -54,7 +54,7 @@ impl Surface {
         let bounds = match extent(&contacts) {
             None => [ball_low, ball_high],
             Some([low, high]) => {
-                let beyond_m = BEYOND * scope.met(contacts.iter()).radius_m;
+                let beyond_m = BEYOND * scope.estimated_ball(contacts.iter()).radius_m;
                 [
                     low.map(|x| x - beyond_m).sup(&ball_low),
                     high.map(|x| x + beyond_m).inf(&ball_high),
@@ -98,7 +98,7 @@ impl Surface {
         let cell_m = (high - low).max() / f64::from(cells.max(1));
         let mut field = self.field();
         let (mut vertices, triangles) = zero_set([*low, *high], cell_m, |p_w| field.value(p_w));
-        let triangles = touched(&vertices, triangles, &self.contacts);
+        let triangles = touched_components(&vertices, triangles, &self.contacts);
         for p_w in &mut vertices {
             for _ in 0..STEPS {
                 let Field { value, gradient } = field.at(p_w);
@@ -112,7 +112,7 @@ impl Surface {
 
 /// Evaluator of a surface's field at many points, with its own buffers.
 pub struct SurfaceField<'a> {
-    prior: &'a Prior,
+    prior: &'a PriorMean,
     mean: MeanField,
 }
 

@@ -28,7 +28,7 @@ pub struct Capabilities {
 
 impl Capabilities {
     /// Capabilities of a simulated `chain` with a control period of `period_s`.
-    pub fn of(chain: &Chain, period_s: f64) -> Self {
+    pub fn simulated(chain: &Chain, period_s: f64) -> Self {
         let joints = &chain.joints;
         Self {
             joints: joints.iter().map(|joint| joint.name.to_string()).collect(),
@@ -93,7 +93,7 @@ pub struct Reading {
 
 impl Reading {
     /// Copies `other` into `self` without allocating.
-    pub fn copy(&mut self, other: &Self) {
+    pub fn copy_from(&mut self, other: &Self) {
         let Self { time_s, q, qdot, wrench, samples, applied } = self;
         (*time_s, *wrench) = (other.time_s, other.wrench);
         q.clone_from(&other.q);

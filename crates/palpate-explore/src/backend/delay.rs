@@ -8,14 +8,14 @@ pub const DELAY_MAX_S: f64 = 1.0;
 
 /// A backend that applies every command some ticks later; until the first one arrives it is
 /// commanded to rest.
-pub struct Delayed {
+pub struct DelayedBackend {
     inner: Box<dyn Backend>,
     ticks: usize,
     /// Pending commands, oldest first.
     waiting: VecDeque<Command>,
 }
 
-impl Delayed {
+impl DelayedBackend {
     /// Wraps `inner` with a delay of `delay_s`, at most one second, rounded to whole periods.
     pub fn new(inner: Box<dyn Backend>, delay_s: f64) -> Self {
         let ticks = (delay_s.clamp(0.0, DELAY_MAX_S) / inner.capabilities().period_s).round();
@@ -31,7 +31,7 @@ impl Delayed {
     }
 }
 
-impl Backend for Delayed {
+impl Backend for DelayedBackend {
     fn capabilities(&self) -> &Capabilities {
         self.inner.capabilities()
     }

@@ -1,7 +1,7 @@
 //! Faults: reasons why a backend or a touch could not continue.
 
 use crate::robot::arm::ArmError;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::fmt;
 use thiserror::Error;
 
@@ -27,12 +27,12 @@ pub enum Fault {
     },
     /// No posture within the joint limits brings the tip to its target.
     #[error(
-        "out of reach at {time_s:.3} s: on the way to {phase} the tip misses its goal by {:.1} mm and {:.1} deg",
+        "out of reach at {time_s:.3} s: on the way to {goal} the tip misses its goal by {:.1} mm and {:.1} deg",
         1e3 * distance_m, angle_rad.to_degrees()
     )]
     OutOfReach {
         /// Target of the movement.
-        phase: &'static str,
+        goal: &'static str,
         /// Time since reset, s.
         time_s: f64,
         /// Smallest distance found, m.
@@ -146,24 +146,24 @@ pub enum Fault {
     /// The backend cannot be built from its scene, or cannot continue for a reason that no caller
     /// distinguishes.
     #[error(transparent)]
-    Invalid(#[from] Invalid),
+    Invalid(#[from] InputError),
 }
 
 impl Fault {
     /// Returns the fault of a backend that needs `part`, which its scene lacks.
     pub fn lacks(part: &str) -> Self {
-        Invalid::new(format!("this simulator needs {part}, which the scene lacks")).into()
+        InputError::new(format!("this simulator needs {part}, which the scene lacks")).into()
     }
 
     /// Returns the fault of a backend with `found` joints for an arm with `expected`.
     pub fn joints(expected: usize, found: usize) -> Self {
-        Invalid::new(format!("the backend has {found} joints and the arm {expected}")).into()
+        InputError::new(format!("the backend has {found} joints and the arm {expected}")).into()
     }
 
     /// Returns the fault of a controller that cannot compute a command for the arm's position and
     /// goal.
     pub fn no_command(time_s: f64, cause: ArmError) -> Self {
-        Invalid::new(format!("cannot compute a command at {time_s:.3} s: {cause}")).into()
+        InputError::new(format!("cannot compute a command at {time_s:.3} s: {cause}")).into()
     }
 }
 
@@ -175,7 +175,7 @@ pub enum LinkFault {
     Arm(String),
     /// Failure of the transport, a topic or a service.
     #[error(transparent)]
-    Link(#[from] Invalid),
+    Link(#[from] InputError),
 }
 
 /// Reason of an interlock for stopping the robot: what was measured, and the limit.
@@ -198,7 +198,7 @@ impl Trip {
     ///
     /// # Errors
     /// The trip, with the value `found` of `part`, its `limit`, and their unit.
-    pub fn unless(
+    pub fn check(
         is_fine: bool,
         interlock: &'static str,
         part: &str,

@@ -9,14 +9,14 @@ pub fn now_s() -> f64 {
 }
 
 /// Paces ticks of a fixed period.
-pub struct Pace {
+pub struct RealTimePacer {
     period: Duration,
     /// Deadline of the current tick.
     next: Instant,
     overruns: u64,
 }
 
-impl Pace {
+impl RealTimePacer {
     /// Starts pacing now.
     pub fn new(period_s: f64) -> Self {
         let period = Duration::try_from_secs_f64(period_s).unwrap_or_default();

@@ -30,13 +30,13 @@ impl Ticks {
 }
 
 /// A backend that records its ticks.
-pub struct Trace {
+pub struct TracedBackend {
     inner: Box<dyn Backend>,
     chain: Chain,
     ticks: Ticks,
 }
 
-impl Trace {
+impl TracedBackend {
     /// Wraps `inner`, which moves `chain`.
     pub fn new(inner: Box<dyn Backend>, chain: Chain) -> (Self, Ticks) {
         let ticks = Ticks::default();
@@ -44,7 +44,7 @@ impl Trace {
     }
 }
 
-impl Backend for Trace {
+impl Backend for TracedBackend {
     fn capabilities(&self) -> &Capabilities {
         self.inner.capabilities()
     }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 /// State of a backend for display.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Seen {
+pub struct ViewState {
     /// Time since reset, s.
     pub time_s: f64,
     /// Joint positions, rad or m.
@@ -21,11 +21,11 @@ pub struct Seen {
 
 /// The displayed state, shared between the thread that moves the robot and the one that draws it.
 #[derive(Clone, Debug, Default)]
-pub struct Sight(Arc<Mutex<Seen>>);
+pub struct LiveView(Arc<Mutex<ViewState>>);
 
-impl Sight {
+impl LiveView {
     /// Returns the current state.
-    pub fn seen(&self) -> Seen {
+    pub fn seen(&self) -> ViewState {
         self.lock().clone()
     }
 
@@ -39,7 +39,7 @@ impl Sight {
         self.lock().is_closed = true;
     }
 
-    fn lock(&self) -> MutexGuard<'_, Seen> {
+    fn lock(&self) -> MutexGuard<'_, ViewState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -54,7 +54,7 @@ impl Sight {
 /// readings, including their time, are those of the wrapped backend, whatever the clock says.
 pub struct Watched {
     inner: Box<dyn Backend>,
-    sight: Sight,
+    sight: LiveView,
     /// Simulated seconds per second of the clock.
     speed: f64,
     /// Reference: an instant of the clock and the backend's time then.
@@ -63,8 +63,8 @@ pub struct Watched {
 
 impl Watched {
     /// Wraps `inner` so that `speed` of its seconds pass per second of the clock.
-    pub fn new(inner: Box<dyn Backend>, speed: f64) -> (Self, Sight) {
-        let sight = Sight::default();
+    pub fn new(inner: Box<dyn Backend>, speed: f64) -> (Self, LiveView) {
+        let sight = LiveView::default();
         (Self { inner, sight: sight.clone(), speed, since: None }, sight)
     }
 }
@@ -82,7 +82,7 @@ impl Backend for Watched {
     }
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        let Seen { is_closed, time_s, .. } = *self.sight.lock();
+        let ViewState { is_closed, time_s, .. } = *self.sight.lock();
         if is_closed {
             return Err(Fault::Stopped { time_s });
         }

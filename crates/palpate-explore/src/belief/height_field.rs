@@ -1,15 +1,15 @@
 //! Belief of the heights of a surface over a zone: a Gaussian process with its uncertainty.
 
-use crate::free_space::Ceiling;
+use crate::free_space::FreeSpaceBound;
 use crate::gp_settings::{Band, GpSettings};
-use crate::presence::Presence;
-use crate::probe::{Swept, Touch};
+use crate::presence::SurfaceEvidence;
+use crate::probe::{SweptVolume, Touch};
 use crate::task::Zone;
 use nalgebra::Vector3;
 use palpate_gp::covariance::CovarianceError;
-use palpate_gp::fit::Choice;
 use palpate_gp::fit::Fit;
-use palpate_gp::inducing::Induced;
+use palpate_gp::fit::KernelSelection;
+use palpate_gp::inducing::InducingPosterior;
 use palpate_gp::math::normal::BAND_95;
 use palpate_gp::posterior::Posterior;
 use palpate_gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
@@ -26,12 +26,12 @@ const NORMAL_Y_MIN: f64 = 0.05;
 #[derive(Clone)]
 pub struct HeightField {
     zone: Zone,
-    kernels: Choice,
+    kernels: KernelSelection,
     settings: GpSettings,
     contacts: Observations,
     /// Upper bound from free space, if that is enabled.
-    ceiling: Option<Ceiling>,
-    presence: Presence,
+    ceiling: Option<FreeSpaceBound>,
+    presence: SurfaceEvidence,
     /// Whether the last touch was a miss.
     has_missed: bool,
     targets: Vec<Vec<f64>>,
@@ -39,7 +39,7 @@ pub struct HeightField {
     fit: Option<Fit>,
     surface: Option<Posterior>,
     /// `surface`, conditioned also on the unreached targets, which are not worth another touch.
-    explored: Option<Posterior>,
+    planning_posterior: Option<Posterior>,
 }
 
 impl HeightField {
@@ -47,9 +47,9 @@ impl HeightField {
     pub fn new(zone: Zone, settings: GpSettings) -> Self {
         let contacts = Observations::new(zone.dimension());
         Self {
-            ceiling: settings.free_space.then(|| Ceiling::new(&zone)),
-            kernels: Choice::between(settings.kernel.names()),
-            presence: Presence::new(&zone),
+            ceiling: settings.free_space.then(|| FreeSpaceBound::new(&zone)),
+            kernels: KernelSelection::between(settings.kernel.names()),
+            presence: SurfaceEvidence::new(&zone),
             has_missed: false,
             zone,
             settings,
@@ -58,7 +58,7 @@ impl HeightField {
             unreached: Vec::new(),
             fit: None,
             surface: None,
-            explored: None,
+            planning_posterior: None,
         }
     }
 
@@ -74,7 +74,7 @@ impl HeightField {
                 let slope = self.slope(&contact.normal_w);
                 let slope =
                     slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
-                self.contacts.take_in(&Observation { place: &place, height, noise: 1.0, slope });
+                self.contacts.push(&Observation { place: &place, height, noise: 1.0, slope });
                 self.zone.distance(&place, target) <= REACHED_WITHIN
             }
             Touch::Miss | Touch::Overload => false,
@@ -86,7 +86,7 @@ impl HeightField {
 
     /// Adds the volume swept by the last touch: the surface is below it after a contact, and absent
     /// there after a miss.
-    pub fn observe_swept(&mut self, swept: &Swept) {
+    pub fn observe_swept(&mut self, swept: &SweptVolume) {
         self.presence.passed(swept, self.has_missed);
         if let Some(ceiling) = self.ceiling.as_mut().filter(|_| !self.has_missed) {
             ceiling.lower(&self.zone, swept);
@@ -128,12 +128,12 @@ impl HeightField {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
                 Posterior::new(self.kernels.kernel(), hyperparameters, self.contacts.clone())?;
-            posterior.widen(widening(&posterior.left_out()));
+            posterior.inflate(sd_inflation(&posterior.loo_z_scores()));
             // Conditioned again below, so that the recorded numbers are reproduced to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
         let (posterior, left_sd) = self.posterior(fit.hyperparameters.clone())?;
-        fit.left_sd = left_sd;
+        fit.nystrom_residual_sd = left_sd;
         self.explore(&posterior)?;
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
     }
@@ -166,8 +166,8 @@ impl HeightField {
         let (mut posterior, left_sd) = match self.inducing() {
             None => (Posterior::new(kernel, hyperparameters, self.contacts.clone())?, None),
             Some(most) => {
-                let Induced { posterior, left_sd } =
-                    Posterior::through(most, kernel, hyperparameters, &self.contacts)?;
+                let InducingPosterior { posterior, left_sd } =
+                    Posterior::with_inducing_points(most, kernel, hyperparameters, &self.contacts)?;
                 (posterior, Some(left_sd))
             }
         };
@@ -180,15 +180,17 @@ impl HeightField {
     /// Conditions the variance of `surface` on the unreached targets.
     fn explore(&mut self, surface: &Posterior) -> Result<(), CovarianceError> {
         let unreached = self.unreached.iter().map(Vec::as_slice);
-        self.explored = match self.inducing() {
+        self.planning_posterior = match self.inducing() {
             _ if self.unreached.is_empty() => None,
             None => Some(surface.fantasize(unreached)?),
             Some(most) => {
                 let mut all = self.contacts.clone();
-                unreached.for_each(|place| all.push(place, 0.0));
+                unreached.for_each(|place| all.push_height(place, 0.0));
                 let hyperparameters = surface.hyperparameters().clone();
                 let kernel = self.kernels.kernel();
-                Some(Posterior::through(most, kernel, hyperparameters, &all)?.posterior)
+                Some(
+                    Posterior::with_inducing_points(most, kernel, hyperparameters, &all)?.posterior,
+                )
             }
         };
         Ok(())
@@ -196,7 +198,7 @@ impl HeightField {
 
     /// Largest jitter added to a covariance of this belief, relative to its diagonal.
     pub fn jitter(&self) -> f64 {
-        let posteriors = self.surface.iter().chain(&self.explored);
+        let posteriors = self.surface.iter().chain(&self.planning_posterior);
         posteriors.map(Posterior::jitter).fold(0.0, f64::max)
     }
 
@@ -258,12 +260,12 @@ impl HeightField {
     /// Posterior for planning: conditioned also on targets that missed or were contacted elsewhere,
     /// which are not worth another touch. Its variance is what a touch can still remove; its mean
     /// is meaningless.
-    pub fn explorable(&self) -> Option<&Posterior> {
-        self.explored.as_ref().or(self.surface.as_ref())
+    pub fn planning_posterior(&self) -> Option<&Posterior> {
+        self.planning_posterior.as_ref().or(self.surface.as_ref())
     }
 
     /// Evidence of the touches for the presence of a surface.
-    pub fn presence(&self) -> &Presence {
+    pub fn presence(&self) -> &SurfaceEvidence {
         &self.presence
     }
 
@@ -276,7 +278,7 @@ impl HeightField {
 /// Factor that makes the 95 % band cover that share of the leave-one-out deviations `z`: the
 /// smallest that covers (n + 1)·95 % of n, or all of them where that exceeds n, in units of 1.96.
 /// It is at least 1, since a few contacts do not show the largest deviations.
-fn widening(z: &[f64]) -> f64 {
+fn sd_inflation(z: &[f64]) -> f64 {
     let mut far: Vec<f64> = z.iter().map(|z| z.abs()).collect();
     far.sort_by(f64::total_cmp);
     let held = (0.95 * (far.len() + 1) as f64).ceil() as usize;

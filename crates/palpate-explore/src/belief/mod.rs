@@ -4,9 +4,9 @@ mod height_field;
 
 pub use height_field::HeightField;
 
-use super::around::{ImplicitSurface, Scope, SpaceSettings};
+use super::around::{ImplicitSurface, Scope, SpatialGpSettings};
 use super::gp_settings::GpSettings;
-use super::probe::{Swept, Touch};
+use super::probe::{SweptVolume, Touch};
 use crate::robot::Finger;
 use crate::task::{Approach, Region, Target, Task};
 use palpate_gp::Posterior;
@@ -29,7 +29,7 @@ impl Belief {
         task: &Task,
         (finger, is_soft): (&Finger, bool),
         gp: &GpSettings,
-        space: &SpaceSettings,
+        space: &SpatialGpSettings,
     ) -> Self {
         match task.region() {
             Region::Zone(zone) => HeightField::new(zone.clone(), gp.clone()).into(),
@@ -46,7 +46,7 @@ impl Belief {
         &mut self,
         target: &Target,
         approach: &Approach,
-        (touch, swept): (&Touch, Option<&Swept>),
+        (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
         match (self, target) {
             (Self::HeightField(field), Target::Place(place)) => {
@@ -113,7 +113,7 @@ impl Belief {
         match self {
             Self::HeightField(field) => field.targets().iter().cloned().map(Target::from).collect(),
             Self::ImplicitSurface(surface) => {
-                surface.asked().iter().copied().map(Target::from).collect()
+                surface.aims().iter().copied().map(Target::from).collect()
             }
         }
     }

@@ -2,11 +2,11 @@
 //! Algorithm 1). For a whole object, it is the standard deviation of the surface along its normal.
 
 use super::candidates::Candidates;
-use super::plan::{Entry, Plan};
+use super::plan::{Plan, PlannerEntry};
 use super::search::Search;
 use crate::belief::Belief;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "active",
     about: "largest posterior standard deviation, by DIRECT then BFGS (Yi et al. 2016)",
     zone_only: None,
@@ -20,14 +20,14 @@ pub(super) const ENTRY: Entry = Entry {
 /// gradient of the variance is finite everywhere.
 fn plan(search: &mut Search, belief: &Belief) -> Plan {
     match belief {
-        Belief::HeightField(field) => match field.explorable() {
+        Belief::HeightField(field) => match field.planning_posterior() {
             None => search.anywhere(field.zone()),
             Some(known) => {
                 search.plan(field, |places, gradients| known.variances(places, gradients))
             }
         },
         Belief::ImplicitSurface(surface) => {
-            Candidates::choose(surface, &mut search.rng, |candidates| {
+            Candidates::plan(surface, &mut search.rng, |candidates| {
                 candidates.all.iter().map(|candidate| candidate.offset_m).collect()
             })
         }

@@ -1,8 +1,8 @@
 //! Candidate targets on the estimated surface of a whole object: whether a straight approach to
 //! them is free, and where the space is still unexplored.
 
-use super::plan::{Plan, Stall};
-use super::sample::{any_side, in_ball};
+use super::plan::{Fallback, Plan};
+use super::sample::{in_ball, random_aim};
 use crate::around::ImplicitSurface;
 use crate::around::surface::{Surface, SurfaceField, steepness};
 use crate::task::Aim;
@@ -37,7 +37,7 @@ pub struct Candidates<'a> {
 impl<'a> Candidates<'a> {
     /// Computes the candidates on the surface of `belief`, thinned evenly. Returns `None` before
     /// the first fit, or if the belief has no surface.
-    pub fn of(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
+    pub fn new(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
         let surface = belief.surface()?;
         let mesh = surface.mesh(CELLS)?;
         let vertices = mesh.vertices();
@@ -57,16 +57,16 @@ impl<'a> Candidates<'a> {
 
     /// Plans a touch at the candidate with the highest score whose approach is free, or from time
     /// to time into unexplored space. Plans a random touch if the belief has no surface.
-    pub fn choose(
+    pub fn plan(
         belief: &ImplicitSurface,
         rng: &mut ChaCha8Rng,
         score: impl FnOnce(&Candidates) -> Vec<f64>,
     ) -> Plan {
-        if let Some(aim) = unseen(belief, rng) {
+        if let Some(aim) = explore_unknown(belief, rng) {
             return Plan::at(aim);
         }
-        let aside = any_side(belief.scope(), rng);
-        match Candidates::of(belief, rng) {
+        let aside = random_aim(belief.scope(), rng);
+        match Candidates::new(belief, rng) {
             Some(candidates) => candidates.best(score(&candidates).into_iter(), &aside),
             None => Plan::at(aside),
         }
@@ -88,7 +88,7 @@ impl<'a> Candidates<'a> {
             let aim = free_aim(self.belief, &mut field, place)?;
             Some(Plan { sd_m: Some(candidate.offset_m), ..Plan::at(aim) })
         });
-        free.unwrap_or_else(|| Plan { stall: Some(Stall::Blocked), ..Plan::at(*anywhere) })
+        free.unwrap_or_else(|| Plan { fallback: Some(Fallback::Blocked), ..Plan::at(*anywhere) })
     }
 }
 
@@ -132,7 +132,7 @@ pub fn free_aim(
     let upright = ways.iter().filter_map(|way_w| UnitVector3::try_new(*way_w, 1e-6));
     upright
         .filter(|way_w| way_w.dot(normal_w) >= SLANT)
-        .map(|way_w| Aim { p_w: *p_w, ahead_w: -way_w })
+        .map(|way_w| Aim { p_w: *p_w, direction_w: -way_w })
         .find(|aim| {
             ball.contains(aim)
                 && is_new(belief, aim)
@@ -149,15 +149,15 @@ fn any_orthogonal(to: &UnitVector3<f64>) -> Vector3<f64> {
 
 fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     let near_m = NEAR * belief.scope().radius_m;
-    belief.asked().iter().all(|asked| {
-        (asked.p_w - aim.p_w).norm() > near_m || asked.ahead_w.dot(&aim.ahead_w) < ALONG
+    belief.aims().iter().all(|asked| {
+        (asked.p_w - aim.p_w).norm() > near_m || asked.direction_w.dot(&aim.direction_w) < ALONG
     })
 }
 
 /// Whether the approach of `aim` outside the object is clear of the estimated surface.
 fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> bool {
     let (ball, radius_m) = (&belief.scope().ball, belief.scope().radius_m);
-    let back = |radii: f64| aim.p_w - aim.ahead_w.scale(radii * radius_m);
+    let back = |radii: f64| aim.p_w - aim.direction_w.scale(radii * radius_m);
     let mut radii = FIRST;
     while (back(radii) - ball.centre_w).norm() < ball.radius_m {
         if surface.value(&back(radii)) < ROOM * radius_m {
@@ -184,11 +184,11 @@ const HOLE: f64 = 0.15;
 
 /// Returns an aim into the largest hole between all contacts and swept space, if it is the turn of
 /// one and a large, reachable hole exists.
-pub fn unseen(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
+pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;
-    let is_known = scope.met(belief.contacts()).radius_m >= KNOWN * whole.radius_m;
-    if is_known || !belief.asked().len().is_multiple_of(EVERY) {
+    let is_known = scope.estimated_ball(belief.contacts()).radius_m >= KNOWN * whole.radius_m;
+    if is_known || !belief.aims().len().is_multiple_of(EVERY) {
         return None;
     }
     let mut surface = belief.surface()?.field();

@@ -6,11 +6,11 @@
 //! the lattice is resolved only at a finer level. For a whole object, it is an equal-area lattice
 //! on the sphere of directions.
 
-use super::plan::{Entry, Plan};
-use super::sample::sampled;
+use super::plan::{Plan, PlannerEntry};
+use super::sample::target_from_fractions;
 use crate::belief::Belief;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "grid",
     about: "a lattice from coarse to fine, no model",
     zone_only: None,
@@ -19,7 +19,7 @@ pub(super) const ENTRY: Entry = Entry {
         // Remaining nodes of this level, the next one last, as fractions in 0..1.
         let mut rest: Vec<Vec<f64>> = Vec::new();
         Box::new(move |belief: &Belief| {
-            let target = sampled(belief, |dimension| {
+            let target = target_from_fractions(belief, |dimension| {
                 loop {
                     match rest.pop() {
                         Some(node) => break node,

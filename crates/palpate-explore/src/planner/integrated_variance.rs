@@ -2,7 +2,7 @@
 //! (active learning, Cohn 1996; also called integrated variance reduction).
 
 use super::candidates::Candidates;
-use super::plan::{Entry, Plan};
+use super::plan::{Plan, PlannerEntry};
 use super::search::Search;
 use super::sobol;
 use crate::around::ImplicitSurface;
@@ -11,7 +11,7 @@ use palpate_gp::posterior::Scratch;
 use palpate_gp::reduction::Reduction;
 use rand::RngExt;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "integrated_variance",
     about: "largest reduction of the variance over the whole surface (Cohn 1996)",
     zone_only: None,
@@ -33,18 +33,18 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 fn in_zone(search: &mut Search, seed: u32, field: &HeightField) -> Plan {
-    let Some(posterior) = field.explorable() else { return search.anywhere(field.zone()) };
+    let Some(posterior) = field.planning_posterior() else { return search.anywhere(field.zone()) };
     let places = sobol::places(field.zone(), search.settings.integrated_variance.places, seed);
     let reduction = Reduction::new(posterior, places.iter().map(Vec::as_slice));
     let mut scratch = Scratch::default();
-    let score = search.differentiated(field.zone(), |places| {
+    let score = search.with_gradients(field.zone(), |places| {
         places.iter().map(|place| reduction.at(place, &mut scratch)).collect()
     });
     search.plan(field, score)
 }
 
 fn around(search: &mut Search, surface: &ImplicitSurface) -> Plan {
-    Candidates::choose(surface, &mut search.rng, |candidates| {
+    Candidates::plan(surface, &mut search.rng, |candidates| {
         let all = &candidates.all;
         let places = || all.iter().map(|candidate| candidate.p_w.coords.as_slice());
         let reduction = Reduction::new(candidates.surface().posterior(), places());

@@ -17,12 +17,12 @@ mod sobol;
 mod travel;
 mod ucb;
 
-pub use plan::{Entry, Plan, PlanError, Planner, PlannerFactory, Stall, over_zone};
+pub use plan::{Fallback, Plan, PlanError, Planner, PlannerEntry, PlannerFactory, zone_planner};
 pub use sample::uniform;
 pub use settings::PlanningSettings;
 
 /// All built-in planners; add one line per planner.
-pub const PLANNERS: &[Entry] = &[
+pub const PLANNERS: &[PlannerEntry] = &[
     active::ENTRY,
     random::ENTRY,
     sobol::ENTRY,
@@ -37,13 +37,13 @@ pub const PLANNERS: &[Entry] = &[
 /// Whether `name` names an external planner, `MODULE:NAME`. An experiment may list external
 /// planners: a program that runs it needs [their factories](PlannerFactory), one that only reads it
 /// does not.
-pub fn is_own(name: &str) -> bool {
+pub fn is_external(name: &str) -> bool {
     let is_plain = |c: char| c.is_alphanumeric() || "_.<>".contains(c);
     let is_word = |word: &str| !word.is_empty() && word.chars().all(is_plain);
     name.split_once(':').is_some_and(|(module, name)| is_word(module) && is_word(name))
 }
 
 /// Returns the planner with this name.
-pub fn by_name(name: &str) -> Option<&'static Entry> {
+pub fn by_name(name: &str) -> Option<&'static PlannerEntry> {
     PLANNERS.iter().find(|entry| entry.name == name)
 }

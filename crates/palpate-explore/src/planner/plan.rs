@@ -42,13 +42,13 @@ pub struct Plan {
     /// variance.
     pub sd_m: Option<f64>,
     /// Reason for a fallback to a random target, if the planner's own rule could not decide.
-    pub stall: Option<Stall>,
+    pub fallback: Option<Fallback>,
 }
 
 impl Plan {
     /// A plan to touch `target`.
     pub fn at(target: impl Into<Target>) -> Self {
-        Self { target: target.into(), sd_m: None, stall: None }
+        Self { target: target.into(), sd_m: None, fallback: None }
     }
 }
 
@@ -56,7 +56,7 @@ impl Plan {
 /// pattern might coincide with a pattern of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Stall {
+pub enum Fallback {
     /// The variance at the best place is below rounding error.
     Collapsed,
     /// The target would repeat an earlier one.
@@ -86,14 +86,16 @@ impl<F: FnMut(&Belief) -> Result<Plan, PlanError> + Send> Planner for F {
 }
 
 /// Wraps a planner that supports zones only; it returns an error for a whole object.
-pub fn over_zone(mut plan: impl FnMut(&HeightField) -> Plan + Send + 'static) -> Box<dyn Planner> {
+pub fn zone_planner(
+    mut plan: impl FnMut(&HeightField) -> Plan + Send + 'static,
+) -> Box<dyn Planner> {
     Box::new(move |belief: &Belief| {
         Ok(plan(belief.height_field().ok_or("this planner supports zones only")?))
     })
 }
 
 /// A built-in planner.
-pub struct Entry {
+pub struct PlannerEntry {
     /// Name in an experiment file.
     pub name: &'static str,
     /// One-line description for `--help`.
@@ -126,7 +128,7 @@ pub trait PlannerFactory: Send + Sync {
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner>;
 }
 
-impl PlannerFactory for Entry {
+impl PlannerFactory for PlannerEntry {
     fn name(&self) -> &str {
         self.name
     }

@@ -1,12 +1,14 @@
 //! Planner `random`: uniformly random targets, the baseline of Yi et al. 2016.
 
-use super::plan::{Entry, Plan};
-use super::sample::anywhere;
+use super::plan::{Plan, PlannerEntry};
+use super::sample::random_target;
 use crate::belief::Belief;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "random",
     about: "uniformly random targets (baseline of Yi et al. 2016)",
     zone_only: None,
-    make: |_, mut rng| Box::new(move |belief: &Belief| Ok(Plan::at(anywhere(belief, &mut rng)))),
+    make: |_, mut rng| {
+        Box::new(move |belief: &Belief| Ok(Plan::at(random_target(belief, &mut rng))))
+    },
 };

@@ -14,8 +14,8 @@ pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 /// Returns a uniformly random target: a place of a zone, or an aim from a random direction at the
 /// ball's centre.
-pub fn anywhere(belief: &Belief, rng: &mut ChaCha8Rng) -> Target {
-    sampled(belief, |count| fractions(count, rng))
+pub fn random_target(belief: &Belief, rng: &mut ChaCha8Rng) -> Target {
+    target_from_fractions(belief, |count| fractions(count, rng))
 }
 
 fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
@@ -25,7 +25,7 @@ fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 /// Returns the target at the fractions in 0..1 returned by `next`, whose argument is their number,
 /// one or two. For a whole object, they encode a direction, and `next` is called until one is
 /// reachable.
-pub fn sampled(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Target {
+pub fn target_from_fractions(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Target {
     match belief {
         Belief::HeightField(field) => field.zone().at(&next(field.zone().dimension())).into(),
         Belief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).into(),
@@ -37,7 +37,7 @@ pub fn sampled(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Targ
 const TRIED: usize = 1000;
 
 /// Returns an aim at the ball's centre from a uniformly random direction among the reachable ones.
-pub fn any_side(scope: &Scope, rng: &mut ChaCha8Rng) -> Aim {
+pub fn random_aim(scope: &Scope, rng: &mut ChaCha8Rng) -> Aim {
     reached(scope, || fractions(2, rng))
 }
 

@@ -3,13 +3,13 @@
 //!
 //! The function is evaluated for lists of places, which costs less than single evaluations.
 
-use super::plan::{Plan, Stall};
+use super::plan::{Fallback, Plan};
 use super::sample::uniform;
 use super::settings::PlanningSettings;
 use super::sobol;
 use crate::belief::HeightField;
 use crate::task::Zone;
-use palpate_gp::math::climb::{Climb, Manner};
+use palpate_gp::math::climb::{BfgsOptions, Climb};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::Bounds;
 use palpate_gp::posterior::Scratch;
@@ -35,7 +35,7 @@ const MARGIN: f64 = 0.1;
 
 /// A climb is stopped if it would stay below the highest even with this many times its predicted
 /// gain; a heuristic.
-const HOPE: f64 = 4.0;
+const GAIN_FACTOR: f64 = 4.0;
 
 /// First step of a climb in units of the zone's sides, half the distance between two hills; and the
 /// relative gain at which a climb ends, far below what changes a plan; heuristics.
@@ -76,15 +76,15 @@ impl Search {
         score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
         let (_, place) = self.maximum(belief.zone(), score);
-        self.conclude(belief, place)
+        self.plan_at(belief, place)
     }
 
     /// Plans a touch at `place`, or at a random one if a touch there would bring no information.
-    pub fn conclude(&mut self, belief: &HeightField, place: Vec<f64>) -> Plan {
-        let stall = stalled(belief, &place);
+    pub fn plan_at(&mut self, belief: &HeightField, place: Vec<f64>) -> Plan {
+        let stall = fallback_reason(belief, &place);
         let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
         let sd_m = Some(variance(belief, &target).sqrt());
-        Plan { target: target.into(), sd_m, stall }
+        Plan { target: target.into(), sd_m, fallback: stall }
     }
 
     /// Returns the largest value of `score` found and its place.
@@ -104,7 +104,7 @@ impl Search {
         });
         let (lower, upper) = corners(zone, 0.0);
         let bounds = Bounds { lower: &lower, upper: &upper };
-        let manner = Manner {
+        let manner = BfgsOptions {
             first_step: FIRST_STEP,
             gain: 0.0,
             relative_gain: RELATIVE_GAIN,
@@ -114,25 +114,27 @@ impl Search {
         let mut climbs: Vec<Climb> = hills(zone, seen).into_iter().map(start).collect();
         loop {
             let asked: Vec<Vec<f64>> =
-                climbs.iter().filter_map(|climb| climb.asked().map(<[f64]>::to_vec)).collect();
+                climbs.iter().filter_map(|climb| climb.requested().map(<[f64]>::to_vec)).collect();
             if asked.is_empty() {
                 break;
             }
             let mut gradients = vec![vec![0.0; zone.dimension()]; asked.len()];
             let values = score(&asked, &mut gradients);
-            let going = climbs.iter_mut().filter(|climb| climb.asked().is_some());
+            let going = climbs.iter_mut().filter(|climb| climb.requested().is_some());
             for ((climb, value), gradient) in going.zip(values).zip(&gradients) {
-                climb.tell(value, gradient);
+                climb.observe(value, gradient);
             }
-            let tops = climbs.iter().map(|climb| climb.top().value);
+            let tops = climbs.iter().map(|climb| climb.best().value);
             let highest = tops.fold(f64::NEG_INFINITY, f64::max);
             climbs.retain(|climb| {
-                climb.asked().is_none() || !climb.is_measured() || climb.hope(HOPE) >= highest
+                climb.requested().is_none()
+                    || !climb.is_measured()
+                    || climb.upper_bound(GAIN_FACTOR) >= highest
             });
         }
         let mut best = (f64::MIN, zone.at(&vec![0.5; zone.dimension()]));
         for climb in &climbs {
-            let top = climb.top();
+            let top = climb.best();
             if top.value > best.0 {
                 best = (top.value, top.x.clone());
             }
@@ -141,12 +143,12 @@ impl Search {
     }
 
     /// Returns evenly spread places, different ones on each call.
-    pub fn scattered(&mut self, zone: &Zone, count: u32) -> Vec<Vec<f64>> {
+    pub fn spread_places(&mut self, zone: &Zone, count: u32) -> Vec<Vec<f64>> {
         sobol::places(zone, count, self.rng.random())
     }
 
     /// Returns `values` and their gradients by central differences, one-sided at the zone's border.
-    pub fn differentiated<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
+    pub fn with_gradients<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
         &self,
         zone: &Zone,
         mut values: V,
@@ -214,19 +216,19 @@ fn hills(zone: &Zone, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
 }
 
 /// Returns the reason why a touch at `place` would bring no information, if so.
-fn stalled(belief: &HeightField, place: &[f64]) -> Option<Stall> {
+fn fallback_reason(belief: &HeightField, place: &[f64]) -> Option<Fallback> {
     let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
     let same = |target: &Vec<f64>| belief.zone().distance(target, place) < SAME_TARGET;
     if variance(belief, place) <= lost_sd * lost_sd {
-        Some(Stall::Collapsed)
+        Some(Fallback::Collapsed)
     } else if belief.targets().iter().any(same) {
-        Some(Stall::Repeated)
+        Some(Fallback::Repeated)
     } else {
         None
     }
 }
 
 fn variance(belief: &HeightField, place: &[f64]) -> f64 {
-    let known = belief.explorable();
+    let known = belief.planning_posterior();
     known.map_or(f64::NAN, |known| known.variance(place, &mut Scratch::default()))
 }

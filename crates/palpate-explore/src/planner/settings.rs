@@ -1,6 +1,6 @@
 //! Settings of the planners.
 
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -141,7 +141,7 @@ impl Default for UcbSettings {
     }
 }
 
-impl Checked for PlanningSettings {
+impl Validate for PlanningSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("direct_evaluations", self.direct_evaluations.into(), 1.0..=1e6);
         rules.number("lbfgs_evaluations", self.lbfgs_evaluations.into(), 1.0..=1e6);
@@ -149,7 +149,7 @@ impl Checked for PlanningSettings {
         rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
         rules.number("silhouette.places", self.silhouette.places.into(), 1.0..=65536.0);
         rules.number("silhouette.candidates", self.silhouette.candidates.into(), 1.0..=65536.0);
-        rules.given("silhouette.touch_way_m", self.silhouette.touch_way_m, 1e-6..=1e6);
+        rules.optional_number("silhouette.touch_way_m", self.silhouette.touch_way_m, 1e-6..=1e6);
         rules.number("oracle.candidates", self.oracle.candidates.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);

@@ -11,7 +11,7 @@
 //! A few touches determine the length scales poorly, so the variance is that of a committee of
 //! beliefs whose length scales differ from the fitted ones.
 
-use super::plan::{Entry, Plan, over_zone};
+use super::plan::{Plan, PlannerEntry, zone_planner};
 use super::search::Search;
 use super::sobol;
 use crate::belief::HeightField;
@@ -19,7 +19,7 @@ use palpate_gp::posterior::{Posterior, Scratch};
 use palpate_gp::reduction::Reduction;
 use rand::RngExt;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "silhouette",
     about: "integrated_variance over the probable surface, times the probability of contact",
     zone_only: Some("the silhouette is defined along a single approach direction"),
@@ -27,7 +27,7 @@ pub(super) const ENTRY: Entry = Entry {
         let mut search = Search::new(settings, rng);
         // Seed of the places at which the variance is computed.
         let seed = search.rng.random();
-        over_zone(move |belief| plan(&mut search, seed, belief))
+        zone_planner(move |belief| plan(&mut search, seed, belief))
     },
 };
 
@@ -36,13 +36,13 @@ pub(super) const ENTRY: Entry = Entry {
 const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
 fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
-    let Some(posterior) = belief.explorable() else {
+    let Some(posterior) = belief.planning_posterior() else {
         return search.anywhere(belief.zone());
     };
     let count = search.settings.silhouette.places;
     let places = sobol::places(belief.zone(), count, seed);
     let silhouette = belief.presence().silhouette();
-    let weigh = |place: &Vec<f64>| silhouette.hoped(place).sqrt();
+    let weigh = |place: &Vec<f64>| silhouette.optimistic_probability(place).sqrt();
     let weights: Vec<f64> = places.iter().map(weigh).collect();
     let committee: Vec<Posterior> =
         COMMITTEE.iter().filter_map(|scale| posterior.scaled(*scale).ok()).collect();
@@ -54,7 +54,7 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
         .collect();
     let mut scratch = Scratch::default();
     let mut value = |place: &[f64]| -> f64 {
-        match silhouette.of_contact(place) {
+        match silhouette.hit_probability(place) {
             0.0 => 0.0,
             chance => {
                 let falls = reductions.iter().map(|fall| fall.at(place, &mut scratch));
@@ -62,7 +62,7 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
             }
         }
     };
-    let candidates = search.scattered(belief.zone(), search.settings.silhouette.candidates);
+    let candidates = search.spread_places(belief.zone(), search.settings.silhouette.candidates);
     // Time in units of a touch that begins where the last one ended.
     let time = |place: &[f64]| {
         let way = search.settings.silhouette.touch_way_m.zip(belief.targets().last());
@@ -72,7 +72,7 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
     };
     let valued = candidates.into_iter().map(|place| (value(&place) / time(&place), place));
     match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((_, place)) => search.conclude(belief, place),
+        Some((_, place)) => search.plan_at(belief, place),
         None => search.anywhere(belief.zone()),
     }
 }

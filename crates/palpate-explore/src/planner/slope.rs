@@ -3,20 +3,20 @@
 //!
 //! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), with the mean over the zone.
 
-use super::plan::{Entry, Plan, over_zone};
+use super::plan::{Plan, PlannerEntry, zone_planner};
 use super::search::Search;
 use super::sobol;
 use crate::belief::HeightField;
 use palpate_gp::Posterior;
 use palpate_gp::posterior::Scratch;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "slope",
     about: "standard deviation weighted by the slope of the posterior mean",
     zone_only: Some("it uses the slope of a height field"),
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
-        over_zone(move |belief| plan(&mut search, belief))
+        zone_planner(move |belief| plan(&mut search, belief))
     },
 };
 
@@ -24,7 +24,7 @@ pub(super) const ENTRY: Entry = Entry {
 const MEAN_PLACES: u32 = 256;
 
 fn plan(search: &mut Search, belief: &HeightField) -> Plan {
-    let (Some(surface), Some(known)) = (belief.surface(), belief.explorable()) else {
+    let (Some(surface), Some(known)) = (belief.surface(), belief.planning_posterior()) else {
         return search.anywhere(belief.zone());
     };
     let mut scratch = Scratch::default();
@@ -34,7 +34,7 @@ fn plan(search: &mut Search, belief: &HeightField) -> Plan {
     let weight = search.settings.slope.weight;
     // A flat belief has no slope to weight.
     let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
-    let score = search.differentiated(belief.zone(), |places| {
+    let score = search.with_gradients(belief.zone(), |places| {
         let variances = known.variances(places, &mut []);
         let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
         let each = variances.iter().zip(steep);

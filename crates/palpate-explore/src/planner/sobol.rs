@@ -1,19 +1,19 @@
 //! Planner `sobol`: a scrambled Sobol sequence, evenly spread targets without a model.
 
-use super::plan::{Entry, Plan};
-use super::sample::sampled;
+use super::plan::{Plan, PlannerEntry};
+use super::sample::target_from_fractions;
 use crate::belief::Belief;
 use crate::task::Zone;
 use rand::RngExt;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "sobol",
     about: "a scrambled Sobol sequence: evenly spread, no model (stronger baseline)",
     zone_only: None,
     make: |_, mut rng| {
         let (seed, mut index) = (rng.random(), 0);
         Box::new(move |belief: &Belief| {
-            let target = sampled(belief, |count| {
+            let target = target_from_fractions(belief, |count| {
                 let at = fractions(count, index, seed);
                 index += 1;
                 at

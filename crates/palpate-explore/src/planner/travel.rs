@@ -6,16 +6,16 @@
 //! through them; then the next tour is planned from the updated belief. Every tour contains the
 //! place where σ is largest, so that none is postponed forever.
 
-use super::candidates::{Candidates, unseen};
-use super::plan::{Entry, Plan};
-use super::sample::any_side;
+use super::candidates::{Candidates, explore_unknown};
+use super::plan::{Plan, PlannerEntry};
+use super::sample::random_aim;
 use super::search::Search;
 use crate::around::ImplicitSurface;
 use crate::belief::{Belief, HeightField};
 use crate::task::{Aim, Region, Target};
 use palpate_gp::posterior::Scratch;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "travel",
     about: "the largest standard deviations of the next touches, in the order of a short tour",
     zone_only: None,
@@ -45,7 +45,7 @@ impl Travel {
             Some(plan) => plan,
             None => {
                 let places = self.largest(field);
-                let tour = places.into_iter().map(|place| self.search.conclude(field, place));
+                let tour = places.into_iter().map(|place| self.search.plan_at(field, place));
                 self.tour = tour.collect();
                 if let Some(last) = field.targets().last().cloned() {
                     let zone = Region::from(field.zone().clone());
@@ -58,8 +58,8 @@ impl Travel {
         match &plan {
             // Earlier touches of this tour may have removed the variance that this one was planned
             // for.
-            Plan { stall: None, target: Target::Place(place), .. } => {
-                self.search.conclude(field, place.clone())
+            Plan { fallback: None, target: Target::Place(place), .. } => {
+                self.search.plan_at(field, place.clone())
             }
             _ => plan,
         }
@@ -69,7 +69,7 @@ impl Travel {
     /// before.
     fn largest(&self, field: &HeightField) -> Vec<Vec<f64>> {
         let mut places: Vec<Vec<f64>> = Vec::new();
-        let mut known = field.explorable().cloned();
+        let mut known = field.planning_posterior().cloned();
         while let Some(posterior) = &known {
             let (_, place) = self
                 .search
@@ -83,14 +83,14 @@ impl Travel {
     }
 
     fn around(&mut self, surface: &ImplicitSurface) -> Plan {
-        if let Some(aim) = unseen(surface, &mut self.search.rng) {
+        if let Some(aim) = explore_unknown(surface, &mut self.search.rng) {
             return Plan::at(aim);
         }
         if let Some(plan) = self.tour.pop() {
             return plan;
         }
-        let aside = any_side(surface.scope(), &mut self.search.rng);
-        if let Some(candidates) = Candidates::of(surface, &mut self.search.rng) {
+        let aside = random_aim(surface.scope(), &mut self.search.rng);
+        if let Some(candidates) = Candidates::new(surface, &mut self.search.rng) {
             self.tour = self.farthest(surface, &candidates, &aside);
             self.tour.reverse();
         }
@@ -112,7 +112,7 @@ impl Travel {
             let variances = (candidates.all.iter())
                 .map(|candidate| known.variance(candidate.p_w.coords.as_slice(), &mut scratch));
             let plan = candidates.best(variances, aside);
-            let aimed_at = plan.target.aim().filter(|_| plan.stall.is_none());
+            let aimed_at = plan.target.aim().filter(|_| plan.fallback.is_none());
             let Some(place) = aimed_at.map(|aim| aim.p_w.coords) else { break };
             plans.push(plan);
             match known.fantasize([place.as_slice()].into_iter()) {
@@ -123,7 +123,7 @@ impl Travel {
         if plans.is_empty() {
             plans.push(Plan::at(*aside));
         }
-        if let Some(last) = surface.asked().last() {
+        if let Some(last) = surface.aims().last() {
             let ball = Region::from(surface.scope().ball);
             shorten(&mut plans, &Target::from(*last), &|a, b| ball.travel_m(a, b));
         }

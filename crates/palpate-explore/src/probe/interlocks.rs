@@ -1,7 +1,7 @@
 //! Construction of the interlocks of a backend from the robot and the task.
 
 use super::servo::{BEYOND_M, standoff, turning_point};
-use crate::backend::interlock::{InterlockSettings, Interlocked, Site};
+use crate::backend::interlock::{InterlockSettings, Interlocked, SafetyContext};
 use crate::backend::{Backend, Fault};
 use crate::robot::Robot;
 use crate::task::{Region, Task};
@@ -13,7 +13,7 @@ use palpate_geometry::distance::{HalfSpace, OrientedBox};
 ///
 /// # Errors
 /// If the backend drives a different arm.
-pub fn interlocked(
+pub fn with_interlocks(
     body: Box<dyn Backend>,
     robot: &Robot,
     task: &Task,
@@ -46,7 +46,7 @@ pub fn interlocked(
             }
         }
     }
-    let site = Site {
+    let site = SafetyContext {
         robot: robot.clone(),
         tip_w: Some([low, high]),
         farthest,

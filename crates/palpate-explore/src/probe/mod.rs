@@ -37,7 +37,7 @@ pub trait Probe: Send {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault>;
 
     /// The volume found free by the last touch; `None` if unknown.
-    fn swept(&self) -> Option<Swept> {
+    fn swept_volume(&self) -> Option<SweptVolume> {
         None
     }
 
@@ -56,7 +56,7 @@ pub trait Probe: Send {
 /// Volume swept by a touch, which is free: the hull at the end of an approach along the zone's
 /// axis. The hull moved there in a straight line, so no surface lies above its front.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Swept {
+pub struct SweptVolume {
     /// The finger's hull.
     pub finger: Finger,
     /// Centre of the fingertip's hemisphere in `W` at the end of the approach: at rest on the
@@ -64,10 +64,10 @@ pub struct Swept {
     pub p_wt: Point3<f64>,
 }
 
-impl Swept {
+impl SweptVolume {
     /// Returns the upper bound of the surface's height above the datum at each of `places` of
     /// `zone`; `None` where the hull did not pass.
-    pub fn ceilings_m<'a>(
+    pub fn upper_bounds_m<'a>(
         &'a self,
         zone: &'a Zone,
         places: impl Iterator<Item = &'a [f64]> + 'a,
@@ -86,7 +86,7 @@ impl Swept {
 ///
 /// # Errors
 /// [`Fault::Refused`] if a coordinate is not finite.
-pub fn refuse_unless_finite(approach: &Approach) -> Result<(), Fault> {
+pub fn check_finite(approach: &Approach) -> Result<(), Fault> {
     let points = [approach.p_near_w, approach.p_far_w];
     match approach.is_finite() {
         true => Ok(()),

@@ -1,13 +1,15 @@
 //! Design of registration touches: the most informative touches of a known body.
 
-use super::hand_eye::{FELT, HandEyeFit, PARAMETERS, RegistrationTouch, parameters, undetermined};
-use super::known_body::{KnownBody, Outline};
+use super::hand_eye::{
+    HandEyeFit, PARAMETERS, RegistrationTouch, SENSING_PARAMETERS, parameters, undetermined,
+};
+use super::known_body::{CalibrationBody, Outline};
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::control::posture;
 use crate::probe::Probe;
 use crate::probe::servo::{BEYOND_M, Servo};
 use crate::robot::Robot;
-use crate::robot::arm::{Chain, Joints, Kind};
+use crate::robot::arm::{Chain, JointType, Joints};
 use crate::robot::finger::Finger;
 use crate::robot::finger::frame::FRAME_S;
 use crate::task::Approach;
@@ -16,8 +18,8 @@ use nalgebra::{
     DMatrix, Isometry3, Point3, Rotation3, SMatrix, Translation3, UnitQuaternion, UnitVector3,
     Vector3,
 };
-use palpate_gp::math::least_squares::{Problem, foresee, jacobian};
-use palpate_input::error::Invalid;
+use palpate_gp::math::least_squares::{Problem, jacobian, predict_information};
+use palpate_input::error::InputError;
 use rand::Rng;
 use rand::seq::SliceRandom;
 
@@ -120,14 +122,14 @@ impl Design {
     pub fn new(
         robot: &Robot,
         touch: &TouchSettings,
-        body: &KnownBody,
+        body: &CalibrationBody,
         count: usize,
         rng: &mut impl Rng,
-    ) -> Result<Self, Invalid> {
-        if !robot.chain.turns() {
+    ) -> Result<Self, InputError> {
+        if !robot.chain.has_revolute() {
             return Err(unreachable(0, 0, count));
         }
-        let outline = Outline::of(robot);
+        let outline = Outline::new(robot);
         let free_w = free_side(robot, body);
         let mut all = candidates(&outline, robot, body, &free_w, rng);
         let tried = all.len();
@@ -152,8 +154,8 @@ impl Design {
         }
         let chosen = in_order(robot, chosen);
         let ways: Vec<Approach> = chosen.iter().map(Candidate::expected).collect();
-        let mut made = rehearsed(robot, &touch_settings(touch), &ways)
-            .map_err(|fault| Invalid::new(fault.to_string()))?;
+        let mut made = simulate_touches(robot, &touch_settings(touch), &ways)
+            .map_err(|fault| InputError::new(fault.to_string()))?;
         if made.len() < count {
             return Err(unreachable(made.len(), tried, count));
         }
@@ -163,8 +165,8 @@ impl Design {
             .collect();
         let touches: Vec<_> = chosen.iter().map(|candidate| candidate.touch).collect();
         let fit = HandEyeFit::new(&outline, &touches);
-        let foreseen = foresee(&fit, &HandEyeFit::start(*body))
-            .map_err(|error| Invalid::new(error.to_string()))?;
+        let foreseen = predict_information(&fit, &HandEyeFit::start(*body))
+            .map_err(|error| InputError::new(error.to_string()))?;
         let named = parameters(body);
         let sds = std::array::from_fn(|i| foreseen.covariance[(i, i)].sqrt() * named[i].1);
         let lost = undetermined(&foreseen, body);
@@ -180,20 +182,20 @@ impl Design {
     ///
     /// # Errors
     /// If they leave a parameter undetermined, or determine it poorly.
-    pub fn check(&self) -> Result<(), Invalid> {
+    pub fn check(&self) -> Result<(), InputError> {
         // Parameters of the sensing may remain undetermined; the poses must not.
-        let sought = self.undetermined.iter().filter(|name| !FELT.contains(name));
+        let sought = self.undetermined.iter().filter(|name| !SENSING_PARAMETERS.contains(name));
         let lost: Vec<&'static str> = sought.copied().collect();
         if !lost.is_empty() {
             let (touches, lost) = (self.approaches.len(), lost.join(", "));
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "these {touches} touches would not determine {lost}"
             ))
-            .mend("increase --touches"));
+            .remedy("increase --touches"));
         }
         match self.condition <= CONDITION_MAX {
             true => Ok(()),
-            false => Err(Invalid::new(format!(
+            false => Err(InputError::new(format!(
                 "the condition number of these touches is {:.0}; allowed is at most {CONDITION_MAX}",
                 self.condition
             ))),
@@ -201,11 +203,11 @@ impl Design {
     }
 }
 
-fn unreachable(reached: usize, tried: usize, wanted: usize) -> Invalid {
-    Invalid::new(format!(
+fn unreachable(reached: usize, tried: usize, wanted: usize) -> InputError {
+    InputError::new(format!(
         "the robot reaches {reached} of {tried} touches of the body; required are {wanted}"
     ))
-    .mend(
+    .remedy(
         "a finger must be turned to find its pose, which a stage cannot do; move the body closer \
          (--at)",
     )
@@ -213,10 +215,10 @@ fn unreachable(reached: usize, tried: usize, wanted: usize) -> Invalid {
 
 /// Returns the side from which the robot comes: from the body's centre to the fingertip at home; a
 /// plate's normal.
-fn free_side(robot: &Robot, body: &KnownBody) -> UnitVector3<f64> {
+fn free_side(robot: &Robot, body: &CalibrationBody) -> UnitVector3<f64> {
     match body {
-        KnownBody::Plate { normal_w, .. } => *normal_w,
-        KnownBody::Ball { centre_w, .. } => {
+        CalibrationBody::Plate { normal_w, .. } => *normal_w,
+        CalibrationBody::Ball { centre_w, .. } => {
             let home_w = robot.chain.forward(&robot.chain.home).translation.vector;
             UnitVector3::try_new(home_w - centre_w.coords, 0.0).unwrap_or(Vector3::y_axis())
         }
@@ -228,7 +230,7 @@ fn free_side(robot: &Robot, body: &KnownBody) -> UnitVector3<f64> {
 fn candidates(
     outline: &Outline,
     robot: &Robot,
-    body: &KnownBody,
+    body: &CalibrationBody,
     free_w: &UnitVector3<f64>,
     rng: &mut impl Rng,
 ) -> Vec<Candidate> {
@@ -247,7 +249,7 @@ fn candidates(
         let length_m = if site > 0.0 { outline.radius_m() } else { outline.length_m() };
         let (p_t, outward_t) = outline.at(site * length_m, turn);
         let x_wt = pose(body, &side_w, (&p_t, &outward_t), spin)?;
-        let touch = RegistrationTouch { x_wt, pressed_m: 0.0, felt_t: Some(p_t) };
+        let touch = RegistrationTouch { x_wt, pressed_m: 0.0, sensed_t: Some(p_t) };
         let is_meant = outline.nearest(body, &x_wt).1 > -INTO_M;
         is_meant.then(|| {
             let only = [touch];
@@ -264,11 +266,11 @@ fn candidates(
 
 /// Returns directions from the body towards the finger: around the free side of a ball; one for a
 /// plate.
-fn sides(body: &KnownBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f64>> {
-    if let KnownBody::Plate { normal_w, .. } = body {
+fn sides(body: &CalibrationBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f64>> {
+    if let CalibrationBody::Plate { normal_w, .. } = body {
         return vec![*normal_w];
     }
-    let [across, along] = KnownBody::axes(free_w);
+    let [across, along] = CalibrationBody::axes(free_w);
     let circle = |(angle_deg, count): (f64, usize)| {
         (0..count).map(move |i| {
             let (sin, cos) = angle_deg.to_radians().sin_cos();
@@ -283,14 +285,14 @@ fn sides(body: &KnownBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f64>> {
 /// Returns the pose of `T` at which the finger's point with this outward normal touches the body on
 /// `side_w`, rotated by `spin` about that normal; `None` if there is none.
 fn pose(
-    body: &KnownBody,
+    body: &CalibrationBody,
     side_w: &UnitVector3<f64>,
     (p_t, outward_t): (&Point3<f64>, &UnitVector3<f64>),
     spin: f64,
 ) -> Option<Isometry3<f64>> {
     let p_w = match body {
-        KnownBody::Ball { centre_w, radius_m } => centre_w + side_w.scale(*radius_m),
-        KnownBody::Plate { point_w, .. } => *point_w,
+        CalibrationBody::Ball { centre_w, radius_m } => centre_w + side_w.scale(*radius_m),
+        CalibrationBody::Plate { point_w, .. } => *point_w,
     };
     let inward_w = -side_w.into_inner();
     let turn = Rotation3::rotation_between(outward_t, &inward_w)
@@ -304,14 +306,14 @@ fn pose(
 /// Returns the approach to that pose against `side_w`.
 fn approach(x_wt: &Isometry3<f64>, side_w: &UnitVector3<f64>, finger: &Finger) -> Approach {
     let p_wt = Point3::from(x_wt.translation.vector);
-    let [across, _] = KnownBody::axes(side_w);
+    let [across, _] = CalibrationBody::axes(side_w);
     let axes = [across, side_w.into_inner(), across.cross(side_w)];
     let r_wa = Rotation3::from_basis_unchecked(&axes);
     let r_wa = UnitQuaternion::from_rotation_matrix(&r_wa);
     // The servo offsets an approach by the hull's bulge and radius.
     let ahead_m = [finger.bulge_m() - MARGIN_M, MARGIN_M - finger.radius_m];
     let [p_near_w, p_far_w] = ahead_m.map(|ahead_m| p_wt - side_w.scale(ahead_m));
-    Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation, around: None }
+    Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation, obstacle: None }
 }
 
 /// Whether `robot` has a posture at both ends of the approach.
@@ -343,7 +345,7 @@ fn in_order(robot: &Robot, mut left: Vec<Candidate>) -> Vec<Candidate> {
 }
 
 /// A purely kinematic arm: no mass, no object, no sensor.
-struct Rehearsal {
+struct KinematicArm {
     chain: Chain,
     capabilities: Capabilities,
     q: Joints,
@@ -353,9 +355,9 @@ struct Rehearsal {
 /// Its control period; a heuristic: sufficient for a resolved-rate controller, not for a servo.
 const PERIOD_S: f64 = 0.01;
 
-impl Rehearsal {
+impl KinematicArm {
     fn new(chain: &Chain) -> Self {
-        let capabilities = Capabilities::of(chain, PERIOD_S);
+        let capabilities = Capabilities::simulated(chain, PERIOD_S);
         let (chain, q, reading) = (chain.clone(), chain.home, Reading::default());
         Self { chain, capabilities, q, reading }
     }
@@ -370,7 +372,7 @@ impl Rehearsal {
     }
 }
 
-impl Backend for Rehearsal {
+impl Backend for KinematicArm {
     fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }
@@ -399,19 +401,19 @@ const SLACK_RAD: f64 = 0.25;
 ///
 /// # Errors
 /// If the robot cannot be driven at all.
-fn rehearsed(
+fn simulate_touches(
     robot: &Robot,
     touch: &TouchSettings,
     approaches: &[Approach],
 ) -> Result<Vec<usize>, Fault> {
     let mut robot = robot.clone();
-    for joint in robot.chain.joints.iter_mut().filter(|joint| joint.kind == Kind::Revolute) {
+    for joint in robot.chain.joints.iter_mut().filter(|joint| joint.kind == JointType::Revolute) {
         joint.q_limits = [joint.q_limits[0] + SLACK_RAD, joint.q_limits[1] - SLACK_RAD];
     }
     // Simulated with the servo that will make them, on the arm's kinematics alone.
     let mut left: Vec<usize> = (0..approaches.len()).collect();
     'again: loop {
-        let body = Box::new(Rehearsal::new(&robot.chain));
+        let body = Box::new(KinematicArm::new(&robot.chain));
         let mut servo = Servo::new(robot.clone(), touch.clone(), body, 0)?;
         for at in 0..left.len() {
             if servo.touch(&approaches[left[at]]).is_err() {

@@ -7,7 +7,7 @@
 //! only weakly, by the corner of its tip. There, the side of contact according to the electrodes is
 //! used too, with a fitted gain, within the region where a finger is mirror-symmetric.
 
-use super::known_body::{KnownBody, Outline};
+use super::known_body::{CalibrationBody, Outline};
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::least_squares::{Problem, Solution};
 
@@ -19,16 +19,16 @@ pub struct RegistrationTouch {
     /// Depth of that pose beyond the detection of contact.
     pub pressed_m: f64,
     /// Contact located by the sensor, in its own `T`; `None` if it was not located.
-    pub felt_t: Option<Point3<f64>>,
+    pub sensed_t: Option<Point3<f64>>,
 }
 
 /// Estimate from touches of a known body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HandEye {
+pub struct HandEyeEstimate {
     /// Pose of the actual `T` in the `T` of the kinematics.
     pub correction: Isometry3<f64>,
     /// Pose of the body.
-    pub body: KnownBody,
+    pub body: CalibrationBody,
     /// Indentation of the finger before contact is detected; see [`Outline::meet`].
     pub give_m: f64,
     /// Gain of the lateral contact position: measured over actual.
@@ -39,7 +39,7 @@ pub struct HandEye {
 
 /// Number of fitted parameters: three each for the finger's position, its rotation and the body,
 /// and three for the sensing.
-pub const PARAMETERS: usize = 6 + KnownBody::PARAMETERS + 3;
+pub const PARAMETERS: usize = 6 + CalibrationBody::PARAMETERS + 3;
 
 /// Plausible position error of the finger on its mount; a heuristic: assembled by hand.
 const FINGER_M: f64 = 0.01;
@@ -78,15 +78,15 @@ impl<'a> HandEyeFit<'a> {
     pub fn new(outline: &'a Outline, touches: &'a [RegistrationTouch]) -> Self {
         let limit_m = ASKED * outline.radius_m();
         let felt = touches.iter().enumerate().filter_map(|(i, touch)| {
-            let aside_m = touch.felt_t?.y;
+            let aside_m = touch.sensed_t?.y;
             (aside_m.abs() <= limit_m).then_some((i, aside_m))
         });
         Self { outline, felt: felt.collect(), touches }
     }
 
     /// Returns the initial estimate.
-    pub fn start(body: KnownBody) -> HandEye {
-        HandEye {
+    pub fn start(body: CalibrationBody) -> HandEyeEstimate {
+        HandEyeEstimate {
             correction: Isometry3::identity(),
             body,
             give_m: START_M,
@@ -97,18 +97,18 @@ impl<'a> HandEyeFit<'a> {
 }
 
 impl Problem for HandEyeFit<'_> {
-    type State = HandEye;
+    type State = HandEyeEstimate;
 
     fn parameters(&self) -> usize {
         PARAMETERS
     }
 
-    fn moved(&self, state: &HandEye, step: &DVector<f64>) -> HandEye {
+    fn moved(&self, state: &HandEyeEstimate, step: &DVector<f64>) -> HandEyeEstimate {
         let [place, turn, body] =
             [0, 3, 6].map(|i| Vector3::new(step[i], step[i + 1], step[i + 2]));
         let turn = UnitQuaternion::from_scaled_axis(turn * FINGER_RAD);
         let place = state.correction.translation.vector + place * FINGER_M;
-        HandEye {
+        HandEyeEstimate {
             correction: Isometry3::from_parts(
                 Translation3::from(place),
                 turn * state.correction.rotation,
@@ -122,10 +122,10 @@ impl Problem for HandEyeFit<'_> {
 
     /// Returns the residuals: the depth of each touch, the lateral position where used, and the
     /// deviation from plausible values.
-    fn residuals(&self, state: &HandEye) -> DVector<f64> {
+    fn residuals(&self, state: &HandEyeEstimate) -> DVector<f64> {
         let meetings = self.touches.iter().map(|touch| {
             let x_wt = touch.x_wt * state.correction;
-            self.outline.meet(&state.body, &x_wt, state.give_m)
+            self.outline.contact(&state.body, &x_wt, state.give_m)
         });
         let meetings: Vec<(Point3<f64>, f64)> = meetings.collect();
         let depths = (meetings.iter().zip(self.touches))
@@ -148,10 +148,10 @@ impl Problem for HandEyeFit<'_> {
 }
 
 /// Names of the sensing parameters.
-pub const FELT: [&str; 3] = ["give", "gain", "lateral offset"];
+pub const SENSING_PARAMETERS: [&str; 3] = ["give", "gain", "lateral offset"];
 
 /// Returns the name of each parameter and the unit of its step in m, rad or 1.
-pub fn parameters(body: &KnownBody) -> [(&'static str, f64); PARAMETERS] {
+pub fn parameters(body: &CalibrationBody) -> [(&'static str, f64); PARAMETERS] {
     let ([a, b, c], units) = (body.names(), body.units());
     [
         ("finger x", FINGER_M),
@@ -163,9 +163,9 @@ pub fn parameters(body: &KnownBody) -> [(&'static str, f64); PARAMETERS] {
         (a, units[0]),
         (b, units[1]),
         (c, units[2]),
-        (FELT[0], GIVE_M),
-        (FELT[1], GAIN),
-        (FELT[2], ASIDE_M),
+        (SENSING_PARAMETERS[0], GIVE_M),
+        (SENSING_PARAMETERS[1], GAIN),
+        (SENSING_PARAMETERS[2], ASIDE_M),
     ]
 }
 
@@ -174,7 +174,7 @@ pub fn parameters(body: &KnownBody) -> [(&'static str, f64); PARAMETERS] {
 const LOST: f64 = 0.05;
 
 /// Returns the parameters that a fit leaves undetermined.
-pub fn undetermined(fit: &Solution<HandEye>, body: &KnownBody) -> Vec<&'static str> {
+pub fn undetermined(fit: &Solution<HandEyeEstimate>, body: &CalibrationBody) -> Vec<&'static str> {
     let lost = |i: usize| {
         fit.undetermined.iter().map(|direction| direction[i].powi(2)).sum::<f64>() > LOST
     };
@@ -183,6 +183,6 @@ pub fn undetermined(fit: &Solution<HandEye>, body: &KnownBody) -> Vec<&'static s
 }
 
 /// Returns the depth residuals of a fit, one per touch, m.
-pub fn depths_m(fit: &Solution<HandEye>, touches: usize) -> Vec<f64> {
+pub fn depths_m(fit: &Solution<HandEyeEstimate>, touches: usize) -> Vec<f64> {
     fit.residuals.iter().take(touches).map(|r| r * DEPTH_SD_M).collect()
 }

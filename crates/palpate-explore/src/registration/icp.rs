@@ -4,12 +4,12 @@ use super::register::pose_table;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_gp::math::least_squares::{FitError, Problem, Solution, fit};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use toml_edit::{Array, DocumentMut, Table, value};
 
 /// Estimated pose of the mesh.
 #[derive(Clone, Debug)]
-pub struct Aligned {
+pub struct IcpResult {
     /// Pose of the mesh's frame in that of the cloud.
     pub x_wo: Isometry3<f64>,
     /// Standard deviation of its position along each axis, m, then of its rotation about each axis
@@ -28,7 +28,7 @@ pub struct Aligned {
     pub rounds: usize,
 }
 
-impl Aligned {
+impl IcpResult {
     /// Returns the keys of a scene's `[object]` with their uncertainty, as TOML.
     pub fn tables(&self) -> String {
         let [a, b, c, d, e, f] = self.sds;
@@ -114,10 +114,10 @@ pub fn align(
     mesh: &MeshBvh,
     points_w: &[Point3<f64>],
     start: &Isometry3<f64>,
-) -> Result<Aligned, Invalid> {
+) -> Result<IcpResult, InputError> {
     if points_w.len() < LEAST {
         let count = points_w.len();
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "the cloud has {count} points; at least {LEAST} are needed"
         )));
     }
@@ -127,7 +127,7 @@ pub fn align(
     for round in 1..=ROUNDS {
         let planes_o = points_w.iter().map(|p_w| plane(mesh, &x_wo.inverse_transform_point(p_w)));
         let problem = Planes { points_w, planes_o: planes_o.collect(), middle_o };
-        let fitted = fit(&problem, &x_wo).map_err(|error| Invalid::new(error.to_string()))?;
+        let fitted = fit(&problem, &x_wo).map_err(|error| InputError::new(error.to_string()))?;
         let step = x_wo.inverse() * fitted.state;
         let moved = (step * middle_o - middle_o).norm() / size_m + step.rotation.angle();
         x_wo = fitted.state;
@@ -135,7 +135,7 @@ pub fn align(
             return Ok(told(&problem, &fitted, mesh, round));
         }
     }
-    Err(Invalid::new(FitError::Unsettled.to_string()))
+    Err(InputError::new(FitError::Unsettled.to_string()))
 }
 
 /// Returns the plane through the mesh's point nearest to `p_o`: orthogonal to the connecting line,
@@ -152,7 +152,7 @@ fn told(
     fitted: &Solution<Isometry3<f64>>,
     mesh: &MeshBvh,
     rounds: usize,
-) -> Aligned {
+) -> IcpResult {
     let x_wo = fitted.state;
     let distances = problem
         .points_w
@@ -163,7 +163,7 @@ fn told(
     let distances: Vec<f64> = distances.collect();
     let squares: f64 = distances.iter().map(|m| m * m).sum();
     let unit = |i: usize| if i < 3 { PLACE_M } else { TURN_RAD };
-    Aligned {
+    IcpResult {
         x_wo,
         sds: std::array::from_fn(|i| fitted.covariance[(i, i)].sqrt() * unit(i)),
         undetermined: fitted.undetermined.clone(),

@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Pose of a known body in `W`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum KnownBody {
+pub enum CalibrationBody {
     /// A ball.
     Ball {
         /// Centre.
@@ -30,7 +30,7 @@ pub enum KnownBody {
 const PLACE_M: f64 = 0.01;
 const TURN_RAD: f64 = 0.1;
 
-impl KnownBody {
+impl CalibrationBody {
     /// Number of pose parameters.
     pub const PARAMETERS: usize = 3;
 
@@ -140,7 +140,7 @@ struct Sample {
 
 impl Outline {
     /// Creates the outline: a BioTac's for a soft finger, the hull for a rigid one.
-    pub fn of(robot: &Robot) -> Self {
+    pub fn new(robot: &Robot) -> Self {
         let profile = match robot.is_soft {
             true => Profile::biotac(&robot.finger),
             false => Profile::capsule(&robot.finger),
@@ -161,7 +161,7 @@ impl Outline {
         let [x_m, turn] = place;
         let [along, around] = self.edges(x_m, turn, [0.5 * self.steps[0], 0.5 * self.steps[1]]);
         let (start, direction) = self.profile.ray(x_m, turn);
-        let wet = self.profile.layers(start.x, &direction).wet;
+        let wet = self.profile.layers(start.x, &direction).has_fluid;
         let area_m2 = along.cross(&around).norm();
         Sample { place, p_t: self.profile.skin_t(x_m, turn), area_m2, wet }
     }
@@ -191,7 +191,12 @@ impl Outline {
     /// A soft finger indicates contact at a certain displaced volume of fluid: that which a sphere
     /// of its own radius displaces at this indentation, V = π r give². Therefore a blunt site is
     /// indented less than a sharp one. A rigid finger has the same value everywhere.
-    pub fn meet(&self, body: &KnownBody, x_wt: &Isometry3<f64>, give_m: f64) -> (Point3<f64>, f64) {
+    pub fn contact(
+        &self,
+        body: &CalibrationBody,
+        x_wt: &Isometry3<f64>,
+        give_m: f64,
+    ) -> (Point3<f64>, f64) {
         match self.is_soft {
             true => self.meet_soft(body, x_wt, give_m),
             false => {
@@ -205,7 +210,7 @@ impl Outline {
     /// distance).
     fn meet_soft(
         &self,
-        body: &KnownBody,
+        body: &CalibrationBody,
         x_wt: &Isometry3<f64>,
         give_m: f64,
     ) -> (Point3<f64>, f64) {
@@ -244,7 +249,7 @@ impl Outline {
 
     /// Returns the outline's point nearest to `body` for the fingertip pose `x_wt`, and its signed
     /// distance; negative inside.
-    pub fn nearest(&self, body: &KnownBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
+    pub fn nearest(&self, body: &CalibrationBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
         let far = |p_t: &Point3<f64>| body.distance_m(&(x_wt * p_t));
         let first = |best: ([f64; 2], f64), point: &Sample| {
             let distance_m = far(&point.p_t);

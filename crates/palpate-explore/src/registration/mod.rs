@@ -11,6 +11,6 @@ mod known_body;
 mod register;
 
 pub use design::Design;
-pub use hand_eye::{HandEye, HandEyeFit, RegistrationTouch};
-pub use known_body::{KnownBody, Outline};
-pub use register::{Registered, conclude, register};
+pub use hand_eye::{HandEyeEstimate, HandEyeFit, RegistrationTouch};
+pub use known_body::{CalibrationBody, Outline};
+pub use register::{RegistrationResult, conclude, register};

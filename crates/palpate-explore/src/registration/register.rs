@@ -2,9 +2,9 @@
 
 use super::design::{Design, pressed_m};
 use super::hand_eye::{
-    HandEye, HandEyeFit, PARAMETERS, RegistrationTouch, depths_m, parameters, undetermined,
+    HandEyeEstimate, HandEyeFit, PARAMETERS, RegistrationTouch, depths_m, parameters, undetermined,
 };
-use super::known_body::{KnownBody, Outline};
+use super::known_body::{CalibrationBody, Outline};
 use crate::backend::Fault;
 use crate::probe::{Probe, Touch};
 use crate::robot::Robot;
@@ -12,14 +12,14 @@ use crate::task::touch::TouchSettings;
 use nalgebra::Isometry3;
 use palpate_gp::math::least_squares::fit;
 use palpate_gp::math::pose::parts;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use toml_edit::{Array, DocumentMut, Item, Table, value};
 
 /// Result of a registration by touch.
 #[derive(Clone, Debug)]
-pub struct Registered {
+pub struct RegistrationResult {
     /// Pose of the finger on its mount, pose of the body, and the skin's indentation.
-    pub found: HandEye,
+    pub found: HandEyeEstimate,
     /// Standard deviation of each of [`parameters`], in its own unit.
     pub sds: [f64; PARAMETERS],
     /// Parameters that the touches did not determine; they keep their initial values.
@@ -38,7 +38,7 @@ pub struct Registered {
     pub ended: Option<Fault>,
 }
 
-impl Registered {
+impl RegistrationResult {
     /// Returns the pose of `T` at the end of the mount, for `arm.tool_position_m` and
     /// `arm.tool_rotation_deg`; `before` is their value during the touches.
     pub fn tool(&self, before: Option<Isometry3<f64>>) -> Isometry3<f64> {
@@ -95,9 +95,9 @@ pub fn register(
     probe: &mut dyn Probe,
     robot: &Robot,
     touch: &TouchSettings,
-    (body, design): (&KnownBody, &Design),
+    (body, design): (&CalibrationBody, &Design),
     made: &mut dyn FnMut(&Touch),
-) -> Result<Registered, Invalid> {
+) -> Result<RegistrationResult, InputError> {
     let of = design.approaches.len();
     let pressed_m = pressed_m(robot, touch);
     let mut touches = Vec::with_capacity(of);
@@ -114,26 +114,26 @@ pub fn register(
         made_count += 1;
         if let Touch::Contact(contact) = &ending {
             let x_wt = probe.tip().ok_or_else(|| {
-                Invalid::new("this probe does not report the pose of its finger at contact")
+                InputError::new("this probe does not report the pose of its finger at contact")
             })?;
             let felt_t = Some(x_wt.inverse_transform_point(&contact.p_wc));
-            touches.push(RegistrationTouch { x_wt, pressed_m, felt_t });
+            touches.push(RegistrationTouch { x_wt, pressed_m, sensed_t: felt_t });
         }
     }
     let least = PARAMETERS;
     if touches.len() < least {
         return Err(match ended {
             Some((touch, fault)) => {
-                Invalid::new(fault.to_string()).at(format!("touch {touch} of {of}"))
+                InputError::new(fault.to_string()).at(format!("touch {touch} of {of}"))
             }
-            None => Invalid::new(format!(
+            None => InputError::new(format!(
                 "{} of {of} touches made contact with the body; at least {least} are needed; check --at",
                 touches.len()
             )),
         });
     }
     let told = conclude(&touches, robot, body, made_count)?;
-    Ok(Registered { ended: ended.map(|(_, fault)| fault), ..told })
+    Ok(RegistrationResult { ended: ended.map(|(_, fault)| fault), ..told })
 }
 
 /// Fits the poses to `touches`, of `of` that were made.
@@ -143,19 +143,19 @@ pub fn register(
 pub fn conclude(
     touches: &[RegistrationTouch],
     robot: &Robot,
-    body: &KnownBody,
+    body: &CalibrationBody,
     of: usize,
-) -> Result<Registered, Invalid> {
-    let outline = Outline::of(robot);
+) -> Result<RegistrationResult, InputError> {
+    let outline = Outline::new(robot);
     let problem = HandEyeFit::new(&outline, touches);
     let fitted = fit(&problem, &HandEyeFit::start(*body))
-        .map_err(|error| Invalid::new(error.to_string()))?;
+        .map_err(|error| InputError::new(error.to_string()))?;
     let named = parameters(body);
     let depths_m = depths_m(&fitted, touches.len());
     let used: Vec<f64> =
         depths_m.iter().zip(&fitted.used).filter(|(_, used)| **used).map(|(m, _)| *m).collect();
     let squares: f64 = used.iter().map(|m| m * m).sum();
-    Ok(Registered {
+    Ok(RegistrationResult {
         found: fitted.state,
         sds: std::array::from_fn(|i| fitted.covariance[(i, i)].sqrt() * named[i].1),
         undetermined: undetermined(&fitted, body),

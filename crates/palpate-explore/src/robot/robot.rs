@@ -1,6 +1,6 @@
 //! Robot: an arm with a finger.
 
-use super::arm::{Chain, LinkCapsule, Part};
+use super::arm::{Chain, LinkCapsule, RobotPart};
 use super::finger::Finger;
 use nalgebra::Point3;
 
@@ -27,8 +27,8 @@ impl Robot {
         let on_flange = |z_m: f64| chain.flange * Point3::new(0.0, 0.0, z_m);
         let link = chain.joints.len();
         let parts = [
-            ("tool", Part::Tool, 0.0, heel_m, 2.0),
-            ("finger", Part::Finger, heel_m, mount_m, 1.0),
+            ("tool", RobotPart::Tool, 0.0, heel_m, 2.0),
+            ("finger", RobotPart::Finger, heel_m, mount_m, 1.0),
         ];
         all.extend(parts.map(|(name, part, from_m, to_m, times)| LinkCapsule {
             name: name.into(),

@@ -4,7 +4,7 @@
 use super::target::Aim;
 use crate::robot::Finger;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
@@ -29,7 +29,7 @@ pub struct Approach {
     pub r_at: UnitQuaternion<f64>,
     /// Ball between this approach and others; `None` if the finger moves straight from one to the
     /// next.
-    pub around: Option<Ball>,
+    pub obstacle: Option<Ball>,
 }
 
 impl Approach {
@@ -62,7 +62,7 @@ impl Approach {
 /// Table `[around]`: the ball to explore around a whole object, instead of a zone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct Around {
+pub struct WholeObject {
     /// Centre of the ball in `W`; default in simulation: centre of the object's box. Required
     /// for a real robot.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -83,17 +83,17 @@ pub const RADIUS_M: RangeInclusive<f64> = 1e-4..=10.0;
 /// Largest distance of a ball's centre; far beyond any arm's reach.
 const REACH_M: f64 = 1e3;
 
-impl Checked for Around {
+impl Validate for WholeObject {
     fn check(&self, rules: &mut Rules) {
         if let Some(centre_m) = self.centre_m {
             rules.numbers("centre_m", &centre_m, -REACH_M..=REACH_M);
         }
-        rules.given("radius_m", self.radius_m, RADIUS_M);
-        rules.given("lowest_m", self.lowest_m, -REACH_M..=REACH_M);
+        rules.optional_number("radius_m", self.radius_m, RADIUS_M);
+        rules.optional_number("lowest_m", self.lowest_m, -REACH_M..=REACH_M);
     }
 }
 
-impl Around {
+impl WholeObject {
     /// Returns the ball, if centre and radius are given.
     pub fn ball(&self) -> Option<Ball> {
         let centre_w = self.centre_m?.into();
@@ -122,7 +122,7 @@ const ROOMIER: f64 = 1.1;
 
 impl Ball {
     /// Returns a ball around a box given by its lowest and highest corner, with a margin.
-    pub fn about([low, high]: [Point3<f64>; 2], lowest_m: Option<f64>) -> Self {
+    pub fn around_box([low, high]: [Point3<f64>; 2], lowest_m: Option<f64>) -> Self {
         let radius_m = ROOMIER * (high - low).norm() / 2.0;
         Self { centre_w: nalgebra::center(&low, &high), radius_m, lowest_m }
     }
@@ -138,7 +138,7 @@ impl Ball {
     /// ball; both are those of the nearest point if the line misses the ball.
     pub fn chord_m(&self, aim: &Aim) -> [f64; 2] {
         let to_centre_w = self.centre_w - aim.p_w;
-        let along_m = to_centre_w.dot(&aim.ahead_w);
+        let along_m = to_centre_w.dot(&aim.direction_w);
         let beside2 = to_centre_w.norm_squared() - along_m * along_m;
         let half_m = (self.radius_m * self.radius_m - beside2).max(0.0).sqrt();
         [along_m - half_m, along_m + half_m]
@@ -153,16 +153,18 @@ impl Ball {
     /// its y, the reverse of the approach's direction.
     pub fn approach(&self, aim: &Aim, finger: &Finger, standoff_m: f64, roll_rad: f64) -> Approach {
         let roll = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll_rad);
-        let r_wa = attitude(&aim.ahead_w) * roll;
-        let ahead_w = aim.ahead_w.into_inner();
+        let r_wa = attitude(&aim.direction_w) * roll;
+        let ahead_w = aim.direction_w.into_inner();
         let [near_m, mut far_m] = self.chord_m(aim);
-        if let Some(room_m) = self.room_m(&aim.p_w, finger, &r_wa).filter(|_| ahead_w.z < 0.0) {
+        if let Some(room_m) =
+            self.height_above_lowest_m(&aim.p_w, finger, &r_wa).filter(|_| ahead_w.z < 0.0)
+        {
             let turns_m = room_m / -ahead_w.z;
             far_m = far_m.min(turns_m - finger.radius_m - BEYOND_M);
         }
         let [p_near_w, p_far_w] = [near_m, far_m].map(|way_m| aim.p_w + ahead_w * way_m);
         let around = Some(self.keep_out(finger, standoff_m));
-        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), around }
+        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), obstacle: around }
     }
 
     /// Returns the ball that a fingertip stays out of between approaches, to keep the stand-off.
@@ -173,7 +175,7 @@ impl Ball {
     /// Returns the point at which the straight line to `p_w` along `ahead_w` enters the ball; the
     /// point nearest to the centre, if it misses the ball.
     pub fn entrance_w(&self, p_w: &Point3<f64>, ahead_w: &UnitVector3<f64>) -> Point3<f64> {
-        p_w + ahead_w.scale(self.chord_m(&Aim { p_w: *p_w, ahead_w: *ahead_w })[0])
+        p_w + ahead_w.scale(self.chord_m(&Aim { p_w: *p_w, direction_w: *ahead_w })[0])
     }
 
     /// Depth of `p_w` in the ball; negative outside.
@@ -183,7 +185,7 @@ impl Ball {
 
     /// Height of the hull above the lowest z with the tip at `p_wt`; `None` if there is no lowest
     /// z.
-    fn room_m(
+    fn height_above_lowest_m(
         &self,
         p_wt: &Point3<f64>,
         finger: &Finger,
@@ -196,10 +198,11 @@ impl Ball {
     /// reaches the aim's point.
     pub fn is_free(&self, aim: &Aim, approach: &Approach, finger: &Finger) -> bool {
         let ahead_w = approach.direction_w();
-        let keep_out = approach.around.as_ref();
+        let keep_out = approach.obstacle.as_ref();
         let start_w = keep_out.map_or(approach.p_near_w, |out| out.entrance_w(&aim.p_w, &ahead_w));
-        let sets_out =
-            self.room_m(&start_w, finger, &approach.r_wa).is_none_or(|room_m| room_m >= 0.0);
+        let sets_out = self
+            .height_above_lowest_m(&start_w, finger, &approach.r_wa)
+            .is_none_or(|room_m| room_m >= 0.0);
         // At the turning point, the hull's front is beyond the far end by this distance.
         let arrives = (approach.p_far_w - aim.p_w).dot(&ahead_w) + BEYOND_M >= 0.0;
         sets_out && (arrives || self.lowest_m.is_none())
@@ -235,10 +238,10 @@ mod tests {
             let ball = Ball { centre_w, radius_m: 0.9, lowest_m: None };
             let aim = Aim::against(centre_w + Vector3::from(at), &-ahead_w);
             let approach = ball.approach(&aim, &Finger::default(), 0.01, 0.0);
-            prop_assert!((approach.direction_w().into_inner() - *aim.ahead_w).norm() < 1e-9);
+            prop_assert!((approach.direction_w().into_inner() - *aim.direction_w).norm() < 1e-9);
             let way = approach.p_far_w - approach.p_near_w;
-            prop_assert!((way.normalize() - *aim.ahead_w).norm() < 1e-9);
-            let beside = (aim.p_w - approach.p_near_w).cross(&aim.ahead_w);
+            prop_assert!((way.normalize() - *aim.direction_w).norm() < 1e-9);
+            let beside = (aim.p_w - approach.p_near_w).cross(&aim.direction_w);
             prop_assert!(beside.norm() < 1e-12);
             for end in [approach.p_near_w, approach.p_far_w] {
                 prop_assert!(((end - centre_w).norm() - 0.9).abs() < 1e-9);

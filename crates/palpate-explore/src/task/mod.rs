@@ -7,7 +7,7 @@ mod task;
 pub mod touch;
 pub mod zone;
 
-pub use approach::{Approach, Around, Ball, RADIUS_M};
+pub use approach::{Approach, Ball, RADIUS_M, WholeObject};
 pub use target::{Aim, Target};
 pub use task::{DIRECTIONS, Region, Task};
 pub use zone::Zone;

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// A target: the next touch as selected by a planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(into = "Written", try_from = "Read")]
-#[schemars(with = "Written")]
+#[serde(into = "TargetOut", try_from = "TargetIn")]
+#[schemars(with = "TargetOut")]
 pub enum Target {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
@@ -37,7 +37,9 @@ impl Target {
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Place(place) => place.clone(),
-            Self::Aim(aim) => aim.p_w.coords.iter().chain(aim.ahead_w.iter()).copied().collect(),
+            Self::Aim(aim) => {
+                aim.p_w.coords.iter().chain(aim.direction_w.iter()).copied().collect()
+            }
         }
     }
 
@@ -82,7 +84,7 @@ pub struct Aim {
     /// The point, in `W`.
     pub p_w: Point3<f64>,
     /// Direction of the approach, in `W`.
-    pub ahead_w: UnitVector3<f64>,
+    pub direction_w: UnitVector3<f64>,
 }
 
 impl Aim {
@@ -90,7 +92,7 @@ impl Aim {
     /// length zero.
     pub fn against(p_w: Point3<f64>, outward_w: &Vector3<f64>) -> Self {
         let down_w = -Vector3::z_axis();
-        Self { p_w, ahead_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
+        Self { p_w, direction_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
     }
 
     /// Returns an aim at the point `p_w` along `ahead_w`, unchanged if its length is 1. Returns
@@ -103,14 +105,14 @@ impl Aim {
             true => UnitVector3::new_unchecked(ahead_w),
             false => UnitVector3::try_new(ahead_w, 1e-6)?,
         };
-        is_finite.then_some(Self { p_w, ahead_w })
+        is_finite.then_some(Self { p_w, direction_w: ahead_w })
     }
 }
 
 /// A target as written in a row.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum Written {
+enum TargetOut {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
     /// An approach to a whole object.
@@ -122,11 +124,11 @@ enum Written {
     },
 }
 
-impl From<Target> for Written {
+impl From<Target> for TargetOut {
     fn from(target: Target) -> Self {
         match target {
             Target::Place(place) => Self::Place(place),
-            Target::Aim(Aim { p_w, ahead_w }) => {
+            Target::Aim(Aim { p_w, direction_w: ahead_w }) => {
                 Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
             }
         }
@@ -136,24 +138,24 @@ impl From<Target> for Written {
 /// A target as read from a row: version 0.1 wrote its numbers without a name.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Read {
-    Written(Written),
+enum TargetIn {
+    Written(TargetOut),
     Numbers(Vec<f64>),
 }
 
-impl TryFrom<Read> for Target {
+impl TryFrom<TargetIn> for Target {
     type Error = String;
 
-    fn try_from(read: Read) -> Result<Self, String> {
+    fn try_from(read: TargetIn) -> Result<Self, String> {
         match read {
-            Read::Written(Written::Place(place)) => Ok(Self::Place(place)),
-            Read::Written(Written::Aim { p_w, ahead_w }) => {
+            TargetIn::Written(TargetOut::Place(place)) => Ok(Self::Place(place)),
+            TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
                 let aim = Aim::along(p_w, ahead_w);
                 aim.map(Self::Aim).ok_or_else(|| {
                     format!("the direction {ahead_w:?} has length zero or is not finite")
                 })
             }
-            Read::Numbers(numbers) => Self::from_numbers(&numbers)
+            TargetIn::Numbers(numbers) => Self::from_numbers(&numbers)
                 .ok_or_else(|| format!("a target has 1, 2 or 6 numbers, not {}", numbers.len())),
         }
     }
@@ -194,6 +196,6 @@ mod tests {
         assert!(Aim::along([0.0; 3], [0.0; 3]).is_none());
         assert!(Aim::along([0.0; 3], [0.0, 0.0, f64::NAN]).is_none());
         assert!(Target::from_numbers(&[0.0; 3]).is_none());
-        assert_eq!(*Aim::along([0.0; 3], [0.0, 0.0, -2.0]).unwrap().ahead_w, -Vector3::z());
+        assert_eq!(*Aim::along([0.0; 3], [0.0, 0.0, -2.0]).unwrap().direction_w, -Vector3::z());
     }
 }

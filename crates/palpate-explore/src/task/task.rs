@@ -7,7 +7,7 @@ use super::zone::Zone;
 use crate::robot::Finger;
 use nalgebra::{UnitVector3, Vector3};
 use palpate_geometry::spread::directions;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
@@ -54,7 +54,7 @@ impl Region {
                 from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
             }
             (Self::Ball(ball), Target::Aim(from), Target::Aim(to)) => {
-                let entrance_w = |aim: &Aim| aim.p_w + aim.ahead_w.scale(ball.chord_m(aim)[0]);
+                let entrance_w = |aim: &Aim| aim.p_w + aim.direction_w.scale(ball.chord_m(aim)[0]);
                 (entrance_w(from) - entrance_w(to)).norm()
             }
             _ => 0.0,
@@ -102,10 +102,10 @@ impl Task {
         region: impl Into<Region>,
         touch: TouchSettings,
         finger: &Finger,
-    ) -> Result<Self, Invalid> {
+    ) -> Result<Self, InputError> {
         let region = region.into();
         let depth_m = match &region {
-            Region::Zone(zone) => zone.depth_m.ok_or_else(|| Invalid::new(NO_DEPTH))?,
+            Region::Zone(zone) => zone.depth_m.ok_or_else(|| InputError::new(NO_DEPTH))?,
             Region::Ball(_) => [0.0; 2],
         };
         let (finger, cells) = (finger.clone(), cells());
@@ -153,19 +153,19 @@ impl Task {
     }
 
     /// Whether the finger can reach the aim's point of the ball.
-    pub fn reaches(&self, aim: &Aim) -> bool {
+    pub fn is_reachable(&self, aim: &Aim) -> bool {
         self.contains(&Target::Aim(*aim))
     }
 
     /// Approximates [`reaches`](Self::reaches) for this direction and the ball's centre: computed
     /// once per cell of directions, for use in searches. Always true without a limit of reach and a
     /// lowest z.
-    pub fn may_reach(&self, aim: &Aim) -> bool {
+    pub fn is_probably_reachable(&self, aim: &Aim) -> bool {
         let Some(ball) = self.ball() else { return false };
         if self.reach.is_none() && ball.lowest_m.is_none() {
             return true;
         }
-        let cell = cell(&-aim.ahead_w.into_inner());
+        let cell = cell(&-aim.direction_w.into_inner());
         let find = || self.over(ball, &Aim::against(ball.centre_w, &middle(cell))).is_some();
         self.cells.get(cell).is_some_and(|found| *found.get_or_init(find))
     }
@@ -174,8 +174,9 @@ impl Task {
     /// the ball's centre.
     pub fn unreached(&self, of: usize) -> Vec<UnitVector3<f64>> {
         let Some(ball) = self.ball() else { return Vec::new() };
-        let is_missed =
-            |outward_w: &UnitVector3<f64>| !self.reaches(&Aim::against(ball.centre_w, outward_w));
+        let is_missed = |outward_w: &UnitVector3<f64>| {
+            !self.is_reachable(&Aim::against(ball.centre_w, outward_w))
+        };
         directions(of).filter(is_missed).collect()
     }
 
@@ -189,7 +190,7 @@ impl Task {
                 let [p_near_w, p_far_w] =
                     self.depth_m.map(|depth_m| x_wz * zone.local(place, -depth_m));
                 let (r_wa, r_at) = (x_wz.rotation, self.finger.r_at());
-                Some(Approach { p_near_w, p_far_w, r_wa, r_at, around: None })
+                Some(Approach { p_near_w, p_far_w, r_wa, r_at, obstacle: None })
             }
             (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
             _ => None,

@@ -3,7 +3,7 @@
 use crate::robot::finger::Detection;
 use crate::robot::finger::contact_point::ContactEstimate;
 use crate::robot::finger::frame::FRAME_S;
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -84,9 +84,9 @@ impl TouchSettings {
     }
 }
 
-impl Checked for TouchSettings {
+impl Validate for TouchSettings {
     fn check(&self, rules: &mut Rules) {
-        rules.given("period_s", self.period_s, 1e-4..=0.1);
+        rules.optional_number("period_s", self.period_s, 1e-4..=0.1);
         rules.number("travel_m_s", self.travel_m_s, 1e-4..=1.0);
         rules.number("approach_m_s", self.approach_m_s, 1e-4..=1.0);
         rules.number("standoff_m", self.standoff_m, 1e-4..=1.0);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +43,7 @@ const REACH_M: f64 = 1e3;
 /// Smallest side of a zone; below it, places differ by rounding only.
 const SIDE_MIN_M: f64 = 1e-6;
 
-impl Checked for Zone {
+impl Validate for Zone {
     fn check(&self, rules: &mut Rules) {
         rules.interval("x_m", self.x_m, -REACH_M..=REACH_M);
         if let Some(z_m) = self.z_m {
@@ -55,7 +55,7 @@ impl Checked for Zone {
                 format!("at least {SIDE_MIN_M} m wide")
             });
         }
-        rules.given("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
+        rules.optional_number("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
         if let Some(depth_m) = self.depth_m {
             rules.interval("depth_m", depth_m, -REACH_M..=REACH_M);
         }
@@ -136,7 +136,7 @@ impl Zone {
 
     /// Describes the frame of this zone's points and the direction of touch, for the head of a
     /// file.
-    pub fn frame_words(&self) -> String {
+    pub fn frame_description(&self) -> String {
         let [x, y, z] = self.ahead_w().into_inner().into();
         let tidy = |part: f64| (part * 1e6).round() / 1e6 + 0.0;
         let (x, y, z) = (tidy(x), tidy(y), tidy(z));

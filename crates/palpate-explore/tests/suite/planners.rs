@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
-use palpate_explore::planner::{PLANNERS, Plan, PlanningSettings, Stall};
+use palpate_explore::planner::{Fallback, PLANNERS, Plan, PlanningSettings};
 use palpate_explore::probe::{Contact, Touch};
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -60,13 +60,15 @@ fn active_finds_the_largest_explorable_variance() {
         for trial in 0..40 {
             let belief = belief(zone, trial, 5 + 2 * trial as usize, 3);
             let plan = make("active").plan(&belief);
-            if plan.stall.is_some() {
+            if plan.fallback.is_some() {
                 continue;
             }
             let mut scratch = Scratch::default();
             let grid = zone.grid(per_side).into_iter();
             let best = grid
-                .map(|place| belief.explorable().unwrap().variance(&place, &mut scratch).sqrt())
+                .map(|place| {
+                    belief.planning_posterior().unwrap().variance(&place, &mut scratch).sqrt()
+                })
                 .fold(0.0, f64::max);
             let share = plan.sd_m.unwrap() / best;
             plans += 1;
@@ -104,7 +106,7 @@ fn a_belief_that_is_sure_everywhere_is_a_stall() {
     }
     belief.refit().unwrap();
     let plan = make("active").plan(&belief);
-    assert!(matches!(plan.stall, Some(Stall::Collapsed | Stall::Repeated)), "{plan:?}");
+    assert!(matches!(plan.fallback, Some(Fallback::Collapsed | Fallback::Repeated)), "{plan:?}");
 }
 
 #[test]
@@ -132,7 +134,7 @@ fn reduction_is_what_a_refit_with_the_candidate_finds() {
     for (zone, noisy) in [(&LINE, false), (&SQUARE, true)] {
         for trial in 0..5 {
             let belief = belief(zone, trial, 6 + 9 * trial as usize, if noisy { 2 } else { 99 });
-            let posterior = belief.explorable().unwrap();
+            let posterior = belief.planning_posterior().unwrap();
             let references = zone.grid(9);
             let reduction = Reduction::new(posterior, references.iter().map(Vec::as_slice));
             let mut scratch = Scratch::default();
@@ -140,7 +142,7 @@ fn reduction_is_what_a_refit_with_the_candidate_finds() {
             for _ in 0..20 {
                 let place = planner::uniform(zone, &mut rng);
                 let mut observations = posterior.observations().clone();
-                observations.push(&place, 0.0);
+                observations.push_height(&place, 0.0);
                 let hyperparameters = posterior.hyperparameters().clone();
                 let signal2 = hyperparameters.signal_sd.powi(2);
                 let kernel = &SquaredExponential;
@@ -195,7 +197,7 @@ fn finds(name: &str, formula: impl for<'a> Fn(&'a HeightField, &[Vec<f64>]) -> F
         for trial in 0..8 {
             let belief = belief(zone, trial, 6 + 3 * trial as usize, 3);
             let plan = make(name).plan(&belief);
-            if plan.stall.is_some() {
+            if plan.fallback.is_some() {
                 continue;
             }
             let mut scratch = Scratch::default();
@@ -212,7 +214,7 @@ fn finds(name: &str, formula: impl for<'a> Fn(&'a HeightField, &[Vec<f64>]) -> F
 
 fn mean_sd(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> (f64, f64) {
     let mean = belief.surface().unwrap().mean(place, scratch);
-    (mean, belief.explorable().unwrap().variance(place, scratch).sqrt())
+    (mean, belief.planning_posterior().unwrap().variance(place, scratch).sqrt())
 }
 
 #[test]
@@ -246,7 +248,7 @@ fn slope_finds_the_unsure_and_steep() {
 fn integrated_variance_finds_the_largest_fall() {
     finds("integrated_variance", |belief, grid| {
         let places = grid.iter().step_by(7).map(Vec::as_slice);
-        let reduction = Reduction::new(belief.explorable().unwrap(), places);
+        let reduction = Reduction::new(belief.planning_posterior().unwrap(), places);
         Box::new(move |place, scratch| reduction.at(place, scratch))
     });
 }

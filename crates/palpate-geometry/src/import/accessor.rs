@@ -13,7 +13,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::source::{BYTES_MAX, Source};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::files;
 
 /// A glTF document with the bytes of its buffers.
@@ -39,23 +39,27 @@ impl<'a> Elements<'a> {
 
 impl Document {
     /// Loads the buffers of `root`: from the binary chunk, from data URIs, or from files.
-    pub fn load(source: &Source, root: Root, mut chunk: Option<Vec<u8>>) -> Result<Self, Invalid> {
+    pub fn load(
+        source: &Source,
+        root: Root,
+        mut chunk: Option<Vec<u8>>,
+    ) -> Result<Self, InputError> {
         let mut buffers = Vec::with_capacity(root.buffers.len());
         let mut left = BYTES_MAX;
         for (number, buffer) in root.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
                 Some(uri) => fetch(source, uri, left),
-                None => chunk.take().ok_or_else(|| Invalid::new("the file has no binary chunk")),
+                None => chunk.take().ok_or_else(|| InputError::new("the file has no binary chunk")),
             };
             let declared = buffer.byte_length.0;
             let checked = bytes.and_then(|bytes| match bytes.len() {
                 actual if declared > actual as u64 => {
-                    Err(Invalid::new(format!("{declared} bytes declared, {actual} present")))
+                    Err(InputError::new(format!("{declared} bytes declared, {actual} present")))
                 }
                 _ => Ok(bytes),
             });
             let bytes =
-                checked.map_err(|reason| Invalid::new(format!("buffer {number}: {reason}")))?;
+                checked.map_err(|reason| InputError::new(format!("buffer {number}: {reason}")))?;
             // Several buffers may refer to one large file.
             left = left.saturating_sub(bytes.len() as u64);
             buffers.push(bytes);
@@ -64,7 +68,7 @@ impl Document {
     }
 
     /// Returns vertex positions.
-    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, Invalid> {
+    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, InputError> {
         let is_vec3 = |component, kind| component == ComponentType::F32 && kind == Type::Vec3;
         let values = self.values(index, "float VEC3", is_vec3)?;
         let (floats, _) = values.as_chunks::<4>();
@@ -73,14 +77,14 @@ impl Document {
     }
 
     /// Returns vertex indices.
-    pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Invalid> {
+    pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, InputError> {
         let is_index = |component, kind| unsigned_size(component).is_some() && kind == Type::Scalar;
         let values = self.values(index, "unsigned SCALAR", is_index)?;
         let size = self.component(index)?.size();
         Ok(values.chunks_exact(size).map(unsigned).collect())
     }
 
-    fn component(&self, index: Index<Accessor>) -> Result<ComponentType, Invalid> {
+    fn component(&self, index: Index<Accessor>) -> Result<ComponentType, InputError> {
         let accessor = find(&self.root.accessors, "accessor", index)?;
         match accessor.component_type {
             Checked::Valid(component) => Ok(component.0),
@@ -94,7 +98,7 @@ impl Document {
         index: Index<Accessor>,
         expected: &str,
         accepts: impl Fn(ComponentType, Type) -> bool,
-    ) -> Result<Vec<u8>, Invalid> {
+    ) -> Result<Vec<u8>, InputError> {
         let number = index.value();
         let wrong_type = || wrong_type(number, expected);
         let accessor = find(&self.root.accessors, "accessor", index)?;
@@ -117,7 +121,7 @@ impl Document {
             // Zeros, to be replaced by sparse values: the count is not backed by data, so it may
             // not exceed the bytes of the whole file.
             None if count > self.buffers.iter().map(Vec::len).sum::<usize>() as u64 => {
-                return Err(Invalid::new(format!(
+                return Err(InputError::new(format!(
                     "accessor {number} declares {count} elements and no data"
                 )));
             }
@@ -133,7 +137,7 @@ impl Document {
         accessor: &Accessor,
         size: usize,
         values: &mut [u8],
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         let Some(sparse) = &accessor.sparse else { return Ok(()) };
         let (places, news) = (&sparse.indices, &sparse.values);
         let component = match places.component_type {
@@ -149,7 +153,7 @@ impl Document {
         for (place, new) in places.iter().map(unsigned).zip(news.iter()) {
             let old = values.chunks_exact_mut(size).nth(place as usize);
             let out_of_range = || {
-                Invalid::new(format!("accessor {number} replaces element {place} of {elements}"))
+                InputError::new(format!("accessor {number} replaces element {place} of {elements}"))
             };
             old.ok_or_else(out_of_range)?.copy_from_slice(new);
         }
@@ -164,7 +168,7 @@ impl Document {
         offset: u64,
         size: usize,
         count: u64,
-    ) -> Result<Elements<'_>, Invalid> {
+    ) -> Result<Elements<'_>, InputError> {
         let number = view.value();
         let view = find(&self.root.buffer_views, "buffer view", view)?;
         let buffer = find(&self.buffers, "buffer", view.buffer)?;
@@ -175,7 +179,7 @@ impl Document {
             .and_then(|end| buffer.get(start as usize..end))
             .ok_or_else(|| {
                 let available = buffer.len();
-                Invalid::new(format!(
+                InputError::new(format!(
                     "buffer view {number} reaches byte {end} of a buffer of {available}"
                 ))
             })?;
@@ -186,7 +190,7 @@ impl Document {
         };
         if needed > bytes.len() as u128 {
             let available = bytes.len();
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "accessor {accessor} needs {needed} bytes of buffer view {number}, which has \
                  {available}"
             )));
@@ -201,13 +205,13 @@ pub(super) fn find<'a, T, K>(
     objects: &'a [T],
     kind: &str,
     index: Index<K>,
-) -> Result<&'a T, Invalid> {
-    let missing = || Invalid::new(format!("{kind} {} does not exist", index.value()));
+) -> Result<&'a T, InputError> {
+    let missing = || InputError::new(format!("{kind} {} does not exist", index.value()));
     objects.get(index.value()).ok_or_else(missing)
 }
 
-fn wrong_type(accessor: usize, expected: &str) -> Invalid {
-    Invalid::new(format!("accessor {accessor} must hold {expected}"))
+fn wrong_type(accessor: usize, expected: &str) -> InputError {
+    InputError::new(format!("accessor {accessor} must hold {expected}"))
 }
 
 fn unsigned_size(component: ComponentType) -> Option<usize> {
@@ -222,21 +226,21 @@ fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u32::from(byte))
 }
 
-fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, Invalid> {
-    let unknown = || Invalid::new("its URI is neither base64 data nor a path");
+fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, InputError> {
+    let unknown = || InputError::new("its URI is neither base64 data nor a path");
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, encoded) = data.split_once(";base64,").ok_or_else(unknown)?;
         let decoded = STANDARD.decode(encoded);
-        return decoded.map_err(|error| Invalid::new(format!("base64: {error}")));
+        return decoded.map_err(|error| InputError::new(format!("base64: {error}")));
     }
     let name = percent_decoded(uri).filter(|name| !name.contains("://")).ok_or_else(unknown)?;
     let path = source.path.with_file_name("").join(&name);
-    let unreadable = |error| Invalid::new(format!("{} cannot be read: {error}", path.display()));
+    let unreadable = |error| InputError::new(format!("{} cannot be read: {error}", path.display()));
     // The actual location: `..` and links may lead anywhere.
     let real = path.canonicalize().map_err(unreadable)?;
     let folder = folder(source.path).map_err(unreadable)?;
     if !source.outside_buffers && !real.starts_with(folder) {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "{} lies outside the mesh's folder; to allow it, set \
              object.outside_buffers = true in the scene, or use --outside-buffers",
             real.display()

@@ -14,8 +14,8 @@ use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 use super::accessor::{Document, find};
 use super::source::Source;
 use crate::raw::RawMesh;
-use palpate_input::error::Invalid;
-use palpate_input::files::unmarked;
+use palpate_input::error::InputError;
+use palpate_input::files::without_bom;
 use palpate_input::words;
 
 /// Prefixes of extensions that do not affect the geometry.
@@ -32,12 +32,12 @@ const UPRIGHT: Matrix4<f64> = Matrix4::new(
 );
 
 /// Reads a glTF file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
+pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
     let (root, chunk) = parse(source.bytes)?;
     let harmless = |name: &&String| HARMLESS_EXTENSIONS.iter().any(|known| name.starts_with(known));
     if let Some(name) = root.extensions_required.iter().find(|name| !harmless(name)) {
         let problem = format!("needs the extension \"{name}\", which is not supported");
-        return Err(Invalid::new(problem));
+        return Err(InputError::new(problem));
     }
     let document = Document::load(source, root, chunk)?;
     let mut raw = RawMesh::default();
@@ -49,28 +49,28 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     Ok(raw)
 }
 
-fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), Invalid> {
+fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), InputError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((root(unmarked(bytes))?, None));
+        return Ok((root(without_bom(bytes))?, None));
     }
     // The crate subtracts the header's size from the stated length without a check.
     if let Some(&[a, b, c, d]) = bytes.get(8..12).and_then(<[u8]>::first_chunk) {
         let length = u32::from_le_bytes([a, b, c, d]);
         if length < 12 {
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "binary container: a length of {length} bytes is shorter than its header"
             )));
         }
     }
     let container = gltf::Glb::from_slice(bytes)
-        .map_err(|error| Invalid::new(format!("binary container: {error}")))?;
+        .map_err(|error| InputError::new(format!("binary container: {error}")))?;
     Ok((root(&container.json)?, container.bin.map(Into::into)))
 }
 
-fn root(json: &[u8]) -> Result<Root, Invalid> {
+fn root(json: &[u8]) -> Result<Root, InputError> {
     Root::from_slice(json).map_err(|error| {
         let (line, column) = (error.line(), error.column());
-        Invalid::new(format!("JSON: line {line}, column {column}: {}", words::json(&error)))
+        InputError::new(format!("JSON: line {line}, column {column}: {}", words::json(&error)))
     })
 }
 
@@ -79,7 +79,7 @@ type PlacedNode = (Index<Node>, Matrix4<f64>);
 
 /// Returns the nodes of the scene, parents before children, each with its pose in the upright frame
 /// S: the point p of a node N is `x_sn` p in S.
-fn placed_nodes(root: &Root) -> Result<Vec<PlacedNode>, Invalid> {
+fn placed_nodes(root: &Root) -> Result<Vec<PlacedNode>, InputError> {
     let roots = match root.scene {
         Some(scene) => find(&root.scenes, "scene", scene)?.nodes.clone(),
         None => orphans(root)?,
@@ -100,12 +100,12 @@ fn placed_nodes(root: &Root) -> Result<Vec<PlacedNode>, Invalid> {
     Ok(placed)
 }
 
-fn not_a_tree(node: usize) -> Invalid {
-    Invalid::new(format!("node {node} is reached twice; nodes must form a tree"))
+fn not_a_tree(node: usize) -> InputError {
+    InputError::new(format!("node {node} is reached twice; nodes must form a tree"))
 }
 
 /// Returns the nodes without a parent. If every node has one, they form a cycle.
-fn orphans(root: &Root) -> Result<Vec<Index<Node>>, Invalid> {
+fn orphans(root: &Root) -> Result<Vec<Index<Node>>, InputError> {
     let mut is_child = vec![false; root.nodes.len()];
     for &child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
         find(&root.nodes, "node", child)?;
@@ -123,12 +123,12 @@ fn orphans(root: &Root) -> Result<Vec<Index<Node>>, Invalid> {
 }
 
 /// Returns the pose of a node in its parent.
-fn local_pose(index: Index<Node>, node: &Node) -> Result<Matrix4<f64>, Invalid> {
+fn local_pose(index: Index<Node>, node: &Node) -> Result<Matrix4<f64>, InputError> {
     if let Some(columns) = node.matrix {
         let matrix = Matrix4::from_column_slice(&columns.map(f64::from));
         let last_row = [matrix[(3, 0)], matrix[(3, 1)], matrix[(3, 2)], matrix[(3, 3)]];
         if last_row != [0.0, 0.0, 0.0, 1.0] {
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "the matrix of node {index} is not affine: its last row is {last_row:?}"
             )));
         }
@@ -150,7 +150,7 @@ fn add_mesh(
     index: Index<Mesh>,
     x_sn: &Matrix4<f64>,
     raw: &mut RawMesh,
-) -> Result<(), Invalid> {
+) -> Result<(), InputError> {
     let mesh = find(&document.root.meshes, "mesh", index)?;
     let mirrored = x_sn.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
     for (number, primitive) in mesh.primitives.iter().enumerate() {
@@ -158,7 +158,7 @@ fn add_mesh(
             Some(name) => format!("primitive {number} of mesh {index} \"{name}\" at node {node}"),
             None => format!("primitive {number} of mesh {index} at node {node}"),
         };
-        let incomplete = |what| Invalid::new(format!("{label} has no {what}"));
+        let incomplete = |what| InputError::new(format!("{label} has no {what}"));
         let Checked::Valid(mode) = primitive.mode else {
             return Err(incomplete("known mode"));
         };
@@ -182,7 +182,7 @@ fn corners(
     document: &Document,
     primitive: &Primitive,
     vertices: usize,
-) -> Result<Vec<u32>, Invalid> {
+) -> Result<Vec<u32>, InputError> {
     match primitive.indices {
         Some(indices) => document.indices(indices),
         None => Ok((0..vertices as u32).collect()),

@@ -7,7 +7,7 @@ use super::mesh::Mesh;
 use super::raw::RawMesh;
 use super::repair::repair;
 use super::report::MeshReport;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::files;
 
 mod accessor;
@@ -20,7 +20,7 @@ mod stl;
 use source::{BYTES_MAX, Source};
 
 /// Reader of a format.
-type Read = fn(&Source) -> Result<RawMesh, Invalid>;
+type Read = fn(&Source) -> Result<RawMesh, InputError>;
 
 /// Extensions, in lower case, and their readers.
 const FORMATS: &[(&str, Read)] = &[
@@ -39,7 +39,7 @@ const FORMATS: &[(&str, Read)] = &[
 ///
 /// # Errors
 /// If the file cannot be read or repaired; the place is the file.
-pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), Invalid> {
+pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), InputError> {
     import_with(path, metres_per_unit, false)
 }
 
@@ -52,7 +52,7 @@ pub fn import_with(
     path: &Path,
     metres_per_unit: f64,
     outside_buffers: bool,
-) -> Result<(Mesh, MeshReport), Invalid> {
+) -> Result<(Mesh, MeshReport), InputError> {
     read_and_repair(path, metres_per_unit, outside_buffers)
         .map_err(|fault| fault.at(path.display()))
 }
@@ -61,9 +61,9 @@ fn read_and_repair(
     path: &Path,
     metres_per_unit: f64,
     outside_buffers: bool,
-) -> Result<(Mesh, MeshReport), Invalid> {
+) -> Result<(Mesh, MeshReport), InputError> {
     if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "the scale is {metres_per_unit} metres per unit; it must be positive and finite"
         )));
     }
@@ -74,7 +74,7 @@ fn read_and_repair(
     let Some((_, read)) = FORMATS.iter().find(|(known, _)| *known == extension) else {
         let supported: Vec<&str> = FORMATS.iter().map(|(known, _)| *known).collect();
         let supported = supported.join(", ");
-        return Err(Invalid::new(format!("is a \".{extension}\" file; supported: {supported}")));
+        return Err(InputError::new(format!("is a \".{extension}\" file; supported: {supported}")));
     };
     let bytes = files::bytes(path, BYTES_MAX).map_err(unreadable)?;
     let mut raw = read(&Source { path, bytes: &bytes, outside_buffers })?;
@@ -84,6 +84,6 @@ fn read_and_repair(
     Ok((mesh, MeshReport { sha256, ..report }))
 }
 
-fn unreadable(cause: io::Error) -> Invalid {
-    Invalid::new(format!("cannot be read: {cause}"))
+fn unreadable(cause: io::Error) -> InputError {
+    InputError::new(format!("cannot be read: {cause}"))
 }

@@ -6,12 +6,12 @@ use nalgebra::Point3;
 
 use super::source::{Source, bad_line};
 use crate::raw::RawMesh;
-use palpate_input::error::Invalid;
-use palpate_input::files::unmarked;
+use palpate_input::error::InputError;
+use palpate_input::files::without_bom;
 
 /// Reads an OBJ file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
-    let text = geometry_only(&String::from_utf8_lossy(unmarked(source.bytes)))?;
+pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
+    let text = geometry_only(&String::from_utf8_lossy(without_bom(source.bytes)))?;
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -20,7 +20,7 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     };
     let (models, _) =
         tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default()))
-            .map_err(|error| Invalid::new(format!("OBJ: {error}")))?;
+            .map_err(|error| InputError::new(format!("OBJ: {error}")))?;
     let mut raw = RawMesh::default();
     for tobj::Model { mesh, name } in &models {
         let (positions, _) = mesh.positions.as_chunks();
@@ -34,7 +34,7 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
 /// Keeps objects, positions and the position indices of faces, and checks them while their line
 /// numbers are known. tobj would overflow on the other indices of a face if they are out of range,
 /// and its errors contain no line number.
-fn geometry_only(text: &str) -> Result<String, Invalid> {
+fn geometry_only(text: &str) -> Result<String, InputError> {
     let is_vertex = |line: &&str| line.split_whitespace().next() == Some("v");
     let vertices = text.lines().filter(is_vertex).count();
     let mut kept = String::with_capacity(text.len());
@@ -81,11 +81,11 @@ fn check_index(
     index: &str,
     seen: usize,
     vertices: usize,
-) -> Result<(), Invalid> {
+) -> Result<(), InputError> {
     let index: i64 = index.parse().map_err(|_| bad_line(number, "f and vertex indices", line))?;
     let limit = if index < 0 { seen } else { vertices };
     if index == 0 || index.unsigned_abs() > limit as u64 {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "line {number}: vertex {index} of a face is out of range: there are {limit} vertices"
         )));
     }

@@ -8,8 +8,8 @@ use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAcc
 
 use super::source::{Source, bad_line};
 use crate::raw::RawMesh;
-use palpate_input::error::Invalid;
-use palpate_input::files::unmarked;
+use palpate_input::error::InputError;
+use palpate_input::files::without_bom;
 
 /// Properties of a position.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -17,10 +17,10 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Reads a PLY file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
+pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
     let (vertices, faces) = elements(source.bytes)?;
     if faces.is_empty() && !vertices.is_empty() {
-        return Err(Invalid::new(format!(
+        return Err(InputError::new(format!(
             "holds {} points and no faces (a point cloud); a mesh with faces is required",
             vertices.len()
         )));
@@ -38,18 +38,18 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
 ///
 /// # Errors
 /// If it is invalid, or a coordinate is not finite.
-pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Invalid> {
+pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
     let (vertices, _) = elements(bytes)?;
     let is_lost = |vertex: &Vertex| !vertex.0.iter().all(|coordinate| coordinate.is_finite());
     if let Some(lost) = vertices.iter().position(is_lost) {
         let at_m = vertices[lost].0;
-        return Err(Invalid::new(format!("PLY: vertex {lost} is not finite: {at_m:?}")));
+        return Err(InputError::new(format!("PLY: vertex {lost} is not finite: {at_m:?}")));
     }
     Ok(vertices.iter().map(|vertex| Point3::from(vertex.0)).collect())
 }
 
-fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
-    let bytes = unmarked(bytes);
+fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), InputError> {
+    let bytes = without_bom(bytes);
     let mut reader = Reader::new(bytes);
     let header = Parser::<Other>::new().read_header(&mut reader);
     let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
@@ -58,7 +58,7 @@ fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
         // Each element takes at least one byte, unless it has no properties.
         if element.count > bytes.len() {
             let count = element.count;
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "PLY: declares {count} of element \"{name}\", more than the file has bytes"
             )));
         }
@@ -83,24 +83,26 @@ fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
     }
     let left = reader.into_inner().trim_ascii().len();
     if left > 0 {
-        return Err(Invalid::new(format!("PLY: holds {left} bytes more than its header declares")));
+        return Err(InputError::new(format!(
+            "PLY: holds {left} bytes more than its header declares"
+        )));
     }
     Ok((vertices, faces))
 }
 
 /// Checks that an element has the required properties.
-fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), Invalid> {
+fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), InputError> {
     match has {
         true => Ok(()),
         false => {
             let name = &element.name;
-            Err(Invalid::new(format!("PLY: element \"{name}\" must have {needed}")))
+            Err(InputError::new(format!("PLY: element \"{name}\" must have {needed}")))
         }
     }
 }
 
 /// Returns the error with its line number, if it is in text.
-fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> Invalid {
+fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> InputError {
     match error.line().filter(|_| *encoding == Encoding::Ascii) {
         Some(line) => {
             let found = bytes.split(|&byte| byte == b'\n').nth(line.saturating_sub(1));
@@ -112,7 +114,7 @@ fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> Invalid {
             let words = error.to_string();
             let message = words.split_once(": ").filter(|_| error.line().is_some());
             let message = message.map_or(words.as_str(), |(_, message)| message);
-            Invalid::new(format!("PLY: {}", message.lines().next().unwrap_or_default()))
+            InputError::new(format!("PLY: {}", message.lines().next().unwrap_or_default()))
         }
     }
 }

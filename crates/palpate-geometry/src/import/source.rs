@@ -1,6 +1,6 @@
 //! Input of the importers: the bytes of a file, and permitted other files.
 
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::path::Path;
 
 /// A file to import.
@@ -18,7 +18,7 @@ pub(super) const BYTES_MAX: u64 = 2 << 30;
 
 /// Returns the error of a line of a text format that cannot be parsed, shortened if it is long;
 /// lines count from 1.
-pub(super) fn bad_line(line: usize, expected: &str, found: &str) -> Invalid {
+pub(super) fn bad_line(line: usize, expected: &str, found: &str) -> InputError {
     let found: String = found.trim().chars().take(60).collect();
-    Invalid::new(format!("line {line}: expected {expected}, found \"{found}\""))
+    InputError::new(format!("line {line}: expected {expected}, found \"{found}\""))
 }

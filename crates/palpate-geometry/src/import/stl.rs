@@ -7,8 +7,8 @@ use stl_io::{Triangle, create_stl_reader};
 
 use super::source::{Source, bad_line};
 use crate::raw::RawMesh;
-use palpate_input::error::Invalid;
-use palpate_input::files::unmarked;
+use palpate_input::error::InputError;
+use palpate_input::files::without_bom;
 
 /// Bytes before the triangles of a binary file: a text, then their number.
 const HEADER: usize = 84;
@@ -20,16 +20,16 @@ const STATEMENTS: &str = "solid, then facets (facet normal, outer loop, three ti
                           three finite numbers, endloop, endfacet), then endsolid";
 
 /// Reads an STL file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
+pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
     let mut raw = RawMesh::default();
     if is_binary(source.bytes)? {
         // The header of a binary file may begin with "solid" like a text file.
         let bytes = [&[0; HEADER - 4], &source.bytes[HEADER - 4..]].concat();
         let triangles = create_stl_reader(&mut Cursor::new(bytes)).and_then(Iterator::collect);
-        add(triangles.map_err(|error| Invalid::new(format!("STL: {error}")))?, &mut raw)?;
+        add(triangles.map_err(|error| InputError::new(format!("STL: {error}")))?, &mut raw)?;
         return Ok(raw);
     }
-    let text = plain(&String::from_utf8_lossy(unmarked(source.bytes)));
+    let text = plain(&String::from_utf8_lossy(without_bom(source.bytes)));
     let mut lines_before = 0;
     for solid in solids(&text) {
         let start = solid.len() - solid.trim_start().len();
@@ -50,8 +50,8 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
 
 /// Whether a file is binary. A file whose length matches its number of triangles is; others are
 /// distinguished by the first word of a text; if it is not a text, it is truncated or padded.
-fn is_binary(bytes: &[u8]) -> Result<bool, Invalid> {
-    let is_text = unmarked(bytes).trim_ascii_start().to_ascii_lowercase().starts_with(b"solid");
+fn is_binary(bytes: &[u8]) -> Result<bool, InputError> {
+    let is_text = without_bom(bytes).trim_ascii_start().to_ascii_lowercase().starts_with(b"solid");
     let count = bytes.get(HEADER - 4..HEADER).and_then(<[u8]>::first_chunk);
     let count = count.map(|&bytes| u32::from_le_bytes(bytes));
     let count = count.unwrap_or(0);
@@ -60,7 +60,7 @@ fn is_binary(bytes: &[u8]) -> Result<bool, Invalid> {
     match needed == actual as u64 {
         true => Ok(true),
         false if is_text => Ok(false),
-        false => Err(Invalid::new(format!(
+        false => Err(InputError::new(format!(
             "STL: not a text that begins with \"solid\", and a binary file of {count} triangles has \
              {needed} bytes, not {actual}"
         ))),
@@ -114,7 +114,7 @@ impl Seek for Lines<'_> {
     }
 }
 
-fn add(triangles: Vec<Triangle>, raw: &mut RawMesh) -> Result<(), Invalid> {
+fn add(triangles: Vec<Triangle>, raw: &mut RawMesh) -> Result<(), InputError> {
     let corners: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices).collect();
     let positions = corners.iter().map(|corner| Point3::from(corner.0.map(f64::from)));
     let corners = (0..corners.len() as u32).step_by(3);

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use super::gltf_sample::{CORNERS, FACES, floats, glb, tetrahedron, with_data_uri};
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::report::MeshReport;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-type Outcome = Result<(Mesh, MeshReport), Invalid>;
+type Outcome = Result<(Mesh, MeshReport), InputError>;
 
 /// Imports a file; checks that an error names the file.
 fn import(path: &Path, metres_per_unit: f64) -> Outcome {

@@ -9,7 +9,7 @@ use super::optimize::{Bounds, Optimum, Stop};
 
 /// Options of a BFGS climb.
 #[derive(Clone, Copy, Debug)]
-pub struct Manner {
+pub struct BfgsOptions {
     /// Length of the first step while the curvature is unknown, in units of the box's sides.
     pub first_step: f64,
     /// Absolute predicted gain below which it has converged.
@@ -36,7 +36,7 @@ const DAMPING: f64 = 0.2;
 #[derive(Clone, Debug)]
 pub struct Climb<'a> {
     bounds: Bounds<'a>,
-    manner: Manner,
+    manner: BfgsOptions,
     /// Highest place so far.
     top: Optimum,
     /// Highest place in units of the box's sides, with the gradient there.
@@ -49,7 +49,7 @@ pub struct Climb<'a> {
     reach: f64,
     step: Vec<f64>,
     /// Predicted gain of the step, and of the step without the trust region.
-    promised: f64,
+    predicted_gain: f64,
     left: f64,
     asked: Vec<f64>,
     is_done: bool,
@@ -62,7 +62,7 @@ impl<'a> Climb<'a> {
         bounds: Bounds<'a>,
         start: &[f64],
         curvature: Option<&[f64]>,
-        manner: Manner,
+        manner: BfgsOptions,
     ) -> Self {
         let count = start.len();
         let sides = bounds.lower.iter().zip(bounds.upper);
@@ -86,7 +86,7 @@ impl<'a> Climb<'a> {
             is_measured: known.is_some(),
             reach: known.map_or(manner.first_step, |_| 4.0 * manner.first_step),
             step: vec![0.0; count],
-            promised: f64::INFINITY,
+            predicted_gain: f64::INFINITY,
             left: f64::INFINITY,
             asked: Vec::new(),
             is_done: false,
@@ -97,32 +97,32 @@ impl<'a> Climb<'a> {
     }
 
     /// Returns the place at which value and gradient are needed; `None` after the end.
-    pub fn asked(&self) -> Option<&[f64]> {
+    pub fn requested(&self) -> Option<&[f64]> {
         (!self.is_done).then_some(&self.asked)
     }
 
     /// Passes the value and gradient at the [`asked`](Self::asked) place. A value that is not
     /// finite marks an infeasible place.
-    pub fn tell(&mut self, value: f64, gradient: &[f64]) {
+    pub fn observe(&mut self, value: f64, gradient: &[f64]) {
         self.top.evaluations += 1;
         let is_finite = value.is_finite() && gradient.iter().all(|slope| slope.is_finite());
         if self.top.evaluations == 1 {
             if !is_finite {
                 return self.end(Stop::Failed);
             }
-            self.stand(value, gradient);
+            self.accept(value, gradient);
             if !self.is_measured {
-                self.presume();
+                self.init_hessian();
             }
         } else {
-            self.judge(value, gradient, is_finite);
+            self.update(value, gradient, is_finite);
         }
-        self.go_on();
+        self.plan_step();
     }
 
     /// Returns an upper bound of the final value, if the remaining gain is at most `times` the
     /// predicted one.
-    pub fn hope(&self, times: f64) -> f64 {
+    pub fn upper_bound(&self, times: f64) -> f64 {
         self.top.value + times * self.left
     }
 
@@ -132,7 +132,7 @@ impl<'a> Climb<'a> {
     }
 
     /// Returns the highest place so far.
-    pub fn top(&self) -> &Optimum {
+    pub fn best(&self) -> &Optimum {
         &self.top
     }
 
@@ -151,7 +151,7 @@ impl<'a> Climb<'a> {
     }
 
     /// Accepts the requested place as the highest one.
-    fn stand(&mut self, value: f64, gradient: &[f64]) {
+    fn accept(&mut self, value: f64, gradient: &[f64]) {
         self.top.value = value;
         self.top.x.clone_from(&self.asked);
         self.here.iter_mut().zip(&self.step).for_each(|(here, step)| *here += step);
@@ -163,7 +163,7 @@ impl<'a> Climb<'a> {
 
     /// Initialises with a small curvature, so that every axis is worth a step until its curvature
     /// is known.
-    fn presume(&mut self) {
+    fn init_hessian(&mut self) {
         let count = self.here.len();
         let little = (PRESUMED * self.enough()).max(f64::MIN_POSITIVE);
         (0..count).for_each(|i| self.curvature[i * count + i] = little);
@@ -175,7 +175,7 @@ impl<'a> Climb<'a> {
     }
 
     /// Updates the curvature from a step, and accepts the step if it is uphill.
-    fn judge(&mut self, value: f64, gradient: &[f64], is_finite: bool) {
+    fn update(&mut self, value: f64, gradient: &[f64], is_finite: bool) {
         let length = self.step.iter().fold(0.0, |longest: f64, step| longest.max(step.abs()));
         if !is_finite {
             self.reach = 0.25 * length;
@@ -187,19 +187,19 @@ impl<'a> Climb<'a> {
         self.learn(&bend);
         let won = value - self.top.value;
         if won > ARMIJO * dot(&self.gradient, &self.step) {
-            if won > 0.5 * self.promised && length > 0.9 * self.reach {
+            if won > 0.5 * self.predicted_gain && length > 0.9 * self.reach {
                 self.reach *= 3.0;
-            } else if won < 0.1 * self.promised {
+            } else if won < 0.1 * self.predicted_gain {
                 self.reach = 0.5 * length;
             }
-            self.stand(value, gradient);
+            self.accept(value, gradient);
         } else {
             self.reach = 0.5 * length;
         }
     }
 
     /// Plans the next step, or ends if none is worth taking.
-    fn go_on(&mut self) {
+    fn plan_step(&mut self) {
         self.left = self.plan(f64::INFINITY);
         let is_worth = self.left > self.enough();
         if !is_worth {
@@ -209,7 +209,7 @@ impl<'a> Climb<'a> {
         } else if self.top.evaluations >= self.manner.budget {
             self.end(Stop::Budget);
         } else {
-            self.promised = self.plan(self.reach);
+            self.predicted_gain = self.plan(self.reach);
             self.ask();
         }
     }
@@ -294,7 +294,7 @@ impl<'a> Climb<'a> {
                 None => break,
             }
         }
-        self.promise()
+        self.predicted_gain()
     }
 
     /// Returns the model's slope along an axis after the step.
@@ -304,7 +304,7 @@ impl<'a> Climb<'a> {
     }
 
     /// Returns the gain of the step predicted by the model.
-    fn promise(&self) -> f64 {
+    fn predicted_gain(&self) -> f64 {
         let rows = self.curvature.chunks_exact(self.step.len().max(1)).zip(&self.step);
         let bend: f64 = rows.map(|(row, step)| step * dot(row, &self.step)).sum();
         dot(&self.gradient, &self.step) - 0.5 * bend
@@ -319,9 +319,9 @@ pub fn climb(
     mut objective: impl FnMut(&[f64], &mut [f64]) -> f64,
 ) -> (Optimum, Vec<f64>) {
     let mut gradient = vec![0.0; climb.here.len()];
-    while let Some(place) = climb.asked() {
+    while let Some(place) = climb.requested() {
         let value = objective(place, &mut gradient);
-        climb.tell(value, &gradient);
+        climb.observe(value, &gradient);
         if !is_worth(&climb) {
             break;
         }

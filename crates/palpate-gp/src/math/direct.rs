@@ -23,7 +23,7 @@ struct Rectangle {
 }
 
 /// Rectangles of one radius.
-struct Equals {
+struct RadiusGroup {
     radius: f32,
     /// Keys sorted so that the lowest cost comes last, the oldest of equal ones.
     keys: Vec<Key>,
@@ -49,7 +49,7 @@ struct Division<'a, F> {
     middles: Vec<f64>,
     sides: Vec<f64>,
     /// Groups by increasing radius; empty groups stay.
-    sorted: Vec<Equals>,
+    sorted: Vec<RadiusGroup>,
     least: f64,
     age: u32,
     left: u32,
@@ -157,7 +157,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         let (radius, key) = (self.rectangles[index].radius, self.key(index));
         let at = self.sorted.partition_point(|equals| equals.radius < radius);
         if self.sorted.get(at).is_none_or(|equals| equals.radius != radius) {
-            self.sorted.insert(at, Equals { radius, keys: Vec::new() });
+            self.sorted.insert(at, RadiusGroup { radius, keys: Vec::new() });
         }
         let keys = &mut self.sorted[at].keys;
         keys.insert(keys.partition_point(|other| *other > key), key);
@@ -166,7 +166,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
     fn unfile(&mut self, index: usize) {
         let (radius, key) = (self.rectangles[index].radius, self.key(index));
         let at = self.sorted.partition_point(|equals| equals.radius < radius);
-        if let Some(Equals { keys, .. }) = self.sorted.get_mut(at) {
+        if let Some(RadiusGroup { keys, .. }) = self.sorted.get_mut(at) {
             let at = keys.partition_point(|other| *other > key);
             keys.remove(at);
         }
@@ -254,7 +254,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
     fn find_hull(&self, hull: &mut Vec<Corner>) {
         hull.clear();
         // The rectangles of lowest cost for each radius; the first one represents all.
-        let lowest = |equals: &Equals| {
+        let lowest = |equals: &RadiusGroup| {
             let (_, _, index) = *equals.keys.last()?;
             Some((equals.radius.into(), self.rectangles[index].cost))
         };
@@ -267,7 +267,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
             from.1 + (radius - from.0) * slope
         };
         // Hull points; those at a right turn are dropped.
-        let mut kept: Vec<((f64, f64), &Equals)> = vec![first];
+        let mut kept: Vec<((f64, f64), &RadiusGroup)> = vec![first];
         for (new, equals) in groups {
             if new.1 > chord(new.0) {
                 continue;
@@ -305,7 +305,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
     }
 }
 
-impl Equals {
+impl RadiusGroup {
     /// Returns all rectangles of lowest cost, by increasing age.
     fn lowest(&self) -> impl Iterator<Item = usize> {
         let least = self.keys.last().map(|key| key.0);

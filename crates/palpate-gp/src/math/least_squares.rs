@@ -158,7 +158,10 @@ pub fn robust<P: Problem>(problem: &P, start: &P::State) -> Result<(P::State, f6
 ///
 /// # Errors
 /// If a residual is not finite, or there is none.
-pub fn foresee<P: Problem>(problem: &P, state: &P::State) -> Result<Solution<P::State>, FitError> {
+pub fn predict_information<P: Problem>(
+    problem: &P,
+    state: &P::State,
+) -> Result<Solution<P::State>, FitError> {
     let count = problem.residuals(state).len();
     let mut foreseen = conclude(problem, state.clone(), vec![true; count])?;
     let jacobian = jacobian(problem, state, count);

@@ -6,7 +6,8 @@ use palpate_gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::{
-    LogNormal, Mean, NoiseRatio, Observation, Observations, Posterior, Range, Scale, Slope,
+    LogNormal, MeanModel, NoiseRatio, Observation, Observations, Posterior, Range, SignalModel,
+    Slope,
 };
 use proptest::prelude::*;
 use serde::Deserialize;
@@ -62,7 +63,7 @@ fn reference() -> Vec<Case> {
 fn observations<'a>(pairs: impl IntoIterator<Item = (&'a [f64], f64)>) -> Observations {
     let mut pairs = pairs.into_iter().peekable();
     let mut all = Observations::new(pairs.peek().map_or(1, |(place, _)| place.len()));
-    pairs.for_each(|(place, height)| all.push(place, height));
+    pairs.for_each(|(place, height)| all.push_height(place, height));
     all
 }
 
@@ -160,7 +161,7 @@ fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
         let tolerance = f64::EPSILON * (0.05 * case.condition_number).max(case.y.len() as f64);
         let observations = case.observations();
         let mut gradient = vec![0.0; case.gradient_log_sf_l_sw.len()];
-        let value = Likelihood::new(&KERNEL, Mean::Zero, &observations)
+        let value = Likelihood::new(&KERNEL, MeanModel::Zero, &observations)
             .value_gradient(&case.hyperparameters(), &mut gradient)
             .unwrap();
         let error = (value / case.log_marginal_likelihood - 1.0).abs();
@@ -230,7 +231,7 @@ proptest! {
     #[test]
     fn gradients_are_central_differences((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
         let touches = all(&touches);
-        let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+        let mut likelihood = Likelihood::new(&KERNEL, MeanModel::Zero, &touches);
         let mut gradient = vec![0.0; 4];
         likelihood.value_gradient(&at, &mut gradient).unwrap();
         for (i, ours) in gradient.iter().enumerate() {
@@ -269,11 +270,11 @@ proptest! {
         let touches = all(&touches);
         let prior = Some(LogNormal { median: 1.0, spread: 1.5 });
         let scale = [
-            Scale::Best((1e-3, 1e3).into()),
-            Scale::Best(Range { low: 1e-3, high: 1e3, prior }),
-            Scale::KnownNoise(0.05),
+            SignalModel::Best((1e-3, 1e3).into()),
+            SignalModel::Best(Range { low: 1e-3, high: 1e3, prior }),
+            SignalModel::KnownNoise(0.05),
         ][choice];
-        let mean = [Mean::Zero, Mean::Constant, Mean::Data][choice];
+        let mean = [MeanModel::Zero, MeanModel::Constant, MeanModel::Data][choice];
         let mut likelihood = Likelihood::new(&KERNEL, mean, &touches);
         let logs: Vec<f64> =
             [at.length_scales[0], at.length_scales[1], at.noise_sd / at.signal_sd].map(f64::ln).into();
@@ -375,7 +376,7 @@ fn an_observation_left_out_is_told_as_by_a_belief_without_it() {
     };
     let whole = believe(None);
     let mut scratch = Scratch::default();
-    for (i, z) in whole.left_out().into_iter().enumerate() {
+    for (i, z) in whole.loo_z_scores().into_iter().enumerate() {
         let without = believe(Some(i));
         let noise_sd = without.hyperparameters().noise_sd;
         let sd = (without.variance(&places[i], &mut scratch) + noise_sd * noise_sd).sqrt();
@@ -383,7 +384,7 @@ fn an_observation_left_out_is_told_as_by_a_belief_without_it() {
         assert!((z - twin).abs() < 1e-9, "{i}: {z} {twin}");
     }
     let mut wide = whole.clone();
-    wide.widen(3.0);
+    wide.inflate(3.0);
     let at = [0.5, 0.5];
     assert_eq!(wide.mean(&at, &mut scratch), whole.mean(&at, &mut scratch));
     let [sd, wide_sd] = [&whole, &wide].map(|it| it.variance(&at, &mut scratch).sqrt());
@@ -402,7 +403,7 @@ fn many_places_at_once_are_each_of_them_alone() {
                 let slope = Slope { gradient: &[0.3, -0.1], noise: 1.0 };
                 let slope = is_sloped.then_some(slope);
                 let height = (3.0 * place[0]).sin() + place[1];
-                touches.take_in(&Observation { place: &place, height, noise: 1.0, slope });
+                touches.push(&Observation { place: &place, height, noise: 1.0, slope });
             }
             let noise = NoiseRatio { height: 0.01, slope: 0.1 };
             let at = Hyperparameters::new(0.7, vec![0.4, 0.6], noise, 0.2);

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use palpate_gp::covariance::CovarianceError;
-use palpate_gp::inducing::Induced;
+use palpate_gp::inducing::InducingPosterior;
 use palpate_gp::kernel::{Hyperparameters, Kernel, Matern52, SquaredExponential};
 use palpate_gp::{Observations, Posterior};
 
@@ -14,7 +14,7 @@ fn touches(count: usize) -> Observations {
     for i in 0..count {
         let at = [0.754_877_67, 0.569_840_29].map(|step| (0.5 + step * i as f64).fract());
         let error = 0.02 * (17.0 * i as f64).sin();
-        touches.push(&at, (6.0 * at[0]).sin() + (9.0 * at[1] + at[0]).cos() + error);
+        touches.push_height(&at, (6.0 * at[0]).sin() + (9.0 * at[1] + at[0]).cos() + error);
     }
     touches
 }
@@ -56,8 +56,8 @@ fn places(observations: &Observations) -> Vec<[f64; 2]> {
 fn it_is_the_posterior_of_its_equations() {
     for kernel in KERNELS {
         let (touches, at) = (touches(120), hyperparameters(0.25));
-        let Induced { posterior, left_sd } =
-            Posterior::through(30, kernel, at.clone(), &touches).unwrap();
+        let InducingPosterior { posterior, left_sd } =
+            Posterior::with_inducing_points(30, kernel, at.clone(), &touches).unwrap();
         let kept = places(posterior.observations());
         assert!(kept.len() <= 30 && kept.len() > 20);
         let lengths = &at.length_scales;
@@ -94,7 +94,7 @@ fn through_all_of_them_it_is_exact() {
     for kernel in KERNELS {
         let (touches, at) = (touches(60), hyperparameters(0.08));
         let exact = Posterior::new(kernel, at.clone(), touches.clone()).unwrap();
-        let induced = Posterior::through(60, kernel, at, &touches).unwrap();
+        let induced = Posterior::with_inducing_points(60, kernel, at, &touches).unwrap();
         assert_eq!((induced.posterior.observations().len(), induced.left_sd < 1e-6), (60, true));
         for place in queries() {
             let [ours, theirs] = [&induced.posterior, &exact]
@@ -118,8 +118,8 @@ fn it_says_how_near_it_is() {
         let exact = exact.predict(queries().iter().map(|place| place.as_slice()));
         let mut last = f64::INFINITY;
         for most in [40, 80, 160, 320, 640] {
-            let Induced { posterior, left_sd } =
-                Posterior::through(most, kernel, at.clone(), &touches).unwrap();
+            let InducingPosterior { posterior, left_sd } =
+                Posterior::with_inducing_points(most, kernel, at.clone(), &touches).unwrap();
             // No inducing points are added once the residual is negligible.
             assert!(left_sd <= last.max(0.02 * at.noise_sd), "{left_sd} {last}");
             assert!(posterior.observations().len() <= most);
@@ -147,11 +147,11 @@ fn touches_at_one_place_are_kept_once() {
     let mut touches = Observations::new(1);
     for i in 0..300 {
         let x = f64::from(i % 5);
-        touches.push(&[x], x + if i < 150 { 0.1 } else { -0.1 });
+        touches.push_height(&[x], x + if i < 150 { 0.1 } else { -0.1 });
     }
     let at = Hyperparameters { length_scales: vec![1.0], mean: 0.0, ..hyperparameters(1.0) };
-    let Induced { posterior, left_sd } =
-        Posterior::through(50, &SquaredExponential, at.clone(), &touches).unwrap();
+    let InducingPosterior { posterior, left_sd } =
+        Posterior::with_inducing_points(50, &SquaredExponential, at.clone(), &touches).unwrap();
     let exact = Posterior::new(&SquaredExponential, at, touches).unwrap();
     assert_eq!((posterior.observations().len(), left_sd < 1e-6), (5, true));
     let [ours, theirs] =
@@ -163,7 +163,8 @@ fn touches_at_one_place_are_kept_once() {
 #[test]
 fn a_touch_that_is_not_finite_is_an_error() {
     let mut touches = touches(20);
-    touches.push(&[0.5, f64::NAN], 0.0);
-    let found = Posterior::through(10, &SquaredExponential, hyperparameters(0.3), &touches);
+    touches.push_height(&[0.5, f64::NAN], 0.0);
+    let found =
+        Posterior::with_inducing_points(10, &SquaredExponential, hyperparameters(0.3), &touches);
     assert!(matches!(found.err(), Some(CovarianceError::NotFinite { index: 20 })));
 }

@@ -1,11 +1,12 @@
 //! Tests of the optimisers: DIRECT evaluates the places of NLopt's; climbs converge in few steps.
 
-use palpate_gp::math::climb::{Climb, Manner, climb};
+use palpate_gp::math::climb::{BfgsOptions, Climb, climb};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::{Bounds, Stop};
 
 const BOX: Bounds = Bounds { lower: &[-2.0, -2.0], upper: &[2.0, 2.0] };
-const MANNER: Manner = Manner { first_step: 0.05, gain: 1e-9, relative_gain: 0.0, budget: 200 };
+const MANNER: BfgsOptions =
+    BfgsOptions { first_step: 0.05, gain: 1e-9, relative_gain: 0.0, budget: 200 };
 
 type Objective = fn(&[f64]) -> f64;
 
@@ -120,7 +121,7 @@ fn hope_holds_the_top_near_it_and_a_climb_without_a_value_ends() {
         value
     };
     let start = Climb::new(BOX, &[0.3, 0.0], None, MANNER);
-    let (top, _) = climb(start, |climb| climb.hope(4.0) > 1.0 - 1e-6, hill);
+    let (top, _) = climb(start, |climb| climb.upper_bound(4.0) > 1.0 - 1e-6, hill);
     assert!(top.stop == Stop::Converged && (top.value - 1.0).abs() < 1e-6, "{top:?}");
     let nowhere = Climb::new(BOX, &[0.0, 0.0], None, MANNER);
     let (top, _) = climb(nowhere, |_| true, |_, _| f64::NAN);

@@ -3,7 +3,7 @@
 use palpate_gp::kernel::{Hyperparameters, KERNELS, Kernel};
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::posterior::Scratch;
-use palpate_gp::{Mean, NoiseRatio, Observation, Observations, Posterior, Scale, Slope};
+use palpate_gp::{MeanModel, NoiseRatio, Observation, Observations, Posterior, SignalModel, Slope};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -25,7 +25,7 @@ impl Touch {
 
 fn all(touches: &[Touch]) -> Observations {
     let mut all = Observations::new(2);
-    touches.iter().for_each(|touch| all.take_in(&touch.observation()));
+    touches.iter().for_each(|touch| all.push(&touch.observation()));
     all
 }
 
@@ -111,11 +111,11 @@ fn crosses(touches: &[Touch]) -> Observations {
                 beside[axis] += side;
                 let height = height + side * slope;
                 let noise = 2.0;
-                crosses.take_in(&Observation { place: &beside, height, noise, slope: None });
+                crosses.push(&Observation { place: &beside, height, noise, slope: None });
             }
         }
         if slope.is_none() {
-            crosses.push(place, *height);
+            crosses.push_height(place, *height);
         }
     }
     crosses
@@ -157,7 +157,7 @@ proptest! {
     ) {
         let touches: Vec<Touch> = touches.into_iter().map(|t| Touch { noise: 1.0, ..t }).collect();
         let [ours, twin] = [all(&touches), crosses(&touches)].map(|observations| {
-            let mut likelihood = Likelihood::new(kernel(choice), Mean::Zero, &observations);
+            let mut likelihood = Likelihood::new(kernel(choice), MeanModel::Zero, &observations);
             let [here, there] = [[1.0, 1.0], lengths].map(|lengths| {
                 let (signal_sd, noise_sd) = (1.0, 1e-2);
                 let at = Hyperparameters {
@@ -180,7 +180,7 @@ proptest! {
         place in [-1.0..1.0f64, -1.0..1.0f64],
     ) {
         let observations = all(&touches);
-        let mut likelihood = Likelihood::new(kernel(choice), Mean::Zero, &observations);
+        let mut likelihood = Likelihood::new(kernel(choice), MeanModel::Zero, &observations);
         let mut gradient = [0.0; 5];
         likelihood.value_gradient(&at, &mut gradient).unwrap();
         for (i, ours) in gradient.iter().enumerate() {
@@ -224,9 +224,9 @@ proptest! {
         at in any_parameters(), touches in any_touches(), choice in 0..3usize,
     ) {
         let observations = all(&touches);
-        let mean = [Mean::Zero, Mean::Constant, Mean::Data][choice];
+        let mean = [MeanModel::Zero, MeanModel::Constant, MeanModel::Data][choice];
         let scale =
-            [Scale::Best((1e-3, 1e3).into()), Scale::KnownNoise(0.05), Scale::KnownNoise(0.2)][choice];
+            [SignalModel::Best((1e-3, 1e3).into()), SignalModel::KnownNoise(0.05), SignalModel::KnownNoise(0.2)][choice];
         let mut likelihood = Likelihood::new(kernel(choice % 2), mean, &observations);
         let NoiseRatio { height, slope } = at.noise_ratio();
         let logs = [at.length_scales[0], at.length_scales[1], height, slope].map(f64::ln);
@@ -258,7 +258,7 @@ proptest! {
         let mut scratch = Scratch::default();
         let mut last = f64::INFINITY;
         for touch in &touches {
-            one_by_one.take_in(&touch.observation()).unwrap();
+            one_by_one.push(&touch.observation()).unwrap();
             let variance = one_by_one.variance(&place, &mut scratch);
             prop_assert!(variance <= last + 1e-10 * at.signal_sd.powi(2));
             last = variance;

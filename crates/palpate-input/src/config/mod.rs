@@ -5,7 +5,7 @@ mod error;
 mod rules;
 
 pub use error::{ConfigError, Origin};
-pub use rules::{Checked, Rules};
+pub use rules::{Rules, Validate};
 
 use crate::{files, words};
 use serde::de::DeserializeOwned;
@@ -49,14 +49,14 @@ impl Loader {
     /// If it cannot be read or is not TOML.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let text = files::text(path, files::TEXT_MAX);
-        Self::of(path, text.map_err(|cause| ConfigError::unreadable(path, &cause))?)
+        Self::from_text(path, text.map_err(|cause| ConfigError::unreadable(path, &cause))?)
     }
 
     /// Creates a loader from `text`, the contents of `path`.
     ///
     /// # Errors
     /// If it is not TOML.
-    pub fn of(path: &Path, text: String) -> Result<Self, ConfigError> {
+    pub fn from_text(path: &Path, text: String) -> Result<Self, ConfigError> {
         let (table, document) = parse(path, text)?;
         let source = Source { path: path.into(), prefix: String::new(), document };
         Ok(Self { table, sources: vec![source], sets: Vec::new(), read_as: None })
@@ -106,7 +106,7 @@ impl Loader {
     }
 
     /// Returns the error that the file is `found`, and not of the requested kind.
-    pub fn other(&self, found: &'static str, remedy: &'static str) -> ConfigError {
+    pub fn wrong_kind(&self, found: &'static str, remedy: &'static str) -> ConfigError {
         let path = self.sources.first().map(|source| source.path.clone()).unwrap_or_default();
         let origin = Origin::File { path, line: None };
         let message = format!("this is {found}; {remedy}");
@@ -190,7 +190,7 @@ impl Loader {
     ///
     /// # Errors
     /// The first invalid value, with its origin.
-    pub fn finish<T: DeserializeOwned + Checked>(self) -> Result<T, ConfigError> {
+    pub fn finish<T: DeserializeOwned + Validate>(self) -> Result<T, ConfigError> {
         let config: T = serde_path_to_error::deserialize(self.table.clone()).map_err(|error| {
             self.explain::<T>(&error.path().to_string(), error.inner().message())
         })?;

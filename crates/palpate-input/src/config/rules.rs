@@ -17,14 +17,14 @@ pub struct Rules {
 impl Rules {
     /// Returns the allowed values of each key of `checked`, as in messages: ranges and names, not
     /// constraints between keys.
-    pub fn of(checked: &impl Checked) -> BTreeMap<String, String> {
+    pub fn allowed_values(checked: &impl Validate) -> BTreeMap<String, String> {
         let mut rules = Self { record: Some(BTreeMap::new()), ..Self::default() };
         checked.check(&mut rules);
         rules.record.unwrap_or_default()
     }
 
     /// Whether `checked` satisfies all rules.
-    pub fn hold(checked: &impl Checked) -> bool {
+    pub fn is_satisfied(checked: &impl Validate) -> bool {
         let mut rules = Self::default();
         checked.check(&mut rules);
         rules.violation.is_none()
@@ -44,7 +44,7 @@ impl Rules {
     }
 
     /// Checks an optional key like [`number`](Self::number).
-    pub fn given(&mut self, key: &str, value: Option<f64>, allowed: RangeInclusive<f64>) {
+    pub fn optional_number(&mut self, key: &str, value: Option<f64>, allowed: RangeInclusive<f64>) {
         if let Some(value) = value {
             self.number(key, value, allowed);
         }
@@ -87,7 +87,7 @@ impl Rules {
     }
 
     /// Validates the table under `key`.
-    pub fn table(&mut self, key: &str, checked: &impl Checked) {
+    pub fn table(&mut self, key: &str, checked: &impl Validate) {
         let outer = self.prefix.len();
         self.prefix += key;
         self.prefix.push('.');
@@ -97,7 +97,7 @@ impl Rules {
 }
 
 /// A configuration with validation rules.
-pub trait Checked {
+pub trait Validate {
     /// Applies every rule to `rules`.
     fn check(&self, rules: &mut Rules);
 }

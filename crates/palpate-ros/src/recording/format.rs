@@ -1,12 +1,12 @@
 //! Contents of a recording: its metadata, topics and custom messages.
 
-use crate::definition::{Definition, Described};
+use crate::definition::{Definition, HasDefinition};
 use crate::message::{BioTacHand, JointState, JointTrajectory, Marker, WrenchStamped};
 use byteorder::LittleEndian;
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::{Capabilities, Command, IdealContact, Reading, Sample, Wrench};
 use palpate_explore::robot::finger::Frame;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::words::brief;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 /// Metadata of a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub struct About {
+pub struct RecordingMetadata {
     /// Version of the program that wrote it.
     pub version: String,
     /// Experiment with all defaults written out, as TOML.
@@ -32,7 +32,7 @@ pub struct About {
 
 /// End of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Ending {
+pub struct TrialEnd {
     /// Reason why it ended before its last touch, if so.
     pub failure: Option<String>,
     /// Whether it was interrupted externally after a touch, so that it can be continued.
@@ -48,7 +48,7 @@ pub(super) const ENDING: &str = "palpate_ending";
 const FAILURE: &str = "failure";
 const INTERRUPTED: &str = "interrupted";
 
-impl About {
+impl RecordingMetadata {
     pub(super) fn texts(&self) -> BTreeMap<String, String> {
         // Names and numbers can always be written as JSON.
         let capabilities = serde_json::to_string(&self.capabilities).unwrap_or_default();
@@ -63,7 +63,7 @@ impl About {
         texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
     }
 
-    pub(super) fn of(texts: &BTreeMap<String, String>) -> Result<Self, Invalid> {
+    pub(super) fn of(texts: &BTreeMap<String, String>) -> Result<Self, InputError> {
         Ok(Self {
             version: text(texts, "version")?.into(),
             experiment: text(texts, "resolved.toml")?.into(),
@@ -76,7 +76,7 @@ impl About {
     }
 }
 
-impl Ending {
+impl TrialEnd {
     pub(super) fn texts(&self) -> BTreeMap<String, String> {
         let failure = self.failure.iter().map(|failure| (FAILURE, failure.clone()));
         let interrupted = self.is_interrupted.then(|| (INTERRUPTED, true.to_string()));
@@ -89,22 +89,22 @@ impl Ending {
     }
 }
 
-fn text<'a>(texts: &'a BTreeMap<String, String>, name: &str) -> Result<&'a str, Invalid> {
+fn text<'a>(texts: &'a BTreeMap<String, String>, name: &str) -> Result<&'a str, InputError> {
     texts.get(name).map(String::as_str).ok_or_else(|| bad(texts, name))
 }
 
-fn number<T: FromStr>(texts: &BTreeMap<String, String>, name: &str) -> Result<T, Invalid> {
+fn number<T: FromStr>(texts: &BTreeMap<String, String>, name: &str) -> Result<T, InputError> {
     text(texts, name)?.parse().map_err(|_| bad(texts, name))
 }
 
-fn bad(texts: &BTreeMap<String, String>, name: &str) -> Invalid {
+fn bad(texts: &BTreeMap<String, String>, name: &str) -> InputError {
     let found = texts.get(name).map_or("missing".into(), |found| format!("\"{}\"", brief(found)));
-    Invalid::new(format!("in its metadata `{name}` is {found}"))
+    InputError::new(format!("in its metadata `{name}` is {found}"))
 }
 
 /// A channel, by its index in [`TOPICS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Topic {
+pub(super) enum RecordingChannel {
     Joints,
     Applied,
     Wrench,
@@ -121,8 +121,8 @@ pub const TOPICS: [(&str, &Definition); 8] = [
     ("/palpate/applied", &JointTrajectory::DEFINITION),
     ("/wrench", &WrenchStamped::DEFINITION),
     ("/biotac_pub", &BioTacHand::DEFINITION),
-    ("/palpate/tick", &Tick::DEFINITION),
-    ("/palpate/touch", &Touch::DEFINITION),
+    ("/palpate/tick", &TickMessage::DEFINITION),
+    ("/palpate/touch", &TouchMessage::DEFINITION),
     ("/palpate/belief", &Marker::DEFINITION),
     ("/palpate/contacts", &Marker::DEFINITION),
 ];
@@ -130,7 +130,7 @@ pub const TOPICS: [(&str, &Definition); 8] = [
 /// `palpate_msgs/Tick`: a command and the subsequent reading, or a reset and the subsequent
 /// reading.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Tick<'a> {
+pub struct TickMessage<'a> {
     /// Number of ticks since the reset; 0 is the reset.
     pub tick: u64,
     /// Seed of a reset; 0 in a tick.
@@ -181,7 +181,7 @@ macro_rules! fields {
     };
 }
 
-impl Described for Tick<'_> {
+impl HasDefinition for TickMessage<'_> {
     const DEFINITION: Definition = Definition {
         name: "palpate_msgs/msg/Tick",
         fields: fields!(
@@ -198,7 +198,7 @@ impl Described for Tick<'_> {
     };
 }
 
-impl Tick<'_> {
+impl TickMessage<'_> {
     /// A tick of a recording without slip states.
     pub(super) const WITHOUT_SLIPS: Definition =
         Definition { fields: fields!(), ..Self::DEFINITION };
@@ -206,13 +206,13 @@ impl Tick<'_> {
 
 /// Loads and frames of a reading, stored while a tick is written.
 #[derive(Default)]
-pub(super) struct Loads {
+pub(super) struct LoadBuffer {
     wrench: Option<[f64; 6]>,
     ideal: Option<[f64; 7]>,
     frames: Vec<Frame>,
 }
 
-impl Loads {
+impl LoadBuffer {
     /// Copies those of `reading`, without allocating.
     pub(super) fn take(&mut self, reading: &Reading) {
         self.wrench = reading
@@ -226,9 +226,9 @@ impl Loads {
     }
 }
 
-impl<'a> Tick<'a> {
+impl<'a> TickMessage<'a> {
     /// Fills in the contents of `reading`; `loads` are those of the same reading.
-    pub(super) fn read(self, reading: &'a Reading, loads: &'a Loads) -> Self {
+    pub(super) fn read(self, reading: &'a Reading, loads: &'a LoadBuffer) -> Self {
         Self {
             time_s: reading.time_s,
             q: (&reading.q).into(),
@@ -354,7 +354,7 @@ mod slips {
 
 /// `palpate_msgs/Touch`: target and result of a touch, written at its end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Touch<'a> {
+pub struct TouchMessage<'a> {
     /// Number, from 1.
     pub touch: u32,
     /// The backend's time at its end.
@@ -371,7 +371,7 @@ pub struct Touch<'a> {
     pub row: Cow<'a, str>,
 }
 
-impl Described for Touch<'_> {
+impl HasDefinition for TouchMessage<'_> {
     const DEFINITION: Definition = Definition {
         name: "palpate_msgs/msg/Touch",
         fields: "# A touch, written when it is done.\n\

@@ -14,6 +14,6 @@ mod reader;
 mod writer;
 
 pub use crate::message::{ColorRGBA, Marker, Point, Shape};
-pub use format::{About, Ending, TOPICS, Tick, Touch, decoded};
-pub use reader::{Player, Recorded};
-pub use writer::{Clock, Recorder, Recording, wall_clock};
+pub use format::{RecordingMetadata, TOPICS, TickMessage, TouchMessage, TrialEnd, decoded};
+pub use reader::{RecordedTrial, ReplayBackend};
+pub use writer::{Clock, Recording, RecordingBackend, wall_clock};

@@ -1,12 +1,14 @@
 //! Reader of recordings, and the backend that replays them.
 
-use super::format::{ABOUT, About, ENDING, Ending, Tick, Touch, decoded};
-use crate::definition::{Definition, Described};
+use super::format::{
+    ABOUT, ENDING, RecordingMetadata, TickMessage, TouchMessage, TrialEnd, decoded,
+};
+use crate::definition::{Definition, HasDefinition};
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, Reading};
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use palpate_input::files;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -18,53 +20,53 @@ const FILE_MAX: u64 = 16 << 30;
 
 /// A recording in memory, complete or up to its truncation.
 #[derive(Clone, Debug)]
-pub struct Recorded {
+pub struct RecordedTrial {
     /// Metadata.
-    pub about: About,
+    pub about: RecordingMetadata,
     /// Touches.
-    pub touches: Vec<Touch<'static>>,
+    pub touches: Vec<TouchMessage<'static>>,
     /// Number of touches made before the recording began, in a trial that was continued.
     pub made: usize,
     /// Number of ticks, including resets.
     pub tick_count: usize,
     /// End of the trial; `None` for a truncated file.
-    pub ending: Option<Ending>,
+    pub ending: Option<TrialEnd>,
     /// Contents of the file; the many ticks are decoded on request.
     bytes: Arc<[u8]>,
 }
 
-impl Recorded {
+impl RecordedTrial {
     /// Reads a file.
     ///
     /// # Errors
     /// If it cannot be read, or is not a recording or is damaged. A truncated file is not damaged:
     /// it ends early.
-    pub fn read(path: &Path) -> Result<Self, Invalid> {
-        Self::of(files::bytes(path, FILE_MAX).map_err(|error| Invalid::new(error.to_string()))?)
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        Self::of(files::bytes(path, FILE_MAX).map_err(|error| InputError::new(error.to_string()))?)
     }
 
     /// Reads the recording in `bytes`.
     ///
     /// # Errors
     /// The errors of [`read`](Self::read).
-    pub fn of(bytes: Vec<u8>) -> Result<Self, Invalid> {
+    pub fn of(bytes: Vec<u8>) -> Result<Self, InputError> {
         let bytes: Arc<[u8]> = bytes.into();
         let (mut about, mut ending) = (None, None);
         let (mut touches, mut made, mut tick_count) = (Vec::new(), 0, 0);
         let mut entries = Entries::new(Arc::clone(&bytes));
         while let Some(entry) = entries.next()? {
             match entry {
-                Entry::About(texts) => about = Some(About::of(&texts)?),
+                Entry::About(texts) => about = Some(RecordingMetadata::of(&texts)?),
                 Entry::Tick(_) => tick_count += 1,
                 Entry::Touch(touch) => {
                     touches.push(touch);
                     made += usize::from(tick_count == 0);
                 }
-                Entry::Ending(texts) => ending = Some(Ending::of(&texts)),
+                Entry::Ending(texts) => ending = Some(TrialEnd::of(&texts)),
             }
         }
         let about = about.ok_or_else(|| {
-            Invalid::new(
+            InputError::new(
                 "not a palpate recording, or truncated at the start: the metadata `palpate` is missing",
             )
         })?;
@@ -72,7 +74,7 @@ impl Recorded {
     }
 
     /// Returns its ticks, from the first.
-    pub fn ticks(&self) -> impl Iterator<Item = Tick<'static>> + use<> {
+    pub fn ticks(&self) -> impl Iterator<Item = TickMessage<'static>> + use<> {
         let mut entries = Entries::new(Arc::clone(&self.bytes));
         std::iter::from_fn(move || next_tick(&mut entries))
     }
@@ -80,21 +82,21 @@ impl Recorded {
 
 /// A backend that returns the recorded readings, as long as it receives the recorded commands:
 /// every bit of every command is compared.
-pub struct Player {
-    recorded: Recorded,
+pub struct ReplayBackend {
+    recorded: RecordedTrial,
     entries: Entries,
     reading: Reading,
 }
 
-impl Player {
+impl ReplayBackend {
     /// Creates a player of `recorded`.
-    pub fn new(recorded: Recorded) -> Self {
+    pub fn new(recorded: RecordedTrial) -> Self {
         let entries = Entries::new(Arc::clone(&recorded.bytes));
         Self { recorded, entries, reading: Reading::default() }
     }
 }
 
-impl Backend for Player {
+impl Backend for ReplayBackend {
     fn capabilities(&self) -> &Capabilities {
         &self.recorded.about.capabilities
     }
@@ -121,7 +123,7 @@ impl Backend for Player {
             now,
         })?;
         if !tick.fault.is_empty() {
-            return Err(Invalid::new(tick.fault).into());
+            return Err(InputError::new(tick.fault).into());
         }
         tick.write_to(&mut self.reading);
         Ok(&self.reading)
@@ -148,8 +150,8 @@ const RECORD_MAX: usize = 64 << 20;
 /// An entry that a reader uses.
 enum Entry {
     About(BTreeMap<String, String>),
-    Tick(Tick<'static>),
-    Touch(Touch<'static>),
+    Tick(TickMessage<'static>),
+    Touch(TouchMessage<'static>),
     Ending(BTreeMap<String, String>),
 }
 
@@ -159,9 +161,9 @@ type Decode = fn(&[u8]) -> Option<Entry>;
 /// Messages that are read. The slips of a tick are its last field, so that a tick without them is
 /// the prefix of one with an empty list of them.
 const DECODERS: [(Definition, Decode); 3] = [
-    (Tick::DEFINITION, |data| decoded(data).map(Entry::Tick)),
-    (Tick::WITHOUT_SLIPS, |data| decoded(&[data, &EMPTY_LIST].concat()).map(Entry::Tick)),
-    (Touch::DEFINITION, |data| decoded(data).map(Entry::Touch)),
+    (TickMessage::DEFINITION, |data| decoded(data).map(Entry::Tick)),
+    (TickMessage::WITHOUT_SLIPS, |data| decoded(&[data, &EMPTY_LIST].concat()).map(Entry::Tick)),
+    (TouchMessage::DEFINITION, |data| decoded(data).map(Entry::Touch)),
 ];
 
 /// An empty list: its length, after lists that keep it aligned.
@@ -188,7 +190,7 @@ impl Entries {
     }
 
     /// Returns the next entry; `None` at the end, and after an error.
-    fn next(&mut self) -> Result<Option<Entry>, Invalid> {
+    fn next(&mut self) -> Result<Option<Entry>, InputError> {
         if self.is_over {
             return Ok(None);
         }
@@ -197,7 +199,7 @@ impl Entries {
         found
     }
 
-    fn find(&mut self) -> Result<Option<Entry>, Invalid> {
+    fn find(&mut self) -> Result<Option<Entry>, InputError> {
         loop {
             let Some(event) = self.reader.next_event() else { return Ok(None) };
             match event.map_err(|error| unreadable(self.at, error))? {
@@ -235,7 +237,7 @@ fn entry(
     record: McapResult<Record>,
     (schemas, channels): (&mut HashMap<u16, Decode>, &mut HashMap<u16, Decode>),
     at: usize,
-) -> Result<Option<Entry>, Invalid> {
+) -> Result<Option<Entry>, InputError> {
     match record.map_err(|error| unreadable(at, error))? {
         Record::Schema { header, data } => {
             let mut named = DECODERS.iter().filter(|(known, _)| known.name == header.name);
@@ -244,7 +246,7 @@ fn entry(
                 let found = named.find(|(known, _)| is_same(known));
                 let (_, decode) = found.ok_or_else(|| {
                     let name = &header.name;
-                    Invalid::new(format!(
+                    InputError::new(format!(
                         "the fields of its messages {name} differ from this version's"
                     ))
                 })?;
@@ -273,15 +275,15 @@ fn entry(
 }
 
 /// Returns the error of a file of which `at` bytes were read.
-fn damaged(at: usize, error: impl fmt::Display) -> Invalid {
-    Invalid::new(format!("damaged before byte {at}: {error}"))
+fn damaged(at: usize, error: impl fmt::Display) -> InputError {
+    InputError::new(format!("damaged before byte {at}: {error}"))
 }
 
 /// Returns the error of the MCAP reader.
-fn unreadable(at: usize, error: McapError) -> Invalid {
+fn unreadable(at: usize, error: McapError) -> InputError {
     match error {
         McapError::BadMagic if at <= mcap::MAGIC.len() => {
-            Invalid::new("not a recording: it does not begin like an MCAP file")
+            InputError::new("not a recording: it does not begin like an MCAP file")
         }
         error => damaged(at, error),
     }
@@ -289,7 +291,7 @@ fn unreadable(at: usize, error: McapError) -> Invalid {
 
 /// Returns the next tick among `entries`; an error ends them, since the file was already read once
 /// without errors.
-fn next_tick(entries: &mut Entries) -> Option<Tick<'static>> {
+fn next_tick(entries: &mut Entries) -> Option<TickMessage<'static>> {
     loop {
         if let Entry::Tick(tick) = entries.next().ok()?? {
             return Some(tick);

@@ -1,6 +1,9 @@
 //! Writer of recordings, and the backend wrapper that records its ticks.
 
-use super::format::{ABOUT, About, ENDING, Ending, Loads, TOPICS, Tick, Topic, Touch, encode};
+use super::format::{
+    ABOUT, ENDING, LoadBuffer, RecordingChannel, RecordingMetadata, TOPICS, TickMessage,
+    TouchMessage, TrialEnd, encode,
+};
 use crate::message::{
     BioTacData, BioTacHand, BioTacTime, Duration, Header, JointState, JointTrajectory,
     JointTrajectoryPoint, Marker, Time, WrenchStamped,
@@ -41,10 +44,10 @@ const CHUNK_MAX: u64 = 16 << 20;
 /// A message's `log_time` is the wall clock's when it is written; its `publish_time` and the stamp
 /// in its header are the backend's time since reset.
 #[derive(Clone)]
-pub struct Recording(Arc<Mutex<Sheet>>);
+pub struct Recording(Arc<Mutex<McapWriter>>);
 
 /// State of the writer.
-struct Sheet {
+struct McapWriter {
     /// `None` after the end.
     writer: Option<Writer<NoSeek<Box<dyn Write + Send>>>>,
     channels: [u16; TOPICS.len()],
@@ -58,7 +61,7 @@ impl Recording {
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
-    pub fn create(path: &Path, about: &About) -> Result<Self, Fault> {
+    pub fn create(path: &Path, about: &RecordingMetadata) -> Result<Self, Fault> {
         let file = files::create(path)
             .map_err(|error| unrecorded(0.0, &format!("{}: {error}", path.display())))?;
         Self::new(Box::new(BufWriter::new(file)), about, wall_clock)
@@ -68,8 +71,12 @@ impl Recording {
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
-    pub fn new(out: Box<dyn Write + Send>, about: &About, clock: Clock) -> Result<Self, Fault> {
-        let sheet = Sheet::new(out, about, clock).map_err(|error| unrecorded(0.0, &error))?;
+    pub fn new(
+        out: Box<dyn Write + Send>,
+        about: &RecordingMetadata,
+        clock: Clock,
+    ) -> Result<Self, Fault> {
+        let sheet = McapWriter::new(out, about, clock).map_err(|error| unrecorded(0.0, &error))?;
         Ok(Self(Arc::new(Mutex::new(sheet))))
     }
 
@@ -78,10 +85,16 @@ impl Recording {
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
-    pub fn touched(&self, touch: &Touch, [belief, contacts]: [Marker; 2]) -> Result<(), Fault> {
+    pub fn touched(
+        &self,
+        touch: &TouchMessage,
+        [belief, contacts]: [Marker; 2],
+    ) -> Result<(), Fault> {
         let mut sheet = self.sheet();
-        sheet.put(Topic::Touch, touch.time_s, touch)?;
-        for (topic, mut shape) in [(Topic::Belief, belief), (Topic::Contacts, contacts)] {
+        sheet.put(RecordingChannel::Touch, touch.time_s, touch)?;
+        for (topic, mut shape) in
+            [(RecordingChannel::Belief, belief), (RecordingChannel::Contacts, contacts)]
+        {
             if !shape.points.is_empty() {
                 shape.header.stamp = Time::from_s(touch.time_s);
                 sheet.put(topic, touch.time_s, &shape)?;
@@ -94,7 +107,7 @@ impl Recording {
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
-    pub fn end(&self, time_s: f64, ending: &Ending) -> Result<(), Fault> {
+    pub fn end(&self, time_s: f64, ending: &TrialEnd) -> Result<(), Fault> {
         let mut sheet = self.sheet();
         let metadata = metadata(ENDING, ending.texts());
         sheet.write(time_s, |writer| {
@@ -105,13 +118,17 @@ impl Recording {
         out.as_mut().map_or(Ok(()), Write::flush).map_err(|error| unrecorded(time_s, &error))
     }
 
-    fn sheet(&self) -> MutexGuard<'_, Sheet> {
+    fn sheet(&self) -> MutexGuard<'_, McapWriter> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Sheet {
-    fn new(out: Box<dyn Write + Send>, about: &About, clock: Clock) -> McapResult<Self> {
+impl McapWriter {
+    fn new(
+        out: Box<dyn Write + Send>,
+        about: &RecordingMetadata,
+        clock: Clock,
+    ) -> McapResult<Self> {
         let mut writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
@@ -130,7 +147,12 @@ impl Sheet {
     }
 
     /// Adds a message with the backend's time `time_s`.
-    fn put(&mut self, topic: Topic, time_s: f64, message: &impl Serialize) -> Result<(), Fault> {
+    fn put(
+        &mut self,
+        topic: RecordingChannel,
+        time_s: f64,
+        message: &impl Serialize,
+    ) -> Result<(), Fault> {
         let mut bytes = std::mem::take(&mut self.message);
         encode(&mut bytes, message).map_err(|error| unrecorded(time_s, &error))?;
         self.sequence = self.sequence.wrapping_add(1);
@@ -166,15 +188,15 @@ fn unrecorded(time_s: f64, message: &dyn std::fmt::Display) -> Fault {
 
 /// A backend that records the ticks of another. A tick that cannot be recorded is a fault, even if
 /// the backend executed it.
-pub struct Recorder {
+pub struct RecordingBackend {
     inner: Box<dyn Backend>,
     recording: Recording,
-    page: Page,
+    page: TickBuffer,
 }
 
 /// Buffers kept from tick to tick, so that ticks do not allocate.
-struct Page {
-    loads: Loads,
+struct TickBuffer {
+    loads: LoadBuffer,
     tick: u64,
     time_s: f64,
     joints: JointState,
@@ -183,15 +205,15 @@ struct Page {
     tactile: BioTacHand,
 }
 
-impl Recorder {
+impl RecordingBackend {
     /// Records the commands and readings of `inner` to `recording`.
     pub fn new(inner: Box<dyn Backend>, recording: Recording) -> Self {
-        let page = Page::new(inner.capabilities());
+        let page = TickBuffer::new(inner.capabilities());
         Self { inner, recording, page }
     }
 }
 
-impl Backend for Recorder {
+impl Backend for RecordingBackend {
     fn capabilities(&self) -> &Capabilities {
         self.inner.capabilities()
     }
@@ -199,7 +221,11 @@ impl Backend for Recorder {
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
         self.page.tick = 0;
         let reading = self.inner.reset(seed)?;
-        self.page.write(&mut self.recording.sheet(), reading, Tick { seed, ..Tick::default() })?;
+        self.page.write(
+            &mut self.recording.sheet(),
+            reading,
+            TickMessage { seed, ..TickMessage::default() },
+        )?;
         Ok(reading)
     }
 
@@ -211,21 +237,22 @@ impl Backend for Recorder {
         match &result {
             Ok(reading) => {
                 let command = (&command.qdot).into();
-                let tick = Tick { tick: number, command, ..Tick::default() };
+                let tick = TickMessage { tick: number, command, ..TickMessage::default() };
                 self.page.write(&mut sheet, reading, tick)?;
             }
             Err(fault) => {
                 let (time_s, fault) = (self.page.time_s, fault.to_string().into());
                 let command = (&command.qdot).into();
-                let tick = Tick { tick: number, time_s, command, fault, ..Tick::default() };
-                sheet.put(Topic::Tick, time_s, &tick)?;
+                let tick =
+                    TickMessage { tick: number, time_s, command, fault, ..TickMessage::default() };
+                sheet.put(RecordingChannel::Tick, time_s, &tick)?;
             }
         }
         result
     }
 }
 
-impl Page {
+impl TickBuffer {
     fn new(capabilities: &Capabilities) -> Self {
         let header = Header::new(0.0, "W");
         let names = &capabilities.joints;
@@ -234,7 +261,7 @@ impl Page {
             ..JointTrajectoryPoint::default()
         };
         Self {
-            loads: Loads::default(),
+            loads: LoadBuffer::default(),
             tick: 0,
             time_s: 0.0,
             joints: JointState {
@@ -253,29 +280,34 @@ impl Page {
     }
 
     /// Writes `tick` with the contents of `reading`.
-    fn write(&mut self, sheet: &mut Sheet, reading: &Reading, tick: Tick) -> Result<(), Fault> {
+    fn write(
+        &mut self,
+        sheet: &mut McapWriter,
+        reading: &Reading,
+        tick: TickMessage,
+    ) -> Result<(), Fault> {
         let time_s = reading.time_s;
         self.time_s = time_s;
         let stamp = Time::from_s(time_s);
         self.loads.take(reading);
         let is_reset = tick.is_reset();
-        sheet.put(Topic::Tick, time_s, &tick.read(reading, &self.loads))?;
+        sheet.put(RecordingChannel::Tick, time_s, &tick.read(reading, &self.loads))?;
         self.joints.header.stamp = stamp;
         self.joints.position.clone_from(&reading.q);
         self.joints.velocity.clone_from(&reading.qdot);
-        sheet.put(Topic::Joints, time_s, &self.joints)?;
+        sheet.put(RecordingChannel::Joints, time_s, &self.joints)?;
         if !is_reset {
             self.applied.header.stamp = stamp;
             for point in &mut self.applied.points {
                 point.velocities.clone_from(&reading.applied.qdot);
             }
-            sheet.put(Topic::Applied, time_s, &self.applied)?;
+            sheet.put(RecordingChannel::Applied, time_s, &self.applied)?;
         }
         if let Some(wrench) = reading.wrench {
             self.wrench.header.stamp = stamp;
             self.wrench.wrench.force = wrench.force_n.into();
             self.wrench.wrench.torque = wrench.torque_nm.into();
-            sheet.put(Topic::Wrench, time_s, &self.wrench)?;
+            sheet.put(RecordingChannel::Wrench, time_s, &self.wrench)?;
         }
         for frame in reading.frames() {
             self.tactile.header.stamp = Time::from_s(frame.time_s);
@@ -285,7 +317,7 @@ impl Page {
                 ..BioTacTime::default()
             };
             self.tactile.bt_data.iter_mut().for_each(|data| fill(data, frame));
-            sheet.put(Topic::Tactile, time_s, &self.tactile)?;
+            sheet.put(RecordingChannel::Tactile, time_s, &self.tactile)?;
         }
         Ok(())
     }

@@ -114,7 +114,7 @@ impl ArmPc {
     }
 
     /// Processes a command that arrived at `now_s`, at `wall_s` since 1970.
-    pub fn take(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64) {
+    pub fn receive(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64) {
         let mut incoming = std::mem::take(&mut self.incoming);
         let read = self.names.read_command(packet, &mut incoming);
         self.incoming = incoming;

@@ -17,12 +17,12 @@ pub struct Failure {
     /// Description.
     pub about: &'static str,
     /// Effect.
-    pub act: Act,
+    pub act: FailureEffect,
 }
 
 /// Effect of a failure.
 #[derive(Clone, Copy)]
-pub enum Act {
+pub enum FailureEffect {
     /// Drops one packet in five.
     Lose,
     /// Stops sending on a topic.
@@ -30,7 +30,7 @@ pub enum Act {
     /// Repeats the first message of a topic, with new stamps.
     Freeze(Topic),
     /// Changes packets.
-    Change(fn(&mut Packet, &mut Memory)),
+    Change(fn(&mut Packet, &mut FailureState)),
     /// Writes the flag of this name in a status, or all flags, as one of these texts: off, on.
     Flags(Option<&'static str>, [&'static str; 2]),
     /// Delays packets by this time, s.
@@ -42,14 +42,14 @@ pub enum Act {
 }
 
 /// State of the failures.
-pub struct Memory {
+pub struct FailureState {
     /// Random number generator for noise and loss.
     pub rng: ChaCha8Rng,
     /// First packet of each topic since the failure began.
     pub kept: [Option<Packet>; Topic::ALL.len()],
 }
 
-impl Memory {
+impl FailureState {
     /// Returns the first packet of the topic of `packet` since the failure began: this one, if
     /// there was none before.
     fn first(&mut self, packet: &Packet) -> &mut Packet {
@@ -73,72 +73,80 @@ const AHEAD_S: i32 = 1;
 // heuristic: hundreds of messages stay within the age limit of 50 ms.
 const BACKWARD_S: f64 = 1e-4;
 
-const fn failure(name: &'static str, about: &'static str, act: Act) -> Failure {
+const fn failure(name: &'static str, about: &'static str, act: FailureEffect) -> Failure {
     Failure { name, about, act }
 }
 
 /// All failures; add one line per failure.
 pub static FAILURES: &[Failure] = &[
-    failure("loss", "one packet in five is lost", Act::Lose),
-    failure("latency", "packets are sent 20 ms late", Act::Delay(0.02)),
-    failure("noise", "the force has noise of 0.3 N", Act::Change(add_noise)),
-    failure("frozen", "the same tactile frame is repeated", Act::Freeze(Topic::Tactile)),
+    failure("loss", "one packet in five is lost", FailureEffect::Lose),
+    failure("latency", "packets are sent 20 ms late", FailureEffect::Delay(0.02)),
+    failure("noise", "the force has noise of 0.3 N", FailureEffect::Change(add_noise)),
+    failure("frozen", "the same tactile frame is repeated", FailureEffect::Freeze(Topic::Tactile)),
     failure(
         "frozen_joints",
         "the same joint positions and velocities are repeated, with new stamps",
-        Act::Freeze(Topic::Joints),
+        FailureEffect::Freeze(Topic::Joints),
     ),
     failure(
         "frozen_wrench",
         "the same force and torque are repeated, with new stamps",
-        Act::Freeze(Topic::Wrench),
+        FailureEffect::Freeze(Topic::Wrench),
     ),
-    failure("force_spike", "the force has a spike of 60 N along z", Act::Change(add_spike)),
-    failure("nan", "a joint position is NaN", Act::Change(spoil_position)),
-    failure("six_names", "joint states contain six joints", Act::Change(drop_seventh)),
+    failure(
+        "force_spike",
+        "the force has a spike of 60 N along z",
+        FailureEffect::Change(add_spike),
+    ),
+    failure("nan", "a joint position is NaN", FailureEffect::Change(spoil_position)),
+    failure("six_names", "joint states contain six joints", FailureEffect::Change(drop_seventh)),
     failure(
         "swapped_names",
         "the names of the first two joints are swapped",
-        Act::Change(|packet, _| with_joints(packet, |message| message.name.swap(0, 1))),
+        FailureEffect::Change(|packet, _| with_joints(packet, |message| message.name.swap(0, 1))),
     ),
     failure(
         "other_joints",
         "every other joint state belongs to a hand",
-        Act::Change(alternate_joints),
+        FailureEffect::Change(alternate_joints),
     ),
-    failure("future", "stamps are one second ahead", Act::Change(lead)),
-    failure("unstamped", "stamps are zero", Act::Change(clear_stamp)),
-    failure("backward", "stamps run backwards by 0.1 ms per message", Act::Change(turn_back)),
-    failure("no_joints", "joint states stop arriving", Act::Cease(Topic::Joints)),
-    failure("no_wrench", "forces stop arriving", Act::Cease(Topic::Wrench)),
-    failure("no_tactile", "tactile frames stop arriving", Act::Cease(Topic::Tactile)),
-    failure("estop", "the emergency stop is pressed", Act::Estop),
-    failure("deadman", "the dead-man switch is released", Act::Deadman),
+    failure("future", "stamps are one second ahead", FailureEffect::Change(lead)),
+    failure("unstamped", "stamps are zero", FailureEffect::Change(clear_stamp)),
+    failure(
+        "backward",
+        "stamps run backwards by 0.1 ms per message",
+        FailureEffect::Change(turn_back),
+    ),
+    failure("no_joints", "joint states stop arriving", FailureEffect::Cease(Topic::Joints)),
+    failure("no_wrench", "forces stop arriving", FailureEffect::Cease(Topic::Wrench)),
+    failure("no_tactile", "tactile frames stop arriving", FailureEffect::Cease(Topic::Tactile)),
+    failure("estop", "the emergency stop is pressed", FailureEffect::Estop),
+    failure("deadman", "the dead-man switch is released", FailureEffect::Deadman),
     failure(
         "hold",
         "the status reports a hold, but the arm follows commands",
-        Act::Flags(Some("hold"), ["true"; 2]),
+        FailureEffect::Flags(Some("hold"), ["true"; 2]),
     ),
     failure(
         "brake",
         "the status reports closed brakes, but the arm follows commands",
-        Act::Flags(Some("brake"), ["true"; 2]),
+        FailureEffect::Flags(Some("brake"), ["true"; 2]),
     ),
     failure(
         "python_flags",
         "the flags of the status are Python booleans: True, False",
-        Act::Flags(None, ["False", "True"]),
+        FailureEffect::Flags(None, ["False", "True"]),
     ),
     failure(
         "number_flags",
         "the flags of the status are numbers: 1, 0",
-        Act::Flags(None, ["0", "1"]),
+        FailureEffect::Flags(None, ["0", "1"]),
     ),
-    failure("no_flags", "the status has no values", Act::Change(clear_flags)),
+    failure("no_flags", "the status has no values", FailureEffect::Change(clear_flags)),
     failure(
         "unknown_flag",
         "the status reports the emergency stop as \"unknown\"",
-        Act::Flags(Some("estop"), ["unknown"; 2]),
+        FailureEffect::Flags(Some("estop"), ["unknown"; 2]),
     ),
 ];
 
@@ -147,7 +155,7 @@ pub fn by_name(name: &str) -> Option<usize> {
     FAILURES.iter().position(|failure| failure.name == name)
 }
 
-fn add_noise(packet: &mut Packet, memory: &mut Memory) {
+fn add_noise(packet: &mut Packet, memory: &mut FailureState) {
     if let Packet::Wrench(message) = packet {
         let force = &mut message.wrench.force;
         for part in [&mut force.x, &mut force.y, &mut force.z] {
@@ -156,27 +164,27 @@ fn add_noise(packet: &mut Packet, memory: &mut Memory) {
     }
 }
 
-fn add_spike(packet: &mut Packet, _: &mut Memory) {
+fn add_spike(packet: &mut Packet, _: &mut FailureState) {
     if let Packet::Wrench(message) = packet {
         message.wrench.force.z += SPIKE_N;
     }
 }
 
-fn freeze(packet: &mut Packet, memory: &mut Memory) {
+fn freeze(packet: &mut Packet, memory: &mut FailureState) {
     let stamp = packet.stamp_mut().copied();
     packet.clone_from(memory.first(packet));
     packet.stamp_mut().into_iter().zip(stamp).for_each(|(now, stamp)| *now = stamp);
 }
 
-fn lead(packet: &mut Packet, _: &mut Memory) {
+fn lead(packet: &mut Packet, _: &mut FailureState) {
     packet.stamp_mut().into_iter().for_each(|stamp| stamp.sec += AHEAD_S);
 }
 
-fn clear_stamp(packet: &mut Packet, _: &mut Memory) {
+fn clear_stamp(packet: &mut Packet, _: &mut FailureState) {
     packet.stamp_mut().into_iter().for_each(|stamp| *stamp = Time::default());
 }
 
-fn turn_back(packet: &mut Packet, memory: &mut Memory) {
+fn turn_back(packet: &mut Packet, memory: &mut FailureState) {
     if let (Some(last), Some(stamp)) = (memory.first(packet).stamp_mut(), packet.stamp_mut()) {
         *last = Time::from_s(last.s() - BACKWARD_S);
         *stamp = *last;
@@ -191,11 +199,11 @@ fn with_joints(packet: &mut Packet, change: impl FnOnce(&mut JointState)) {
     }
 }
 
-fn spoil_position(packet: &mut Packet, _: &mut Memory) {
+fn spoil_position(packet: &mut Packet, _: &mut FailureState) {
     with_joints(packet, |message| message.position[0] = f64::NAN);
 }
 
-fn drop_seventh(packet: &mut Packet, _: &mut Memory) {
+fn drop_seventh(packet: &mut Packet, _: &mut FailureState) {
     with_joints(packet, |message| {
         message.name.truncate(6);
         message.position.truncate(6);
@@ -203,7 +211,7 @@ fn drop_seventh(packet: &mut Packet, _: &mut Memory) {
     });
 }
 
-fn alternate_joints(packet: &mut Packet, memory: &mut Memory) {
+fn alternate_joints(packet: &mut Packet, memory: &mut FailureState) {
     if let Packet::Joints(message) = packet {
         if memory.kept[Topic::Joints as usize].take().is_some() {
             return;
@@ -222,7 +230,7 @@ fn statuses(packet: &mut Packet) -> &mut [DiagnosticStatus] {
     }
 }
 
-fn clear_flags(packet: &mut Packet, _: &mut Memory) {
+fn clear_flags(packet: &mut Packet, _: &mut FailureState) {
     statuses(packet).iter_mut().for_each(|status| status.values.clear());
 }
 
@@ -237,19 +245,19 @@ fn write_flags(packet: &mut Packet, key: Option<&str>, texts: [&str; 2]) {
 }
 
 /// Sends packets through the active failures.
-pub struct Sender {
+pub struct FailingSender {
     is_on: Vec<bool>,
-    memory: Memory,
+    memory: FailureState,
     /// Delayed packets with their time of sending.
     delayed: VecDeque<(f64, Packet)>,
 }
 
-impl Sender {
+impl FailingSender {
     /// Creates a sender without failures.
     pub fn new(seed: u64) -> Self {
         Self {
             is_on: vec![false; FAILURES.len()],
-            memory: Memory { rng: seed::stream(seed, 0, "twin"), kept: Default::default() },
+            memory: FailureState { rng: seed::stream(seed, 0, "twin"), kept: Default::default() },
             delayed: VecDeque::new(),
         }
     }
@@ -272,14 +280,14 @@ impl Sender {
         let mut delay_s = 0.0;
         for (failure, _) in FAILURES.iter().zip(&self.is_on).filter(|(_, is_on)| **is_on) {
             match failure.act {
-                Act::Lose if self.memory.rng.random::<f64>() <= LOST => return,
-                Act::Cease(topic) if packet.topic() == topic => return,
-                Act::Freeze(topic) if packet.topic() == topic => {
+                FailureEffect::Lose if self.memory.rng.random::<f64>() <= LOST => return,
+                FailureEffect::Cease(topic) if packet.topic() == topic => return,
+                FailureEffect::Freeze(topic) if packet.topic() == topic => {
                     freeze(&mut packet, &mut self.memory);
                 }
-                Act::Change(change) => change(&mut packet, &mut self.memory),
-                Act::Flags(key, texts) => write_flags(&mut packet, key, texts),
-                Act::Delay(by_s) => delay_s += by_s,
+                FailureEffect::Change(change) => change(&mut packet, &mut self.memory),
+                FailureEffect::Flags(key, texts) => write_flags(&mut packet, key, texts),
+                FailureEffect::Delay(by_s) => delay_s += by_s,
                 _ => (),
             }
         }

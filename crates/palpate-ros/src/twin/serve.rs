@@ -2,7 +2,7 @@
 //! time.
 
 use super::arm_pc::ArmPc;
-use super::failure::{Act, FAILURES, Sender, by_name};
+use super::failure::{FAILURES, FailingSender, FailureEffect, by_name};
 use crate::joints::JointNames;
 use crate::link::Link;
 use crate::message::{Header, TriggerResponse, Wrench as WrenchMessage, WrenchStamped};
@@ -12,7 +12,7 @@ use crate::tactile;
 use crate::topics::{Service, Topic};
 use crate::transport::{Connect, Delivery, Packet};
 use nalgebra::Isometry3;
-use palpate_explore::backend::pace::{self, Pace};
+use palpate_explore::backend::pace::{self, RealTimePacer};
 use palpate_explore::backend::{Backend, Command, Fault, Reading, Wrench};
 use palpate_explore::robot::arm::Chain;
 use serde::Serialize;
@@ -80,7 +80,7 @@ pub struct Twin {
     /// Deliveries, queued for the loop.
     inbox: Receiver<Delivery>,
     link: Link,
-    sender: Sender,
+    sender: FailingSender,
     injections: Vec<Injection>,
     /// Pose of `T` in the sensor's frame.
     x_mt: Isometry3<f64>,
@@ -128,7 +128,7 @@ impl Twin {
             names,
             inbox,
             link,
-            sender: Sender::new(seed),
+            sender: FailingSender::new(seed),
             injections,
             x_mt: chain.tool,
             bias: Wrench::default(),
@@ -150,7 +150,7 @@ impl Twin {
         tell: &mut dyn FnMut(f64, Event),
     ) -> Result<(), Fault> {
         let mut command = Command::default();
-        let mut pace = Pace::new(self.period_s);
+        let mut pace = RealTimePacer::new(self.period_s);
         self.since = Instant::now();
         self.tell(Event::Serving);
         while !stop.load(Ordering::Relaxed) {
@@ -203,7 +203,7 @@ impl Twin {
                 Delivery::Packet { packet, sender, received } => {
                     if packet.topic() == Topic::Command {
                         let at_s = received.saturating_duration_since(self.since).as_secs_f64();
-                        self.pc.take(&packet, sender, at_s.min(now_s), pace::now_s());
+                        self.pc.receive(&packet, sender, at_s.min(now_s), pace::now_s());
                     }
                 }
                 Delivery::Garbled { words, .. } => {
@@ -242,8 +242,8 @@ impl Twin {
         let Some(entry) = FAILURES.get(failure) else { return };
         self.sender.set(failure, is_on);
         match entry.act {
-            Act::Estop => self.pc.set_estop(is_on),
-            Act::Deadman => self.pc.set_deadman(!is_on),
+            FailureEffect::Estop => self.pc.set_estop(is_on),
+            FailureEffect::Deadman => self.pc.set_deadman(!is_on),
             _ => (),
         }
         self.tell(Event::Failure { name: entry.name, is_on });

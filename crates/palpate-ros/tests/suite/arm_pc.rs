@@ -28,10 +28,10 @@ fn arm_pc() -> ArmPc {
 /// Returns an arm computer that was commanded to rest and then to move, 4 ms apart, until 0.1 s.
 fn moving() -> ArmPc {
     let mut pc = arm_pc();
-    pc.take(&names().command(0.0, &[0.0; 3], &topic()), 1, 0.0, 0.0);
+    pc.receive(&names().command(0.0, &[0.0; 3], &topic()), 1, 0.0, 0.0);
     for i in 1..=25 {
         let now_s = f64::from(i) * 0.004;
-        pc.take(&names().command(now_s, &[0.1, -0.2, 0.3], &topic()), 1, now_s, now_s);
+        pc.receive(&names().command(now_s, &[0.1, -0.2, 0.3], &topic()), 1, now_s, now_s);
         pc.advance(now_s);
     }
     assert_eq!(pc.advance(0.1), [0.1, -0.2, 0.3]);
@@ -48,7 +48,7 @@ fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
 #[test]
 fn it_moves_after_a_command_to_stand_still_only() {
     let mut pc = arm_pc();
-    pc.take(&names().command(1.0, &[0.1; 3], &topic()), 1, 1.0, 1.0);
+    pc.receive(&names().command(1.0, &[0.1; 3], &topic()), 1, 1.0, 1.0);
     assert_eq!(pc.advance(1.0), [0.0; 3]);
     assert!(!pc.status().servo_on && pc.status().brake);
     moving();
@@ -75,7 +75,7 @@ fn old_commands_move_nothing_neither_before_nor_after_a_stop() {
     pc.clear();
     for i in 0..200 {
         let sent_s = 0.1 + f64::from(i) * 0.004;
-        pc.take(&names().command(sent_s, &[0.3; 3], &topic()), 1, 1.0, 1.0);
+        pc.receive(&names().command(sent_s, &[0.3; 3], &topic()), 1, 1.0, 1.0);
         assert_eq!(pc.advance(1.0 + f64::from(i) * 1e-4), [0.0; 3]);
     }
     assert_eq!(pc.refused(), 200, "those of the last 20 ms are timely, but not to stand still");
@@ -86,19 +86,19 @@ fn an_alarm_stays_until_it_is_cleared_and_it_begins_again_from_rest() {
     let mut pc = moving();
     speeds(&mut pc, 60);
     let still = |now_s| names().command(now_s, &[0.0; 3], &topic());
-    pc.take(&still(0.3), 1, 0.3, 0.3);
+    pc.receive(&still(0.3), 1, 0.3, 0.3);
     assert!(!pc.status().servo_on);
     pc.clear();
-    pc.take(&still(0.4), 1, 0.4, 0.4);
+    pc.receive(&still(0.4), 1, 0.4, 0.4);
     assert!(pc.status().servo_on);
-    pc.take(&names().command(0.404, &[0.1; 3], &topic()), 1, 0.404, 0.404);
+    pc.receive(&names().command(0.404, &[0.1; 3], &topic()), 1, 0.404, 0.404);
     assert_eq!(pc.advance(0.404), [0.1; 3]);
 }
 
 #[test]
 fn a_second_publisher_stops_it() {
     let mut pc = moving();
-    pc.take(&names().command(0.102, &[0.1; 3], &topic()), 2, 0.102, 0.102);
+    pc.receive(&names().command(0.102, &[0.1; 3], &topic()), 2, 0.102, 0.102);
     assert_eq!(pc.status().refusal(), Some("alarm: two publishers command".into()));
     assert_eq!(speeds(&mut pc, 50).last(), Some(&0.0));
 }
@@ -145,7 +145,7 @@ fn what_is_no_command_of_this_arm_stops_it() {
     ];
     for (packet, says) in cases {
         let mut pc = moving();
-        pc.take(&packet, 1, 0.102, 0.102);
+        pc.receive(&packet, 1, 0.102, 0.102);
         let refusal = pc.status().refusal().unwrap();
         assert!(refusal.contains(says), "{refusal}: {says}");
         assert_eq!(speeds(&mut pc, 50).last(), Some(&0.0));
@@ -157,7 +157,7 @@ fn what_is_no_command_of_this_arm_stops_it() {
 fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
     for fast in [1e9, LIMIT * 1.001, -LIMIT * 1.001] {
         let mut pc = moving();
-        pc.take(&command(&["S1", "S2", "S3"], &[0.1, fast, 0.1]), 1, 0.102, 0.102);
+        pc.receive(&command(&["S1", "S2", "S3"], &[0.1, fast, 0.1]), 1, 0.102, 0.102);
         let refusal = pc.status().refusal().unwrap();
         let says = format!("velocity of \"S2\" is {fast}, its limit 2");
         assert!(refusal.contains(&says), "{refusal}");
@@ -165,7 +165,7 @@ fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
         assert!(speeds.iter().all(|&speed| speed <= 0.3) && speeds[49] == 0.0, "{speeds:?}");
     }
     let mut pc = moving();
-    pc.take(&command(&["S1", "S2", "S3"], &[0.1, LIMIT, 0.1]), 1, 0.102, 0.102);
+    pc.receive(&command(&["S1", "S2", "S3"], &[0.1, LIMIT, 0.1]), 1, 0.102, 0.102);
     assert_eq!(pc.advance(0.102), [0.1, LIMIT, 0.1]);
 }
 
@@ -173,7 +173,7 @@ fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
 #[test]
 fn swapped_names_move_the_joints_that_they_name() {
     let mut pc = moving();
-    pc.take(&command(&["S3", "S1", "S2"], &[0.3, 0.1, 0.2]), 1, 0.102, 0.102);
+    pc.receive(&command(&["S3", "S1", "S2"], &[0.3, 0.1, 0.2]), 1, 0.102, 0.102);
     assert_eq!(pc.advance(0.102), [0.1, 0.2, 0.3]);
 }
 
@@ -190,7 +190,7 @@ proptest! {
             now_s += after_s;
             fastest = fastest.max(qdot.abs());
             let stamp_s = now_s - age_s;
-            pc.take(&names().command(stamp_s, &[qdot, 0.0, 0.0], &topic()), 1, now_s, now_s);
+            pc.receive(&names().command(stamp_s, &[qdot, 0.0, 0.0], &topic()), 1, now_s, now_s);
             prop_assert!(pc.advance(now_s)[0].abs() <= fastest);
         }
         pc.advance(now_s + 0.025);

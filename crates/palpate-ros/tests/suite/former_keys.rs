@@ -1,6 +1,6 @@
 //! Tests of keys of `[backend]` in files of version 0.1 that are no longer settings.
 
-use palpate_input::config::{Checked, ConfigError, Loader, Rules};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate};
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use serde::Deserialize;
 use std::path::Path;
@@ -11,14 +11,14 @@ struct File {
     backend: BackendSettings,
 }
 
-impl Checked for File {
+impl Validate for File {
     fn check(&self, rules: &mut Rules) {
         rules.table("backend", &self.backend);
     }
 }
 
 fn read(text: &str) -> Result<File, ConfigError> {
-    let mut loader = Loader::of(Path::new("old.toml"), text.into())?;
+    let mut loader = Loader::from_text(Path::new("old.toml"), text.into())?;
     take_former_keys(&mut loader)?;
     loader.finish()
 }

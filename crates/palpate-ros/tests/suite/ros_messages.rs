@@ -1,6 +1,6 @@
 //! Tests of the message definitions against the standard ones.
 
-use palpate_ros::definition::{Definition, Described};
+use palpate_ros::definition::{Definition, HasDefinition};
 use palpate_ros::message::*;
 use std::collections::BTreeMap;
 

@@ -2,17 +2,17 @@
 
 mod reach;
 
-pub use reach::Reach;
+pub use reach::FingerReach;
 
 use crate::sim::Environment;
-use crate::sim::environment::Shape;
+use crate::sim::environment::Surface;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::around::Surface;
 use palpate_explore::task::approach::attitude;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::inside::{Crossing, spans_inside};
 use palpate_geometry::mesh::Mesh;
-use palpate_geometry::spread::{Spot, in_square, over_surface};
+use palpate_geometry::spread::{SurfacePoint, in_square, over_surface};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,13 +54,13 @@ pub struct ShapeMetrics {
 }
 
 /// Standard deviations within which the true surface counts as covered.
-const COVERED_SD: f64 = 2.0;
+const COVERAGE_SDS: f64 = 2.0;
 
 impl ShapeMetrics {
     /// Sets the coverage from |mean| / sd of the field at the true samples; a NaN ratio is not
     /// covered.
     pub fn with_coverage(self, ratios: impl IntoIterator<Item = f64>) -> Self {
-        let coverage = share(ratios, |ratio| ratio.abs() <= COVERED_SD).map(tidy);
+        let coverage = share(ratios, |ratio| ratio.abs() <= COVERAGE_SDS).map(round_share);
         Self { coverage, ..self }
     }
 }
@@ -73,7 +73,7 @@ fn f_score(from_true_m: &[f64], from_believed_m: &[f64], limit_m: f64) -> f64 {
     };
     let (recall, precision) = (within(from_true_m), within(from_believed_m));
     let sum = precision + recall;
-    if sum > 0.0 { tidy(2.0 * precision * recall / sum) } else { 0.0 }
+    if sum > 0.0 { round_share(2.0 * precision * recall / sum) } else { 0.0 }
 }
 
 /// Mean of numbers; `None` if there are none.
@@ -84,7 +84,7 @@ fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 /// Rounds a share to six decimals, finer than the samples resolve: each row stores one per touch.
-fn tidy(share: f64) -> f64 {
+fn round_share(share: f64) -> f64 {
     (1e6 * share).round() / 1e6
 }
 
@@ -105,13 +105,13 @@ const LINES: usize = 1000;
 
 /// Step between the true samples whose standard deviation is computed.
 // heuristic: limits a cost that is quadratic in the number of observations.
-const COVERED: usize = 4;
+const COVERAGE_STEP: usize = 4;
 
 /// True surface, with precomputed samples and properties.
 #[derive(Clone)]
 pub struct TrueShape {
     bvh: MeshBvh,
-    samples: Vec<Spot>,
+    samples: Vec<SurfacePoint>,
     /// Enclosed volume; `None` for an open surface.
     volume_m3: Option<f64>,
     area_m2: f64,
@@ -123,9 +123,9 @@ pub struct TrueShape {
 impl TrueShape {
     /// Returns the surface of an environment with a whole object, with its reachable part if it is
     /// closed; `None` for other environments.
-    pub fn of(environment: &Environment) -> Option<Self> {
+    pub fn from_environment(environment: &Environment) -> Option<Self> {
         let ball = environment.task().ball()?;
-        let Shape::Mesh { bvh, report } = environment.shape() else { return None };
+        let Surface::Mesh { bvh, report } = environment.shape() else { return None };
         let shape = Self::new(bvh.clone(), report.is_closed());
         if !report.is_closed() {
             return Some(shape);
@@ -133,7 +133,7 @@ impl TrueShape {
         let finger = &environment.scene().finger;
         let axis_w = |ahead_w: &UnitVector3<f64>| attitude(ahead_w) * finger.axis_a();
         let (radius_m, lowest_m) = (finger.radius_m, ball.lowest_m);
-        Some(shape.with_reach(&Reach { radius_m, axis_w: &axis_w, lowest_m }))
+        Some(shape.with_reach(&FingerReach { radius_m, axis_w: &axis_w, lowest_m }))
     }
 
     /// Returns the surface of a mesh; only a closed mesh has a volume.
@@ -151,7 +151,7 @@ impl TrueShape {
     }
 
     /// Adds the part that a finger can touch.
-    pub fn with_reach(self, reach: &Reach) -> Self {
+    pub fn with_reach(self, reach: &FingerReach) -> Self {
         let is_reachable = Some(reach.touches(&self.bvh, &self.samples));
         Self { is_reachable, ..self }
     }
@@ -165,20 +165,20 @@ impl TrueShape {
 
     /// Points spread evenly over the surface, and whether the finger can touch each; empty if that
     /// was not computed.
-    pub fn reached(&self) -> Vec<(Point3<f64>, bool)> {
+    pub fn reachable_samples(&self) -> Vec<(Point3<f64>, bool)> {
         let is_reachable = self.is_reachable.iter().flatten();
         self.samples.iter().map(|spot| spot.point).zip(is_reachable.copied()).collect()
     }
 
     /// Points spread evenly over the surface.
-    pub fn samples(&self) -> &[Spot] {
+    pub fn samples(&self) -> &[SurfacePoint] {
         &self.samples
     }
 
     /// Compares an estimated surface, meshed with `cells` along its longest side, with the true
     /// one, including the coverage.
-    pub fn judge(&self, surface: &Surface, cells: u32) -> ShapeMetrics {
-        let looked_at = self.samples.iter().step_by(COVERED).map(|spot| spot.point);
+    pub fn evaluate(&self, surface: &Surface, cells: u32) -> ShapeMetrics {
+        let looked_at = self.samples.iter().step_by(COVERAGE_STEP).map(|spot| spot.point);
         let points_w: Vec<Point3<f64>> = looked_at.collect();
         let mut field = surface.field();
         let ratios = surface.sds_m(&points_w).into_iter().zip(&points_w);
@@ -200,18 +200,18 @@ impl TrueShape {
         let reached = self.is_reachable.iter().flatten().zip(&from_true_m);
         let reached_m = reached.filter_map(|(is_reachable, way_m)| is_reachable.then_some(*way_m));
         let f_at = |share| f_score(&from_true_m, &from_believed_m, share * self.diagonal_m);
-        let error = |believed: f64, truly: f64| tidy(believed / truly - 1.0);
+        let error = |believed: f64, truly: f64| round_share(believed / truly - 1.0);
         let volume_error = self.volume_m3.map(|volume_m3| error(believed.volume_m3(), volume_m3));
         let overlap = self.volume_m3.and_then(|_| intersection_over_union(&self.bvh, &bvh, LINES));
         ShapeMetrics {
             chamfer_m,
-            chamfer_share: chamfer_m.map(|chamfer_m| tidy(chamfer_m / self.diagonal_m)),
+            chamfer_share: chamfer_m.map(|chamfer_m| round_share(chamfer_m / self.diagonal_m)),
             reachable_chamfer_m: mean(reached_m),
             f_1: f_at(0.01),
             f_3: f_at(0.03),
             volume_error: volume_error.filter(|error| error.is_finite()),
             area_error: error(believed.area_m2(), self.area_m2),
-            iou: overlap.map(tidy),
+            iou: overlap.map(round_share),
             coverage: None,
         }
     }
@@ -228,7 +228,7 @@ impl TrueShape {
     }
 }
 
-fn distances_m(from: &[Spot], to: &MeshBvh) -> Vec<f64> {
+fn distances_m(from: &[SurfacePoint], to: &MeshBvh) -> Vec<f64> {
     from.iter().map(|spot| to.closest_point(&spot.point).distance_m).collect()
 }
 
@@ -257,7 +257,7 @@ fn intersection_over_union(a: &MeshBvh, b: &MeshBvh, lines: usize) -> Option<f64
         start[along] -= sides_m[along];
         for (mesh, spans) in [(a, &mut of_a), (b, &mut of_b)] {
             crossings.clear();
-            mesh.cross(&start, &axis, |crossing| crossings.push(crossing));
+            mesh.crossings(&start, &axis, |crossing| crossings.push(crossing));
             spans_inside(&mut crossings, spans);
         }
         both_m += common_m(&of_a, &of_b);

@@ -3,7 +3,7 @@
 use nalgebra::{UnitVector3, Vector3};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::{nearest_on_segment, normal};
-use palpate_geometry::spread::{Spot, directions};
+use palpate_geometry::spread::{SurfacePoint, directions};
 use palpate_geometry::sweep::Capsule;
 use rayon::prelude::*;
 
@@ -20,7 +20,7 @@ const DIRECTIONS: usize = 128;
 
 /// Geometry of a finger's approaches to an object.
 #[derive(Clone, Copy)]
-pub struct Reach<'a> {
+pub struct FingerReach<'a> {
     /// Radius of the finger's hemisphere and cylinder.
     pub radius_m: f64,
     /// Vector from the hemisphere's centre to the cylinder's far end, in `W`, for an approach
@@ -30,18 +30,18 @@ pub struct Reach<'a> {
     pub lowest_m: Option<f64>,
 }
 
-impl Reach<'_> {
+impl FingerReach<'_> {
     /// Whether the finger can touch the surface at each of `spots`: on a straight path from outside
     /// the ball around the mesh to the pose where its hemisphere rests on the surface there,
     /// nothing stops it before the tolerance. The normal and an even spread of directions on its
     /// side are tried.
     ///
     /// The mesh must be closed; its outside is the free space.
-    pub fn touches(&self, mesh: &MeshBvh, spots: &[Spot]) -> Vec<bool> {
+    pub fn touches(&self, mesh: &MeshBvh, spots: &[SurfacePoint]) -> Vec<bool> {
         let spread: Vec<UnitVector3<f64>> = directions(DIRECTIONS).collect();
         let (low, high) = mesh.mesh().bounds();
         let tolerance_m = TOLERANCE * (high - low).norm();
-        let touches = |spot: &Spot| {
+        let touches = |spot: &SurfacePoint| {
             let corners = mesh.mesh().corners(spot.triangle as usize);
             let outward = UnitVector3::new_unchecked(normal(&corners));
             let tip_w = spot.point + outward.scale(self.radius_m);
@@ -71,7 +71,7 @@ impl Reach<'_> {
     fn rests_at(
         &self,
         (mesh, tolerance_m): (&MeshBvh, f64),
-        spot: &Spot,
+        spot: &SurfacePoint,
         tip_w: &Vector3<f64>,
         back: &UnitVector3<f64>,
     ) -> bool {

@@ -7,7 +7,7 @@ use crate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 
 /// Model constants of a kind of finger.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Model {
+pub struct FingerConstants {
     /// Constants of the skin.
     pub skin: SkinEffect,
     /// Constants of the electrodes; each recording has its own baselines.
@@ -16,7 +16,7 @@ pub struct Model {
     pub cavity_pa_m3: f64,
 }
 
-impl Default for Model {
+impl Default for FingerConstants {
     /// Returns the constants of a scene without settings of its own.
     fn default() -> Self {
         Self {
@@ -27,7 +27,7 @@ impl Default for Model {
     }
 }
 
-impl Model {
+impl FingerConstants {
     /// Returns the default constants with another skin model.
     pub fn of(model: SkinModel) -> Self {
         let known = Self::default();
@@ -61,17 +61,17 @@ pub struct Constant {
     pub bounds: [f64; 2],
     /// Plausible standard deviation, as a logarithm.
     pub plausible: f64,
-    of: fn(&mut Model) -> &mut f64,
+    of: fn(&mut FingerConstants) -> &mut f64,
 }
 
 impl Constant {
     /// Returns the value in `model`.
-    pub fn value(&self, model: &Model) -> f64 {
+    pub fn value(&self, model: &FingerConstants) -> f64 {
         *(self.of)(&mut model.clone())
     }
 
     /// Sets the value in `model`.
-    pub fn set(&self, model: &mut Model, value: f64) {
+    pub fn set(&self, model: &mut FingerConstants, value: f64) {
         *(self.of)(model) = value;
     }
 }
@@ -80,7 +80,7 @@ const fn constant(
     key: &'static str,
     bounds: [f64; 2],
     plausible: f64,
-    of: fn(&mut Model) -> &mut f64,
+    of: fn(&mut FingerConstants) -> &mut f64,
 ) -> Constant {
     Constant { key, bounds, plausible, of }
 }

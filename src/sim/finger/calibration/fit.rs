@@ -1,9 +1,9 @@
 //! Least-squares fit of constants and sessions, with its uncertainty.
 
-use super::constants::{Constant, Model};
-use super::session::{Bench, Session};
+use super::constants::{Constant, FingerConstants};
+use super::session::{PlateRig, Session};
 use crate::sim::finger::effects::skin::SkinModel;
-use crate::sim::finger::recording::Recording;
+use crate::sim::finger::recording::PlateRecording;
 use nalgebra::DVector;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::{FitError, Problem, clustered_covariance, robust};
@@ -15,7 +15,7 @@ const SOFTER: [f64; 2] = [1.0, 10.0];
 
 /// Parameters that a fit may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Free {
+pub enum FreeParameters {
     /// Only the parameters of the sessions: a test of the constants.
     Sessions,
     /// Constants and sessions.
@@ -35,7 +35,7 @@ pub struct Estimate {
 
 /// Constant that reached a bound and was reset to its start.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Refused {
+pub struct UndeterminedConstant {
     /// Key of the constant in a scene's `[effects]`.
     pub key: &'static str,
     /// Bound that it reached.
@@ -48,13 +48,13 @@ pub struct Refused {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// Model with the fitted constants.
-    pub model: Model,
+    pub model: FingerConstants,
     /// Sessions, one for each recording.
     pub sessions: Vec<Session>,
     /// Constants that the recordings determine.
     pub estimates: Vec<Estimate>,
     /// Constants that the recordings do not determine.
-    pub refused: Vec<Refused>,
+    pub refused: Vec<UndeterminedConstant>,
 }
 
 /// Fits `free` to all recordings together, from `start`.
@@ -64,10 +64,14 @@ pub struct Fit {
 ///
 /// # Errors
 /// If there is no recording, or no step lowers the cost.
-pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, FitError> {
+pub fn fit(
+    start: &FingerConstants,
+    recordings: &[&PlateRecording],
+    free: FreeParameters,
+) -> Result<Fit, FitError> {
     let mut constants: Vec<&'static Constant> = match free {
-        Free::Sessions => Vec::new(),
-        Free::Constants => start.constants().iter().collect(),
+        FreeParameters::Sessions => Vec::new(),
+        FreeParameters::Constants => start.constants().iter().collect(),
     };
     let mut refused = Vec::new();
     loop {
@@ -77,7 +81,7 @@ pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, 
         let (model, sessions) = problem.decode(&state);
         let at_bound = |constant: &&&Constant| constant.bounds.contains(&constant.value(&model));
         if let Some(&lost) = constants.iter().find(at_bound) {
-            refused.push(Refused {
+            refused.push(UndeterminedConstant {
                 key: lost.key,
                 bound: lost.value(&model),
                 kept: lost.value(start),
@@ -157,20 +161,20 @@ const COLUMNS_DIFFERENCE: f64 = 1e-4;
 const SHELL_DIFFERENCE: f64 = 2e-2;
 
 // heuristic: a step with a smaller relative gain than this is the last.
-const GAINED: f64 = 1e-4;
+const RELATIVE_GAIN_MIN: f64 = 1e-4;
 
 /// Least-squares problem of the fit. Its parameters are the free constants, then each session's
 /// offset, gain, pitch and rolls, all in units of their plausible deviation, 0 at the start.
 struct Calibration<'a> {
-    start: &'a Model,
+    start: &'a FingerConstants,
     free: Vec<&'static Constant>,
-    recordings: &'a [&'a Recording],
-    bench: RefCell<Bench>,
+    recordings: &'a [&'a PlateRecording],
+    bench: RefCell<PlateRig>,
 }
 
 impl Calibration<'_> {
     /// Returns the model and the sessions of a parameter vector.
-    fn decode(&self, state: &DVector<f64>) -> (Model, Vec<Session>) {
+    fn decode(&self, state: &DVector<f64>) -> (FingerConstants, Vec<Session>) {
         let mut model = self.start.clone();
         for (constant, units) in self.free.iter().zip(state.iter()) {
             let value = constant.value(self.start) * (constant.plausible * units).exp();
@@ -208,7 +212,7 @@ impl Calibration<'_> {
     }
 
     /// Returns the errors of the counts, in units of the expected error.
-    fn errors(&self, model: &Model, sessions: &[Session]) -> Option<Vec<f64>> {
+    fn errors(&self, model: &FingerConstants, sessions: &[Session]) -> Option<Vec<f64>> {
         let bench = &mut *self.bench.borrow_mut();
         let mut errors = Vec::new();
         for (session, recording) in sessions.iter().zip(self.recordings) {
@@ -223,7 +227,11 @@ impl Calibration<'_> {
     }
 
     /// Returns the saturation residual of each session's pressure.
-    fn unsaturated(&self, model: &Model, sessions: &[Session]) -> Option<Vec<f64>> {
+    fn saturation_residuals(
+        &self,
+        model: &FingerConstants,
+        sessions: &[Session],
+    ) -> Option<Vec<f64>> {
         if self.free.is_empty() {
             return Some(Vec::new());
         }
@@ -236,7 +244,7 @@ impl Calibration<'_> {
     }
 
     /// Returns the prior residuals: deviations from the plausible values.
-    fn doubts(&self, state: &DVector<f64>, sessions: &[Session]) -> Vec<f64> {
+    fn prior_residuals(&self, state: &DVector<f64>, sessions: &[Session]) -> Vec<f64> {
         let mut doubts = state.as_slice()[..self.free.len()].to_vec();
         for session in sessions {
             let mean_rad = session.mean_roll_rad();
@@ -273,8 +281,9 @@ impl Problem for Calibration<'_> {
 
     fn residuals(&self, state: &DVector<f64>) -> DVector<f64> {
         let (model, sessions) = self.decode(state);
-        let doubts = self.doubts(state, &sessions);
-        let found = self.errors(&model, &sessions).zip(self.unsaturated(&model, &sessions));
+        let doubts = self.prior_residuals(state, &sessions);
+        let found =
+            self.errors(&model, &sessions).zip(self.saturation_residuals(&model, &sessions));
         let residuals = match found {
             Some((errors, unsaturated)) => [errors, unsaturated, doubts].concat(),
             None => {
@@ -288,7 +297,7 @@ impl Problem for Calibration<'_> {
     }
 
     fn gained(&self) -> f64 {
-        GAINED
+        RELATIVE_GAIN_MIN
     }
 
     fn difference(&self) -> f64 {

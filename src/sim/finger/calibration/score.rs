@@ -1,10 +1,10 @@
 //! Accuracy of the constants on a held-out sensor, with baselines that do not use force.
 
-use super::constants::Model;
-use super::fit::{Fit, Free, fit};
-use super::session::{Bench, Session};
+use super::constants::FingerConstants;
+use super::fit::{Fit, FreeParameters, fit};
+use super::session::{PlateRig, Session};
 use crate::sim::finger::effects::electrodes::{counts, impedance_ohm};
-use crate::sim::finger::recording::{Bin, Recording};
+use crate::sim::finger::recording::{Bin, PlateRecording};
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::FitError;
 use rayon::prelude::*;
@@ -63,7 +63,7 @@ impl Score {
 
 /// Result on a held-out sensor.
 #[derive(Clone, Debug)]
-pub struct HeldOut {
+pub struct HeldOutResult {
     /// Name of the held-out sensor.
     pub sensor: String,
     /// Sensors that the constants are fitted to; empty if the constants are those of the start.
@@ -74,7 +74,7 @@ pub struct HeldOut {
     pub loads: Vec<(f64, Score)>,
 }
 
-impl HeldOut {
+impl HeldOutResult {
     /// Returns the score over all loads.
     pub fn whole(&self) -> Score {
         Score::of(self.loads.iter().map(|(_, score)| score))
@@ -89,24 +89,25 @@ impl HeldOut {
 /// # Errors
 /// The errors of [`fit`].
 pub fn leave_one_out(
-    start: &Model,
-    recordings: &[Recording],
-    free: Free,
-) -> Result<Vec<HeldOut>, FitError> {
+    start: &FingerConstants,
+    recordings: &[PlateRecording],
+    free: FreeParameters,
+) -> Result<Vec<HeldOutResult>, FitError> {
     let held = recordings.par_iter().enumerate().map(|(i, recording)| {
-        let others: Vec<&Recording> = recordings[..i].iter().chain(&recordings[i + 1..]).collect();
+        let others: Vec<&PlateRecording> =
+            recordings[..i].iter().chain(&recordings[i + 1..]).collect();
         let known = match free {
-            Free::Constants if !others.is_empty() => Some(fit(start, &others, free)?),
+            FreeParameters::Constants if !others.is_empty() => Some(fit(start, &others, free)?),
             _ => None,
         };
         let model = known.as_ref().map_or(start, |known| &known.model);
-        let own = fit(model, &[recording], Free::Sessions)?;
+        let own = fit(model, &[recording], FreeParameters::Sessions)?;
         let session = own.sessions.first().ok_or(FitError::Empty)?;
         let loads = loads(model, session, recording, &others).ok_or(FitError::NotFinite)?;
         let (estimates, refused) =
             known.map_or_else(Default::default, |known| (known.estimates, known.refused));
         let trained = if estimates.is_empty() { &[][..] } else { &others[..] };
-        Ok(HeldOut {
+        Ok(HeldOutResult {
             sensor: recording.sensor.clone(),
             others: trained.iter().map(|other| other.sensor.clone()).collect(),
             fit: Fit { estimates, refused, ..own },
@@ -118,7 +119,7 @@ pub fn leave_one_out(
 
 /// Returns the factor of one standard deviation of the constant `key` between sensors, from the
 /// leave-one-out fits (jackknife); `None` for fewer than two of them.
-pub fn between(held_out: &[HeldOut], key: &str) -> Option<f64> {
+pub fn jackknife_factor(held_out: &[HeldOutResult], key: &str) -> Option<f64> {
     let found =
         held_out.iter().map(|held| held.fit.estimates.iter().find(|found| found.key == key));
     let logs: Vec<f64> = found.map(|found| Some(found?.value.ln())).collect::<Option<_>>()?;
@@ -130,12 +131,12 @@ pub fn between(held_out: &[HeldOut], key: &str) -> Option<f64> {
 
 /// Scores a session by load; `None` if a pose has no solution.
 pub fn loads(
-    model: &Model,
+    model: &FingerConstants,
     session: &Session,
-    recording: &Recording,
-    others: &[&Recording],
+    recording: &PlateRecording,
+    others: &[&PlateRecording],
 ) -> Option<Vec<(f64, Score)>> {
-    let predicted = session.predict(model, recording, &mut Bench::default())?;
+    let predicted = session.predict(model, recording, &mut PlateRig::default())?;
     let rest = &recording.no_contact_median_counts;
     let bins = &recording.near_normal_loads;
     let offset = offset(bins, rest);
@@ -182,10 +183,10 @@ fn offset(bins: &[Bin], rest: &[f64; ELECTRODES]) -> f64 {
 }
 
 /// Returns each electrode's mean change over the loads of all `others`.
-fn mean_change(others: &[&Recording]) -> Option<[f64; ELECTRODES]> {
+fn mean_change(others: &[&PlateRecording]) -> Option<[f64; ELECTRODES]> {
     let count: usize = others.iter().map(|other| other.near_normal_loads.len()).sum();
     let change = |i: usize| -> f64 {
-        let of = |other: &&Recording| -> f64 {
+        let of = |other: &&PlateRecording| -> f64 {
             let rest = other.no_contact_median_counts[i];
             other.near_normal_loads.iter().map(|bin| bin.mean_counts[i] - rest).sum()
         };

@@ -1,9 +1,9 @@
 //! Session of one sensor, and the plate on which its presses are simulated.
 
-use super::constants::Model;
+use super::constants::FingerConstants;
 use crate::sim::finger::effects::electrodes::{Electrodes, ElectrodesEffect};
-use crate::sim::finger::plate::{Plate, direction_t};
-use crate::sim::finger::recording::Recording;
+use crate::sim::finger::plate::{PlateContact, direction_t};
+use crate::sim::finger::recording::PlateRecording;
 use crate::sim::finger::samples::SkinSample;
 use nalgebra::Vector3;
 use palpate_explore::robot::finger::frame::ELECTRODES;
@@ -40,9 +40,9 @@ impl Session {
     /// Returns the counts at each load of `recording`; `None` if a pose has no solution.
     pub fn predict(
         &self,
-        model: &Model,
-        recording: &Recording,
-        bench: &mut Bench,
+        model: &FingerConstants,
+        recording: &PlateRecording,
+        bench: &mut PlateRig,
     ) -> Option<Vec<[f64; ELECTRODES]>> {
         let effect = self.electrodes(model, recording);
         let electrodes = Electrodes::new(&effect, bench.wear(model)?, 1.0);
@@ -56,7 +56,11 @@ impl Session {
     }
 
     /// Returns the electrodes of the recorded sensor.
-    pub(super) fn electrodes(&self, model: &Model, recording: &Recording) -> ElectrodesEffect {
+    pub(super) fn electrodes(
+        &self,
+        model: &FingerConstants,
+        recording: &PlateRecording,
+    ) -> ElectrodesEffect {
         ElectrodesEffect {
             baseline_counts: recording.no_contact_median_counts,
             exponent: model.electrodes.exponent * self.gain,
@@ -72,13 +76,13 @@ impl Session {
         [force_n, roll_rad]: [f64; 2],
         electrodes: &Electrodes,
         carry: &dyn Fn(&Vector3<f64>, &mut [f64; ELECTRODES]),
-        bench: &mut Bench,
+        bench: &mut PlateRig,
     ) -> Option<[f64; ELECTRODES]> {
         let mut mean = [0.0; ELECTRODES];
         for (off, weight) in QUADRATURE {
             let angles_rad = [self.pitch_rad, roll_rad + off * PRESS_SD_RAD];
             let press = bench.press(angles_rad, force_n)?;
-            let mut closed = electrodes.closed(&press.inward_m);
+            let mut closed = electrodes.closed_fractions(&press.inward_m);
             carry(&direction_t(angles_rad[0], angles_rad[1]), &mut closed);
             let counts = electrodes.counts_closed(&closed, self.offset);
             mean.iter_mut().zip(counts).for_each(|(mean, counts)| *mean += weight * counts);
@@ -88,7 +92,7 @@ impl Session {
 
     /// Returns the rise of pressure per newton from 4 to 8 N, relative to the first newton; `None`
     /// if a pose has no solution.
-    pub fn saturation(&self, model: &Model, bench: &mut Bench) -> Option<f64> {
+    pub fn saturation(&self, model: &FingerConstants, bench: &mut PlateRig) -> Option<f64> {
         bench.wear(model)?;
         let angles_rad = [self.pitch_rad, self.mean_roll_rad()];
         let mut pressure_pa = |force_n| Some(bench.press(angles_rad, force_n)?.pressure_pa);
@@ -99,11 +103,11 @@ impl Session {
 
 // heuristic: number of cached presses, of 4 kB each; several times the number in the slopes of one
 // step.
-const REMEMBERED: usize = 4000;
+const CACHED_PRESSES_MAX: usize = 4000;
 
 /// Response of the finger to a press.
 #[derive(Debug)]
-pub struct Press {
+pub struct PressResponse {
     /// Inward motion of the skin at each sample.
     pub inward_m: Vec<f64>,
     /// Pressure of the fluid above rest.
@@ -113,26 +117,26 @@ pub struct Press {
 /// Finger over a plate, with one skin at a time and a cache of its presses: most parameters of a
 /// fit leave them unchanged.
 #[derive(Default)]
-pub struct Bench {
-    worn: Option<(Model, Plate)>,
-    presses: HashMap<Vec<u64>, Rc<Press>>,
+pub struct PlateRig {
+    worn: Option<(FingerConstants, PlateContact)>,
+    presses: HashMap<Vec<u64>, Rc<PressResponse>>,
 }
 
-impl Bench {
+impl PlateRig {
     /// Sets the skin of `model`, unless it is set already, and returns its points; `None` if it
     /// cannot be built.
-    pub fn wear(&mut self, model: &Model) -> Option<&[SkinSample]> {
-        let is_worn = |(worn, _): &(Model, Plate)| {
+    pub fn wear(&mut self, model: &FingerConstants) -> Option<&[SkinSample]> {
+        let is_worn = |(worn, _): &(FingerConstants, PlateContact)| {
             worn.skin == model.skin && worn.cavity_pa_m3 == model.cavity_pa_m3
         };
         if !self.worn.as_ref().is_some_and(is_worn) {
-            self.worn = Some((model.clone(), Plate::new(&model.skin, model.cavity_pa_m3)?));
+            self.worn = Some((model.clone(), PlateContact::new(&model.skin, model.cavity_pa_m3)?));
         }
         Some(self.worn.as_ref()?.1.skin.samples())
     }
 
     /// Presses with a normal force at pitch and roll; `None` if the pose has no solution.
-    pub fn press(&mut self, angles_rad: [f64; 2], force_n: f64) -> Option<Rc<Press>> {
+    pub fn press(&mut self, angles_rad: [f64; 2], force_n: f64) -> Option<Rc<PressResponse>> {
         let (model, plate) = self.worn.as_mut()?;
         let skin = &model.skin;
         let stiffness = [skin.modulus_pa, skin.flatten_pa_m, skin.inflate_pa_m, skin.core_pa_m];
@@ -143,9 +147,9 @@ impl Bench {
         }
         let towards_t = direction_t(angles_rad[0], angles_rad[1]);
         let load = plate.press_to(&towards_t, force_n).ok()?;
-        let inward_m = plate.pressed.moved_m().to_vec();
-        let press = Rc::new(Press { inward_m, pressure_pa: load.pressure_pa });
-        if self.presses.len() >= REMEMBERED {
+        let inward_m = plate.pressed.inward_or_empty_m().to_vec();
+        let press = Rc::new(PressResponse { inward_m, pressure_pa: load.pressure_pa });
+        if self.presses.len() >= CACHED_PRESSES_MAX {
             self.presses.clear();
         }
         self.presses.insert(key, Rc::clone(&press));

@@ -1,15 +1,15 @@
 //! Response of the electrodes to tangential force: measurement and model.
 
-use super::constants::Model;
-use super::fit::{Free, fit};
-use super::session::{Bench, Session};
-use crate::sim::finger::effects::electrodes::{Electrodes, Shear};
+use super::constants::FingerConstants;
+use super::fit::{FreeParameters, fit};
+use super::session::{PlateRig, Session};
+use crate::sim::finger::effects::electrodes::{Electrodes, ShearCoupling};
 use crate::sim::finger::effects::friction::FrictionEffect;
-use crate::sim::finger::recording::{Recording, filled, force};
+use crate::sim::finger::recording::{PlateRecording, check_not_empty, force};
 use nalgebra::Vector3;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::FitError;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use serde::Deserialize;
 
 // heuristic: tangential force to either side over which the model's slopes are computed, about that
@@ -46,8 +46,8 @@ impl ShearRecordings {
     ///
     /// # Errors
     /// Returns the first value that is not plausible.
-    pub fn check(&self) -> Result<(), Invalid> {
-        filled("sensors", self.sensors.len())?;
+    pub fn check(&self) -> Result<(), InputError> {
+        check_not_empty("sensors", self.sensors.len())?;
         for (i, of) in self.sensors.iter().enumerate() {
             force(&format!("sensors[{i}].mean_normal_force_n"), of.mean_normal_force_n)?;
         }
@@ -57,14 +57,14 @@ impl ShearRecordings {
 
 /// Comparison of the model's slopes with measured ones.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Agreement {
+pub struct SlopeComparison {
     /// Measured slopes, counts per N.
     pub measured: [f64; ELECTRODES],
     /// Slopes of the model, counts per N.
     pub model: [f64; ELECTRODES],
 }
 
-impl Agreement {
+impl SlopeComparison {
     /// Returns Pearson's correlation over the electrodes.
     pub fn correlation(&self) -> f64 {
         let about_mean = |all: &[f64; ELECTRODES]| {
@@ -94,13 +94,13 @@ impl Agreement {
 
 /// Comparison for a sensor under tangential force.
 #[derive(Clone, Debug)]
-pub struct Sheared {
+pub struct ShearComparison {
     /// Name of the sensor.
     pub sensor: String,
     /// Comparison under force along y of `T`.
-    pub lateral: Agreement,
+    pub lateral: SlopeComparison,
     /// Comparison under force along x of `T`.
-    pub axial: Agreement,
+    pub axial: SlopeComparison,
 }
 
 /// Compares the model with the measured slopes of a sensor, in the session that fits its
@@ -111,19 +111,19 @@ pub struct Sheared {
 /// The errors of [`fit`].
 /// The errors of [`fit`].
 pub fn compare(
-    model: &Model,
+    model: &FingerConstants,
     friction: &FrictionEffect,
-    recording: &Recording,
+    recording: &PlateRecording,
     sheared: &ShearRecording,
-) -> Result<Sheared, FitError> {
-    let own = fit(model, &[recording], Free::Sessions)?;
+) -> Result<ShearComparison, FitError> {
+    let own = fit(model, &[recording], FreeParameters::Sessions)?;
     let session = own.sessions.first().ok_or(FitError::Empty)?;
     let force_n = sheared.mean_normal_force_n;
     let against = |axis: Vector3<f64>, measured: &[f64; ELECTRODES]| {
         let model = slopes(model, friction, (session, recording), force_n, &axis);
-        Ok(Agreement { measured: *measured, model: model.ok_or(FitError::NotFinite)? })
+        Ok(SlopeComparison { measured: *measured, model: model.ok_or(FitError::NotFinite)? })
     };
-    Ok(Sheared {
+    Ok(ShearComparison {
         sensor: sheared.sensor.clone(),
         lateral: against(Vector3::y(), &sheared.counts_per_n_lateral)?,
         axial: against(Vector3::x(), &sheared.counts_per_n_axial)?,
@@ -133,16 +133,16 @@ pub fn compare(
 /// Returns the counts per N of tangential force on the finger along `axis_t`; `None` if a pose has
 /// no solution.
 fn slopes(
-    model: &Model,
+    model: &FingerConstants,
     friction: &FrictionEffect,
-    (session, recording): (&Session, &Recording),
+    (session, recording): (&Session, &PlateRecording),
     force_n: f64,
     axis_t: &Vector3<f64>,
 ) -> Option<[f64; ELECTRODES]> {
-    let mut bench = Bench::default();
+    let mut bench = PlateRig::default();
     let samples = bench.wear(model)?;
     let electrodes = Electrodes::new(&session.electrodes(model, recording), samples, 1.0);
-    let shear = Shear::new(&electrodes, samples);
+    let shear = ShearCoupling::new(&electrodes, samples);
     let mut counts = |aside_n: f64| {
         let carry = |towards_t: &Vector3<f64>, closed: &mut [f64; ELECTRODES]| {
             let along_t = (axis_t - towards_t * towards_t.dot(axis_t)).normalize();

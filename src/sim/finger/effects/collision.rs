@@ -1,7 +1,7 @@
 //! Collisions between links, tool, object and table.
 
-use super::effect::{Effect, Needs};
-use palpate_input::config::{Checked, Rules};
+use super::effect::{Effect, Requirement};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ impl Default for CollisionEffect {
     }
 }
 
-impl Checked for CollisionEffect {
+impl Validate for CollisionEffect {
     fn check(&self, rules: &mut Rules) {
         rules.number("table_m", self.table_m, -1e3..=1e3);
     }
@@ -32,5 +32,5 @@ impl Checked for CollisionEffect {
 impl Effect for CollisionEffect {
     type State = ();
 
-    const NEEDS: Needs = Needs::Nothing;
+    const NEEDS: Requirement = Requirement::Nothing;
 }

@@ -72,7 +72,7 @@ macro_rules! effect {
             }
         }
 
-        impl palpate_input::config::Checked for $Effect {
+        impl palpate_input::config::Validate for $Effect {
             fn check(&self, rules: &mut palpate_input::config::Rules) {
                 $($check(self, rules);)?
                 $($(

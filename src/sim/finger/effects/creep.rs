@@ -3,7 +3,7 @@
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::sim::finger::load::Load;
+use crate::sim::finger::load::ContactLoad;
 
 effect! {
     /// Table `[creep]`: the skin as a standard linear solid. The fluid's share of the force relaxes
@@ -18,7 +18,7 @@ effect! {
 }
 
 impl Effect for CreepEffect {
-    type State = Lag;
+    type State = RelaxationState;
 
     const ON_LOAD: Option<OnLoad<Self>> =
         Some(|effect, lag, _, dt_s, load| lag.step(effect, dt_s, load));
@@ -26,15 +26,15 @@ impl Effect for CreepEffect {
 
 /// Relaxation state of the load in one trial.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Lag {
+pub struct RelaxationState {
     force_n: f64,
     pressure_pa: f64,
 }
 
-impl Lag {
+impl RelaxationState {
     /// Advances by `dt_s` under an elastic `load`, which becomes f + part (f − lag of f), but never
     /// pulls. The lag is exact for a constant load.
-    pub fn step(&mut self, effect: &CreepEffect, dt_s: f64, load: &mut Load) {
+    pub fn step(&mut self, effect: &CreepEffect, dt_s: f64, load: &mut ContactLoad) {
         let caught_up = -(-dt_s / effect.time_constant_s).exp_m1();
         let over = |lag: &mut f64, elastic: f64| {
             *lag += caught_up * (elastic - *lag);

@@ -1,21 +1,21 @@
 //! The trait of an effect: an optional table of the scene, its consequences for the simulation, and
 //! the switches that toggle it.
 
-use crate::sim::finger::load::Load;
+use crate::sim::finger::load::ContactLoad;
 use palpate_explore::robot::finger::TipMotion;
-use palpate_input::config::Checked;
+use palpate_input::config::Validate;
 use std::fmt::Debug;
 
 /// Optional part of the finger's physics: its settings, all with defaults.
 ///
 /// An effect that changes the load implements [`ON_LOAD`](Self::ON_LOAD) and nothing else. An
 /// effect on something else (a channel of the sensor, a pose) is called there.
-pub trait Effect: Checked + Clone + Default + 'static {
+pub trait Effect: Validate + Clone + Default + 'static {
     /// State during one trial; `()` for none.
     type State: Clone + Debug + Default;
 
     /// The effect that this one requires.
-    const NEEDS: Needs = Needs::Skin;
+    const NEEDS: Requirement = Requirement::Skin;
 
     /// Whether the effect fills a channel of the tactile frame.
     const FILLS_FRAMES: bool = false;
@@ -30,23 +30,23 @@ pub trait Effect: Checked + Clone + Default + 'static {
     }
 
     /// Returns the settings for a finger with every effect.
-    fn complete() -> Self {
+    fn full_settings() -> Self {
         Self::default()
     }
 
     /// Returns the parts that can be toggled independently; by default the whole effect.
-    fn switches() -> Vec<Switch<Option<Self>>> {
-        vec![Switch::table()]
+    fn switches() -> Vec<EffectSwitch<Option<Self>>> {
+        vec![EffectSwitch::table()]
     }
 }
 
 /// Changes the load at the end of a step, given the state of the trial, the motion of the
 /// fingertip, and the step's duration in seconds.
-pub type OnLoad<E> = fn(&E, &mut <E as Effect>::State, &TipMotion, f64, &mut Load);
+pub type OnLoad<E> = fn(&E, &mut <E as Effect>::State, &TipMotion, f64, &mut ContactLoad);
 
 /// Requirement of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Needs {
+pub enum Requirement {
     /// No requirement.
     Nothing,
     /// A skin.
@@ -59,14 +59,14 @@ pub enum Needs {
 type Set<T> = Box<dyn Fn(&mut T, bool)>;
 
 /// Switch of a part of a `T`.
-pub struct Switch<T> {
+pub struct EffectSwitch<T> {
     /// Name in the scene file.
     pub name: String,
     is_on: Box<dyn Fn(&T) -> bool>,
     set: Set<T>,
 }
 
-impl<T: 'static> Switch<T> {
+impl<T: 'static> EffectSwitch<T> {
     /// Creates a switch with the getter `is_on` and the setter `set`.
     pub fn new(
         name: &str,
@@ -92,14 +92,14 @@ impl<T: 'static> Switch<T> {
         name: &str,
         get: fn(&U) -> &T,
         get_mut: fn(&mut U) -> &mut T,
-    ) -> Switch<U> {
+    ) -> EffectSwitch<U> {
         let dotted = match (name, self.name.as_str()) {
             (name, "") => name.into(),
             ("", inner) => inner.into(),
             (name, inner) => format!("{name}.{inner}"),
         };
         let Self { is_on, set, .. } = self;
-        Switch {
+        EffectSwitch {
             name: dotted,
             is_on: Box::new(move |of| is_on(get(of))),
             set: Box::new(move |of, on| set(get_mut(of), on)),
@@ -107,7 +107,7 @@ impl<T: 'static> Switch<T> {
     }
 }
 
-impl<E: Default + 'static> Switch<Option<E>> {
+impl<E: Default + 'static> EffectSwitch<Option<E>> {
     /// Returns the switch of a whole optional table, named after the table.
     pub fn table() -> Self {
         Self::new("", Option::is_some, |table, on| match on {

@@ -93,7 +93,7 @@ impl Electrodes {
     }
 
     /// Multiplies the noise of electrode `i` by `factor`.
-    pub fn worsen(&mut self, i: usize, factor: f64) {
+    pub fn scale_noise(&mut self, i: usize, factor: f64) {
         self.noise_counts.iter_mut().skip(i).take(1).for_each(|counts| *counts *= factor);
     }
 
@@ -105,7 +105,7 @@ impl Electrodes {
 
     /// Returns the fraction of each gap that is closed if the skin moves inwards by `inward_m` at
     /// each sample; an empty slice means rest. The fraction is negative where the skin lifted.
-    pub fn closed(&self, inward_m: &[f64]) -> [f64; ELECTRODES] {
+    pub fn closed_fractions(&self, inward_m: &[f64]) -> [f64; ELECTRODES] {
         // A skin at rest is the usual case and needs no sums.
         let moved = |weights: &[(usize, f64)]| match inward_m.is_empty() {
             true => 0.0,
@@ -131,7 +131,13 @@ impl Electrodes {
     }
 
     /// Returns the converter's output for ideal counts, with the common noise and drift.
-    pub fn convert(&self, i: usize, ideal_counts: f64, common: &Common, rng: &mut impl Rng) -> f64 {
+    pub fn convert(
+        &self,
+        i: usize,
+        ideal_counts: f64,
+        common: &CommonNoise,
+        rng: &mut impl Rng,
+    ) -> f64 {
         let effect = &self.effect;
         let mut counts = ideal_counts + common.drift_counts;
         if effect.noise > 0.0 {
@@ -145,9 +151,9 @@ impl Electrodes {
     }
 
     /// Returns the common noise and drift of the next frame, `duration_s` after the last one.
-    pub fn next(&self, common: &Common, duration_s: f64, rng: &mut impl Rng) -> Common {
+    pub fn next(&self, common: &CommonNoise, duration_s: f64, rng: &mut impl Rng) -> CommonNoise {
         let effect = &self.effect;
-        let mut next = Common { noise: 0.0, ..*common };
+        let mut next = CommonNoise { noise: 0.0, ..*common };
         if effect.drift_counts > 0.0 {
             next.drift_counts += effect.drift_counts * duration_s.sqrt() * normal(rng);
         }
@@ -168,29 +174,29 @@ impl Electrodes {
 /// d_x², a heuristic. On a plane the skin slides along itself: under the contact, the object's
 /// shape decides the gap.
 #[derive(Clone, Debug)]
-pub struct Shear {
+pub struct ShearCoupling {
     /// Fraction of each electrode's gap that a metre along x, y and z of `T` closes.
     closes_per_m: [[f64; ELECTRODES]; 3],
 }
 
-impl Shear {
+impl ShearCoupling {
     /// Computes the effect of the skin at `samples` on `electrodes`.
     pub fn new(electrodes: &Electrodes, samples: &[SkinSample]) -> Self {
-        let is_wet = |sample: &&SkinSample| sample.layers.wet;
+        let is_wet = |sample: &&SkinSample| sample.layers.has_fluid;
         let follows = |sample: &SkinSample| 1.0 - sample.direction.x.max(0.0).powi(2);
         let lifted_m2: Vector3<f64> = (samples.iter().filter(is_wet))
             .map(|sample| sample.normal.scale(follows(sample) * sample.area_m2))
             .sum();
         let wet_m2: f64 = samples.iter().filter(is_wet).map(SkinSample::section_m2).sum();
         let closes_per_m = [0, 1, 2].map(|axis| {
-            let inward = |sample: &SkinSample| match sample.layers.wet {
+            let inward = |sample: &SkinSample| match sample.layers.has_fluid {
                 true => {
                     let facing = sample.normal[axis] / sample.normal.dot(&sample.direction);
                     lifted_m2[axis] / wet_m2 - follows(sample) * facing
                 }
                 false => 0.0,
             };
-            electrodes.closed(&samples.iter().map(inward).collect::<Vec<f64>>())
+            electrodes.closed_fractions(&samples.iter().map(inward).collect::<Vec<f64>>())
         });
         Self { closes_per_m }
     }
@@ -208,7 +214,7 @@ impl Shear {
 
 /// Noise and drift common to all electrodes of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Common {
+pub struct CommonNoise {
     /// Accumulated drift.
     pub drift_counts: f64,
     /// Common part of the noise, in standard deviations of each electrode.

@@ -1,7 +1,7 @@
 //! Pressure sensor of the fluid: PDC (static) and PAC (vibration).
 
 use super::constants::effect;
-use super::effect::{Effect, Switch};
+use super::effect::{Effect, EffectSwitch};
 use crate::sim::finger::noise::converted;
 use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
 use palpate_input::config::Rules;
@@ -45,20 +45,20 @@ impl Effect for FluidEffect {
 
     const FILLS_FRAMES: bool = true;
 
-    fn complete() -> Self {
+    fn full_settings() -> Self {
         Self { vibration: Some(VibrationEffect::default()), ..Self::default() }
     }
 
     /// Returns the switch of the whole effect, and that of its vibration, which also adds the
     /// fluid.
-    fn switches() -> Vec<Switch<Option<Self>>> {
+    fn switches() -> Vec<EffectSwitch<Option<Self>>> {
         let is_on = |fluid: &Option<Self>| fluid.as_ref().is_some_and(|f| f.vibration.is_some());
         let set = |fluid: &mut Option<Self>, on| match (fluid, on) {
             (fluid, true) => fluid.get_or_insert_default().vibration = Some(Default::default()),
             (Some(fluid), false) => fluid.vibration = None,
             (None, false) => {}
         };
-        vec![Switch::table(), Switch::new("vibration", is_on, set)]
+        vec![EffectSwitch::table(), EffectSwitch::new("vibration", is_on, set)]
     }
 }
 
@@ -87,12 +87,12 @@ impl FluidEffect {
 
 /// First-order filters of PAC: state of one trial.
 #[derive(Clone, Debug, Default)]
-pub struct Filter {
+pub struct PacFilter {
     smooth_pa: f64,
     slow_pa: f64,
 }
 
-impl Filter {
+impl PacFilter {
     /// Returns PAC `dt_s` after the last sample.
     pub fn pac_counts(
         &mut self,

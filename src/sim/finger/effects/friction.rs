@@ -6,7 +6,7 @@
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::sim::finger::load::Load;
+use crate::sim::finger::load::ContactLoad;
 use nalgebra::Vector3;
 use palpate_explore::robot::finger::TipMotion;
 
@@ -28,7 +28,7 @@ effect! {
 }
 
 impl Effect for FrictionEffect {
-    type State = Bristle;
+    type State = FrictionState;
 
     const ON_LOAD: Option<OnLoad<Self>> =
         Some(|effect, bristle, motion, dt_s, load| bristle.step(effect, motion, dt_s, load));
@@ -46,7 +46,7 @@ impl FrictionEffect {
 
 /// Shear between finger and object: state of one trial.
 #[derive(Clone, Debug, Default)]
-pub struct Bristle {
+pub struct FrictionState {
     stretch_w: Vector3<f64>,
     /// Displacement of the skin over the core by the object, in `T`.
     pub skin_t: Vector3<f64>,
@@ -54,7 +54,7 @@ pub struct Bristle {
     pub slip_m_s: f64,
 }
 
-impl Bristle {
+impl FrictionState {
     /// Moves the skin with the velocity of T for `dt_s` and adds the friction to `load`, at the
     /// centre of pressure.
     ///
@@ -66,7 +66,7 @@ impl Bristle {
         effect: &FrictionEffect,
         motion: &TipMotion,
         dt_s: f64,
-        load: &mut Load,
+        load: &mut ContactLoad,
     ) {
         let TipMotion { x_wt, linear_w, angular_w } = motion;
         let normal_n = load.force_n.norm();

@@ -20,10 +20,10 @@ pub mod timing;
 pub mod variation;
 pub mod wrench;
 
-use super::load::Load;
-use effect::{Effect, Needs, Switch};
+use super::load::ContactLoad;
+use effect::{Effect, EffectSwitch, Requirement};
 use palpate_explore::robot::finger::TipMotion;
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 
 // An effect comes after those that it requires.
 table::effects! {
@@ -64,24 +64,24 @@ impl Effects {
     }
 
     /// Returns whether the requirement `needs` is met.
-    fn supports(&self, needs: Needs) -> bool {
+    fn meets(&self, needs: Requirement) -> bool {
         match needs {
-            Needs::Nothing => true,
-            Needs::Skin => self.skin.is_some(),
-            Needs::Frames => self.sends_frames(),
+            Requirement::Nothing => true,
+            Requirement::Skin => self.skin.is_some(),
+            Requirement::Frames => self.sends_frames(),
         }
     }
 }
 
 /// Returns why `name` is not allowed; `filling` has, for each effect, whether it fills frames.
-fn missing(name: &str, needs: Needs, filling: &[(&str, bool)]) -> String {
+fn missing(name: &str, needs: Requirement, filling: &[(&str, bool)]) -> String {
     match needs {
-        Needs::Frames => {
+        Requirement::Frames => {
             let fills = filling.iter().filter(|(_, fills)| *fills);
             let keys: Vec<String> = fills.map(|(key, _)| format!("[{key}]")).collect();
             let (last, others) = keys.split_last().map_or(("", &[][..]), |(l, o)| (l.as_str(), o));
             format!("no [{name}] without {} or {last}", others.join(", "))
         }
-        Needs::Nothing | Needs::Skin => format!("no [{name}] without a [skin]"),
+        Requirement::Nothing | Requirement::Skin => format!("no [{name}] without a [skin]"),
     }
 }

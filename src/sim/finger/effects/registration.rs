@@ -6,7 +6,7 @@ use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_explore::robot::finger::TipMotion;
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ impl Default for RegistrationEffect {
     }
 }
 
-impl Checked for RegistrationEffect {
+impl Validate for RegistrationEffect {
     fn check(&self, rules: &mut Rules) {
         (self.finger_position_m.iter())
             .for_each(|values| rules.numbers("finger_position_m", values, -0.1..=0.1));
@@ -63,7 +63,7 @@ impl Checked for RegistrationEffect {
 impl RegistrationEffect {
     /// Returns the true pose of the finger's `T` in the `T` of the kinematics, which the arm's
     /// settings move by `correction` from the end of the mount, before random errors.
-    pub fn fixed(&self, correction: Option<Isometry3<f64>>) -> Option<Isometry3<f64>> {
+    pub fn nominal_error(&self, correction: Option<Isometry3<f64>>) -> Option<Isometry3<f64>> {
         if self.finger_position_m.is_none() && self.finger_rotation_deg.is_none() {
             return None;
         }

@@ -55,7 +55,7 @@ fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
         let allowed = format!("a readable file ({}: {cause})", path.display());
         loader.not_allowed(key, &shown, &allowed)
     })?;
-    let mut file = Loader::of(path, text)?;
+    let mut file = Loader::from_text(path, text)?;
     let Some(table) = file.table_mut("") else { return Ok(Table::new()) };
     let sensor = table.clone();
     // With all effects present, none lacks its requirement.

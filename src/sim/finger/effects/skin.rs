@@ -1,12 +1,12 @@
 //! Soft skin in contact with the exact mesh: an elastic foundation, or a shell, over the fluid.
 
 use super::constants::effect;
-use super::effect::{Effect, Needs};
+use super::effect::{Effect, Requirement};
 use crate::sim::finger::foundation::{Column, Foundation, SkinContact};
-use crate::sim::finger::load::{Load, PressError};
-use crate::sim::finger::patches::{Patches, Vicinity, key};
+use crate::sim::finger::load::{ContactLoad, PressError};
+use crate::sim::finger::patches::{NearbyPatches, Patches, key};
 use crate::sim::finger::samples::{Lattice, SkinSample, spread};
-use crate::sim::finger::shell::membrane::{Membrane, Settled};
+use crate::sim::finger::shell::membrane::{Membrane, ShellState};
 use crate::sim::finger::shell::sheet::Material;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::robot::finger::profile::Profile;
@@ -17,11 +17,11 @@ use serde::{Deserialize, Serialize};
 
 // heuristic: smallest cosine between ray and normal; a grazing ray represents at most five times
 // its section.
-const FLATTEST: f64 = 0.2;
+const COSINE_MIN: f64 = 0.2;
 
 // heuristic: largest bulge of the free skin by fluid and neighbours, as a fraction of the hull's
 // radius, to which rays extend; real skins bulge by 0.3 mm of 7.
-const BULGE: f64 = 0.1;
+const BULGE_MAX: f64 = 0.1;
 
 /// Model of load transfer within the skin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -74,7 +74,7 @@ fn check_resolution(skin: &SkinEffect, rules: &mut Rules) {
 impl Effect for SkinEffect {
     type State = ();
 
-    const NEEDS: Needs = Needs::Nothing;
+    const NEEDS: Requirement = Requirement::Nothing;
 }
 
 /// Skin of a fingertip; constant.
@@ -90,28 +90,28 @@ pub struct Skin {
 
 /// Workspace of one trial for [`Skin::press`].
 #[derive(Clone, Debug, Default)]
-pub struct Pressed {
+pub struct SkinState {
     touches: Vec<SkinContact>,
-    vicinity: Vicinity,
-    shell: Option<Settled>,
+    vicinity: NearbyPatches,
+    shell: Option<ShellState>,
     /// Inward motion of the skin's inner side at each sample, in metres.
     pub inward_m: Vec<f64>,
     /// Compression of each sample's column by the object, in metres; 0 without contact.
     pub indentation_m: Vec<f64>,
 }
 
-impl Pressed {
+impl SkinState {
     /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
-        self.shell.as_ref().map_or(0, Settled::bytes)
+        self.shell.as_ref().map_or(0, ShellState::bytes)
             + self.vicinity.bytes()
             + self.touches.capacity() * size_of::<SkinContact>()
             + numbers * size_of::<f64>()
     }
 
     /// Returns `inward_m`, or an empty slice while the skin rests.
-    pub fn moved_m(&self) -> &[f64] {
+    pub fn inward_or_empty_m(&self) -> &[f64] {
         if self.touches.is_empty() { &[] } else { &self.inward_m }
     }
 }
@@ -124,14 +124,14 @@ impl Skin {
         let cells = [effect.along, effect.around];
         let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells));
         if let Some(lattice) = &lattice {
-            samples.retain(|sample| !sample.layers.wet);
+            samples.retain(|sample| !sample.layers.has_fluid);
             samples.splice(0..0, lattice.samples(profile));
         }
         samples.sort_by_cached_key(|sample| key(profile, sample));
         let bulges = cavity_pa_m3 > 0.0 || lattice.is_some();
-        let bulge_m = if bulges { BULGE * profile.radius_m } else { 0.0 };
+        let bulge_m = if bulges { BULGE_MAX * profile.radius_m } else { 0.0 };
         let skin_m = samples.first().map_or(1.0, |sample| sample.layers.skin_m);
-        let wet = samples.iter().filter(|sample| sample.layers.wet);
+        let wet = samples.iter().filter(|sample| sample.layers.has_fluid);
         Self {
             shell: lattice.map(|lattice| {
                 let (young_pa, poisson) = (effect.modulus_pa, effect.poisson);
@@ -173,8 +173,8 @@ impl Skin {
     }
 
     /// Allocates a workspace for [`press`](Self::press).
-    pub fn relaxed(&self) -> Pressed {
-        Pressed {
+    pub fn relaxed(&self) -> SkinState {
+        SkinState {
             touches: Vec::with_capacity(self.samples.len()),
             vicinity: self.patches.vicinity(),
             shell: self.shell.as_ref().map(Membrane::relaxed),
@@ -194,17 +194,17 @@ impl Skin {
         &self,
         bvh: &MeshBvh,
         x_wt: &Isometry3<f64>,
-        pressed: &mut Pressed,
-    ) -> Result<Load, PressError> {
+        pressed: &mut SkinState,
+    ) -> Result<ContactLoad, PressError> {
         if !x_wt.to_homogeneous().iter().all(|number| number.is_finite()) {
             return Err(PressError::NotFinite);
         }
-        if bvh.surrounds(&x_wt.translation.vector.into()) {
+        if bvh.is_enclosed(&x_wt.translation.vector.into()) {
             return Err(PressError::Inside);
         }
         let resting = pressed.touches.is_empty();
         pressed.touches.clear();
-        self.meet(bvh, x_wt, pressed);
+        self.collect_contacts(bvh, x_wt, pressed);
         if pressed.touches.is_empty() {
             if !resting {
                 pressed.inward_m.fill(0.0);
@@ -213,14 +213,14 @@ impl Skin {
                     shell.rest(state);
                 }
             }
-            return Ok(Load::default());
+            return Ok(ContactLoad::default());
         }
         Ok(self.balance(pressed))
     }
 
     /// Collects the rays that meet the object.
-    fn meet(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, pressed: &mut Pressed) {
-        let Pressed { touches, vicinity, .. } = pressed;
+    fn collect_contacts(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, pressed: &mut SkinState) {
+        let SkinState { touches, vicinity, .. } = pressed;
         let (skipped_m, near) = self.patches.near(bvh, x_wt, vicinity);
         for (range, near) in near {
             for i in range.clone() {
@@ -240,10 +240,10 @@ impl Skin {
                         point_t: sample.start + sample.direction.scale(depth_m),
                         section_m2: self.sections_m2[i],
                         gap_m: sample.layers.gap_m,
-                        wet: sample.layers.wet,
+                        wet: sample.layers.has_fluid,
                         indentation_m,
                         normal_t: x_wt.rotation.inverse_transform_vector(&facing),
-                        cosine: slope.abs().max(FLATTEST),
+                        cosine: slope.abs().max(COSINE_MIN),
                         response: Default::default(),
                     });
                 }
@@ -252,8 +252,8 @@ impl Skin {
     }
 
     /// Solves for the columns' pressure, or for the shape of the shell.
-    fn balance(&self, pressed: &mut Pressed) -> Load {
-        let Pressed { touches, shell, inward_m, indentation_m, .. } = pressed;
+    fn balance(&self, pressed: &mut SkinState) -> ContactLoad {
+        let SkinState { touches, shell, inward_m, indentation_m, .. } = pressed;
         let balance = match (&self.shell, shell) {
             (Some(shell), Some(state)) => {
                 shell.balance(touches, &self.samples, self.column(), state, inward_m)
@@ -261,11 +261,11 @@ impl Skin {
             _ => self.foundation.balance(touches, &self.samples, inward_m),
         };
         indentation_m.fill(0.0);
-        let mut load = Load {
+        let mut load = ContactLoad {
             pressure_pa: balance.pressure_pa,
             displaced_m3: balance.displaced_m3,
             energy_j: balance.energy_j,
-            ..Load::default()
+            ..ContactLoad::default()
         };
         let (mut moment, mut weight_n) = (Vector3::zeros(), 0.0);
         for touch in touches.iter() {
@@ -281,7 +281,7 @@ impl Skin {
             load.torque_nm += touch.point_t.coords.cross(&force_n);
             load.area_m2 += area_m2;
             load.indentation_max_m = load.indentation_max_m.max(touch.indentation_m);
-            load.on_core |= response.inward_m > sample.layers.gap_m;
+            load.is_core_loaded |= response.inward_m > sample.layers.gap_m;
             moment += touch.point_t.coords * force_n.norm();
             weight_n += force_n.norm();
         }

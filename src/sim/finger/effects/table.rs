@@ -20,7 +20,7 @@ macro_rules! effects {
             )*
             /// Keys of constants that the scene sets in its effects, as in version 0.1.
             #[serde(skip)]
-            pub moved_keys: Vec<String>,
+            pub legacy_keys: Vec<String>,
         }
 
         impl serde::Serialize for Effects {
@@ -55,16 +55,16 @@ macro_rules! effects {
             }
 
             /// Removes every effect whose requirement is missing.
-            pub fn drop_unsupported(&mut self) {
+            pub fn remove_orphans(&mut self) {
                 $(
-                    if !self.supports(<$Effect>::NEEDS) {
+                    if !self.meets(<$Effect>::REQUIRES) {
                         self.$name = None;
                     }
                 )*
             }
 
             /// Returns every switch, in the table's order.
-            pub fn switches() -> Vec<Switch<Self>> {
+            pub fn switches() -> Vec<EffectSwitch<Self>> {
                 let mut all = Vec::new();
                 $(
                     all.extend(<$Effect>::switches().into_iter().map(|switch| {
@@ -76,16 +76,16 @@ macro_rules! effects {
             }
         }
 
-        impl Checked for Effects {
+        impl Validate for Effects {
             fn check(&self, rules: &mut Rules) {
                 $(
                     self.$name.iter().for_each(|effect| rules.table(stringify!($name), effect));
                 )*
                 let filling = [$((stringify!($name), <$Effect>::FILLS_FRAMES),)*];
                 $(
-                    let fits = self.$name.is_none() || self.supports(<$Effect>::NEEDS);
+                    let fits = self.$name.is_none() || self.meets(<$Effect>::REQUIRES);
                     rules.require(stringify!($name), "(given)", fits, || {
-                        missing(stringify!($name), <$Effect>::NEEDS, &filling)
+                        missing(stringify!($name), <$Effect>::REQUIRES, &filling)
                     });
                 )*
             }
@@ -113,7 +113,7 @@ macro_rules! effects {
                 effects: &Effects,
                 motion: &TipMotion,
                 dt_s: f64,
-                load: &mut Load,
+                load: &mut ContactLoad,
             ) {
                 $(
                     if let Some(act) = <$Effect>::ON_LOAD

@@ -41,7 +41,7 @@ effect! {
 }
 
 impl Effect for ThermalEffect {
-    type State = Heat;
+    type State = ThermalState;
 
     const FILLS_FRAMES: bool = true;
 
@@ -49,9 +49,9 @@ impl Effect for ThermalEffect {
     const ON_LOAD: Option<OnLoad<Self>> =
         Some(|effect, heat, _, dt_s, load| heat.step(effect, load.area_m2, dt_s));
 
-    fn start(&self) -> Heat {
+    fn start(&self) -> ThermalState {
         let start_c = self.start_c;
-        Heat { start_c, temperature_c: start_c, slow_c: start_c }
+        ThermalState { start_c, temperature_c: start_c, slow_c: start_c }
     }
 }
 
@@ -72,14 +72,14 @@ impl ThermalEffect {
 
 /// Heat of the fluid: state of one trial.
 #[derive(Clone, Debug, Default)]
-pub struct Heat {
+pub struct ThermalState {
     start_c: f64,
     /// Temperature of the fluid.
     pub temperature_c: f64,
     slow_c: f64,
 }
 
-impl Heat {
+impl ThermalState {
     /// Advances by `dt_s` with this contact area: exact for a constant area.
     pub fn step(&mut self, effect: &ThermalEffect, area_m2: f64, dt_s: f64) {
         let cooled = area_m2 / (area_m2 + effect.half_area_m2);
@@ -90,7 +90,7 @@ impl Heat {
     }
 
     /// Returns the rate of warming within TAC's band.
-    pub fn warming_c_s(&self) -> f64 {
+    pub fn temperature_rate_c_s(&self) -> f64 {
         (self.temperature_c - self.slow_c) * TAU * TAC_HZ
     }
 

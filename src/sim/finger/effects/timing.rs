@@ -1,7 +1,7 @@
 //! Sampling times of a BioTac's channels, and arrival times of its frames.
 
 use super::constants::effect;
-use super::effect::{Effect, Needs, Switch};
+use super::effect::{Effect, EffectSwitch, Requirement};
 use palpate_explore::backend::delay::DELAY_MAX_S;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_input::config::Rules;
@@ -32,11 +32,11 @@ fn check_timing(timing: &TimingEffect, rules: &mut Rules) {
 impl Effect for TimingEffect {
     type State = ();
 
-    const NEEDS: Needs = Needs::Frames;
+    const NEEDS: Requirement = Requirement::Frames;
 
     /// Returns the switch of the whole effect, and that of the command delay alone, with frames as
     /// close to those without `[timing]` as its settings allow: one in each batch.
-    fn switches() -> Vec<Switch<Option<Self>>> {
+    fn switches() -> Vec<EffectSwitch<Option<Self>>> {
         let is_on =
             |timing: &Option<Self>| timing.as_ref().is_some_and(|t| t.control_delay_s > 0.0);
         let set = |timing: &mut Option<Self>, on| match (timing, on) {
@@ -47,7 +47,7 @@ impl Effect for TimingEffect {
             }
             (None, false) => {}
         };
-        vec![Switch::table(), Switch::new("control_delay_s", is_on, set)]
+        vec![EffectSwitch::table(), EffectSwitch::new("control_delay_s", is_on, set)]
     }
 }
 

@@ -45,7 +45,7 @@ impl Effect for VariationEffect {
 
 impl VariationEffect {
     /// Draws the sensor of one trial.
-    pub fn sensor(&self, mut rng: impl Rng) -> Sensor {
+    pub fn sensor(&self, mut rng: impl Rng) -> SensorVariation {
         // Every number is drawn, also if its spread is 0, so that the others do not change with it.
         let mut factor = |spread: f64| (spread * normal(&mut rng)).exp();
         let resistance = std::array::from_fn(|_| factor(self.resistance));
@@ -56,7 +56,7 @@ impl VariationEffect {
             let (drawn, i) = (rng.random::<f64>(), rng.random_range(0..ELECTRODES));
             (drawn < probability).then_some(i)
         };
-        Sensor {
+        SensorVariation {
             resistance,
             conductivity,
             gain,
@@ -71,7 +71,7 @@ impl VariationEffect {
 
 /// Sensor constants of one trial, as factors on the scene's values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sensor {
+pub struct SensorVariation {
     /// Factor on each electrode's resistance at rest.
     pub resistance: [f64; ELECTRODES],
     /// Factor on the fluid's conductivity.
@@ -90,7 +90,7 @@ pub struct Sensor {
     pub noisy: Option<(usize, f64)>,
 }
 
-impl Sensor {
+impl SensorVariation {
     /// Returns the sensor's skin, if the scene has `nominal`; the core's stiffness is unchanged.
     pub fn skin(&self, nominal: &SkinEffect) -> SkinEffect {
         SkinEffect {

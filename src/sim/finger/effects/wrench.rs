@@ -42,12 +42,12 @@ impl Effect for WrenchEffect {
 
 /// State of the sensor during one trial.
 #[derive(Clone, Debug)]
-pub struct Gauge {
+pub struct WrenchSensor {
     rng: ChaCha8Rng,
     bias: Vector6<f64>,
 }
 
-impl Gauge {
+impl WrenchSensor {
     /// Creates the sensor at the start of a trial; `rng` is the only randomness.
     pub fn new(effect: &WrenchEffect, mut rng: ChaCha8Rng) -> Self {
         let bias = Vector6::from_fn(|i, _| {

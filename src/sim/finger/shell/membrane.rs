@@ -4,20 +4,20 @@
 //! smallest. This module has that energy; `settle` minimises it. `Membrane::balance` minimises it
 //! with the rays by which the skin meets an object.
 
-use super::sheet::{Material, Sheet, Strained};
+use super::sheet::{Material, Sheet, SheetState};
 use super::softness::Softness;
-use super::springs::Springs;
-use crate::sim::finger::foundation::{Balance, Column, Response, SkinContact};
+use super::springs::UnilateralSprings;
+use crate::sim::finger::foundation::{Balance, Column, ColumnResponse, SkinContact};
 use crate::sim::finger::samples::{Lattice, Node, SkinSample};
 use nalgebra::Vector3;
 use palpate_gp::math::simd::Quad;
 
 // heuristic: largest extrapolation of the shell's last motion, as a multiple of it.
-const FARTHEST: f64 = 2.0;
+const EXTRAPOLATION_MAX: f64 = 2.0;
 
 /// Contact of an object with a node of the shell, approximated by a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Push {
+pub struct NodeContact {
     /// Index of the node.
     pub node: usize,
     /// Normal of the plane, towards the finger, in `T`.
@@ -47,20 +47,20 @@ pub struct Membrane {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pose {
     pub moved_m: Vec<Vector3<f64>>,
-    pub strained: Strained,
+    pub strained: SheetState,
 }
 
 /// State of the shell and workspace of one trial.
 #[derive(Clone, Debug)]
-pub struct Settled {
+pub struct ShellState {
     pub(super) here: Pose,
     /// Memory for the next pose.
     pub(super) there: Pose,
     pub(super) at_rest: bool,
-    pub(super) course: Course,
-    pushes: Vec<Push>,
-    pub(super) links: Vec<Link>,
-    pub(super) springs: Springs,
+    pub(super) course: MotionHistory,
+    pushes: Vec<NodeContact>,
+    pub(super) links: Vec<ContactSpring>,
+    pub(super) springs: UnilateralSprings,
     pub(super) residual_n: Vec<f64>,
     pub(super) correction_m: Vec<f32>,
     pub(super) reaction_m: Vec<f32>,
@@ -74,7 +74,7 @@ pub struct Settled {
 
 /// Spring of the contact problem.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Link {
+pub(super) struct ContactSpring {
     pub place: usize,
     pub normal_t: Quad,
     pub overlap_m: f64,
@@ -119,18 +119,18 @@ impl Membrane {
     }
 
     /// Creates the state without contact.
-    pub fn relaxed(&self) -> Settled {
+    pub fn relaxed(&self) -> ShellState {
         let (size, count) = (3 * self.free.len(), self.nodes.len());
         let pose =
             || Pose { moved_m: vec![Vector3::zeros(); count], strained: self.sheet.relaxed() };
-        Settled {
+        ShellState {
             here: pose(),
             there: pose(),
             at_rest: true,
-            course: Course::new(count),
+            course: MotionHistory::new(count),
             pushes: Vec::new(),
             links: Vec::new(),
-            springs: Springs::default(),
+            springs: UnilateralSprings::default(),
             residual_n: vec![0.0; size],
             correction_m: vec![0.0; size],
             reaction_m: vec![0.0; size],
@@ -143,7 +143,7 @@ impl Membrane {
     }
 
     /// Resets the state to rest.
-    pub fn rest(&self, state: &mut Settled) {
+    pub fn rest(&self, state: &mut ShellState) {
         if !state.at_rest {
             state.here.moved_m.fill(Vector3::zeros());
             self.sheet.strain(&state.here.moved_m, &mut state.here.strained);
@@ -153,34 +153,34 @@ impl Membrane {
     }
 
     /// Returns the force of the object along the push's normal.
-    pub fn push_n(&self, push: &Push, state: &Settled) -> f64 {
+    pub fn push_n(&self, push: &NodeContact, state: &ShellState) -> f64 {
         self.pushed_n(push, &state.here)
     }
 
-    fn pushed_n(&self, push: &Push, pose: &Pose) -> f64 {
+    fn pushed_n(&self, push: &NodeContact, pose: &Pose) -> f64 {
         let yielded_m = push.normal_t.dot(&pose.moved_m[push.node]);
         self.skin_n_m[push.node] * (push.overlap_m - yielded_m).max(0.0)
     }
 
     /// Returns the displacement of a node towards the core.
-    pub(super) fn sunk_m(&self, node: usize, pose: &Pose) -> f64 {
+    pub(super) fn inward_m(&self, node: usize, pose: &Pose) -> f64 {
         -self.nodes[node].direction.dot(&pose.moved_m[node])
     }
 
     /// Returns the energy of sheet, fluid, core, and skin under the pushes.
-    pub fn energy_j(&self, pushes: &[Push], state: &Settled) -> f64 {
+    pub fn energy_j(&self, pushes: &[NodeContact], state: &ShellState) -> f64 {
         self.held_j(pushes, &state.here)
     }
 
-    pub(super) fn held_j(&self, pushes: &[Push], pose: &Pose) -> f64 {
-        let Strained { energy_j, displaced_m3, .. } = pose.strained;
+    pub(super) fn held_j(&self, pushes: &[NodeContact], pose: &Pose) -> f64 {
+        let SheetState { energy_j, displaced_m3, .. } = pose.strained;
         let smooth_j = energy_j + 0.5 * self.cavity_pa_m3 * displaced_m3 * displaced_m3;
         let pushed = pushes.iter().map(|push| {
             let force_n = self.pushed_n(push, pose);
             0.5 * force_n * force_n / self.skin_n_m[push.node]
         });
         let on_core = self.free.iter().map(|&k| {
-            let beyond_m = (self.sunk_m(k, pose) - self.nodes[k].gap_m).max(0.0);
+            let beyond_m = (self.inward_m(k, pose) - self.nodes[k].gap_m).max(0.0);
             0.5 * self.core_n_m[k] * beyond_m * beyond_m
         });
         smooth_j + pushed.sum::<f64>() + on_core.sum::<f64>()
@@ -196,7 +196,7 @@ impl Membrane {
         touches: &mut [SkinContact],
         samples: &[SkinSample],
         column: &Column,
-        state: &mut Settled,
+        state: &mut ShellState,
         inward_m: &mut [f64],
     ) -> Balance {
         let mut pushes = std::mem::take(&mut state.pushes);
@@ -204,7 +204,7 @@ impl Membrane {
         pushes.extend(touches.iter().filter_map(|touch| {
             let (along_m, turned_m) =
                 (touch.indentation_m * touch.cosine, self.half_m * (1.0 - touch.cosine));
-            Some(Push {
+            Some(NodeContact {
                 node: samples[touch.sample].node?,
                 normal_t: touch.normal_t,
                 overlap_m: along_m + turned_m,
@@ -213,7 +213,7 @@ impl Membrane {
         self.settle(&pushes, state);
         let here = &state.here;
         for (inward_m, sample) in inward_m.iter_mut().zip(samples) {
-            *inward_m = sample.node.map_or(0.0, |node| self.sunk_m(node, here));
+            *inward_m = sample.node.map_or(0.0, |node| self.inward_m(node, here));
         }
         let mut met = pushes.iter();
         for touch in touches.iter_mut() {
@@ -222,10 +222,10 @@ impl Membrane {
                 continue;
             };
             let force_n = self.pushed_n(push, here);
-            touch.response = Response {
-                inward_m: self.sunk_m(push.node, here),
+            touch.response = ColumnResponse {
+                inward_m: self.inward_m(push.node, here),
                 stress_pa: force_n * touch.cosine / touch.section_m2,
-                ..Response::default()
+                ..ColumnResponse::default()
             };
             // Point of the ball nearest to the plane.
             let moved_m = &here.moved_m[push.node];
@@ -244,7 +244,7 @@ impl Membrane {
     }
 }
 
-impl Settled {
+impl ShellState {
     /// Returns the displacement of each node, in `T`.
     pub fn moved_m(&self) -> &[Vector3<f64>] {
         &self.here.moved_m
@@ -259,8 +259,8 @@ impl Settled {
             + self.here.strained.bytes()
             + self.there.strained.bytes()
             + self.course.bytes()
-            + self.pushes.capacity() * size_of::<Push>()
-            + self.links.capacity() * size_of::<Link>()
+            + self.pushes.capacity() * size_of::<NodeContact>()
+            + self.links.capacity() * size_of::<ContactSpring>()
             + self.springs.bytes()
             + self.residual_n.capacity() * size_of::<f64>()
             + singles.map(|values| values.capacity() * size_of::<f32>()).iter().sum::<usize>()
@@ -269,7 +269,7 @@ impl Settled {
 
 /// Last displacements of shell and object, to extrapolate the shell's next position.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Course {
+pub(super) struct MotionHistory {
     /// Displacement of each node in the last press.
     pub went_m: Vec<Vector3<f64>>,
     /// Overlap of each node with the object (NaN without one), the overlap before, and its
@@ -279,7 +279,7 @@ pub(super) struct Course {
     grew_m: Vec<f64>,
 }
 
-impl Course {
+impl MotionHistory {
     /// Creates the history of `nodes` nodes, at rest.
     pub fn new(nodes: usize) -> Self {
         let unknown = || vec![f64::NAN; nodes];
@@ -321,6 +321,6 @@ impl Course {
             (*grew_m, self.overlap_m[node]) = (grows_m, overlap_m);
         }
         let times = along_m2 / last_m2;
-        if times.is_finite() { times.clamp(-FARTHEST, FARTHEST) } else { 0.0 }
+        if times.is_finite() { times.clamp(-EXTRAPOLATION_MAX, EXTRAPOLATION_MAX) } else { 0.0 }
     }
 }

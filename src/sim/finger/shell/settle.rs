@@ -10,14 +10,14 @@
 //! energy falls with every correction, whatever the press, and the shell cannot diverge. The first
 //! guess is that shell and object repeat their last motion; it is used if it lowers the energy.
 
-use super::membrane::{Link, Membrane, Push, Settled};
+use super::membrane::{ContactSpring, Membrane, NodeContact, ShellState};
 use nalgebra::Vector3;
 use palpate_gp::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest};
 
 /// Convergence threshold: predicted gain of a correction, relative to the energy. Force and
 /// pressure are then within 0.5 % (measured, 1.5 mm deep on a plane at three pitches, ticks of 10
 /// and 40 µm).
-const SETTLED: f64 = 1e-4;
+const CONVERGED: f64 = 1e-4;
 
 // heuristic: largest number of corrections in one call; the next call makes up for missing ones. A
 // press of 2 mm from rest takes 20 to 40.
@@ -29,10 +29,10 @@ const CORRECTIONS: usize = 60;
 const FLUID_AGES: usize = 8;
 
 /// Fraction of the predicted gain that a correction must reach (Armijo's rule; the usual value).
-const BROUGHT: f64 = 1e-4;
+const ARMIJO: f64 = 1e-4;
 
 // heuristic: smallest and largest factor of one step shortening, and the number of shortenings.
-const SHORTER: [f64; 2] = [0.1, 0.6];
+const SHORTENING: [f64; 2] = [0.1, 0.6];
 const SHORTENINGS: usize = 30;
 
 // Places this close to a possible contact take part in a correction.
@@ -41,26 +41,26 @@ const SHORTENINGS: usize = 30;
 const NEAR_M: f64 = 5e-5;
 
 // heuristic: largest extrapolation factor of slowly converging corrections.
-const TOGETHER: f64 = 50.0;
+const ANDERSON_MAX: f64 = 50.0;
 
 impl Membrane {
     /// Brings the shell into equilibrium with `pushes`, from its present state.
-    pub fn settle(&self, pushes: &[Push], state: &mut Settled) {
-        let mut energy_j = self.go_on(pushes, state);
+    pub fn settle(&self, pushes: &[NodeContact], state: &mut ShellState) {
+        let mut energy_j = self.extrapolate(pushes, state);
         for correction in 0..CORRECTIONS {
             if state.fluid_age.is_multiple_of(FLUID_AGES) {
-                self.feel_fluid(state);
+                self.update_fluid_compliance(state);
             }
             state.fluid_age += 1;
-            self.link(pushes, state);
-            let mut promised_j = self.correct(state);
-            let settled = promised_j <= SETTLED * energy_j;
+            self.collect_springs(pushes, state);
+            let mut promised_j = self.solve_correction(state);
+            let settled = promised_j <= CONVERGED * energy_j;
             if correction > 0 {
-                promised_j = self.hurry(promised_j, state);
+                promised_j = self.anderson_step(promised_j, state);
             } else {
                 state.last_m.clone_from(&state.correction_m);
             }
-            let Some(left_j) = self.go(pushes, energy_j, promised_j, state) else { break };
+            let Some(left_j) = self.line_search(pushes, energy_j, promised_j, state) else { break };
             if settled {
                 break;
             }
@@ -73,11 +73,11 @@ impl Membrane {
 
     /// Extrapolates the last motion of shell and object, if that lowers the energy; returns the
     /// energy.
-    fn go_on(&self, pushes: &[Push], state: &mut Settled) -> f64 {
+    fn extrapolate(&self, pushes: &[NodeContact], state: &mut ShellState) -> f64 {
         state.at_rest = false;
         let overlaps = pushes.iter().map(|push| (push.node, push.overlap_m));
         let times = state.course.times(overlaps);
-        let Settled { here, there, course, .. } = state;
+        let ShellState { here, there, course, .. } = state;
         let mut energy_j = self.held_j(pushes, here);
         for ((there_m, here_m), went_m) in
             there.moved_m.iter_mut().zip(&here.moved_m).zip(&course.went_m)
@@ -99,7 +99,7 @@ impl Membrane {
     }
 
     /// Computes A₀⁻¹ v for the present gradient of the volume.
-    fn feel_fluid(&self, state: &mut Settled) {
+    fn update_fluid_compliance(&self, state: &mut ShellState) {
         if self.cavity_pa_m3 <= 0.0 {
             return;
         }
@@ -109,19 +109,19 @@ impl Membrane {
         }
         self.softness.solve(&mut state.fluid_m_pa, &mut state.halves);
         let own = state.fluid_m_pa.chunks_exact(3).zip(&self.free);
-        let softness_m3_pa: f64 = own.map(|(s, &k)| dot_quad(&volume_m2[k], &widened(s))).sum();
+        let softness_m3_pa: f64 = own.map(|(s, &k)| dot_quad(&volume_m2[k], &to_f64(s))).sum();
         state.fluid_pa_m3 = self.cavity_pa_m3 / (1.0 + self.cavity_pa_m3 * softness_m3_pa);
     }
 
     /// Collects the springs that may push, and the residual forces.
-    fn link(&self, pushes: &[Push], state: &mut Settled) {
-        let Settled { here, links, springs, residual_n, .. } = state;
+    fn collect_springs(&self, pushes: &[NodeContact], state: &mut ShellState) {
+        let ShellState { here, links, springs, residual_n, .. } = state;
         links.clear();
         springs.clear();
         let mut link = |place, normal_t: &Vector3<f64>, overlap_m: f64, stiffness_n_m: f64| {
             if overlap_m > -NEAR_M {
                 let (normal_t, force_n) = (quad(normal_t), stiffness_n_m * overlap_m.max(0.0));
-                links.push(Link { place, normal_t, overlap_m, force_n });
+                links.push(ContactSpring { place, normal_t, overlap_m, force_n });
                 springs.stiffness_n_m.push(stiffness_n_m);
             }
         };
@@ -134,7 +134,7 @@ impl Membrane {
         let pressure_pa = self.cavity_pa_m3 * here.strained.displaced_m3;
         for (place, &k) in self.free.iter().enumerate() {
             let node = &self.nodes[k];
-            link(place, &node.direction, self.sunk_m(k, here) - node.gap_m, self.core_n_m[k]);
+            link(place, &node.direction, self.inward_m(k, here) - node.gap_m, self.core_n_m[k]);
             let (gradient_n, volume_m2) =
                 (&here.strained.gradient_n[k], &here.strained.volume_m2[k]);
             let smooth_n = sum(gradient_n, &scaled(volume_m2, pressure_pa));
@@ -147,8 +147,8 @@ impl Membrane {
     }
 
     /// Computes the correction; returns its predicted energy gain.
-    fn correct(&self, state: &mut Settled) -> f64 {
-        let Settled {
+    fn solve_correction(&self, state: &mut ShellState) -> f64 {
+        let ShellState {
             links,
             springs,
             fluid_m_pa,
@@ -172,9 +172,9 @@ impl Membrane {
         springs.free_m.resize(links.len(), 0.0);
         springs.softness_m_n.resize(links.len() * links.len(), 0.0);
         let swells =
-            |link: &Link| dot_quad(&link.normal_t, &widened(&fluid_m_pa[3 * link.place..]));
+            |link: &ContactSpring| dot_quad(&link.normal_t, &to_f64(&fluid_m_pa[3 * link.place..]));
         for (i, own) in links.iter().enumerate() {
-            let moved_m = widened(&correction_m[3 * own.place..]);
+            let moved_m = to_f64(&correction_m[3 * own.place..]);
             springs.free_m[i] += own.overlap_m - dot_quad(&own.normal_t, &moved_m);
             let swelling = fluid_pa_m3 * swells(own);
             for (j, other) in links[..=i].iter().enumerate() {
@@ -211,8 +211,8 @@ impl Membrane {
     /// Combines slowly converging corrections in the same direction: minimises over their
     /// combination (Anderson 1965, with one correction before the last), if it is a descent
     /// direction. `there` is the start of the last one. Returns the predicted energy gain.
-    fn hurry(&self, promised_j: f64, state: &mut Settled) -> f64 {
-        let Settled { here, there, correction_m, last_m, residual_n, .. } = state;
+    fn anderson_step(&self, promised_j: f64, state: &mut ShellState) -> f64 {
+        let ShellState { here, there, correction_m, last_m, residual_n, .. } = state;
         let (mut along, mut apart) = (0.0, 0.0);
         for (now, last) in correction_m.iter().zip(&*last_m) {
             let less = f64::from(now - last);
@@ -233,7 +233,7 @@ impl Membrane {
             }
         }
         std::mem::swap(correction_m, last_m);
-        if hurried_j > 0.0 && back.abs() < TOGETHER {
+        if hurried_j > 0.0 && back.abs() < ANDERSON_MAX {
             return hurried_j;
         }
         correction_m.clone_from(last_m);
@@ -242,31 +242,31 @@ impl Membrane {
 
     /// Moves along the correction as far as the energy falls, and returns the new energy; `None` if
     /// it does not fall.
-    fn go(
+    fn line_search(
         &self,
-        pushes: &[Push],
+        pushes: &[NodeContact],
         energy_j: f64,
         promised_j: f64,
-        state: &mut Settled,
+        state: &mut ShellState,
     ) -> Option<f64> {
-        let Settled { here, there, correction_m, .. } = state;
+        let ShellState { here, there, correction_m, .. } = state;
         there.moved_m.clone_from(&here.moved_m);
         let mut part = 1.0;
         for _ in 0..SHORTENINGS {
             for (correction_m, &k) in correction_m.chunks_exact(3).zip(&self.free) {
-                let [x, y, z, _] = widened(correction_m);
+                let [x, y, z, _] = to_f64(correction_m);
                 there.moved_m[k] = here.moved_m[k] + Vector3::new(x, y, z) * part;
             }
             self.sheet.strain(&there.moved_m, &mut there.strained);
             let there_j = self.held_j(pushes, there);
             let freed_j = energy_j - there_j;
-            if freed_j >= BROUGHT * part * promised_j {
+            if freed_j >= ARMIJO * part * promised_j {
                 std::mem::swap(here, there);
                 return Some(there_j);
             }
             // Minimum of the parabola through the known values; NaN fails the comparison.
             let least = promised_j * part / (2.0 * (promised_j * part - freed_j));
-            let [shortest, longest] = SHORTER;
+            let [shortest, longest] = SHORTENING;
             part *= if least.is_nan() { shortest } else { least.clamp(shortest, longest) };
         }
         None
@@ -275,6 +275,6 @@ impl Membrane {
 
 /// Converts a vector from single to double precision.
 #[inline(always)]
-fn widened(values: &[f32]) -> Quad {
+fn to_f64(values: &[f32]) -> Quad {
     [f64::from(values[0]), f64::from(values[1]), f64::from(values[2]), 0.0]
 }

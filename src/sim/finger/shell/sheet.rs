@@ -64,7 +64,7 @@ pub struct Sheet {
 
 /// State of the sheet, with the workspace to compute it.
 #[derive(Clone, Debug, Default)]
-pub struct Strained {
+pub struct SheetState {
     /// Elastic energy.
     pub energy_j: f64,
     /// Gradient of the energy at each node, in N.
@@ -154,14 +154,14 @@ impl Sheet {
     }
 
     /// Allocates a state for [`strain`](Self::strain), at rest.
-    pub fn relaxed(&self) -> Strained {
-        let mut strained = Strained::default();
+    pub fn relaxed(&self) -> SheetState {
+        let mut strained = SheetState::default();
         self.strain(&vec![Vector3::zeros(); self.rest.len()], &mut strained);
         strained
     }
 
     /// Computes the state with each node displaced by `moved_m`.
-    pub fn strain(&self, moved_m: &[Vector3<f64>], state: &mut Strained) {
+    pub fn strain(&self, moved_m: &[Vector3<f64>], state: &mut SheetState) {
         widest(
             #[inline(always)]
             || self.strain_plainly(moved_m, state),
@@ -169,9 +169,9 @@ impl Sheet {
     }
 
     #[inline(always)]
-    fn strain_plainly(&self, moved_m: &[Vector3<f64>], state: &mut Strained) {
+    fn strain_plainly(&self, moved_m: &[Vector3<f64>], state: &mut SheetState) {
         let Self { rest, edges, volume_m3 } = self;
-        let Strained { points, grown, gradient_n, volume_m2, .. } = state;
+        let SheetState { points, grown, gradient_n, volume_m2, .. } = state;
         points.resize(rest.len(), Quad::default());
         for ((point, at), moved_m) in points.iter_mut().zip(rest).zip(moved_m) {
             *point = sum(at, &quad(moved_m));
@@ -272,7 +272,7 @@ impl Edge {
     }
 }
 
-impl Strained {
+impl SheetState {
     /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let quads = self.gradient_n.capacity() + self.volume_m2.capacity() + self.points.capacity();

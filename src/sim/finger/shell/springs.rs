@@ -16,7 +16,7 @@ const SWEEPS: usize = 100;
 
 /// Springs, with the workspace to solve for their forces.
 #[derive(Clone, Debug, Default)]
-pub struct Springs {
+pub struct UnilateralSprings {
     /// k, in N/m.
     pub stiffness_n_m: Vec<f64>,
     /// b, in m.
@@ -30,7 +30,7 @@ pub struct Springs {
     pushes: Vec<f64>,
 }
 
-impl Springs {
+impl UnilateralSprings {
     /// Removes all springs.
     pub fn clear(&mut self) {
         for values in
@@ -59,7 +59,7 @@ impl Springs {
     }
 
     /// Returns the compression of spring `i` by everything but its own stiffness.
-    fn shortened_m(&self, i: usize) -> f64 {
+    fn compression_m(&self, i: usize) -> f64 {
         let row = &self.softness_m_n[i * self.len()..(i + 1) * self.len()];
         let yielded = self.loaded.iter().map(|&j| row[j] * self.force_n[j]);
         self.free_m[i] - yielded.sum::<f64>()
@@ -73,7 +73,7 @@ impl Springs {
         for _ in 0..GUESSES {
             widest(
                 #[inline(always)]
-                || self.push_loaded(),
+                || self.solve_active_set(),
             );
             self.pushes.clear();
             let mut settled = true;
@@ -82,7 +82,7 @@ impl Springs {
                 let was = self.loaded.get(next) == Some(&i);
                 next += usize::from(was);
                 // An unloaded spring becomes loaded if it is compressed under these forces.
-                let is = if was { self.force_n[i] > 0.0 } else { self.shortened_m(i) > 0.0 };
+                let is = if was { self.force_n[i] > 0.0 } else { self.compression_m(i) > 0.0 };
                 settled &= is == was;
                 self.pushes.push(f64::from(u8::from(is)));
             }
@@ -97,7 +97,7 @@ impl Springs {
 
     /// Solves for the forces that balance the loaded springs, with pulling allowed.
     #[inline(always)]
-    fn push_loaded(&mut self) {
+    fn solve_active_set(&mut self) {
         let (count, size) = (self.len(), self.loaded.len());
         self.factor.clear();
         self.pushes.clear();
@@ -141,7 +141,7 @@ impl Springs {
         self.force_n.iter_mut().for_each(|force_n| *force_n = force_n.max(0.0));
         for i in (0..SWEEPS).flat_map(|_| 0..count) {
             let own_m_n = self.softness_m_n[i * count + i];
-            let alone_m = self.shortened_m(i) + own_m_n * self.force_n[i];
+            let alone_m = self.compression_m(i) + own_m_n * self.force_n[i];
             let softness_m_n = own_m_n + self.stiffness_n_m[i].recip();
             self.force_n[i] = (alone_m / softness_m_n).max(0.0);
         }

@@ -1,6 +1,6 @@
 //! Collision interlock: distances between links, table and object.
 
-use super::interlock::{Ahead, Entry, Interlock, Now, Site};
+use super::interlock::{Interlock, InterlockEntry, RobotState, SafetyContext, StoppingPath};
 use super::settings::InterlockSettings;
 use crate::backend::Trip;
 use crate::robot::arm::Joints;
@@ -11,16 +11,16 @@ use palpate_geometry::sweep::Capsule;
 
 /// Interlock that stops the robot before links come too close to each other, the table or the
 /// object.
-pub const CLEARANCE: Entry = Entry {
+pub const CLEARANCE: InterlockEntry = InterlockEntry {
     name: "clearance",
     make: |site, settings, _| {
-        let guard = Guard::new(site, settings);
+        let guard = CollisionMonitor::new(site, settings);
         (!guard.pairs.is_empty()).then(|| Box::new(guard) as _)
     },
 };
 
 /// Checks the capsules of the links along the stopping path.
-struct Guard {
+struct CollisionMonitor {
     links: Vec<LinkCapsule>,
     /// Each link with an obstacle that it must avoid.
     pairs: Vec<(usize, Other)>,
@@ -39,13 +39,13 @@ enum Other {
     Object(OrientedBox),
 }
 
-impl Guard {
-    fn new(site: &Site, settings: &InterlockSettings) -> Self {
+impl CollisionMonitor {
+    fn new(site: &SafetyContext, settings: &InterlockSettings) -> Self {
         let links = site.robot.capsules();
         let mut pairs = Vec::new();
         for (i, link) in links.iter().enumerate() {
             let beside = links.iter().enumerate().skip(i + 1);
-            let met = beside.filter(|(_, other)| link.may_meet(other));
+            let met = beside.filter(|(_, other)| link.can_collide(other));
             pairs.extend(met.map(|(k, _)| (i, Other::Link(k))));
             if let Some(z_m) = settings.lowest_m.filter(|_| !link.near_base) {
                 let (p_w, outward_w) = (Point3::new(0.0, 0.0, z_m), Vector3::z_axis());
@@ -67,7 +67,7 @@ impl Guard {
     }
 
     /// Returns the smallest distance at `q` and its pair.
-    fn nearest(&mut self, now: &Now, q: &Joints) -> (f64, usize) {
+    fn nearest(&mut self, now: &RobotState, q: &Joints) -> (f64, usize) {
         let frames = now.chain.frames(q);
         self.placed.clear();
         self.placed.extend(self.links.iter().map(|link| link.at(&frames[link.link])));
@@ -97,9 +97,9 @@ impl Guard {
     }
 }
 
-impl Interlock for Guard {
-    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
-        let ahead = Ahead::of(now, qdot, self.reaction_s);
+impl Interlock for CollisionMonitor {
+    fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
+        let ahead = StoppingPath::of(now, qdot, self.reaction_s);
         let limit = self.clearance_m;
         if let Some((q, distance_m)) = &self.looked
             && distance_m - ahead.farthest_m(q) > limit
@@ -115,7 +115,7 @@ impl Interlock for Guard {
             distance_m
         });
         below.map_or(Ok(()), |found| {
-            Trip::unless(false, CLEARANCE.name, &self.name(pair), [found, limit], "m")
+            Trip::check(false, CLEARANCE.name, &self.name(pair), [found, limit], "m")
         })
     }
 }

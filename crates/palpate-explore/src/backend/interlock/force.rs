@@ -1,10 +1,10 @@
 //! Force interlock: limits of the contact force from the force/torque sensor alone.
 
-use super::interlock::{Entry, Interlock, Now};
+use super::interlock::{Interlock, InterlockEntry, RobotState};
 use crate::backend::{Reading, Trip};
 
 /// Interlock that stops the robot above a limit of the force, the torque, or the force's rate.
-pub const FORCE: Entry = Entry {
+pub const FORCE: InterlockEntry = InterlockEntry {
     name: "force",
     make: |site, settings, _| {
         let force_n = settings.force_n(site.touch_force_n);
@@ -53,14 +53,14 @@ struct Force {
 }
 
 impl Interlock for Force {
-    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, _: &Reading) -> Result<(), Trip> {
         let Some(load @ [force_n, _]) = now.load else { return Ok(()) };
         let limits = [(FORCE.name, self.force_n, "N"), ("torque", self.torque_nm, "N·m")];
         for ((found, (interlock, limit, unit)), above) in
             load.into_iter().zip(limits).zip(&mut self.above)
         {
             *above = if found > limit { *above + 1 } else { 0 };
-            Trip::unless(*above < SAMPLES, interlock, "", [found, limit], unit)?;
+            Trip::check(*above < SAMPLES, interlock, "", [found, limit], unit)?;
         }
         let (since_s, before_n) = *self.before.get_or_insert((now.time_s, force_n));
         let passed_s = now.time_s - since_s;
@@ -68,7 +68,7 @@ impl Interlock for Force {
         if passed_s > 0.999 * RISE_S {
             self.before = Some((now.time_s, force_n));
             let found = (force_n - before_n) / passed_s;
-            Trip::unless(found <= RISE_N_S, "force rate", "", [found, RISE_N_S], "N/s")?;
+            Trip::check(found <= RISE_N_S, "force rate", "", [found, RISE_N_S], "N/s")?;
         }
         Ok(())
     }

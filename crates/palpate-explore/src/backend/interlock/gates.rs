@@ -5,8 +5,8 @@ use crate::robot::arm::Chain;
 use crate::robot::finger::Frame;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
-use palpate_input::config::{Checked, Rules};
-use palpate_input::error::Invalid;
+use palpate_input::config::{Rules, Validate};
+use palpate_input::error::InputError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ impl Default for GateSettings {
     }
 }
 
-impl Checked for GateSettings {
+impl Validate for GateSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("drift_n", self.drift_n, 1e-3..=100.0);
         rules.number("noise_counts", self.noise_counts, 0.1..=4095.0);
@@ -39,7 +39,7 @@ pub const HOLD_S: f64 = 2.0;
 
 /// Largest movement of a joint during the check, rad or m.
 // heuristic: 2 mm of the tip at a reach of 1 m.
-pub const STILL: f64 = 2e-3;
+pub const START_TOLERANCE: f64 = 2e-3;
 
 /// Commands `body`, which moves `chain`, to rest after its reset, and checks joints and sensors.
 ///
@@ -66,28 +66,28 @@ pub fn check_start(
     Ok(())
 }
 
-fn check_joints(readings: &[Reading], chain: &Chain) -> Result<(), Invalid> {
+fn check_joints(readings: &[Reading], chain: &Chain) -> Result<(), InputError> {
     for (i, joint) in chain.joints.iter().enumerate() {
         let places = readings.iter().filter_map(|reading| reading.q.get(i).copied());
         let (name, [low, high]) = (&joint.name, joint.q_limits);
         let (least, most) =
             places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
         if let Some(q) = [least, most].into_iter().find(|q| !(low..=high).contains(q)) {
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "the position {q:.4} of joint {name} is outside its limits {low:.4} to {high:.4}"
             )));
         }
         let moved = most - least;
-        if moved > STILL {
-            return Err(Invalid::new(format!(
-                "joint {name} moved by {moved:.5} while commanded to rest; allowed is {STILL}"
+        if moved > START_TOLERANCE {
+            return Err(InputError::new(format!(
+                "joint {name} moved by {moved:.5} while commanded to rest; allowed is {START_TOLERANCE}"
             )));
         }
     }
     Ok(())
 }
 
-fn check_force(readings: &[Reading], allowed_n: f64) -> Result<(), Invalid> {
+fn check_force(readings: &[Reading], allowed_n: f64) -> Result<(), InputError> {
     let wrenches: Vec<Wrench> = readings.iter().filter_map(|reading| reading.wrench).collect();
     let quarter = wrenches.len() / 4;
     if quarter == 0 {
@@ -100,17 +100,21 @@ fn check_force(readings: &[Reading], allowed_n: f64) -> Result<(), Invalid> {
         (mean_n(&wrenches[wrenches.len() - quarter..]) - mean_n(&wrenches[..quarter])).norm();
     match drift_n > allowed_n {
         false => Ok(()),
-        true => Err(Invalid::new(format!(
+        true => Err(InputError::new(format!(
             "the force at rest drifts by {drift_n:.3} N; allowed is {allowed_n} N"
         ))),
     }
 }
 
 /// Checks that frames arrive and that electrodes change, if the sensor is `noisy`.
-fn check_electrodes(readings: &[Reading], allowed_counts: f64, noisy: bool) -> Result<(), Invalid> {
+fn check_electrodes(
+    readings: &[Reading],
+    allowed_counts: f64,
+    noisy: bool,
+) -> Result<(), InputError> {
     let frames: Vec<&Frame> = readings.iter().flat_map(Reading::frames).collect();
     if frames.is_empty() {
-        return Err(Invalid::new(format!("no tactile frame received in {HOLD_S} s")));
+        return Err(InputError::new(format!("no tactile frame received in {HOLD_S} s")));
     }
     let all: Vec<[f64; ELECTRODES]> =
         frames.iter().filter_map(|frame| frame.electrode_counts).collect();
@@ -126,7 +130,7 @@ fn check_electrodes(readings: &[Reading], allowed_counts: f64, noisy: bool) -> R
         let is_alive = sd_counts > 0.0 || !noisy;
         if !(is_inside && is_alive && sd_counts <= allowed_counts) {
             let electrode = i + 1;
-            return Err(Invalid::new(format!(
+            return Err(InputError::new(format!(
                 "electrode E{electrode} at rest is {mean:.1} counts with a standard deviation of \
                  {sd_counts:.2}; allowed is a value inside 0 to 4095 with one above 0 and at most {allowed_counts}"
             )));

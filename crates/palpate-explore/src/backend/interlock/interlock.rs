@@ -13,7 +13,7 @@ pub trait Interlock: Send {
     ///
     /// # Errors
     /// If the robot must stop instead.
-    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+    fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
         let _ = (now, qdot);
         Ok(())
     }
@@ -22,14 +22,14 @@ pub trait Interlock: Send {
     ///
     /// # Errors
     /// If the robot must stop.
-    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, reading: &Reading) -> Result<(), Trip> {
         let _ = (now, reading);
         Ok(())
     }
 }
 
 /// State of the robot as used by interlocks.
-pub struct Now {
+pub struct RobotState {
     /// The chain.
     pub chain: Chain,
     /// For each joint, the largest motion of any point of the robot per rad or m.
@@ -58,7 +58,7 @@ pub struct Now {
     pub load: Option<[f64; 2]>,
 }
 
-impl Now {
+impl RobotState {
     /// Returns the fingertip speed for the joint velocities `qdot`, m/s.
     pub fn tip_speed_m_s(&self, qdot: &Joints) -> f64 {
         (self.jacobian.fixed_rows::<3>(0) * qdot).norm()
@@ -66,16 +66,16 @@ impl Now {
 }
 
 /// An entry of the table of interlocks.
-pub struct Entry {
+pub struct InterlockEntry {
     /// Name in documentation and tests.
     pub name: &'static str,
     /// Creates it at each reset; `None` if there is nothing to monitor.
-    pub make: fn(&Site, &InterlockSettings, &Capabilities) -> Option<Box<dyn Interlock>>,
+    pub make: fn(&SafetyContext, &InterlockSettings, &Capabilities) -> Option<Box<dyn Interlock>>,
 }
 
 /// Safety context of the interlocks: the robot and its workspace, as plain numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Site {
+pub struct SafetyContext {
     /// The robot.
     pub robot: Robot,
     /// Bounding box in `W` of the planned fingertip positions.
@@ -92,8 +92,8 @@ pub struct Site {
 
 /// Unavoidable path of a robot: one more tick, then braking to rest. It is a straight line in joint
 /// space, since braking preserves the direction of the joint velocities.
-pub struct Ahead<'a> {
-    now: &'a Now,
+pub struct StoppingPath<'a> {
+    now: &'a RobotState,
     from: Joints,
     by: Joints,
 }
@@ -106,11 +106,11 @@ pub const GRAIN_M: f64 = 1e-3;
 /// close to its limit over centimetres.
 const LOOKS: usize = 32;
 
-impl<'a> Ahead<'a> {
+impl<'a> StoppingPath<'a> {
     /// Returns the path if `qdot` is commanded for one tick, takes effect `reaction_s` later, and
     /// is then braked; and if the robot has moved as commanded since its position reading last
     /// changed.
-    pub fn of(now: &'a Now, qdot: &Joints, reaction_s: f64) -> Self {
+    pub fn of(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> Self {
         let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
         Self { now, from: now.q, by: now.unseen + qdot * time_s }
     }
@@ -146,7 +146,7 @@ impl<'a> Ahead<'a> {
 
 /// Returns the time in which the joints come to rest from `qdot` together, each within its
 /// deceleration limit.
-pub fn stopping_s(now: &Now, qdot: &Joints) -> f64 {
+pub fn stopping_s(now: &RobotState, qdot: &Joints) -> f64 {
     let joints = now.chain.joints.iter().zip(qdot.iter());
     joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit).fold(0.0, f64::max)
 }

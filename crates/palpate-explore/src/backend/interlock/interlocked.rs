@@ -2,13 +2,13 @@
 
 use super::INTERLOCKS;
 use super::force::{FORCE, RETRACT_M_S, RETRACT_RISE_N};
-use super::interlock::{Entry, Interlock, Now, Site, stopping_s};
+use super::interlock::{Interlock, InterlockEntry, RobotState, SafetyContext, stopping_s};
 use super::limits::limited;
 use super::settings::InterlockSettings;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
 use crate::robot::arm::{Jacobian, Joints};
 use nalgebra::Isometry3;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::collections::VecDeque;
 
 /// A backend that stops the robot on a fault, independently of the commands.
@@ -21,10 +21,10 @@ use std::collections::VecDeque;
 pub struct Interlocked {
     inner: Box<dyn Backend>,
     interlocks: Vec<Box<dyn Interlock>>,
-    site: Site,
+    site: SafetyContext,
     settings: InterlockSettings,
-    now: Now,
-    way_back: WayBack,
+    now: RobotState,
+    way_back: RetractPath,
     /// Wrench at the reset.
     rest: Option<Wrench>,
     reading: Reading,
@@ -41,7 +41,7 @@ impl Interlocked {
     /// If their numbers of joints differ.
     pub fn new(
         inner: Box<dyn Backend>,
-        site: &Site,
+        site: &SafetyContext,
         settings: &InterlockSettings,
     ) -> Result<Self, Fault> {
         let (chain, capabilities) = (site.robot.chain.clone(), inner.capabilities());
@@ -51,9 +51,9 @@ impl Interlocked {
             interlocks: Vec::new(),
             site: site.clone(),
             settings: settings.clone(),
-            way_back: WayBack::new(capabilities.period_s),
+            way_back: RetractPath::new(capabilities.period_s),
             command: Command { qdot: vec![0.0; chain.joints.len()] },
-            now: Now {
+            now: RobotState {
                 reaches_m: chain.reaches_m(site.robot.finger.radius_m),
                 period_s: capabilities.period_s,
                 chain,
@@ -79,7 +79,7 @@ impl Interlocked {
 
     fn make_interlocks(&mut self) {
         let Self { site, settings, inner, .. } = self;
-        let make = |entry: &Entry| (entry.make)(site, settings, inner.capabilities());
+        let make = |entry: &InterlockEntry| (entry.make)(site, settings, inner.capabilities());
         self.interlocks = INTERLOCKS.iter().filter_map(make).collect();
     }
 
@@ -94,7 +94,7 @@ impl Interlocked {
         self.now.sent = *qdot;
         self.now.tick += 1;
         match self.inner.step(&self.command) {
-            Ok(reading) => self.reading.copy(reading),
+            Ok(reading) => self.reading.copy_from(reading),
             Err(fault) => {
                 // The backend reported the stop itself; the last command must not persist.
                 if self.inner.capabilities().real_time {
@@ -137,17 +137,17 @@ impl Interlocked {
     }
 
     /// Returns the trip that forbids even the current position at rest.
-    fn stands_badly(&mut self) -> Option<Trip> {
+    fn trip_at_rest(&mut self) -> Option<Trip> {
         let is_at_rest = self.now.sent == Joints::zeros();
         is_at_rest.then(|| self.shorten(&mut Joints::zeros()).err()).flatten()
     }
 
     /// Returns the fault of a robot that must be moved by hand.
-    fn astray(&self, trip: &Trip) -> Fault {
+    fn blocked_start_fault(&self, trip: &Trip) -> Fault {
         let joints = self.now.chain.joints.iter().zip(self.now.chain.home.iter());
         let home: Vec<_> = joints.map(|(joint, q)| format!("{} {q:.3}", joint.name)).collect();
         let p_wt = self.now.x_wt.translation.vector;
-        Invalid::new(format!(
+        InputError::new(format!(
             "the arm cannot start with its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; jog it close to its \
              home posture: {}",
             p_wt.x, p_wt.y, p_wt.z, home.join(", ")
@@ -176,7 +176,7 @@ impl Interlocked {
         let fault = Fault::Interlock { time_s: self.now.time_s, trip };
         let is_sound = self.brake();
         if is_force && is_sound {
-            self.go_back();
+            self.retract();
         }
         self.latch(fault)
     }
@@ -203,11 +203,12 @@ impl Interlocked {
     }
 
     /// Retracts the finger from the object.
-    fn go_back(&mut self) {
+    fn retract(&mut self) {
         let retract_m = self.settings.retract_m;
         let from = self.now.x_wt.translation.vector;
         let Some([begun_n, _]) = self.now.load else { return };
-        let ticks = (2.0 * retract_m / (RETRACT_M_S * self.now.period_s)) as usize + PATIENCE_TICKS;
+        let ticks =
+            (2.0 * retract_m / (RETRACT_M_S * self.now.period_s)) as usize + RETRACT_TIMEOUT_TICKS;
         for _ in 0..ticks {
             if (self.now.x_wt.translation.vector - from).norm() >= retract_m {
                 break;
@@ -233,7 +234,7 @@ impl Interlocked {
 const HELD_TICKS: f64 = 8.0;
 
 /// Ticks in addition to twice those of a retraction at full speed, to start and to stop.
-const PATIENCE_TICKS: usize = 100;
+const RETRACT_TIMEOUT_TICKS: usize = 100;
 
 impl Backend for Interlocked {
     fn capabilities(&self) -> &Capabilities {
@@ -248,7 +249,7 @@ impl Backend for Interlocked {
         {
             return Err(fault.clone());
         }
-        self.reading.copy(self.inner.reset(seed)?);
+        self.reading.copy_from(self.inner.reset(seed)?);
         self.make_interlocks();
         self.way_back.postures.clear();
         (self.fault, self.rest) = (None, None);
@@ -270,8 +271,8 @@ impl Backend for Interlocked {
             }
         };
         if let Err(trip) = self.shorten(&mut qdot) {
-            return Err(match self.stands_badly() {
-                Some(trip) => self.latch(self.astray(&trip)),
+            return Err(match self.trip_at_rest() {
+                Some(trip) => self.latch(self.blocked_start_fault(&trip)),
                 None => self.trip(trip),
             });
         }
@@ -303,12 +304,12 @@ const KEPT_S: f64 = 2.0;
 const MOST: usize = 4096;
 
 /// Retract path: the postures of the last ticks, oldest first, within a fixed capacity.
-struct WayBack {
+struct RetractPath {
     postures: VecDeque<Joints>,
     most: usize,
 }
 
-impl WayBack {
+impl RetractPath {
     /// Creates the path for a backend with ticks of `period_s`.
     fn new(period_s: f64) -> Self {
         let most = ((KEPT_S / period_s) as usize).clamp(1, MOST);
@@ -325,7 +326,7 @@ impl WayBack {
 
     /// Returns joint velocities that move back along the path with the tip at `speed_m_s`, dropping
     /// the postures passed; `None` at the end of the path.
-    fn velocity(&mut self, now: &Now, speed_m_s: f64) -> Option<Joints> {
+    fn velocity(&mut self, now: &RobotState, speed_m_s: f64) -> Option<Joints> {
         while let Some(q) = self.postures.back() {
             let by = q - now.q;
             let travel_s = now.tip_speed_m_s(&by) / speed_m_s;

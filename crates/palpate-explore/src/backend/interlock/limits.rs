@@ -1,12 +1,12 @@
 //! Interlocks of the fingertip's speed, and of each joint's position, speed and acceleration.
 
-use super::interlock::{Entry, Interlock, Now};
+use super::interlock::{Interlock, InterlockEntry, RobotState};
 use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
 
 /// Interlock that limits commands to the tip's speed limit, and stops a tip that is measured
 /// faster.
-pub const TIP_SPEED: Entry = Entry {
+pub const TIP_SPEED: InterlockEntry = InterlockEntry {
     name: "tip speed",
     make: |site, settings, capabilities| {
         // Largest speed requested by the controller: along the path plus the largest correction.
@@ -18,8 +18,8 @@ pub const TIP_SPEED: Entry = Entry {
 };
 
 /// Interlock that limits commands to the joint limits, and stops a joint measured far beyond one.
-pub const JOINT_POSITION: Entry =
-    Entry { name: "joint position", make: |_, _, _| Some(Box::new(JointLimits)) };
+pub const JOINT_POSITION: InterlockEntry =
+    InterlockEntry { name: "joint position", make: |_, _, _| Some(Box::new(JointLimits)) };
 
 /// The reduced speed of EN ISO 10218-1.
 const REDUCED_M_S: f64 = 0.25;
@@ -37,7 +37,7 @@ struct TipSpeed {
 }
 
 impl Interlock for TipSpeed {
-    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+    fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
         let speed_m_s = now.tip_speed_m_s(qdot);
         if speed_m_s > self.limit_m_s {
             *qdot *= self.limit_m_s / speed_m_s;
@@ -45,11 +45,11 @@ impl Interlock for TipSpeed {
         Ok(())
     }
 
-    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, _: &Reading) -> Result<(), Trip> {
         let found = now.tip_speed_m_s(&now.qdot);
         let limit = OVERSHOOT * self.limit_m_s;
         self.above = if found > limit { self.above + 1 } else { 0 };
-        Trip::unless(self.above < SAMPLES, TIP_SPEED.name, "", [found, limit], "m/s")
+        Trip::check(self.above < SAMPLES, TIP_SPEED.name, "", [found, limit], "m/s")
     }
 }
 
@@ -64,12 +64,12 @@ struct JointLimits;
 
 /// Returns `wanted` limited joint by joint: in speed, in acceleration relative to the last command,
 /// and so that it can stop before its position limit.
-pub fn limited(now: &Now, wanted: &Joints) -> Joints {
+pub fn limited(now: &RobotState, wanted: &Joints) -> Joints {
     let mut qdot = *wanted;
     let joints = now.chain.joints.iter().zip(now.q.iter().zip(now.sent.iter()));
     for ((joint, (&q, &sent)), qdot) in joints.zip(qdot.iter_mut()) {
         let step = joint.qddot_limit * now.period_s;
-        let allowed = joint.fastest(q, *qdot, now.period_s) * (1.0 + ROUNDING);
+        let allowed = joint.speed_limit(q, *qdot, now.period_s) * (1.0 + ROUNDING);
         let slow = qdot.clamp(-allowed, allowed);
         *qdot = match (slow - sent).abs() <= step * (1.0 + ROUNDING) {
             true => slow,
@@ -80,17 +80,17 @@ pub fn limited(now: &Now, wanted: &Joints) -> Joints {
 }
 
 impl Interlock for JointLimits {
-    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+    fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
         *qdot = limited(now, qdot);
         Ok(())
     }
 
-    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, _: &Reading) -> Result<(), Trip> {
         now.chain.joints.iter().enumerate().try_for_each(|(i, joint)| {
             let (q, [low, high]) = (now.q[i], joint.q_limits);
             let is_within = (low - BEYOND..=high + BEYOND).contains(&q);
             let limit = if q > high { high } else { low };
-            Trip::unless(is_within, JOINT_POSITION.name, &joint.name, [q, limit], "rad or m")
+            Trip::check(is_within, JOINT_POSITION.name, &joint.name, [q, limit], "rad or m")
         })
     }
 }

@@ -17,13 +17,13 @@ mod tracking;
 mod workspace;
 
 pub use gates::{GateSettings, check_start};
-pub use interlock::{Entry, Interlock, Now, Site};
+pub use interlock::{Interlock, InterlockEntry, RobotState, SafetyContext};
 pub use interlocked::Interlocked;
 pub use settings::{InterlockSettings, defaults};
 
 /// All interlocks in the order in which they act: those that limit a command come before those that
 /// check the result.
-pub const INTERLOCKS: &[Entry] = &[
+pub const INTERLOCKS: &[InterlockEntry] = &[
     limits::TIP_SPEED,
     limits::JOINT_POSITION,
     workspace::WORKSPACE,
@@ -45,5 +45,5 @@ pub const FORMER_KEYS: [(&str, f64); 7] = [
     ("interlocks.retract_m_s", force::RETRACT_M_S),
     ("interlocks.retract_rise_n", force::RETRACT_RISE_N),
     ("gates.hold_s", gates::HOLD_S),
-    ("gates.still", gates::STILL),
+    ("gates.still", gates::START_TOLERANCE),
 ];

@@ -1,25 +1,31 @@
 //! Sensor interlocks: timeouts, and implausible electrode values.
 
-use super::interlock::{Entry, Interlock, Now};
+use super::interlock::{Interlock, InterlockEntry, RobotState};
 use crate::backend::{Reading, Trip};
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
 
 /// Interlock that stops a robot when joint states, force/torque or tactile data time out.
-pub const SILENCE: Entry = Entry {
+pub const SILENCE: InterlockEntry = InterlockEntry {
     name: "silence",
     make: |_, settings, capabilities| {
         let limits_s =
             [settings.joint_silence_s, settings.wrench_silence_s, settings.frame_silence_s];
         let repeats = capabilities.real_time;
-        Some(Box::new(Silence { limits_s, repeats, heard: [None; 3], time_s: 0.0, force_n: None }))
+        Some(Box::new(SensorTimeout {
+            limits_s,
+            repeats,
+            heard: [None; 3],
+            time_s: 0.0,
+            force_n: None,
+        }))
     },
 };
 
 /// Interlock that stops a real robot if an electrode is at an end of its range or does not change
 /// at all: its noise is several counts. A simulated one may be free of noise, and be pressed to the
 /// end.
-pub const ELECTRODE: Entry = Entry {
+pub const ELECTRODE: InterlockEntry = InterlockEntry {
     name: "electrode",
     make: |_, settings, capabilities| {
         let frozen_s = settings.frozen_s;
@@ -30,7 +36,7 @@ pub const ELECTRODE: Entry = Entry {
 
 const NAMES: [&str; 3] = ["joint state age", "wrench age", "tactile frame age"];
 
-struct Silence {
+struct SensorTimeout {
     limits_s: [f64; 3],
     /// Whether a force that repeats to the last bit counts as missing: a simulated one may be free
     /// of noise.
@@ -41,8 +47,8 @@ struct Silence {
     force_n: Option<Vector3<f64>>,
 }
 
-impl Interlock for Silence {
-    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+impl Interlock for SensorTimeout {
+    fn reading(&mut self, now: &RobotState, reading: &Reading) -> Result<(), Trip> {
         let force_n = reading.wrench.map(|wrench| wrench.force_n);
         let is_new = force_n != self.force_n || !self.repeats;
         let news = [
@@ -58,7 +64,7 @@ impl Interlock for Silence {
             let Some(heard) = heard else { continue };
             // Ages are counted in ticks, since the backend's own time may stand still.
             let (found, limit) = ((now.tick - *heard) as f64 * now.period_s, self.limits_s[i]);
-            Trip::unless(found <= limit, NAMES[i], "", [found, limit], "s")?;
+            Trip::check(found <= limit, NAMES[i], "", [found, limit], "s")?;
         }
         Ok(())
     }
@@ -93,7 +99,7 @@ struct Electrodes {
 }
 
 impl Interlock for Electrodes {
-    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, reading: &Reading) -> Result<(), Trip> {
         for counts in reading.frames().filter_map(|frame| frame.electrode_counts) {
             for (i, &count) in counts.iter().enumerate() {
                 let still = &mut self.still[i];
@@ -111,7 +117,7 @@ impl Interlock for Electrodes {
                         true => ("value", [count, end], "counts"),
                         false => ("standstill", [frozen_s, self.frozen_s], "s"),
                     };
-                    return Trip::unless(false, interlock, &format!("E{}", i + 1), measures, unit);
+                    return Trip::check(false, interlock, &format!("E{}", i + 1), measures, unit);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Settings of the interlocks: limits and timeouts.
 
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -99,7 +99,7 @@ impl InterlockSettings {
     }
 
     /// Checks that the fault force exceeds `touch_force_n`, the value of `touch.force_limit_n`.
-    pub fn check_beside(&self, touch_force_n: f64, rules: &mut Rules) {
+    pub fn check_against_touch(&self, touch_force_n: f64, rules: &mut Rules) {
         let force_n = self.force_n(touch_force_n);
         rules.require("force_limit_n", force_n, force_n > touch_force_n, || {
             format!("more than touch.force_limit_n = {touch_force_n} N")
@@ -107,7 +107,7 @@ impl InterlockSettings {
     }
 }
 
-impl Checked for InterlockSettings {
+impl Validate for InterlockSettings {
     fn check(&self, rules: &mut Rules) {
         let numbers = [
             ("tip_speed_m_s", self.tip_speed_m_s, 1e-3..=2.0),

@@ -1,7 +1,7 @@
 //! Tracking interlocks: velocity tracking error, position tracking error, and position readings
 //! that never change.
 
-use super::interlock::{Entry, Interlock, Now};
+use super::interlock::{Interlock, InterlockEntry, RobotState};
 use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
 use crate::robot::arm::chain::MAX_JOINTS;
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 /// Interlock that stops a real robot if a joint position reading stays constant while the joint is
 /// commanded to move: the driver repeats old data, and all limits would be checked at a wrong
 /// position.
-pub const STANDSTILL: Entry = Entry {
+pub const STANDSTILL: InterlockEntry = InterlockEntry {
     name: "joint standstill",
     make: |_, settings, capabilities| {
         let standstill = Standstill {
@@ -24,7 +24,7 @@ pub const STANDSTILL: Entry = Entry {
 
 /// Interlock that stops a robot if the velocity of a joint differs from the applied one for some
 /// time.
-pub const VELOCITY: Entry = Entry {
+pub const VELOCITY: InterlockEntry = InterlockEntry {
     name: "velocity tracking error",
     make: |_, settings, _| {
         let share = settings.tracking_error_ratio;
@@ -38,7 +38,7 @@ pub const VELOCITY: Entry = Entry {
 /// moved over a span by an amount between the smallest and the largest commanded over spans of the
 /// same length that ended up to that much earlier. Short spans detect a fast joint early, long ones
 /// a joint at 0.1 mm/s, which stays below the allowed error for many seconds.
-pub const POSITION: Entry = Entry {
+pub const POSITION: InterlockEntry = InterlockEntry {
     name: "position tracking error",
     make: |_, settings, capabilities| {
         let span = |step_s: f64| Span::new(step_s, settings.tracking_lag_s);
@@ -67,7 +67,7 @@ struct Standstill {
 }
 
 impl Interlock for Standstill {
-    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, _: &Reading) -> Result<(), Trip> {
         for (i, joint) in now.chain.joints.iter().enumerate() {
             let unseen_m = now.unseen[i].abs() * now.reaches_m[i];
             if now.unseen[i] == 0.0 {
@@ -77,7 +77,7 @@ impl Interlock for Standstill {
             let found = now.time_s - *self.since_s[i].get_or_insert(now.time_s - now.period_s);
             let limit = if unseen_m > BLIND_M { self.blind_s } else { self.frozen_s };
             let moves = unseen_m <= SEEN_M || found <= limit;
-            Trip::unless(moves, STANDSTILL.name, &joint.name, [found, limit], "s")?;
+            Trip::check(moves, STANDSTILL.name, &joint.name, [found, limit], "s")?;
         }
         Ok(())
     }
@@ -95,7 +95,7 @@ struct VelocityTracking {
 }
 
 impl Interlock for VelocityTracking {
-    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, reading: &Reading) -> Result<(), Trip> {
         for ((i, joint), applied) in now.chain.joints.iter().enumerate().zip(&reading.applied.qdot)
         {
             let (found, limit) = ((now.qdot[i] - applied).abs(), self.share * joint.qdot_limit);
@@ -105,7 +105,7 @@ impl Interlock for VelocityTracking {
             }
             let is_short = now.time_s - *self.since_s[i].get_or_insert(now.time_s) <= VELOCITY_S;
             let (name, unit) = (VELOCITY.name, "rad/s or m/s");
-            Trip::unless(is_short, name, &joint.name, [found, limit], unit)?;
+            Trip::check(is_short, name, &joint.name, [found, limit], unit)?;
         }
         Ok(())
     }
@@ -192,7 +192,7 @@ struct Tracking {
 }
 
 impl Interlock for Tracking {
-    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+    fn reading(&mut self, now: &RobotState, reading: &Reading) -> Result<(), Trip> {
         let passed_s = now.time_s - self.time_s;
         self.time_s = now.time_s;
         let Some(applied) = now.chain.joints_from(&reading.applied.qdot) else { return Ok(()) };
@@ -211,7 +211,7 @@ impl Interlock for Tracking {
                 let reach_m = now.reaches_m[i];
                 let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
                 let limit = FLOOR_M + SHARE * low[i].abs().max(high[i].abs()) * reach_m;
-                Trip::unless(found <= limit, POSITION.name, &joint.name, [found, limit], "m")?;
+                Trip::check(found <= limit, POSITION.name, &joint.name, [found, limit], "m")?;
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! Workspace interlocks: bounds of fingertip and elbow, and of the finger's depth.
 
-use super::interlock::{Ahead, Entry, Interlock, Now};
+use super::interlock::{Interlock, InterlockEntry, RobotState, StoppingPath};
 use crate::backend::Trip;
 use crate::robot::arm::Joints;
 use nalgebra::{Point3, Vector3};
@@ -8,19 +8,19 @@ use palpate_geometry::distance::HalfSpace;
 
 /// Interlock that stops the robot before its tip leaves the box of its touches by more than a
 /// margin, or tip or elbow leave the workspace.
-pub const WORKSPACE: Entry = Entry {
+pub const WORKSPACE: InterlockEntry = InterlockEntry {
     name: "workspace",
     make: |site, settings, _| {
         let mut rooms = Vec::new();
         if let Some([low, high]) = site.tip_w {
             let margin = Vector3::repeat(settings.tip_margin_m);
-            rooms.push(Room { elbow: None, low: low - margin, high: high + margin });
+            rooms.push(WorkspaceBox { elbow: None, low: low - margin, high: high + margin });
         }
         if let Some([x, y, z]) = settings.workspace_m {
             let [low, high] = [0, 1].map(|end| Point3::new(x[end], y[end], z[end]));
-            rooms.push(Room { elbow: None, low, high });
+            rooms.push(WorkspaceBox { elbow: None, low, high });
             let elbow = site.robot.chain.elbow;
-            rooms.extend(elbow.map(|link| Room { elbow: Some(link), low, high }));
+            rooms.extend(elbow.map(|link| WorkspaceBox { elbow: Some(link), low, high }));
         }
         let reaction_s = settings.reaction_s;
         (!rooms.is_empty()).then(|| Box::new(Workspace { rooms, reaction_s }) as _)
@@ -28,7 +28,7 @@ pub const WORKSPACE: Entry = Entry {
 };
 
 /// Interlock that stops the robot before its tip passes the turning point by more than a margin.
-pub const DEPTH: Entry = Entry {
+pub const DEPTH: InterlockEntry = InterlockEntry {
     name: "depth",
     make: |site, settings, _| {
         let (margin_m, reaction_s) = (settings.depth_margin_m, settings.reaction_s);
@@ -37,21 +37,21 @@ pub const DEPTH: Entry = Entry {
 };
 
 struct Workspace {
-    rooms: Vec<Room>,
+    rooms: Vec<WorkspaceBox>,
     reaction_s: f64,
 }
 
 /// A box that a point must stay in.
-struct Room {
+struct WorkspaceBox {
     /// The link whose origin is the elbow; `None` for the tip.
     elbow: Option<usize>,
     low: Point3<f64>,
     high: Point3<f64>,
 }
 
-impl Room {
+impl WorkspaceBox {
     /// Distance of the point at `q` from the nearest side of the box, m; negative outside.
-    fn clearance_m(&self, now: &Now, q: &Joints) -> f64 {
+    fn clearance_m(&self, now: &RobotState, q: &Joints) -> f64 {
         let p_w: Point3<f64> = match self.elbow {
             None if *q == now.q => now.x_wt.translation.vector.into(),
             None => now.chain.forward(q).translation.vector.into(),
@@ -62,8 +62,8 @@ impl Room {
 }
 
 impl Interlock for Workspace {
-    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
-        let ahead = Ahead::of(now, qdot, self.reaction_s);
+    fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
+        let ahead = StoppingPath::of(now, qdot, self.reaction_s);
         let farthest_m = ahead.farthest_m(&now.q);
         for room in &self.rooms {
             if room.clearance_m(now, &now.q) > farthest_m {
@@ -71,7 +71,7 @@ impl Interlock for Workspace {
             }
             if let Some(found) = ahead.below(0.0, |q| room.clearance_m(now, q)) {
                 let part = if room.elbow.is_some() { "the elbow" } else { "the tip" };
-                return Trip::unless(false, WORKSPACE.name, part, [found, 0.0], "m inside");
+                return Trip::check(false, WORKSPACE.name, part, [found, 0.0], "m inside");
             }
         }
         Ok(())
@@ -85,15 +85,15 @@ struct Depth {
 }
 
 impl Interlock for Depth {
-    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+    fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
         let left_m = |p_w| self.margin_m - self.space.distance_m(&p_w);
-        let ahead = Ahead::of(now, qdot, self.reaction_s);
+        let ahead = StoppingPath::of(now, qdot, self.reaction_s);
         if left_m(now.x_wt.translation.vector.into()) > ahead.farthest_m(&now.q) {
             return Ok(());
         }
         let below = ahead.below(0.0, |q| left_m(now.chain.forward(q).translation.vector.into()));
         let found_m = self.margin_m - below.unwrap_or_default();
         let (measures, unit) = ([found_m, self.margin_m], "m beyond the turning point");
-        Trip::unless(below.is_none(), DEPTH.name, "", measures, unit)
+        Trip::check(below.is_none(), DEPTH.name, "", measures, unit)
     }
 }

@@ -54,10 +54,10 @@ impl ContactMonitor {
     }
 
     /// Adds the reading of a tick.
-    pub(super) fn take(&mut self, reading: &Reading) {
+    pub(super) fn push(&mut self, reading: &Reading) {
         let Reading { time_s, samples, wrench, .. } = reading;
         for sensor in &mut self.sensors {
-            sensor.take(*time_s, samples, wrench.as_ref());
+            sensor.push(*time_s, samples, wrench.as_ref());
         }
         self.force_n = match wrench {
             Some(wrench) => {
@@ -83,7 +83,7 @@ impl ContactMonitor {
 
     /// Number of samples required by the next [`tare`](Self::tare).
     pub(super) fn samples_of_tare(&self) -> usize {
-        let wanted = self.sensors.iter().map(|sensor| sensor.samples_of_tare());
+        let wanted = self.sensors.iter().map(|sensor| sensor.tare_sample_count());
         wanted.fold(self.settings.frames, usize::max)
     }
 
@@ -94,14 +94,14 @@ impl ContactMonitor {
     }
 
     /// Drops the samples and forces so far.
-    pub(super) fn forget(&mut self) {
-        self.sensors.iter_mut().for_each(|sensor| sensor.forget());
+    pub(super) fn clear_samples(&mut self) {
+        self.sensors.iter_mut().for_each(|sensor| sensor.clear_samples());
         self.forces = (Vector3::zeros(), 0.0);
     }
 
     /// Number of samples since [`forget`](Self::forget), of the sensor with the most.
     pub(super) fn collected(&self) -> usize {
-        self.sensors.iter().filter_map(|sensor| sensor.collected()).max().unwrap_or(0)
+        self.sensors.iter().filter_map(|sensor| sensor.sample_count()).max().unwrap_or(0)
     }
 
     /// Time of the last valid sample, s; `None` if the sensors are read in every tick.

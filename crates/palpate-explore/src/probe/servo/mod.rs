@@ -4,7 +4,7 @@ mod contact_monitor;
 mod reach;
 mod trajectory;
 
-use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
+use super::{Contact, Probe, SweptVolume, Touch, check_finite};
 use crate::backend::{Backend, Command, Fault};
 use crate::control::{Controller, Goal, posture};
 use crate::robot::Robot;
@@ -15,8 +15,8 @@ use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
-use reach::Leg;
-use trajectory::{Path, rounds};
+use reach::PathSegment;
+use trajectory::{Path, paths_around};
 
 pub use crate::task::approach::BEYOND_M;
 pub use reach::{ArmReach, check_reach};
@@ -44,7 +44,7 @@ pub struct Servo {
     /// Time of the last reading.
     time_s: f64,
     q: Vec<f64>,
-    swept: Option<Swept>,
+    swept: Option<SweptVolume>,
     /// Pose of the tip at the reading of the last contact.
     tip: Option<Isometry3<f64>>,
     /// Reach of an arm, which checks each path around an object before moving.
@@ -114,7 +114,7 @@ impl Servo {
         reading.check()?;
         self.time_s = reading.time_s;
         self.q.clone_from(&reading.q);
-        self.monitor.take(reading);
+        self.monitor.push(reading);
         match self.monitor.last_sample_s() {
             Some(heard_s) if self.time_s - heard_s > SILENCE_S => {
                 Err(Fault::Lost { time_s: heard_s })
@@ -124,7 +124,7 @@ impl Servo {
     }
 
     /// Moves in a straight line to `to`; if `alert`, stops at contact or overload.
-    fn go(
+    fn move_straight(
         &mut self,
         phase: &'static str,
         to: Isometry3<f64>,
@@ -161,14 +161,14 @@ impl Servo {
                 return Ok(None);
             }
             if time_s > deadline_s {
-                return Err(self.overdue(phase, &to));
+                return Err(self.timeout_fault(phase, &to));
             }
         }
     }
 
     /// Moves straight back to the level of the stand-off `above` if the finger is beyond it: after
     /// an interrupted touch the finger may be beside the object.
-    fn withdraw(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
+    fn retract_to(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
         let here = self.x_wt();
         let from_w = here.translation.vector;
         let back_w = approach.level_with(&from_w, &above.translation.vector);
@@ -176,7 +176,8 @@ impl Servo {
             return Ok(());
         }
         let back = Isometry3::from_parts(back_w.into(), here.rotation);
-        self.go("the retract position", back, self.settings.approach_m_s, false).map(|_| ())
+        self.move_straight("the retract position", back, self.settings.approach_m_s, false)
+            .map(|_| ())
     }
 
     /// Travels around the object to the stand-off `above`; an arm follows a path that was checked
@@ -190,7 +191,7 @@ impl Servo {
         let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
         self.leave(around, &ahead_t)?;
         let legs = match &self.reach {
-            None => vec![Leg::Around(above)],
+            None => vec![PathSegment::Around(above)],
             Some(reach) => {
                 let q = self.robot.chain.joints_from(&self.q);
                 q.and_then(|q| reach.plan(&q, approach)).ok_or_else(|| self.no_way())?
@@ -198,8 +199,8 @@ impl Servo {
         };
         for leg in legs {
             match leg {
-                Leg::Around(to) => self.go_around(around, approach, to)?,
-                Leg::Home => self.go_home(around)?,
+                PathSegment::Around(to) => self.go_around(around, approach, to)?,
+                PathSegment::Home => self.go_home(around)?,
             }
         }
         Ok(())
@@ -212,7 +213,7 @@ impl Servo {
         to: Isometry3<f64>,
     ) -> Result<(), Fault> {
         let here = self.x_wt();
-        for round in rounds(around, here, to, &self.robot.finger, &approach.r_at) {
+        for round in paths_around(around, here, to, &self.robot.finger, &approach.r_at) {
             let path = Path::round(round, self.settings.travel_m_s);
             self.follow("the stand-off", path, false)?;
         }
@@ -229,7 +230,7 @@ impl Servo {
         let mut deadline_s = None;
         loop {
             let posture = line.advance(period_s);
-            let qdot = self.control.along(&self.q, &posture);
+            let qdot = self.control.step_posture(&self.q, &posture);
             let qdot = qdot.map_err(|cause| Fault::no_command(self.time_s, cause))?;
             self.carry_out(&qdot)?;
             let (time_s, q) = (self.time_s, &self.q);
@@ -263,7 +264,7 @@ impl Servo {
                 return Err(self.no_way());
             }
         }
-        self.go("the retract position", out, speed_m_s, false).map(|_| ())
+        self.move_straight("the retract position", out, speed_m_s, false).map(|_| ())
     }
 
     fn no_way(&self) -> Fault {
@@ -271,11 +272,11 @@ impl Servo {
     }
 
     /// Returns the fault of a movement to `to` that exceeded its timeout.
-    fn overdue(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
+    fn timeout_fault(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
         let time_s = self.time_s;
         match posture(&self.robot.chain, to) {
             Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
-                Fault::OutOfReach { phase, time_s, distance_m, angle_rad }
+                Fault::OutOfReach { goal: phase, time_s, distance_m, angle_rad }
             }
             _ => Fault::Late { phase, time_s, q: self.q.clone() },
         }
@@ -284,8 +285,8 @@ impl Servo {
     /// Rests at `x_wt` until `count` more frames have arrived; without a tactile sensor, for the
     /// same duration.
     fn rest(&mut self, x_wt: Isometry3<f64>, count: usize) -> Result<Option<ApproachEnd>, Fault> {
-        self.monitor.forget();
-        let here = Goal::still(x_wt);
+        self.monitor.clear_samples();
+        let here = Goal::at_rest(x_wt);
         let until_s = self.time_s + count as f64 * FRAME_S;
         while self.monitor.collected() < count {
             if self.monitor.last_sample_s().is_none() && self.time_s >= until_s {
@@ -307,7 +308,7 @@ impl Servo {
         let press_m = if self.robot.is_soft { self.settings.press_m } else { 0.0 };
         held.translation.vector += approach.direction_w().scale(press_m);
         while self.time_s < until_s {
-            self.tick(&Goal::still(held))?;
+            self.tick(&Goal::at_rest(held))?;
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
                 return Ok(None);
             }
@@ -333,24 +334,24 @@ const SILENCE_S: f64 = 0.15;
 impl Probe for Servo {
     /// Moves the centre of the fingertip's hemisphere to the stand-off and along the approach.
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        refuse_unless_finite(approach)?;
+        check_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
-        match &approach.around {
+        match &approach.obstacle {
             Some(around) => self.travel_around(around, approach, above)?,
             None => {
-                self.withdraw(approach, &above)?;
-                self.go("the stand-off", above, travel_m_s, false)?;
+                self.retract_to(approach, &above)?;
+                self.move_straight("the stand-off", above, travel_m_s, false)?;
             }
         }
         self.rest(above, self.monitor.samples_of_tare())?;
         self.monitor.tare();
         let below = turning_point(&self.robot, approach);
-        let end = self.go("the object", below, approach_m_s, true)?;
+        let end = self.move_straight("the object", below, approach_m_s, true)?;
         let ahead_w = approach.direction_w();
         let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
         let finger = self.robot.finger.clone();
-        self.swept = Some(Swept { finger, p_wt: reached_w.into() });
+        self.swept = Some(SweptVolume { finger, p_wt: reached_w.into() });
         let touch = match end {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
@@ -361,11 +362,11 @@ impl Probe for Servo {
         let here_w = self.x_wt().translation.vector;
         let back_w = approach.level_with(&here_w, &above.translation.vector);
         let back = Isometry3::from_parts(back_w.into(), above.rotation);
-        self.go("the retract position", back, travel_m_s, false)?;
+        self.move_straight("the retract position", back, travel_m_s, false)?;
         Ok(touch)
     }
 
-    fn swept(&self) -> Option<Swept> {
+    fn swept_volume(&self) -> Option<SweptVolume> {
         self.swept.clone()
     }
 

@@ -3,18 +3,18 @@
 //! complete the approach, and return home, within the joints' limits, without collision with itself
 //! or the object.
 
-use super::trajectory::{Line, Path, Round, rounds};
+use super::trajectory::{ArcPath, JointLine, Path, paths_around};
 use crate::backend::interlock::defaults;
 use crate::control::{Controller, posture};
 use crate::robot::Robot;
 use crate::robot::arm::chain::MAX_JOINTS;
-use crate::robot::arm::{ArmError, Joints, Kind, LinkCapsule, Part};
+use crate::robot::arm::{ArmError, JointType, Joints, LinkCapsule, RobotPart};
 use crate::task::approach::BEYOND_M;
 use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball, DIRECTIONS, Task};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_geometry::sweep::Capsule;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 
 /// Returns the pose of the tip in front of everything that may be touched.
 pub(in crate::probe) fn standoff(
@@ -22,7 +22,7 @@ pub(in crate::probe) fn standoff(
     standoff_m: f64,
     approach: &Approach,
 ) -> Isometry3<f64> {
-    if let Some(around) = &approach.around {
+    if let Some(around) = &approach.obstacle {
         let p_wt = around.entrance_w(&approach.p_near_w, &approach.direction_w());
         return Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
     }
@@ -49,16 +49,16 @@ const TRIED_PER_SIDE: usize = 5;
 ///
 /// # Errors
 /// If it does not; the error names the place with the largest deviation.
-pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
+pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), InputError> {
     let Some(zone) = task.zone() else {
         let of = DIRECTIONS;
         let is_any = task.unreached(of).len() < of;
         return match is_any {
             true => Ok(()),
-            false => Err(Invalid::new(format!(
+            false => Err(InputError::new(format!(
                 "the finger cannot reach the object from any of {of} directions"
             ))
-            .mend(
+            .remedy(
                 "move it closer (object.position_m), move arm.base_position_m, or decrease \
                  around.radius_m or around.lowest_m",
             )),
@@ -87,11 +87,11 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
     match missed.into_iter().max_by(|a, b| by(a).total_cmp(&by(b))) {
         Some((place, phase, distance_m, angle_rad)) => {
             let away = format!("{:.0} mm and {:.0} deg", 1e3 * distance_m, angle_rad.to_degrees());
-            Err(Invalid::new(format!(
+            Err(InputError::new(format!(
                 "the arm does not reach {count} of {of} places of the zone: at {place:?} the tip \
                  misses {phase} by {away}"
             ))
-            .mend(
+            .remedy(
                 "move the object and the zone closer (object.position_m, zone), move \
                  arm.base_position_m, or make the zone smaller",
             ))
@@ -119,7 +119,7 @@ pub struct ArmReach {
 
 /// A segment of an arm's path to an approach.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Leg {
+pub(super) enum PathSegment {
     /// Around the ball to this pose of the tip.
     Around(Isometry3<f64>),
     /// Along a straight line in joint space to home.
@@ -132,7 +132,7 @@ impl ArmReach {
     pub fn new(robot: &Robot, touch: &TouchSettings) -> Option<Self> {
         let is_arm = robot.chain.joints.iter().any(|joint| {
             let [low, high] = joint.q_limits;
-            joint.kind == Kind::Revolute && high - low <= 4.0 * std::f64::consts::TAU
+            joint.kind == JointType::Revolute && high - low <= 4.0 * std::f64::consts::TAU
         });
         if !is_arm {
             return None;
@@ -140,15 +140,15 @@ impl ArmReach {
         let home = robot.chain.forward(&robot.chain.home);
         let links = robot.capsules();
         let pairs = (0..links.len()).flat_map(|i| (0..i).map(move |k| [k, i]));
-        let pairs = pairs.filter(|&[k, i]| links[k].may_meet(&links[i])).collect();
+        let pairs = pairs.filter(|&[k, i]| links[k].can_collide(&links[i])).collect();
         let &TouchSettings { standoff_m, travel_m_s, approach_m_s, .. } = touch;
         let robot = robot.clone();
         Some(Self { robot, standoff_m, travel_m_s, approach_m_s, home, links, pairs })
     }
 
     /// Returns the clearance constraints, with this fraction of the margins.
-    fn clear(&self, around: &Ball, slack: f64) -> Clear {
-        Clear::of(around, &self.robot, self.standoff_m, slack)
+    fn clear(&self, around: &Ball, slack: f64) -> ClearanceConstraints {
+        ClearanceConstraints::of(around, &self.robot, self.standoff_m, slack)
     }
 
     /// Moves around the object from `q` to `to`; returns the final joints and the stop on the way,
@@ -158,17 +158,17 @@ impl ArmReach {
         q: &Joints,
         approach: &Approach,
         to: Isometry3<f64>,
-        slack: f64,
+        margin_fraction: f64,
     ) -> Option<(Joints, Option<Isometry3<f64>>)> {
-        let around = approach.around.as_ref()?;
-        let clear = self.clear(around, slack);
+        let around = approach.obstacle.as_ref()?;
+        let clear = self.clear(around, margin_fraction);
         let from = self.robot.chain.forward(q);
         let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
-        let top = Round::new(&around.centre_w, from, to, &ahead_t).over_the_top(&ahead_t);
+        let top = ArcPath::new(&around.centre_w, from, to, &ahead_t).pose_above(&ahead_t);
         [None, Some(top)].into_iter().find_map(|stop| {
             let mut here = from;
             let paths = stop.into_iter().chain([to]).flat_map(|to| {
-                let rounds = rounds(around, here, to, &self.robot.finger, &approach.r_at);
+                let rounds = paths_around(around, here, to, &self.robot.finger, &approach.r_at);
                 here = to;
                 rounds.into_iter().map(|round| Path::round(round, self.travel_m_s))
             });
@@ -178,33 +178,33 @@ impl ArmReach {
 
     /// Returns the straight joint-space line from `q` to home, with this fraction of the margins;
     /// `None` if it is not clear.
-    fn line(&self, q: &Joints, around: &Ball, slack: f64) -> Option<Line> {
+    fn line(&self, q: &Joints, around: &Ball, slack: f64) -> Option<JointLine> {
         let chain = &self.robot.chain;
-        let line = Line::new(chain, q, &chain.home, self.travel_m_s);
+        let line = JointLine::new(chain, q, &chain.home, self.travel_m_s);
         self.allows(&line, &self.clear(around, slack)).then_some(line)
     }
 
     /// Returns the path home from `q`: first of the tip, then of the joints, which may by then be
     /// wound up or have the elbow on the other side; or of the joints alone. `None` if there is
     /// none.
-    fn homeward(&self, q: &Joints, approach: &Approach, slack: f64) -> Option<Vec<Leg>> {
-        let around = approach.around.as_ref()?;
+    fn homeward(&self, q: &Joints, approach: &Approach, slack: f64) -> Option<Vec<PathSegment>> {
+        let around = approach.obstacle.as_ref()?;
         let by_tip = || {
             let (there, stop) = self.around(q, approach, self.home, slack)?;
             self.line(&there, around, slack)?;
-            let tip = stop.into_iter().chain([self.home]).map(Leg::Around);
-            Some(tip.chain([Leg::Home]).collect())
+            let tip = stop.into_iter().chain([self.home]).map(PathSegment::Around);
+            Some(tip.chain([PathSegment::Home]).collect())
         };
-        by_tip().or_else(|| self.line(q, around, slack).map(|_| vec![Leg::Home]))
+        by_tip().or_else(|| self.line(q, around, slack).map(|_| vec![PathSegment::Home]))
     }
 
     /// Returns the path from `q` to the stand-off of `approach`; `None` if the arm cannot get
     /// there, along the approach and home again from any turning point on it.
-    fn way(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
-        let clear = self.clear(approach.around.as_ref()?, LATER);
+    fn way(&self, q: &Joints, approach: &Approach) -> Option<Vec<PathSegment>> {
+        let clear = self.clear(approach.obstacle.as_ref()?, MARGIN_PLANNED);
         let above = standoff(&self.robot, self.standoff_m, approach);
         let below = turning_point(&self.robot, approach);
-        let (there, stop) = self.around(q, approach, above, LATER)?;
+        let (there, stop) = self.around(q, approach, above, MARGIN_PLANNED)?;
         for share in TURNS {
             let mut turn = above;
             turn.translation.vector =
@@ -214,9 +214,9 @@ impl ArmReach {
                 Path::straight(from.translation.vector, to, speed_m_s)
             });
             let back = self.follow(there, touch, &clear)?;
-            self.homeward(&back, approach, LATER)?;
+            self.homeward(&back, approach, MARGIN_PLANNED)?;
         }
-        Some(stop.into_iter().chain([above]).map(Leg::Around).collect())
+        Some(stop.into_iter().chain([above]).map(PathSegment::Around).collect())
     }
 
     /// Whether the arm can move from home to the start of `approach`, complete it, and return home.
@@ -226,9 +226,9 @@ impl ArmReach {
 
     /// Returns the path from `q` to the stand-off of `approach`, direct or via home; `None` if both
     /// are blocked.
-    pub(super) fn plan(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
+    pub(super) fn plan(&self, q: &Joints, approach: &Approach) -> Option<Vec<PathSegment>> {
         let by_home = || {
-            let mut legs = self.homeward(q, approach, NOW)?;
+            let mut legs = self.homeward(q, approach, MARGIN_CURRENT)?;
             legs.extend(self.way(&self.robot.chain.home, approach)?);
             Some(legs)
         };
@@ -237,13 +237,13 @@ impl ArmReach {
 
     /// Returns the straight joint-space line from the current joints `q` to home; `None` if it is
     /// not clear.
-    pub(super) fn line_home(&self, q: &Joints, around: &Ball) -> Option<Line> {
-        self.line(q, around, NOW)
+    pub(super) fn line_home(&self, q: &Joints, around: &Ball) -> Option<JointLine> {
+        self.line(q, around, MARGIN_CURRENT)
     }
 
     /// Whether the tip can move straight out of the ball from `q`.
     pub(super) fn leaves(&self, q: &Joints, path: Path, around: &Ball) -> bool {
-        self.follow(*q, [path], &self.clear(around, NOW)).is_some()
+        self.follow(*q, [path], &self.clear(around, MARGIN_CURRENT)).is_some()
     }
 }
 
@@ -280,7 +280,7 @@ const REACTION: f64 = 2.0;
 
 /// Clearance constraints of a checked motion.
 #[derive(Clone, Copy)]
-struct Clear {
+struct ClearanceConstraints {
     /// Ball that the links, and the hand during travel, stay out of.
     ball: (Point3<f64>, f64),
     /// Lowest z of the links that carry the finger; the finger's own paths stay above it too.
@@ -293,12 +293,12 @@ struct Clear {
 
 /// Fraction for a path home from the current joints; a heuristic: the path was checked from nearby
 /// joints, and must be found again.
-const NOW: f64 = 0.4;
+const MARGIN_CURRENT: f64 = 0.4;
 
 /// Fraction for all other paths.
-const LATER: f64 = 1.0;
+const MARGIN_PLANNED: f64 = 1.0;
 
-impl Clear {
+impl ClearanceConstraints {
     /// Returns the constraints for the ball that a finger of `robot` travels `around`, at
     /// `standoff_m` from it, with this fraction of the margins.
     fn of(around: &Ball, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
@@ -319,12 +319,17 @@ impl ArmReach {
         &self,
         q: Joints,
         paths: impl IntoIterator<Item = Path>,
-        clear: &Clear,
+        clear: &ClearanceConstraints,
     ) -> Option<Joints> {
         paths.into_iter().try_fold(q, |q, path| self.follow_one(q, path, clear))
     }
 
-    fn follow_one(&self, mut q: Joints, mut path: Path, clear: &Clear) -> Option<Joints> {
+    fn follow_one(
+        &self,
+        mut q: Joints,
+        mut path: Path,
+        clear: &ClearanceConstraints,
+    ) -> Option<Joints> {
         let mut control = Controller::new(self.robot.chain.clone(), PERIOD_S).ok()?;
         let count = self.robot.chain.joints.len();
         let is_approach = path.is_straight();
@@ -353,7 +358,7 @@ impl ArmReach {
     }
 
     /// Whether all of `line` is clear; braking joints stay on it.
-    fn allows(&self, line: &Line, clear: &Clear) -> bool {
+    fn allows(&self, line: &JointLine, clear: &ClearanceConstraints) -> bool {
         line.postures(GRAIN_M).all(|q| {
             self.is_clear(&q, clear, false)
                 && self.is_apart(&q, clear)
@@ -370,7 +375,7 @@ impl ArmReach {
     }
 
     /// Whether the links keep their distance from each other.
-    fn is_apart(&self, q: &Joints, clear: &Clear) -> bool {
+    fn is_apart(&self, q: &Joints, clear: &ClearanceConstraints) -> bool {
         let frames = self.robot.chain.frames(q);
         let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
         let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
@@ -380,7 +385,7 @@ impl ArmReach {
     /// Whether the joints are within their limits, the tip in its box, the links outside the ball,
     /// and the links that carry the finger above the lowest z; on an approach, hand and finger may
     /// enter the ball.
-    fn is_clear(&self, q: &Joints, clear: &Clear, is_approach: bool) -> bool {
+    fn is_clear(&self, q: &Joints, clear: &ClearanceConstraints, is_approach: bool) -> bool {
         let slack_rad = clear.slack * SLACK_RAD;
         let within = self.robot.chain.joints.iter().zip(q.iter()).all(|(joint, q)| {
             let [low, high] = joint.q_limits;
@@ -396,7 +401,7 @@ impl ArmReach {
         let ball = Capsule { p0_w: centre_w, p1_w: centre_w, radius_m };
         let mut far = self.links.iter().filter(|link| !link.near_base);
         (p_wt - low).inf(&(high - p_wt)).min() >= 0.0
-            && self.is_above(&frames, clear, |link| link.part == Part::Tool)
+            && self.is_above(&frames, clear, |link| link.part == RobotPart::Tool)
             && (is_approach
                 || far.all(|link| link.at(&frames[link.link]).to_capsule_m(&ball) > 0.0))
     }
@@ -405,7 +410,7 @@ impl ArmReach {
     fn is_above(
         &self,
         frames: &[Isometry3<f64>],
-        clear: &Clear,
+        clear: &ClearanceConstraints,
         holds: impl Fn(&LinkCapsule) -> bool,
     ) -> bool {
         let Some(lowest_m) = clear.lowest_m else { return true };
@@ -450,13 +455,13 @@ mod tests {
     #[test]
     fn a_line_of_the_joints_through_the_object_is_refused_and_the_tip_goes_around() {
         let (reach, approach) = reach();
-        let around = approach.around.unwrap();
+        let around = approach.obstacle.unwrap();
         let q = Joints::from([-0.819, 0.695, 0.609, 1.266, 1.593, 1.768, -0.887]);
         let (from, ball) = (reach.robot.chain.forward(&q), around.centre_w);
         assert!((from.translation.vector - ball.coords).norm() > around.radius_m - 1e-3);
         assert!(reach.line_home(&q, &around).is_none());
-        let legs = reach.homeward(&q, &approach, NOW).unwrap();
-        assert!(matches!(legs[..], [Leg::Around(_), .., Leg::Home]), "{legs:?}");
+        let legs = reach.homeward(&q, &approach, MARGIN_CURRENT).unwrap();
+        assert!(matches!(legs[..], [PathSegment::Around(_), .., PathSegment::Home]), "{legs:?}");
     }
 
     /// The elbow is on the other side, from where moving the tip home does not bring it back.
@@ -464,13 +469,13 @@ mod tests {
     fn joints_are_home_in_the_end_on_whichever_side_the_elbow_was() {
         let (reach, approach) = reach();
         let q = [1.322, -0.724, -1.416, 1.894, -1.630, -0.712, 1.747];
-        let legs = reach.homeward(&Joints::from(q), &approach, NOW).unwrap();
-        assert!(matches!(legs[..], [Leg::Around(_), .., Leg::Home]), "{legs:?}");
+        let legs = reach.homeward(&Joints::from(q), &approach, MARGIN_CURRENT).unwrap();
+        assert!(matches!(legs[..], [PathSegment::Around(_), .., PathSegment::Home]), "{legs:?}");
         let mut wound = reach.robot.chain.home;
         wound[6] += 4.3;
-        assert!(reach.line_home(&wound, &approach.around.unwrap()).is_some());
+        assert!(reach.line_home(&wound, &approach.obstacle.unwrap()).is_some());
         wound[6] += 0.14;
-        assert!(reach.line_home(&wound, &approach.around.unwrap()).is_none());
+        assert!(reach.line_home(&wound, &approach.obstacle.unwrap()).is_none());
     }
 
     /// Paths that are planned for later need larger margins, so that they are found again.
@@ -479,7 +484,7 @@ mod tests {
         let (reach, approach) = reach();
         let mut q = reach.robot.chain.home;
         q[6] += 4.38;
-        assert!(reach.homeward(&q, &approach, LATER).is_none());
-        assert!(reach.homeward(&q, &approach, NOW).is_some());
+        assert!(reach.homeward(&q, &approach, MARGIN_PLANNED).is_none());
+        assert!(reach.homeward(&q, &approach, MARGIN_CURRENT).is_some());
     }
 }

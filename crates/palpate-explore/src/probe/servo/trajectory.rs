@@ -20,8 +20,8 @@ pub(super) struct Path {
     /// End pose.
     pub(super) to: Isometry3<f64>,
     /// Path around a sphere; `None` for a straight path.
-    round: Option<Round>,
-    pub(super) pace: Pace,
+    round: Option<ArcPath>,
+    pub(super) pace: VelocityProfile,
 }
 
 impl Path {
@@ -29,13 +29,13 @@ impl Path {
     /// attitude of `to`.
     pub(super) fn straight(from: Vector3<f64>, to: Isometry3<f64>, speed_m_s: f64) -> Self {
         let length_m = (to.translation.vector - from).norm();
-        Self { from, to, round: None, pace: Pace::new(length_m, speed_m_s) }
+        Self { from, to, round: None, pace: VelocityProfile::new(length_m, speed_m_s) }
     }
 
     /// Creates a path along `round` at no more than `speed_m_s`.
-    pub(super) fn round(round: Round, speed_m_s: f64) -> Self {
+    pub(super) fn round(round: ArcPath, speed_m_s: f64) -> Self {
         let (from, to) = (round.from.translation.vector, round.to);
-        let pace = Pace::new(round.length_m(), speed_m_s);
+        let pace = VelocityProfile::new(round.length_m(), speed_m_s);
         Self { from, to, round: Some(round), pace }
     }
 
@@ -52,7 +52,7 @@ impl Path {
     /// Advances the set point by `dt_s`.
     pub(super) fn advance(&mut self, dt_s: f64) -> Goal {
         let Some([travelled_m, now_m_s]) = self.pace.advance(dt_s) else {
-            return Goal::still(self.to);
+            return Goal::at_rest(self.to);
         };
         if let Some(round) = &self.round {
             let length_m = self.pace.length_m;
@@ -73,14 +73,14 @@ impl Path {
 const ACCELERATION_M_S2: f64 = 0.5;
 
 /// A trapezoidal velocity profile along a path.
-pub(super) struct Pace {
+pub(super) struct VelocityProfile {
     length_m: f64,
     speed_m_s: f64,
     travelled_m: f64,
     now_m_s: f64,
 }
 
-impl Pace {
+impl VelocityProfile {
     /// Creates a profile over `length_m` at no more than `speed_m_s`.
     fn new(length_m: f64, speed_m_s: f64) -> Self {
         Self { length_m, speed_m_s, travelled_m: 0.0, now_m_s: 0.0 }
@@ -125,7 +125,7 @@ const LOOKS: usize = 48;
 /// At the fraction t of the path, with rotation vectors a, b, c of those three turns in `W`:
 /// `R(t) = exp(t a) exp(t b) exp(t c) R(0)` and `p(t) = centre + ρ(t) exp(t a) u`.
 #[derive(Clone)]
-pub(super) struct Round {
+pub(super) struct ArcPath {
     centre_w: Vector3<f64>,
     from: Isometry3<f64>,
     to: Isometry3<f64>,
@@ -138,7 +138,7 @@ pub(super) struct Round {
     rolled: Vector3<f64>,
 }
 
-impl Round {
+impl ArcPath {
     /// Creates a path from `from` to `to` about `centre_w`, for a finger that points along
     /// `ahead_t` in `T`.
     pub(super) fn new(
@@ -170,7 +170,7 @@ impl Round {
 
     /// Returns the pose above the centre, at the larger distance of both ends, which the finger
     /// reaches without rolling, pointing down.
-    pub(super) fn over_the_top(&self, ahead_t: &UnitVector3<f64>) -> Isometry3<f64> {
+    pub(super) fn pose_above(&self, ahead_t: &UnitVector3<f64>) -> Isometry3<f64> {
         let up = Vector3::z_axis();
         let carry = turn(&UnitVector3::new_unchecked(self.outward_w), &up, &Vector3::y());
         let carried = carry * self.from.rotation;
@@ -222,19 +222,19 @@ impl Round {
 
 /// Returns the paths from one pose outside the sphere to another: around it, or over its top if
 /// that path would come too low.
-pub(super) fn rounds(
+pub(super) fn paths_around(
     around: &Ball,
     from: Isometry3<f64>,
     to: Isometry3<f64>,
     finger: &Finger,
     r_at: &UnitQuaternion<f64>,
-) -> Vec<Round> {
+) -> Vec<ArcPath> {
     let ahead_t = r_at.inverse() * -Vector3::y_axis();
-    let part = |from, to| Round::new(&around.centre_w, from, to, &ahead_t);
+    let part = |from, to| ArcPath::new(&around.centre_w, from, to, &ahead_t);
     let whole = part(from, to);
     match around.lowest_m {
         Some(lowest_m) if !whole.is_above(lowest_m, finger, r_at) => {
-            let top = whole.over_the_top(&ahead_t);
+            let top = whole.pose_above(&ahead_t);
             vec![part(from, top), part(top, to)]
         }
         _ => vec![whole],
@@ -276,13 +276,13 @@ const STEPS: usize = 64;
 ///
 /// All joints start and arrive together, so that their position on one line alone decides the
 /// clearance.
-pub(super) struct Line {
+pub(super) struct JointLine {
     from: Joints,
     by: Joints,
-    pub(super) pace: Pace,
+    pub(super) pace: VelocityProfile,
 }
 
-impl Line {
+impl JointLine {
     /// Creates a line of `chain` between two postures, on which no point moves faster than
     /// `speed_m_s`.
     pub(super) fn new(chain: &Chain, from: &Joints, to: &Joints, speed_m_s: f64) -> Self {
@@ -292,7 +292,7 @@ impl Line {
         let steps = (0..STEPS).map(|i| farthest_m(&at(i), &at(i + 1), &tip));
         // Assumes the largest speed along the whole line.
         let longest_m = steps.fold(LEVER_M * by.amax() / STEPS as f64, f64::max);
-        Self { from: *from, by, pace: Pace::new(longest_m * STEPS as f64, speed_m_s) }
+        Self { from: *from, by, pace: VelocityProfile::new(longest_m * STEPS as f64, speed_m_s) }
     }
 
     /// Returns postures along it, including its ends, between which no point moves more than
@@ -345,7 +345,7 @@ mod tests {
         ) {
             let chain = ArmSettings::default().chain().unwrap();
             let (from, to) = (Joints::from(from), Joints::from(to));
-            let mut line = Line::new(&chain, &from, &to, 0.1);
+            let mut line = JointLine::new(&chain, &from, &to, 0.1);
             let tip = chain.flange * chain.tool;
             let moved_m = |a: &Joints, b: &Joints| {
                 farthest_m(&chain.frames(a), &chain.frames(b), &tip)
@@ -395,13 +395,13 @@ mod tests {
             let [Some(from), Some(to)] = aims else { return Ok(()) };
             let (robot, touch) = (robot(), TouchSettings::default());
             let task = Task::new(ball, touch.clone(), &robot.finger).unwrap();
-            prop_assume!(task.reaches(&from) && task.reaches(&to));
+            prop_assume!(task.is_reachable(&from) && task.is_reachable(&to));
             let approaches = [from, to].map(|aim| task.approach(&aim.into()).unwrap());
             let [from, to] = approaches.map(|approach| standoff(&robot, touch.standoff_m, &approach));
-            let (around, r_at) = (approaches[0].around.unwrap(), approaches[0].r_at);
+            let (around, r_at) = (approaches[0].obstacle.unwrap(), approaches[0].r_at);
             let heel_t = Vector3::x() * -robot.finger.length_m;
             let mut last = from;
-            for round in rounds(&around, from, to, &robot.finger, &r_at) {
+            for round in paths_around(&around, from, to, &robot.finger, &r_at) {
                 prop_assert!((round.at(0.0).0.translation.vector - last.translation.vector).norm() < 1e-9);
                 prop_assert!(round.at(0.0).0.rotation.angle_to(&last.rotation) < 1e-6);
                 for i in 0..=200 {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
 use palpate_geometry::sweep::Capsule;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -18,7 +18,7 @@ pub type Jacobian = SMatrix<f64, 6, MAX_JOINTS>;
 
 /// Type of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum JointType {
     /// Revolute: rotates about its axis, rad.
     Revolute,
     /// Prismatic: translates along its axis, m.
@@ -31,7 +31,7 @@ pub struct Joint {
     /// The manufacturer's name; joints are matched by name, never by number.
     pub name: Arc<str>,
     /// Type.
-    pub kind: Kind,
+    pub kind: JointType,
     /// Origin in the frame of the previous joint; all frames are parallel at q = 0.
     pub origin_m: Vector3<f64>,
     /// Axis in the same frame.
@@ -47,7 +47,7 @@ pub struct Joint {
 impl Joint {
     /// Largest speed in the direction of `qdot` from which the joint can stop before its limit, if
     /// commanded once per period: `v² / 2a + v · period = distance`.
-    pub fn fastest(&self, q: f64, qdot: f64, period_s: f64) -> f64 {
+    pub fn speed_limit(&self, q: f64, qdot: f64, period_s: f64) -> f64 {
         let [low, high] = self.q_limits;
         let distance = if qdot > 0.0 { high - q } else { q - low };
         let a = self.qddot_limit;
@@ -59,10 +59,10 @@ impl Joint {
     #[inline]
     fn moved(&self, x: &Isometry3<f64>, q: f64) -> Isometry3<f64> {
         let (origin_m, rotation) = match self.kind {
-            Kind::Revolute => {
+            JointType::Revolute => {
                 (self.origin_m, x.rotation * UnitQuaternion::from_axis_angle(&self.axis, q))
             }
-            Kind::Prismatic => (self.origin_m + self.axis.scale(q), x.rotation),
+            JointType::Prismatic => (self.origin_m + self.axis.scale(q), x.rotation),
         };
         Isometry3::from_parts((x * Point3::from(origin_m)).into(), rotation)
     }
@@ -70,7 +70,7 @@ impl Joint {
 
 /// Part of a robot covered by a capsule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum RobotPart {
     /// A link of the arm.
     Link,
     /// The adapter between flange and finger.
@@ -85,7 +85,7 @@ pub struct LinkCapsule {
     /// Name in messages: that of its link, `tool` or `finger`.
     pub name: Arc<str>,
     /// Part of the robot that it covers.
-    pub part: Part,
+    pub part: RobotPart,
     /// Number of joints that move it: the index of its frame in [`Chain::frames`].
     pub link: usize,
     /// Ends of its axis in that frame.
@@ -108,14 +108,14 @@ impl LinkCapsule {
     /// Whether a collision with `other` is possible within the joints' limits: they are at least
     /// three joints apart. Closer neighbours touch where they are joined, except that one that
     /// [`folds`](Self::folds) is checked against the tool and finger.
-    pub fn may_meet(&self, other: &Self) -> bool {
+    pub fn can_collide(&self, other: &Self) -> bool {
         let (near, far) = if self.link < other.link { (self, other) } else { (other, self) };
         far.link >= near.link + 3 || (near.folds && far.is_carried())
     }
 
     /// Whether it lies beyond the flange: the tool or the finger.
     pub fn is_carried(&self) -> bool {
-        self.part != Part::Link
+        self.part != RobotPart::Link
     }
 }
 
@@ -160,8 +160,8 @@ impl Chain {
     }
 
     /// Whether any joint is revolute; a purely prismatic chain cannot change its attitude.
-    pub fn turns(&self) -> bool {
-        self.joints.iter().any(|joint| joint.kind == Kind::Revolute)
+    pub fn has_revolute(&self) -> bool {
+        self.joints.iter().any(|joint| joint.kind == JointType::Revolute)
     }
 
     /// Returns the pose of `T` in `W` by forward kinematics:
@@ -196,8 +196,8 @@ impl Chain {
         for (i, joint) in joints {
             let [low, high] = joint.q_limits;
             (reaches[i], rest_m) = match joint.kind {
-                Kind::Revolute => (rest_m, rest_m + joint.origin_m.norm()),
-                Kind::Prismatic => {
+                JointType::Revolute => (rest_m, rest_m + joint.origin_m.norm()),
+                JointType::Prismatic => {
                     (1.0, rest_m + joint.origin_m.norm() + low.abs().max(high.abs()))
                 }
             };
@@ -222,8 +222,8 @@ impl Chain {
             self.joints.iter().zip(axes).zip(jacobian.column_iter_mut())
         {
             let (linear, angular) = match joint.kind {
-                Kind::Revolute => (axis.cross(&(x_wt.translation.vector - origin)), axis),
-                Kind::Prismatic => (axis, Vector3::zeros()),
+                JointType::Revolute => (axis.cross(&(x_wt.translation.vector - origin)), axis),
+                JointType::Prismatic => (axis, Vector3::zeros()),
             };
             column.fixed_rows_mut::<3>(0).copy_from(&linear);
             column.fixed_rows_mut::<3>(3).copy_from(&angular);
@@ -237,7 +237,7 @@ impl Chain {
 pub enum ArmError {
     /// Wrong number of joints, or an unusable position, goal or period.
     #[error(transparent)]
-    Invalid(#[from] Invalid),
+    Invalid(#[from] InputError),
     /// No posture within the joint limits reaches the pose of the tip.
     #[error("out of reach: the closest pose of the tip is {distance_m} m and {angle_rad} rad away")]
     OutOfReach {

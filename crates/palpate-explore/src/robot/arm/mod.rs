@@ -5,6 +5,6 @@ pub mod model;
 pub mod settings;
 pub mod stage;
 
-pub use chain::{ArmError, Chain, Jacobian, Joint, Joints, Kind, LinkCapsule, Part};
+pub use chain::{ArmError, Chain, Jacobian, Joint, JointType, Joints, LinkCapsule, RobotPart};
 pub use model::ArmModel;
 pub use settings::ArmSettings;

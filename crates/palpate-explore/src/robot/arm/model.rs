@@ -1,9 +1,9 @@
 //! Model of an arm: a file with its joints, home posture, collision capsules and topics.
 
-use super::chain::{Joint, Joints, Kind, LinkCapsule, MAX_JOINTS, Part};
+use super::chain::{Joint, JointType, Joints, LinkCapsule, MAX_JOINTS, RobotPart};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{Checked, ConfigError, Loader, Rules};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate};
 use palpate_input::files;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -126,7 +126,7 @@ impl ArmModel {
     /// If the file cannot be read or does not describe an arm.
     pub fn load(model: &str) -> Result<Self, ConfigError> {
         match MODELS.iter().find(|(name, _)| *name == model) {
-            Some((name, [text, _])) => Loader::of(Path::new(name), (*text).into())?.finish(),
+            Some((name, [text, _])) => Loader::from_text(Path::new(name), (*text).into())?.finish(),
             None => Loader::read(Path::new(model))?.finish(),
         }
     }
@@ -212,10 +212,10 @@ impl JointModel {
         let (kind, q_limits, qdot_limit, qddot_limit) = match self {
             Self::Revolute { limits_deg, speed_rad_s, acceleration_deg_s2, .. } => {
                 let limits = limits_deg.map(f64::to_radians);
-                (Kind::Revolute, limits, *speed_rad_s, acceleration_deg_s2.to_radians())
+                (JointType::Revolute, limits, *speed_rad_s, acceleration_deg_s2.to_radians())
             }
             Self::Prismatic { limits_m, speed_m_s, acceleration_m_s2, .. } => {
-                (Kind::Prismatic, *limits_m, *speed_m_s, *acceleration_m_s2)
+                (JointType::Prismatic, *limits_m, *speed_m_s, *acceleration_m_s2)
             }
         };
         Joint {
@@ -235,7 +235,7 @@ impl CapsuleModel {
     fn on(&self, link: usize) -> LinkCapsule {
         LinkCapsule {
             name: self.name.as_deref().unwrap_or(&self.link).into(),
-            part: Part::Link,
+            part: RobotPart::Link,
             link,
             ends: [self.from_m.into(), self.to_m.into()],
             radius_m: self.radius_m,
@@ -249,7 +249,7 @@ impl CapsuleModel {
 // heuristic: ten times the reach of a table-mounted arm.
 const FAR_M: f64 = 10.0;
 
-impl Checked for ArmModel {
+impl Validate for ArmModel {
     fn check(&self, rules: &mut Rules) {
         let (count, most) = (self.joint.len(), MAX_JOINTS);
         rules.require("joint", count, (1..=most).contains(&count), || {

@@ -1,10 +1,10 @@
 //! Settings of the arm in a scene: model, mounting and home posture.
 
-use super::chain::{Chain, Kind};
+use super::chain::{Chain, JointType};
 use super::model::{ArmModel, MODELS};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{Checked, ConfigError, Origin, Rules};
+use palpate_input::config::{ConfigError, Origin, Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -114,8 +114,8 @@ impl ArmSettings {
         }
         home.iter().zip(&joints).enumerate().find_map(|(i, (&home, joint))| {
             let [low, high] = match joint.kind {
-                Kind::Revolute => joint.q_limits.map(f64::to_degrees).map(f64::round),
-                Kind::Prismatic => joint.q_limits,
+                JointType::Revolute => joint.q_limits.map(f64::to_degrees).map(f64::round),
+                JointType::Prismatic => joint.q_limits,
             };
             let allowed = || format!("{low} to {high}");
             let is_within = (low..=high).contains(&home);
@@ -146,7 +146,7 @@ pub(super) fn tool(mount_m: f64) -> Isometry3<f64> {
     )
 }
 
-impl Checked for ArmSettings {
+impl Validate for ArmSettings {
     fn check(&self, rules: &mut Rules) {
         rules.numbers("base_position_m", &self.base_position_m, -1e3..=1e3);
         rules.numbers("base_rotation_deg", &self.base_rotation_deg, -360.0..=360.0);

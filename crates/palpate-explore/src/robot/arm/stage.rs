@@ -1,7 +1,7 @@
 //! A stage of three prismatic joints, with or without a wrist: the first three of q are the
 //! position of `T` in `W`.
 
-use super::chain::{Chain, Joint, Joints, Kind};
+use super::chain::{Chain, Joint, JointType, Joints};
 use super::settings::tool;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
@@ -58,7 +58,7 @@ pub fn stage_with_wrist(
 ) -> Chain {
     let hinges = WRIST.iter().map(|&(name, axis)| Joint {
         name: name.into(),
-        kind: Kind::Revolute,
+        kind: JointType::Revolute,
         origin_m: Vector3::zeros(),
         axis: UnitVector3::new_unchecked(axis.into()),
         q_limits: [-ENDLESS_RAD, ENDLESS_RAD],
@@ -73,7 +73,7 @@ fn slides(middle_w: Point3<f64>, travel_m: f64) -> impl Iterator<Item = Joint> {
     let axes = [("X", Vector3::x_axis()), ("Y", Vector3::y_axis()), ("Z", Vector3::z_axis())];
     axes.into_iter().enumerate().map(move |(i, (name, axis))| Joint {
         name: name.into(),
-        kind: Kind::Prismatic,
+        kind: JointType::Prismatic,
         origin_m: Vector3::zeros(),
         axis,
         q_limits: [middle_w[i] - travel_m, middle_w[i] + travel_m],

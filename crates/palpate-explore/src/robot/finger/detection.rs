@@ -3,14 +3,14 @@
 
 use super::contact_point::OPEN_COUNTS;
 use super::frame::{ELECTRODES, FULL_SCALE_COUNTS, Frame};
-use palpate_input::config::{Checked, Rules, is_default};
+use palpate_input::config::{Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Channels that detect contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Alarm {
+pub enum ContactChannels {
     /// The fluid's pressure (PDC).
     #[default]
     Pressure,
@@ -20,7 +20,7 @@ pub enum Alarm {
     Both,
 }
 
-impl Alarm {
+impl ContactChannels {
     /// Whether a sensor with these channels supports this detection.
     pub fn is_heard(self, pressure: bool, electrodes: bool) -> bool {
         let [by_pressure, by_electrodes] = self.by();
@@ -38,7 +38,7 @@ impl Alarm {
 pub struct Detection {
     /// Channels that detect contact; electrodes require `threshold_sds`.
     #[serde(skip_serializing_if = "is_default")]
-    pub by: Alarm,
+    pub by: ContactChannels,
     /// Threshold of PDC above its tare, counts; ignored with `threshold_sds`.
     pub threshold_counts: f64,
     /// Threshold in standard deviations of the sensor's noise at rest; `threshold_counts` is used
@@ -53,17 +53,22 @@ impl Default for Detection {
     /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: a heuristic, 30 ms; the
     /// latter waits for 10.
     fn default() -> Self {
-        Self { by: Alarm::Pressure, threshold_counts: 10.0, threshold_sds: None, frames: 3 }
+        Self {
+            by: ContactChannels::Pressure,
+            threshold_counts: 10.0,
+            threshold_sds: None,
+            frames: 3,
+        }
     }
 }
 
-impl Checked for Detection {
+impl Validate for Detection {
     fn check(&self, rules: &mut Rules) {
         rules.number("threshold_counts", self.threshold_counts, 0.0..=FULL_SCALE_COUNTS);
         if let Some(threshold_sds) = self.threshold_sds {
             rules.number("threshold_sds", threshold_sds, 1.0..=100.0);
         }
-        let is_told = self.by == Alarm::Pressure || self.threshold_sds.is_some();
+        let is_told = self.by == ContactChannels::Pressure || self.threshold_sds.is_some();
         rules.require("threshold_sds", "(none)", is_told, || {
             "a number, since detection by electrodes needs a threshold in standard deviations"
                 .into()
@@ -79,7 +84,7 @@ impl Checked for Detection {
 pub struct Detector {
     detection: Detection,
     tare: Option<Frame>,
-    rest: Rest,
+    rest: RestState,
     touching: bool,
     against: u32,
 }
@@ -87,12 +92,12 @@ pub struct Detector {
 impl Detector {
     /// Creates a detector without data of a sensor.
     pub fn new(detection: Detection) -> Self {
-        Self { detection, tare: None, rest: Rest::default(), touching: false, against: 0 }
+        Self { detection, tare: None, rest: RestState::default(), touching: false, against: 0 }
     }
 
     /// Smallest number of frames at rest for the next [`tare`](Self::tare).
-    pub fn wants(&self) -> usize {
-        self.detection.threshold_sds.map_or(0, |_| self.rest.wants())
+    pub fn tare_frame_count(&self) -> usize {
+        self.detection.threshold_sds.map_or(0, |_| self.rest.tare_frame_count())
     }
 
     /// Sets the rest state to the mean of `frames`, without contact. The scatter is accumulated
@@ -106,7 +111,7 @@ impl Detector {
     }
 
     /// Whether `frame` has a channel that is used for detection.
-    pub fn hears(&self, frame: &Frame) -> bool {
+    pub fn has_channel(&self, frame: &Frame) -> bool {
         let Some(tare) = &self.tare else { return false };
         let pressure = tare.pdc_counts.is_some() && frame.pdc_counts.is_some();
         let electrodes = tare.electrode_counts.is_some() && frame.electrode_counts.is_some();
@@ -120,7 +125,7 @@ impl Detector {
     /// frame is Q(T)ⁿ for the electrodes, and ∫ φ(u) Q(T √(1 + v) + u √v)ⁿ du for the pressure: all
     /// frames share the error u of a tare of 1/v frames.
     pub fn update(&mut self, frame: &Frame) -> bool {
-        let Some(says) = self.says(frame) else { return self.touching };
+        let Some(says) = self.is_contact(frame) else { return self.touching };
         self.against = if says == self.touching { 0 } else { self.against + 1 };
         if self.against >= self.detection.frames {
             (self.touching, self.against) = (says, 0);
@@ -129,8 +134,8 @@ impl Detector {
     }
 
     /// Whether this frame alone indicates contact.
-    fn says(&self, frame: &Frame) -> Option<bool> {
-        if !self.hears(frame) {
+    fn is_contact(&self, frame: &Frame) -> Option<bool> {
+        if !self.has_channel(frame) {
             return None;
         }
         let Some(threshold_sds) = self.detection.threshold_sds else {
@@ -171,7 +176,7 @@ const LEAST_PDC_COUNTS: f64 = 0.5;
 /// (I-Quotient-Robotics/syntouch_btd_decode). No other drift is compensated between two tares, so
 /// slow contacts are detected too.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rest {
+pub struct RestState {
     electrodes: Option<[Channel; ELECTRODES]>,
     pdc: Option<Channel>,
     /// Number of frames of the means.
@@ -186,9 +191,9 @@ struct Channel {
     variance: f64,
 }
 
-impl Rest {
+impl RestState {
     /// Number of frames that the next tare needs for a valid evidence.
-    pub fn wants(&self) -> usize {
+    pub fn tare_frame_count(&self) -> usize {
         LEARNT.saturating_sub(self.variance_of as usize)
     }
 

@@ -9,6 +9,6 @@ pub mod profile;
 pub mod shape;
 
 pub use contact_point::PointOfContact;
-pub use detection::{Detection, Detector, Rest};
+pub use detection::{Detection, Detector, RestState};
 pub use frame::Frame;
 pub use shape::{Finger, TipMotion};

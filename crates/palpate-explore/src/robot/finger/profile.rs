@@ -37,7 +37,7 @@ pub struct Profile {
     /// Outer radius at the sides.
     pub radius_m: f64,
     /// Whether pad, corner, apex and facet differ from a plain capsule.
-    pub shaped: bool,
+    pub has_pad: bool,
 }
 
 /// Layers of the fingertip along a ray from its axis.
@@ -51,19 +51,19 @@ pub struct Layers {
     pub gap_m: f64,
     /// Whether fluid flows there; a heuristic: not above the axis, on the back, where the nail
     /// holds the skin.
-    pub wet: bool,
+    pub has_fluid: bool,
 }
 
 impl Profile {
     /// The BioTac, scaled to the finger's size.
     pub fn biotac(finger: &Finger) -> Self {
-        Self { length_m: finger.length_m, radius_m: finger.radius_m, shaped: true }
+        Self { length_m: finger.length_m, radius_m: finger.radius_m, has_pad: true }
     }
 
     /// A capsule with the layers of the BioTac's sides everywhere: a shape with closed-form
     /// solutions.
     pub fn capsule(finger: &Finger) -> Self {
-        Self { shaped: false, ..Self::biotac(finger) }
+        Self { has_pad: false, ..Self::biotac(finger) }
     }
 
     /// Ratio of all lengths to those of the BioTac.
@@ -78,10 +78,10 @@ impl Profile {
     pub fn layers(&self, x_m: f64, d: &Vector3<f64>) -> Layers {
         let scale = self.scale();
         let (skin_m, film_m) = (SKIN_M * scale, FILM_M * scale);
-        if !self.shaped {
+        if !self.has_pad {
             let outer_m = self.radius_m;
             let gap_m = (outer_m - skin_m - CORE_M * scale).max(film_m);
-            return Layers { outer_m, skin_m, gap_m, wet: true };
+            return Layers { outer_m, skin_m, gap_m, has_fluid: true };
         }
         let off_m = x_m / scale - BULGE_X_M;
         let bulge_m = (BULGE_M - BULGE_FALL_PER_M * off_m * off_m).max(0.0);
@@ -96,7 +96,7 @@ impl Profile {
             }
         }
         let gap_m = (outer_m - SKIN_M - core_m).max(FILM_M) * scale;
-        Layers { outer_m: outer_m * scale, skin_m, gap_m, wet: d.z <= 0.0 }
+        Layers { outer_m: outer_m * scale, skin_m, gap_m, has_fluid: d.z <= 0.0 }
     }
 
     /// Returns the ray to the outer skin over the capsule's point at height `x_m` and angle `turn`

@@ -2,7 +2,7 @@
 //! hemisphere.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3, Vector6};
-use palpate_input::config::{Checked, Rules};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +73,7 @@ impl Finger {
     }
 
     /// Direction of the approach in `T`.
-    pub fn ahead_t(&self) -> Vector3<f64> {
+    pub fn direction_t(&self) -> Vector3<f64> {
         self.r_at().inverse() * -Vector3::y()
     }
 
@@ -156,7 +156,7 @@ impl TipMotion {
     }
 }
 
-impl Checked for Finger {
+impl Validate for Finger {
     fn check(&self, rules: &mut Rules) {
         rules.number("radius_m", self.radius_m, 1e-5..=0.1);
         rules.number("length_m", self.length_m, 0.0..=1.0);

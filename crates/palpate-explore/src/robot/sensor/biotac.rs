@@ -42,7 +42,7 @@ impl BioTac {
 }
 
 impl Sensor for BioTac {
-    fn take(&mut self, time_s: f64, samples: &[Sample], _: Option<&Wrench>) {
+    fn push(&mut self, time_s: f64, samples: &[Sample], _: Option<&Wrench>) {
         for sample in samples {
             let Sample::BioTac(frame) = sample else { continue };
             if !frame.is_finite() {
@@ -56,7 +56,7 @@ impl Sensor for BioTac {
         }
     }
 
-    fn forget(&mut self) {
+    fn clear_samples(&mut self) {
         self.frames.clear();
     }
 
@@ -66,11 +66,11 @@ impl Sensor for BioTac {
         self.touching = false;
     }
 
-    fn samples_of_tare(&self) -> usize {
-        self.detector.wants()
+    fn tare_sample_count(&self) -> usize {
+        self.detector.tare_frame_count()
     }
 
-    fn collected(&self) -> Option<usize> {
+    fn sample_count(&self) -> Option<usize> {
         Some(self.frames.len())
     }
 
@@ -83,7 +83,7 @@ impl Sensor for BioTac {
     }
 
     fn is_touching(&self) -> Option<bool> {
-        let can_tell = self.frames.last().is_some_and(|frame| self.detector.hears(frame));
+        let can_tell = self.frames.last().is_some_and(|frame| self.detector.has_channel(frame));
         can_tell.then_some(self.touching)
     }
 

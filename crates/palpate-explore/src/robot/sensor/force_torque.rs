@@ -35,7 +35,7 @@ pub fn point_on_sphere(radius_m: f64, wrench: &Wrench) -> Option<Point3<f64>> {
 }
 
 impl Sensor for ForceTorqueTip {
-    fn take(&mut self, _: f64, _: &[Sample], wrench: Option<&Wrench>) {
+    fn push(&mut self, _: f64, _: &[Sample], wrench: Option<&Wrench>) {
         if let Some(wrench) = wrench {
             self.sum.force_n += wrench.force_n;
             self.sum.torque_nm += wrench.torque_nm;
@@ -43,7 +43,7 @@ impl Sensor for ForceTorqueTip {
         }
     }
 
-    fn forget(&mut self) {
+    fn clear_samples(&mut self) {
         (self.sum, self.count) = (Wrench::default(), 0.0);
     }
 

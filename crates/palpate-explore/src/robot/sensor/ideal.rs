@@ -11,14 +11,14 @@ pub struct IdealSensor {
 }
 
 impl Sensor for IdealSensor {
-    fn take(&mut self, _: f64, samples: &[Sample], _: Option<&Wrench>) {
+    fn push(&mut self, _: f64, samples: &[Sample], _: Option<&Wrench>) {
         self.contact = samples.iter().find_map(|sample| match sample {
             Sample::Ideal(contact) => Some(*contact),
             _ => None,
         });
     }
 
-    fn forget(&mut self) {}
+    fn clear_samples(&mut self) {}
 
     fn tare(&mut self) {}
 

@@ -28,21 +28,21 @@ pub struct SensedContact {
 /// samples at rest on the object and locates the contact.
 pub trait Sensor: Send {
     /// Adds the samples of a tick, and the wrench measured at the finger's mount.
-    fn take(&mut self, time_s: f64, samples: &[Sample], wrench: Option<&Wrench>);
+    fn push(&mut self, time_s: f64, samples: &[Sample], wrench: Option<&Wrench>);
 
     /// Drops the samples collected so far.
-    fn forget(&mut self);
+    fn clear_samples(&mut self);
 
     /// Tares the sensor with the samples collected so far, of the finger at rest.
     fn tare(&mut self);
 
     /// Smallest number of samples for the next [`tare`](Self::tare).
-    fn samples_of_tare(&self) -> usize {
+    fn tare_sample_count(&self) -> usize {
         0
     }
 
     /// Number of samples collected; `None` for a sensor that is read in every tick.
-    fn collected(&self) -> Option<usize> {
+    fn sample_count(&self) -> Option<usize> {
         None
     }
 
