@@ -140,7 +140,7 @@ fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
         let Touch::Contact(contact) = probe.touch(&approach)? else { anyhow::bail!("a miss") };
         Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
     };
-    truth.iter().map(|truth| resting_pose(&truth.target)).collect()
+    truth.iter().map(|truth| rest(&truth.target)).collect()
 }
 
 /// Returns the positions at which MuJoCo first reports contact while the finger is lowered along −y
@@ -176,7 +176,7 @@ fn lowered(stage: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>
         let p_wc = deepest(target, low_m).context("contact was lost")?;
         Ok(Rest { target: target.clone(), y_m: low_m, p_wc })
     };
-    truth.iter().map(&mut resting_pose).collect()
+    truth.iter().map(&mut rest).collect()
 }
 
 /// Returns the median over some places of the time of a step, µs, while the PA-10 holds its finger
@@ -195,8 +195,8 @@ fn step(
         let chain = environment.chain().context("no chain")?;
         let mut controller = Controller::new(chain, scene.period_s())?;
         for (gap_m, duration_s) in [(2e-3, 3.0), (-depth_m, 1.0)] {
-            let mut p_wt = scene.zone.as_ref().unwrap().point(&resting_pose.target, 0.0);
-            p_wt.y = resting_pose.y_m + gap_m;
+            let mut p_wt = scene.zone.as_ref().unwrap().point(&rest.target, 0.0);
+            p_wt.y = rest.y_m + gap_m;
             let goal = Goal::at_rest(Isometry3::from_parts(p_wt.into(), scene.finger.r_at()));
             let until_s = reading.time_s + duration_s;
             while reading.time_s < until_s {

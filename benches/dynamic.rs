@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use palpate::backend::Command;
 use palpate::explore::probe::Probe;
 use palpate::robot::finger::TipMotion;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::finger::FingertipState;
 use palpate::sim::probe::resting_pose;
 use palpate::sim::simulator::Simulator;
@@ -63,7 +63,8 @@ fn main() -> anyhow::Result<()> {
             simulated_s / targets.len() as f64,
             simulated_s / touches_s,
         );
-        let (Some(tip), Surface::Mesh { bvh, .. }) = (environment.fingertip(), environment.shape())
+        let (Some(tip), ObjectShape::Mesh { bvh, .. }) =
+            (environment.fingertip(), environment.shape())
         else {
             continue;
         };
@@ -71,7 +72,7 @@ fn main() -> anyhow::Result<()> {
         let Some(rest) = resting_pose(&environment, &approach) else { continue };
         let mut feel = FingertipState::new(tip, &palpate::math::seed::stream(1, 0, "finger"));
         for gap_mm in [-0.5, 0.5, 1.0, 2.0, 5.0, 20.0] {
-            let p_wt = resting_pose.p_wt - approach.direction_w().scale(1e-3 * gap_mm);
+            let p_wt = rest.p_wt - approach.direction_w().scale(1e-3 * gap_mm);
             let x_wt = Isometry3::from_parts(p_wt.into(), approach.r_wt());
             let feel_us = best(|| {
                 let begun = Instant::now();

@@ -6,7 +6,7 @@ use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use palpate::sim::{Environment, Scene};
@@ -21,7 +21,7 @@ fn finger(c: &mut Criterion) {
     else {
         return;
     };
-    let Surface::Mesh { bvh, .. } = environment.shape() else { return };
+    let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return };
     // The pad faces the object: −z of T along −y of W, the tip up.
     let pad = nalgebra::UnitQuaternion::from_rotation_matrix(
         &nalgebra::Rotation3::from_basis_unchecked(&[Vector3::z(), Vector3::x(), Vector3::y()]),

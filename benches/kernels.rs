@@ -6,7 +6,7 @@ mod pieces;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitVector3, Vector3};
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
@@ -41,7 +41,7 @@ fn contact(c: &mut Criterion) {
     };
     let approach = environment.task().approach(&[0.013, 0.487].into()).unwrap();
     group.bench_function("touch", |b| b.iter(|| probe.touch(black_box(&approach))));
-    if let Surface::Mesh { bvh, .. } = environment.shape() {
+    if let ObjectShape::Mesh { bvh, .. } = environment.shape() {
         let origin = Point3::new(0.013, -0.5, 0.487);
         let direction = UnitVector3::new_unchecked(-Vector3::y());
         group.bench_function("ray", |b| b.iter(|| bvh.ray(black_box(&origin), &direction, 1.0)));

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use palpate::explore::probe::Touch;
 use palpate::geometry::spread::direction;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::Aim;
@@ -41,7 +41,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
     }
     let task = environment.task();
     let ball = *task.ball().ok_or("the scene has no [around]")?;
-    let Surface::Mesh { bvh, .. } = environment.shape() else { return Err("no mesh".into()) };
+    let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return Err("no mesh".into()) };
     let mut probe = simulator.probe(1)?;
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();
     let (mut off_mm, mut turned_deg, mut seconds) = (Vec::new(), Vec::new(), Vec::new());

@@ -157,7 +157,7 @@ fn observed(
 ) -> Observations {
     let mut observations = Observations::new(dimension);
     for (place, height) in each(places).iter().zip(heights.as_array()) {
-        observations.push(place, *height);
+        observations.push_height(place, *height);
     }
     observations
 }

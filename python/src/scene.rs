@@ -11,7 +11,7 @@ use palpate::explore::probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::sim;
 use palpate::sim::Environment;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use palpate::task::{self, Approach};
 use pyo3::exceptions::PyValueError;
@@ -154,7 +154,7 @@ impl Scene {
         Self::around(py, seed, || {
             let x_wo = scene.object.as_ref().map(|object| object.x_wo()).unwrap_or_default();
             let bvh = MeshBvh::new(mesh.transformed(&x_wo));
-            Environment::with_shape(scene, Surface::Mesh { bvh, report: report.into() })
+            Environment::with_shape(scene, ObjectShape::Mesh { bvh, report: report.into() })
                 .map_err(errors::scene)
         })
     }

@@ -84,7 +84,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     for held in &held_out {
         print(&held_out_text(held))?;
     }
-    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::whole).collect();
+    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::overall).collect();
     print(&table(vec![row("all sensors", &Score::of(whole.iter()))]))?;
     if free == FreeParameters::Constants {
         let all: Vec<&PlateRecording> = sensors.iter().collect();
@@ -157,7 +157,7 @@ fn held_out_text(held: &HeldOutResult) -> String {
     for (force_n, score) in &held.loads {
         rows.push(row(&format!("{force_n:.1} N"), score));
     }
-    rows.push(row("all loads", &held.whole()));
+    rows.push(row("all loads", &held.overall()));
     text + &table(rows)
 }
 

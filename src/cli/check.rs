@@ -75,7 +75,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     experiment.trials = args.max_trials;
     let name = experiment.name.clone();
     for path in [&args.junit, &args.markdown, &args.svg].into_iter().flatten() {
-        args.force.claim(path)?;
+        args.force.check_file(path)?;
     }
     let old = match &args.bless {
         Some(_) if !args.baseline.exists() => None,
@@ -151,7 +151,7 @@ fn accept_baseline(
     stop: &AtomicBool,
     talk: Verbosity,
 ) -> anyhow::Result<Outcome> {
-    args.force.claim(&args.baseline)?;
+    args.force.check_file(&args.baseline)?;
     let jobs = runner::missing_jobs(simulation, &[])?;
     let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
     let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);

@@ -42,12 +42,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let compared = compare(&runs, &args.against)?;
     let mut text = format!("{}\n{}", interquartiles(&compared).text(), text(&compared));
     if let Some(path) = &args.svg {
-        args.force.claim(path)?;
+        args.force.check_file(path)?;
         let svg = profiles(&compared).context("nothing to draw")?;
         write_whole(path, &svg)?;
     }
     if let Some(folder) = &args.out {
-        args.force.claim(&folder.join(PAGE))?;
+        args.force.check_file(&folder.join(PAGE))?;
         make_folder(folder)?;
         let name = compared.objects.join(", ");
         text += &format!("\npage: {}\n", write(folder, (&name, ""), &compared)?.display());

@@ -25,7 +25,7 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
         return Ok(found);
     }
     let word = name.to_string_lossy();
-    let known = words::nearest(&word, &names(folder));
+    let known = words::nearest(&word, &file_stems(folder));
     let meant = known.map_or(String::new(), |known| format!(", did you mean `{known}`?"));
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
 }
@@ -40,7 +40,7 @@ pub(super) fn is_experiment(path: &Path) -> bool {
 }
 
 /// Sorted names of the files in the first `folder` that [`find`] searches.
-pub(super) fn names(folder: &str) -> Vec<String> {
+pub(super) fn file_stems(folder: &str) -> Vec<String> {
     let files = folders(folder).find_map(|folder| std::fs::read_dir(folder).ok());
     let stem = |path: PathBuf| -> Option<String> {
         let is_toml = path.extension().is_some_and(|extension| extension == "toml");

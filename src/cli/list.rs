@@ -1,6 +1,6 @@
 //! `palpate list`.
 
-use super::find::{EXPERIMENTS, SCENES, find, names};
+use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::terminal::{Outcome, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::MEASURES;
@@ -59,7 +59,7 @@ fn experiments() -> Vec<[String; 2]> {
             .and_then(|path| Ok(Experiment::load(&path, &[])?.question));
         [name.clone(), loaded.unwrap_or_else(|error| format!("{error:#}"))]
     };
-    names(EXPERIMENTS).iter().map(about).collect()
+    file_stems(EXPERIMENTS).iter().map(about).collect()
 }
 
 fn scenes() -> Vec<[String; 2]> {
@@ -70,7 +70,7 @@ fn scenes() -> Vec<[String; 2]> {
         });
         [name.clone(), loaded.unwrap_or_else(|error| format!("{error:#}"))]
     };
-    names(SCENES).iter().map(about).collect()
+    file_stems(SCENES).iter().map(about).collect()
 }
 
 /// Names and descriptions of all planners.

@@ -140,7 +140,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let [experiment, scene] = ["", "-scene"].map(|what| args.beside(format!("{name}{what}.toml")));
     args.force.check_new_file(&experiment)?;
     args.force.check_new_file(&scene)?;
-    let guess = MeshPlacement::of(args)?;
+    let guess = MeshPlacement::new(args)?;
     make_folder(&args.out)?;
     let kit = args.finger.kit();
     write_whole(&scene, &guess.scene(args, &kit)?)?;
@@ -181,7 +181,7 @@ struct MeshPlacement {
 }
 
 impl MeshPlacement {
-    fn of(args: &Args) -> anyhow::Result<Self> {
+    fn new(args: &Args) -> anyhow::Result<Self> {
         let extension = args.mesh.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
         let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
@@ -193,7 +193,8 @@ impl MeshPlacement {
             high - low
         };
         let unit = args.unit.or(is_gltf.then_some(Unit::M));
-        let (unit, scale) = placement::size(extent(&mesh).max() / Unit::Mm.metres_per_unit(), unit);
+        let (unit, scale) =
+            placement::propose_size(extent(&mesh).max() / Unit::Mm.metres_per_unit(), unit);
         let mesh = mesh.scaled(unit.metres_per_unit() * scale / Unit::Mm.metres_per_unit());
         let size_mm = (extent(&mesh) * 1e3).into();
         let facing = if is_gltf { Facing::of_gltf(up) } else { Facing::of(up) };
@@ -201,7 +202,7 @@ impl MeshPlacement {
         let turned = mesh.transformed(&pose([0.0; 3], rotation_deg));
         let position_m = placement::position_m(&turned);
         let bvh = MeshBvh::new(turned.transformed(&pose(position_m, [0.0; 3])));
-        let found = placement::zone(&bvh).with_context(|| {
+        let found = placement::propose_zone(&bvh).with_context(|| {
             format!(
                 "{}: no surface visible from that side; try another --side or --up",
                 args.mesh.display()

@@ -26,7 +26,7 @@ impl Overwrite {
     ///
     /// # Errors
     /// If it may not be written.
-    pub(super) fn claim(self, path: &Path) -> anyhow::Result<()> {
+    pub(super) fn check_file(self, path: &Path) -> anyhow::Result<()> {
         if found(path)? == ExistingFile::Other && !self.force {
             bail!(
                 "{} exists and was not written by Palpate; use --force to replace it",
@@ -42,11 +42,11 @@ impl Overwrite {
     /// # Errors
     /// If one of the files may not be written.
     pub(super) fn check_files(self, path: &Path, extensions: &[&str]) -> anyhow::Result<()> {
-        self.claim(path)?;
+        self.check_file(path)?;
         if found(path)? == ExistingFile::Ours {
             return Ok(());
         }
-        extensions.iter().try_for_each(|extension| self.claim(&path.with_extension(extension)))
+        extensions.iter().try_for_each(|extension| self.check_file(&path.with_extension(extension)))
     }
 
     /// Checks that `path`, a file for the user to edit, does not exist or may be replaced.
@@ -54,7 +54,7 @@ impl Overwrite {
     /// # Errors
     /// If it exists without `--force`, or is not a file.
     pub(super) fn check_new_file(self, path: &Path) -> anyhow::Result<()> {
-        self.claim(path)?;
+        self.check_file(path)?;
         if path.exists() && !self.force {
             bail!("{} exists; use --force to replace it", path.display());
         }

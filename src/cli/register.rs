@@ -62,7 +62,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let name = if args.cloud.cloud.is_some() { "align.toml" } else { "registration.toml" };
     let out = args.out.clone().unwrap_or_else(|| name.into());
-    args.force.claim(&out)?;
+    args.force.check_file(&out)?;
     if let Some(cloud) = &args.cloud.cloud {
         let position_m = args.body.at.unwrap_or_default();
         return align((&args.file, cloud), position_m, &args.cloud, &out, talk);
@@ -89,9 +89,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut probe = match settings.kind {
         BackendKind::Simulated => simulator.probe(args.seed)?,
         _ => {
-            let lab = RosArm::join(&settings, &robot.chain)?;
+            let lab = RosArm::connect_over(&settings, &robot.chain)?;
             prepare_arm(&lab, args.clear_fault)?;
-            let body = Box::new(lab.body());
+            let body = Box::new(lab.backend());
             Box::new(simulator.servo_within(body, args.seed, &settings.interlocks)?)
         }
     };

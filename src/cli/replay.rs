@@ -5,7 +5,7 @@ use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::trial::recorded_trial::parts;
 use crate::experiment::trial::replay::{self, Difference, Replay};
 use anyhow::Context;
-use palpate_input::words::brief;
+use palpate_input::words::shorten;
 use palpate_ros::recording::RecordedTrial;
 use serde_json::json;
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ impl ReplayedPart {
             "version": about.version,
             "planner": about.planner,
             "trial": about.trial,
-            "made_before": self.recorded.made,
+            "made_before": self.recorded.earlier_touches,
             "ticks": self.recorded.tick_count,
             "replay": self.replay,
         })
@@ -91,7 +91,7 @@ fn text(recorded: &RecordedTrial, replay: &Replay) -> String {
     let head =
         format!("{}, trial {}, recorded by palpate {}", about.planner, about.trial, about.version);
     let cut = if *is_cut { "; the recording ends before the trial does" } else { "" };
-    let before = match recorded.made {
+    let before = match recorded.earlier_touches {
         0 => String::new(),
         made => format!(", {made} of them from earlier parts"),
     };
@@ -121,7 +121,7 @@ fn words(difference: &Difference) -> String {
         Difference::Row { touch, recorded, now } => {
             let at = recorded.bytes().zip(now.bytes()).take_while(|(a, b)| a == b).count();
             let from = recorded[..at.min(recorded.len())].rfind(',').map_or(0, |comma| comma + 1);
-            let part = |row: &str| brief(row.get(from..).unwrap_or(row));
+            let part = |row: &str| shorten(row.get(from..).unwrap_or(row));
             format!(
                 "touch {touch} differs for the same readings: recorded\n  {}\nnow\n  {}",
                 part(recorded),

@@ -94,10 +94,10 @@ impl Args {
 
 pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Outcome> {
     let path = find(&args.experiment, EXPERIMENTS)?;
-    let cells = sweep_cases(&path)?;
+    let cases = sweep_cases(&path)?;
     set_thread_count(args.threads)?;
     let mut stop = None;
-    if sweep_cases.is_empty() {
+    if cases.is_empty() {
         let out = args.out.clone();
         let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
         if let Some(shards) = args.plan {
@@ -111,10 +111,10 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         path.display()
     );
     // All combinations are loaded before the first is run.
-    let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
-    let experiments = sweep_cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let load = |case| with_planners(args, |sets| Experiment::load_cell(&path, case, sets));
+    let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let first = experiments[0].clone();
-    let name = first.name.strip_suffix(&sweep_cases[0].label).unwrap_or(&first.name);
+    let name = first.name.strip_suffix(&cases[0].label).unwrap_or(&first.name);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(name));
     let mut paths = Vec::new();
     for experiment in experiments {
@@ -182,7 +182,7 @@ fn with_planners(
 struct RunResult {
     path: PathBuf,
     /// Number of trials run and their duration.
-    words: String,
+    summary: String,
     tally: RowCounts,
     /// Expected number of trials.
     total: u64,
@@ -196,7 +196,7 @@ impl RunResult {
     }
 
     /// Returns the outcome; prints to stderr the number of failed trials and the first failure.
-    fn ending(&self, talk: Verbosity) -> Outcome {
+    fn outcome(&self, talk: Verbosity) -> Outcome {
         let RowCounts { trials, failed } = &self.tally;
         let all_failed = *trials > 0 && failed.len() == *trials;
         if let Some((TrialId { trial, planner }, reason)) = failed.first() {
@@ -298,7 +298,7 @@ fn run_missing(
     if !done.is_empty() {
         words += &format!(", {} already done", done.len());
     }
-    Ok(RunResult { path, words, tally, total, halt })
+    Ok(RunResult { path, summary: words, tally, total, halt })
 }
 
 fn run_one(
@@ -309,11 +309,11 @@ fn run_one(
     (talk, host): (Verbosity, &Host),
 ) -> anyhow::Result<Outcome> {
     let made = run_missing(args, experiment, out, stop, (talk, host))?;
-    let RunResult { path, words, total, halt, .. } = &made;
+    let RunResult { path, summary: words, total, halt, .. } = &made;
     // A shard is not summarised: its rows may not fit in memory.
     if args.shard.is_some() {
         print(&format!("{words}\nrows in {}", path.display()))?;
-        return Ok(made.ending(talk));
+        return Ok(made.outcome(talk));
     }
 
     let run = Run::read(path)?;
@@ -348,5 +348,5 @@ fn run_one(
         }
         talk.note(kept);
     }
-    Ok(made.ending(talk))
+    Ok(made.outcome(talk))
 }

@@ -15,7 +15,7 @@ use crate::experiment::truth::Truth;
 use crate::report;
 use crate::report::files::png;
 use crate::report::solid;
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
 use anyhow::{Context, bail, ensure};
@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     ];
     check_applicable(&path, &options)?;
     for file in [&args.mjcf, &args.png, &args.render].into_iter().flatten() {
-        args.force.claim(file)?;
+        args.force.check_file(file)?;
     }
     if args.watch.watch {
         return watch(&path, &args.set, &args.watch, talk);
@@ -143,7 +143,7 @@ fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
         Some((ball, shape)) => whole_object_summary(ball, shape.as_ref(), talk),
         None => zone_summary(&environment, talk),
     };
-    if let Surface::Mesh { report, .. } = environment.shape() {
+    if let ObjectShape::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }
     if let Some(path) = &args.png {

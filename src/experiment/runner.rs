@@ -81,7 +81,7 @@ impl Shard {
 
     /// Removes the jobs of other shards.
     pub fn retain(self, jobs: &mut Vec<Job>) {
-        missing_jobs.retain(|(trial, _)| self.contains(*trial));
+        jobs.retain(|(trial, _)| self.contains(*trial));
     }
 }
 
@@ -105,7 +105,7 @@ pub fn run(
     // Jobs are handed out one by one, so that rows finish roughly in order and an interrupted run
     // has complete pairs.
     pool.install(|| {
-        missing_jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
+        jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
@@ -143,8 +143,8 @@ pub fn run_in_memory(
         progress(Progress::Trial(&row));
         Some(row)
     };
-    let found: Vec<Option<TrialRow>> = thread_pool(threads)?
-        .install(|| missing_jobs.into_par_iter().with_max_len(1).map(run).collect());
+    let found: Vec<Option<TrialRow>> =
+        thread_pool(threads)?.install(|| jobs.into_par_iter().with_max_len(1).map(run).collect());
     Ok(found.into_iter().flatten().collect())
 }
 

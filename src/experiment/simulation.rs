@@ -202,7 +202,7 @@ impl Simulation {
         if self.is_real() {
             let lacks = || LinkFault::Arm("the scene has no object to touch".into());
             let chain = self.environment().chain().ok_or_else(lacks)?;
-            self.arm = Some(RosArm::join(&self.experiment.backend, &chain)?);
+            self.arm = Some(RosArm::connect_over(&self.experiment.backend, &chain)?);
         }
         Ok(self.arm.clone())
     }
@@ -214,7 +214,7 @@ impl Simulation {
     /// If no arm is connected, or memory for the body's state is missing.
     pub fn backend(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         match &self.arm {
-            Some(lab) => Ok(Some(Box::new(lab.body()))),
+            Some(lab) => Ok(Some(Box::new(lab.backend()))),
             None if self.is_real() => Err(Fault::lacks("a connection to the arm")),
             None => self.simulator.body(),
         }

@@ -44,9 +44,9 @@ pub fn sweep_cases(path: &Path) -> Result<Vec<SweepCase>, ConfigError> {
         return Err(loader.not_allowed(SWEEP, &sweep.to_string(), allowed));
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut cells = vec![SweepCase { label: String::new(), sets: Vec::new() }];
+    let mut cases = vec![SweepCase { label: String::new(), sets: Vec::new() }];
     for (key, values) in &axes {
-        let longer = |cell: &SweepCase| -> Vec<SweepCase> {
+        let longer = |case: &SweepCase| -> Vec<SweepCase> {
             let with = |(i, value): (usize, &Value)| {
                 let set = match value {
                     Value::String(name) if is_file(key, name) => {
@@ -57,14 +57,14 @@ pub fn sweep_cases(path: &Path) -> Result<Vec<SweepCase>, ConfigError> {
                     }
                     value => format!("{key}={value}"),
                 };
-                let label = format!("{}-{}", cell.label, label(key, value, i));
-                SweepCase { label, sets: [&cell.sets[..], &[set]].concat() }
+                let label = format!("{}-{}", case.label, label(key, value, i));
+                SweepCase { label, sets: [&case.sets[..], &[set]].concat() }
             };
             values.iter().enumerate().map(with).collect()
         };
-        sweep_cases = sweep_cases.iter().flat_map(longer).collect();
+        cases = cases.iter().flat_map(longer).collect();
     }
-    Ok(sweep_cases)
+    Ok(cases)
 }
 
 /// Collects dotted keys and their lists; returns whether the table contains nothing else.
@@ -105,12 +105,12 @@ impl Experiment {
     ///
     /// # Errors
     /// See [`load`](Self::load).
-    pub fn load_cell(path: &Path, cell: &SweepCase, sets: &[String]) -> Result<Self, ConfigError> {
+    pub fn load_cell(path: &Path, case: &SweepCase, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
         loader.take(SWEEP);
-        let sets = [sets, &cell.sets].concat();
+        let sets = [sets, &case.sets].concat();
         let mut experiment = Self::finish(loader, &sets)?;
-        experiment.name += &cell.label;
+        experiment.name += &case.label;
         Ok(experiment)
     }
 }

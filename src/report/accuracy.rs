@@ -3,7 +3,7 @@
 
 use super::axes::{Axis, Panel};
 use super::canvas::{Anchor, Area, Canvas};
-use super::legend::{Sheet, Swatch};
+use super::legend::{FigureLayout, Swatch};
 use super::style::{self, FAINT_INK, INK, SMALL_PX, dot};
 use crate::experiment::statistics::mean;
 use crate::study::accuracy::comparison::AccuracyComparison;
@@ -61,7 +61,7 @@ pub fn draw(
     ]);
     let first = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
     let entries = entries.filter(|_| levels.is_some());
-    let mut sheet = Sheet::new(size, (first, [STEP_PX, ROW_PX]), (size[0], ""), entries);
+    let mut sheet = FigureLayout::new(size, (first, [STEP_PX, ROW_PX]), (size[0], ""), entries);
     if let Some(levels) = levels {
         for (column, error) in ERRORS.into_iter().enumerate() {
             let area = sheet.area(column, 0.0);

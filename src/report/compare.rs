@@ -6,7 +6,7 @@ use super::canvas::Area;
 use super::findings::{CALIBRATED, by_verdict, clauses};
 use super::glossary::explained;
 use super::html::{figure, fold, page, tables};
-use super::legend::{Sheet, Swatch};
+use super::legend::{FigureLayout, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
 use crate::experiment::measure::Direction;
@@ -59,12 +59,12 @@ pub fn overall(compared: &SuiteComparison) -> Table {
         Column::new("IoU")
             .note("Intersection over union of the believed and the true silhouette.")
             .unit("", 1.0, 3),
-        Column::new(format!("better than {}", compared.against))
+        Column::new(format!("better than {}", compared.reference))
             .note("Probability that a trial has a smaller error than one of the reference.")
             .unit("", 1.0, 2),
     ]);
     let all: Vec<usize> = (0..count).collect();
-    let reference = compared.contenders.iter().find(|it| it.name == compared.against);
+    let reference = compared.contenders.iter().find(|it| it.name == compared.reference);
     for contender in &compared.contenders {
         let on = |word: &str| {
             let intervals = all.iter().map(|object| error_on(contender, *object)?.interval);
@@ -138,7 +138,7 @@ pub fn note(against: &str) -> String {
 
 /// Returns the verdict as a sentence; `None` without other planners than the reference.
 fn sentence(compared: &SuiteComparison) -> Option<String> {
-    let against = &compared.against;
+    let against = &compared.reference;
     let others = compared.contenders.iter().filter(|it| it.name != *against);
     let verdicts = others.map(|it| {
         let interval = geometric(&it.scores(), SEED).and_then(|error| error.interval);
@@ -155,7 +155,7 @@ fn sentence(compared: &SuiteComparison) -> Option<String> {
 
 /// Returns the page: the verdict, the table over all objects, the figures, then each object.
 pub fn html(name: &str, question: &str, compared: &SuiteComparison) -> String {
-    let note = note(&compared.against);
+    let note = note(&compared.reference);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
     let each = tables("", &[each(compared)], "named", "");
     let each = fold("Object by object", &each);
@@ -241,7 +241,7 @@ pub fn profiles(compared: &SuiteComparison) -> Option<String> {
         (0..=STEPS).map(|i| (at(i), profile(contender, at(i)))).collect()
     });
     let area = Area { left: 70.0, top: 60.0, width: 460.0, height: 300.0 };
-    let x_name = format!("error over the touches, relative to {}", compared.against);
+    let x_name = format!("error over the touches, relative to {}", compared.reference);
     let names = [x_name.as_str(), "fraction of the trials"];
     Some(draw(compared, (area, x, names), curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
 }
@@ -284,7 +284,7 @@ fn draw(
     let swatches = strokes.iter().cloned().map(Swatch::Line);
     let entries = swatches.zip(names.iter().map(String::as_str));
     let size = [area.right() + 20.0, area.bottom() + 50.0];
-    let mut sheet = Sheet::new(size, (area, [0.0; 2]), (area.width, ""), entries);
+    let mut sheet = FigureLayout::new(size, (area, [0.0; 2]), (area.width, ""), entries);
     let panel = Panel { area: sheet.area(0, 0.0), x, y: Axis::linear(0.0, 1.0, 6.0) };
     let canvas = &mut sheet.canvas;
     panel.frame(canvas);

@@ -49,7 +49,7 @@ impl<'a> Legend<'a> {
 }
 
 /// Drawing with a legend above panels of one size in columns and rows.
-pub struct Sheet {
+pub struct FigureLayout {
     /// Drawing with the legend.
     pub canvas: Canvas,
     first: Area,
@@ -58,7 +58,7 @@ pub struct Sheet {
     pub bottom: f64,
 }
 
-impl Sheet {
+impl FigureLayout {
     /// Creates a drawing of `size` with a legend of a width, drawn in a group of `attributes`, and
     /// a distance of `step` between panels. The drawing grows, and `first` moves down, by the
     /// legend's additional rows.

@@ -3,7 +3,7 @@
 
 use super::figures::ReportFigure;
 use super::replay::{self, swept, touched};
-use super::solid::{self, Frame, PlannerSurfaces, Touch, counts};
+use super::solid::{self, PlannerSurfaces, SolidTouch, SurfaceFrame, counts};
 use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
@@ -82,7 +82,7 @@ fn sequences(
         for (i, touch) in row.touches.iter().enumerate() {
             let no_aim = || format!("{}: target is not an aim at a whole object", place(i + 1));
             let aim = touch.target.aim().with_context(no_aim)?;
-            sequence.touches.push(Touch {
+            sequence.touches.push(SolidTouch {
                 aim_w: aim.p_w,
                 along_w: *aim.direction_w,
                 contact_w: touch.contact.map(Point3::from),
@@ -110,7 +110,7 @@ pub fn frame(
     count: u32,
     truth: Option<&MeshBvh>,
     most: usize,
-) -> anyhow::Result<Option<Frame>> {
+) -> anyhow::Result<Option<SurfaceFrame>> {
     let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
     let Some(belief) = belief(experiment, touches)? else { return Ok(None) };
     let Some(surface) = belief.surface() else { return Ok(None) };
@@ -126,7 +126,7 @@ pub fn frame(
         let distance_m = bvh.closest_point(p_w).distance_m;
         if bvh.is_enclosed(p_w) { -distance_m } else { distance_m }
     };
-    Ok(Some(Frame {
+    Ok(Some(SurfaceFrame {
         touches: count,
         sd_m: surface.offsets_m(&mesh.0),
         error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),

@@ -22,7 +22,7 @@ use std::borrow::Cow;
 /// Scene with its mesh loaded and its search tree built.
 pub struct Environment {
     scene: Scene,
-    shape: Surface,
+    shape: ObjectShape,
     task: Task,
     arm: Option<Chain>,
     arm_mjcf: Option<String>,
@@ -31,7 +31,7 @@ pub struct Environment {
 }
 
 /// Surface to touch.
-pub enum Surface {
+pub enum ObjectShape {
     /// An analytic curve.
     Function(AnalyticCurve),
     /// A mesh in `W`.
@@ -70,7 +70,7 @@ impl Environment {
     pub fn build_with_progress(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, InputError> {
         if scene.body == SimulatorKind::Function {
             let function = scene.function.ok_or_else(|| missing_part("function"))?;
-            return Self::with_shape(scene, Surface::Function(function));
+            return Self::with_shape(scene, ObjectShape::Function(function));
         }
         let object = scene.object.as_ref().ok_or_else(|| missing_part("object"))?;
         tell(&format!("reading {}", object.mesh.display()));
@@ -81,14 +81,14 @@ impl Environment {
         )?;
         tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
-        Self::with_shape(scene, Surface::Mesh { bvh, report: report.into() })
+        Self::with_shape(scene, ObjectShape::Mesh { bvh, report: report.into() })
     }
 
     /// Builds an environment around a shape in memory, in place of the object that the scene names.
     ///
     /// # Errors
     /// If the shape lies wholly outside the zone.
-    pub fn with_shape(mut scene: Scene, shape: Surface) -> Result<Self, InputError> {
+    pub fn with_shape(mut scene: Scene, shape: ObjectShape) -> Result<Self, InputError> {
         let mut notices = Vec::new();
         let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
         if let Cow::Owned(effects) = scene.effective_effects() {
@@ -102,26 +102,27 @@ impl Environment {
         if scene.body.moves_finger() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
-        let task = if let (Some(around), Surface::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
-            let ball = bounding_ball(around, bvh.mesh())?;
-            whole_object_task(&scene, arm.as_ref(), ball, bvh.mesh())?
-        } else {
-            let zone = scene.zone.as_mut().ok_or_else(|| missing_part("zone"))?;
-            let extent = extent(zone, &shape);
-            let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
-            if let Surface::Mesh { bvh, .. } = &shape {
-                let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-                let size = notice::size_mismatch(zone, unit, &extent);
-                check_overlap(zone, depth_m, &extent, size.as_deref())?;
-                check_front(zone, bvh, depth_m[0], -extent[1].y)?;
-                notices.extend(size);
-                if zone.datum_y_m.is_none() {
-                    zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
+        let task =
+            if let (Some(around), ObjectShape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
+                let ball = bounding_ball(around, bvh.mesh())?;
+                whole_object_task(&scene, arm.as_ref(), ball, bvh.mesh())?
+            } else {
+                let zone = scene.zone.as_mut().ok_or_else(|| missing_part("zone"))?;
+                let extent = extent(zone, &shape);
+                let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
+                if let ObjectShape::Mesh { bvh, .. } = &shape {
+                    let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
+                    let size = notice::size_mismatch(zone, unit, &extent);
+                    check_overlap(zone, depth_m, &extent, size.as_deref())?;
+                    check_front(zone, bvh, depth_m[0], -extent[1].y)?;
+                    notices.extend(size);
+                    if zone.datum_y_m.is_none() {
+                        zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
+                    }
                 }
-            }
-            zone.datum_y_m.get_or_insert(0.0);
-            Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
-        };
+                zone.datum_y_m.get_or_insert(0.0);
+                Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
+            };
         let arm_mjcf = match &scene.arm {
             Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,
@@ -145,15 +146,15 @@ impl Environment {
     }
 
     /// Returns the surface to touch.
-    pub fn shape(&self) -> &Surface {
+    pub fn shape(&self) -> &ObjectShape {
         &self.shape
     }
 
     /// Returns the object in `W`, or `None` for a function.
     pub fn mesh(&self) -> Option<&Mesh> {
         match &self.shape {
-            Surface::Function(_) => None,
-            Surface::Mesh { bvh, .. } => Some(bvh.mesh()),
+            ObjectShape::Function(_) => None,
+            ObjectShape::Mesh { bvh, .. } => Some(bvh.mesh()),
         }
     }
 
@@ -207,8 +208,8 @@ impl Environment {
     /// `None` if there is no surface.
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
-            Surface::Function(function) => place.first().map(|&x| function.height_m(x)),
-            Surface::Mesh { .. } => {
+            ObjectShape::Function(function) => place.first().map(|&x| function.height_m(x)),
+            ObjectShape::Mesh { .. } => {
                 let datum_y_m = self.task.zone()?.datum_y_m();
                 let y_m = match self.analytic() {
                     Some((surface, object)) => {
@@ -230,7 +231,7 @@ impl Environment {
     /// Returns y, in the zone's frame, of the first point of the mesh along the approach to
     /// `place`.
     pub(super) fn mesh_y_m(&self, place: &[f64]) -> Option<f64> {
-        let Surface::Mesh { bvh, .. } = &self.shape else { return None };
+        let ObjectShape::Mesh { bvh, .. } = &self.shape else { return None };
         self.first_surface_y_m(place, |start_w, ahead_w, reach_m| {
             Some(bvh.ray(&start_w, &ahead_w, reach_m)?.distance_m)
         })
@@ -267,14 +268,14 @@ impl Environment {
 }
 
 /// Returns the smallest and largest coordinates of a shape in the frame of `zone`.
-fn extent(zone: &Zone, shape: &Surface) -> [Point3<f64>; 2] {
+fn extent(zone: &Zone, shape: &ObjectShape) -> [Point3<f64>; 2] {
     match shape {
-        Surface::Function(function) => {
+        ObjectShape::Function(function) => {
             let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m() + height_m);
             let [at_low, at_high] = [0.0, 1.0].map(|end| zone.at(&[end, end]));
             [zone.local(&at_low, low), zone.local(&at_high, high)]
         }
-        Surface::Mesh { bvh, .. } => {
+        ObjectShape::Mesh { bvh, .. } => {
             let x_zw = zone.x_wz().inverse();
             let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(|end| Point3::from([end; 3]));
             bvh.mesh().vertices().iter().fold(nothing, |[low, high], p_w| {

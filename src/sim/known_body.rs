@@ -1,6 +1,6 @@
 //! Registration target, a ball or a plate, in place of a scene's object.
 
-use super::environment::{Environment, Surface, missing_part};
+use super::environment::{Environment, ObjectShape, missing_part};
 use super::scene::{ObjectSettings, Scene, SimulatorKind, Unit};
 use nalgebra::Point3;
 use palpate_explore::registration::{CalibrationBody, design};
@@ -54,7 +54,7 @@ pub fn environment(scene: &Scene, body: &CalibrationBody) -> Result<Environment,
     let scene =
         Scene { zone: Some(zone), around: None, object: Some(object), touch, ..scene.clone() };
     let bvh = MeshBvh::new(mesh.transformed(&x_wo));
-    Environment::with_shape(scene, Surface::Mesh { bvh, report: report.into() })
+    Environment::with_shape(scene, ObjectShape::Mesh { bvh, report: report.into() })
 }
 
 /// Placeholder for the file name of the mesh.

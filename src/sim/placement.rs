@@ -44,7 +44,7 @@ const SIZE_M: f64 = 0.15;
 /// Returns the unit and scale factor that give a mesh a size that a finger can explore. `extent` is
 /// the largest in the file's numbers. Without a `unit` it is the first of mm, m and cm that fits
 /// with a scale of 1; if none fits, metres with another scale.
-pub fn size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
+pub fn propose_size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
     let fits = |unit: &Unit| {
         let size_m = extent * unit.metres_per_unit();
         (EXPLORABLE_M[0]..=EXPLORABLE_M[1]).contains(&size_m)
@@ -151,7 +151,7 @@ pub struct ZoneProposal {
 /// Returns the largest rectangle of the silhouette, seen along −y, in which almost every place has
 /// a surface. Its datum is the middle of that surface; its depth reaches from the object's front to
 /// a little behind the farthest surface. Returns `None` if there is no surface along the approach.
-pub fn zone(bvh: &MeshBvh) -> Option<ZoneProposal> {
+pub fn propose_zone(bvh: &MeshBvh) -> Option<ZoneProposal> {
     let (low, high) = bvh.mesh().bounds();
     let whole = Zone::new([low.x, high.x], Some([low.z, high.z]));
     let [width_m, height_m] = [high.x - low.x, high.z - low.z];

@@ -1,7 +1,7 @@
 //! Probes without dynamics: analytic surface and swept hull.
 
 use crate::sim::Environment;
-use crate::sim::environment::{CLEARANCE_M, Surface};
+use crate::sim::environment::{CLEARANCE_M, ObjectShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch, check_finite};
@@ -28,7 +28,7 @@ impl Probe for ExactProbe {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         check_finite(approach)?;
         let environment = &self.environment;
-        if let (Surface::Function(function), Some(zone)) =
+        if let (ObjectShape::Function(function), Some(zone)) =
             (environment.shape(), environment.task().zone())
         {
             let place = zone.place(&approach.p_near_w);
@@ -44,11 +44,11 @@ impl Probe for ExactProbe {
             approach.p_far_w
                 + approach.direction_w().scale(turnaround_distance_m(environment, approach))
         };
-        let p_wt = found.as_ref().map_or_else(turned_w, |rest| resting_pose.p_wt);
+        let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
         self.swept = Some(SweptVolume { finger: environment.scene().finger.clone(), p_wt });
         self.tip = found
             .as_ref()
-            .map(|rest| Isometry3::from_parts(resting_pose.p_wt.coords.into(), approach.r_wt()));
+            .map(|rest| Isometry3::from_parts(rest.p_wt.coords.into(), approach.r_wt()));
         Ok(found.map_or(Touch::Miss, |RestingPose { hit, .. }| {
             Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal })
         }))
@@ -74,7 +74,7 @@ pub struct RestingPose {
 /// Returns the pose in which the hull comes to rest on its approach; `None` for a miss, or without
 /// a mesh.
 pub fn resting_pose(environment: &Environment, approach: &Approach) -> Option<RestingPose> {
-    let Surface::Mesh { bvh, .. } = environment.shape() else { return None };
+    let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return None };
     let finger = &environment.scene().finger;
     let (ahead_w, reach_m) = (approach.direction_w(), reach_m(environment));
     let start_w = approach.p_near_w - ahead_w.scale(reach_m);

@@ -41,13 +41,13 @@ pub fn reachable(
     let part = places.len().div_ceil(PARTS).max(1);
     let mut is_reachable = Vec::with_capacity(places.len());
     for (places, heights_m) in places.chunks(part).zip(heights_m.chunks(part)) {
-        let percent = 100 * reachable.len() / (PARTS * part);
+        let percent = 100 * is_reachable.len() / (PARTS * part);
         tell(&format!("computing where the finger can touch the surface: {percent} %"));
-        reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
+        is_reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
             height_m.is_some_and(|height_m| fingers.touch(place, height_m, &lowest_y_m))
         }));
     }
-    reachable
+    is_reachable
 }
 
 /// Number of chunks after which progress is reported.
@@ -204,7 +204,7 @@ impl<'a> FingerGrid<'a> {
             let approach = self.environment.task().approach(&target.into())?;
             let rest = resting_pose(self.environment, &approach)?;
             let x_zw = self.zone.x_wz().inverse();
-            Some(x_zw.transform_point(&resting_pose.p_wt).y)
+            Some(x_zw.transform_point(&rest.p_wt).y)
         })
     }
 }

@@ -381,7 +381,7 @@ impl Scene {
     /// Returns whether contact is detected from tactile frames instead of force.
     fn detects_by_frames(&self) -> bool {
         let effects = self.effective_effects();
-        self.touch.detection.by.is_heard(effects.fluid.is_some(), effects.electrodes.is_some())
+        self.touch.detection.by.is_supported(effects.fluid.is_some(), effects.electrodes.is_some())
     }
 
     /// Reads a scene file and applies `--set` assignments.

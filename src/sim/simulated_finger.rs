@@ -1,7 +1,7 @@
 //! Simulated finger in contact with the scene's object, for every simulated backend.
 
 use crate::sim::Environment;
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::WrenchSensor;
 use crate::sim::finger::{ContactLoad, Fingertip, FingertipState};
@@ -88,7 +88,7 @@ impl SimulatedFinger {
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
         let Self { varied_fingertip: own, state, registration_error: misplaced, .. } = self;
         let tip = own.as_deref().or(self.environment.fingertip());
-        let (Some(tip), Surface::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
+        let (Some(tip), ObjectShape::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
             return Ok(Wrench::default());
         };
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));

@@ -24,7 +24,7 @@ pub const BASELINE_PLANNER: &str = "random";
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SuiteComparison {
     /// Reference planner.
-    pub against: String,
+    pub reference: String,
     /// Names of the objects.
     pub objects: Vec<String>,
     /// Compared planners.
@@ -120,12 +120,12 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<SuiteComparison,
     for contender in &mut contenders {
         contender.results.resize(objects.len(), ObjectResult::default());
     }
-    Ok(SuiteComparison { against: against.into(), objects, contenders })
+    Ok(SuiteComparison { reference: against.into(), objects, contenders })
 }
 
 /// Mean log RMSE of a planner's finished trials.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
-    let of = CHECK_MEASURES[0].of;
+    let of = CHECK_MEASURES[0].value;
     let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
     finished.filter_map(|row| Some((row.trial, of(row, &run.experiment)?))).collect()
 }

@@ -191,7 +191,7 @@ fn at_the_limit_of_approach_the_skin_is_not_used_up() {
         let task = environment.task();
         let rest =
             |target| resting_pose(&environment, &task.approach(target).unwrap()).unwrap().p_wt;
-        let rest_m = targets.iter().map(|target| resting_pose(target).y);
+        let rest_m = targets.iter().map(|target| rest(target).y);
         let depth_m = |(rest_m, load): (f64, &Option<ReferenceLoad>)| {
             Some(rest_m - load.as_ref()?.motion.x_wt.translation.y)
         };

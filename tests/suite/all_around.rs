@@ -11,7 +11,7 @@ use palpate::explore::probe::{Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::report::MeshReport;
 use palpate::geometry::spread::direction;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::kinematic::KinematicBackend;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
@@ -25,7 +25,7 @@ const RADIUS_M: f64 = 0.05;
 fn with_sphere(scene: Scene) -> Result<Arc<Environment>, InputError> {
     let bvh = MeshBvh::new(sphere_mesh(MIDDLE_W.into(), RADIUS_M, 60));
     let report = Box::<MeshReport>::default();
-    Environment::with_shape(scene, Surface::Mesh { bvh, report }).map(Arc::new)
+    Environment::with_shape(scene, ObjectShape::Mesh { bvh, report }).map(Arc::new)
 }
 
 fn around(name: &str, sets: &[&str]) -> Arc<Environment> {

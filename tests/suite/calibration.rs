@@ -27,10 +27,10 @@ fn constants_of_one_sensor_predict_the_other() {
     let held_out =
         leave_one_out(&coarse(), &recordings().sensors, FreeParameters::Constants).unwrap();
     for held in &held_out {
-        println!("{} from {:?}: {:?}", held.sensor, held.others, held.whole());
+        println!("{} from {:?}: {:?}", held.sensor, held.others, held.overall());
         assert_eq!(held.others.len(), 1);
         assert!(held.fit.refused.is_empty(), "{:?}", held.fit.refused);
-        let whole = held.whole();
+        let whole = held.overall();
         assert!(whole.model_counts < whole.mean_change_counts.unwrap(), "{whole:?}");
         for (force_n, score) in &held.loads {
             assert!(score.model_counts < score.no_change_counts, "{force_n} N: {score:?}");
@@ -39,7 +39,7 @@ fn constants_of_one_sensor_predict_the_other() {
         let offset = held.fit.sessions[0].offset;
         assert!((1.02..1.25).contains(&offset), "{offset}");
     }
-    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::whole).collect();
+    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::overall).collect();
     let all = Score::of(whole.iter());
     assert!(all.model_counts <= 85.0 && all.right_sign() >= 0.95, "{all:?}");
 }
@@ -72,9 +72,9 @@ fn an_offset_alone_is_told_as_one() {
         bin.mean_counts = rest.map(|rest| counts(impedance_ohm(rest) / 1.1));
     }
     let held = leave_one_out(&coarse(), &[recording], FreeParameters::Constants).unwrap().remove(0);
-    assert!(held.others.is_empty() && held.whole().mean_change_counts.is_none());
-    assert!(held.whole().offset_counts < 1.0, "{:?}", held.whole());
-    assert!(held.whole().no_change_counts > 50.0, "{:?}", held.whole());
+    assert!(held.others.is_empty() && held.overall().mean_change_counts.is_none());
+    assert!(held.overall().offset_counts < 1.0, "{:?}", held.overall());
+    assert!(held.overall().no_change_counts > 50.0, "{:?}", held.overall());
 }
 
 #[test]

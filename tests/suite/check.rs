@@ -74,7 +74,7 @@ fn judged(shift: f64, sd: f64, count: usize) -> Vec<palpate::study::check::Measu
     let mut rng = seed::stream(7, count as u64, "judged");
     let mut values = || (0..count).map(|_| shift + sd * normal(&mut rng)).collect::<Vec<f64>>();
     let differences: Vec<_> = CHECK_MEASURES.iter().map(|judged| (judged, values())).collect();
-    CheckOptions::default().judge(&differences)
+    CheckOptions::default().evaluate(&differences)
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn verdicts_are_what_their_intervals_say() {
     assert_eq!(said(0.0, 0.5, 20), Verdict::Undecided);
     assert_eq!(said(0.0, 0.0, 10), Verdict::Identical);
     let none: Vec<_> = CHECK_MEASURES.iter().map(|judged| (judged, Vec::new())).collect();
-    assert_eq!(planner_verdict(&CheckOptions::default().judge(&none)), Verdict::Missing);
+    assert_eq!(planner_verdict(&CheckOptions::default().evaluate(&none)), Verdict::Missing);
 }
 
 fn simulation(sets: &[&str]) -> Simulation {
@@ -110,18 +110,18 @@ fn rows_are_held_against_a_baseline() {
     let stop = AtomicBool::new(false);
     let rules = CheckOptions { first: 2, batch: 2, ..CheckOptions::default() };
     let old = baseline(&simulation(&SHORT));
-    let hold =
+    let check =
         |sets: &[&str]| run_check(&simulation(sets), &old, &rules, 0, &stop, &|_| ()).unwrap();
-    let same = run_check(&SHORT);
+    let same = check(&SHORT);
     assert_eq!((same.verdict(), same.same_settings), (Verdict::Identical, true));
     assert_eq!(same.rows.len(), 4, "a batch is enough");
-    let gone = run_check(&["trials=4", "touches=8", "initial_touches=3", "planners=[\"random\"]"]);
+    let gone = check(&["trials=4", "touches=8", "initial_touches=3", "planners=[\"random\"]"]);
     assert_eq!(gone.verdict(), Verdict::Missing);
     let random = gone.planners.iter().find(|planner| planner.name == "random").unwrap();
     assert_eq!(random.verdict, Verdict::Identical);
     let mut other = SHORT.to_vec();
     other.push("gp.noise_sd_m=0.3");
-    let other = run_check(&other);
+    let other = check(&other);
     assert!(!other.same_settings && other.verdict() > Verdict::Identical, "{:?}", other.planners);
     let text = old.text().unwrap();
     assert_eq!(text.lines().count(), 9);
@@ -239,7 +239,7 @@ fn one_check(
             values.push(is.values[judged.id] - was.values[judged.id]);
         }
         if (trial + 1) % 10 == 0 {
-            let verdict = planner_verdict(&rules.judge(&differences));
+            let verdict = planner_verdict(&rules.evaluate(&differences));
             if verdict != Verdict::Undecided || trial == 49 {
                 let values = &differences[0].1;
                 return (verdict, values.len(), values.iter().sum::<f64>() / values.len() as f64);

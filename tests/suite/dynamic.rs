@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Translation3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::{Probe, Touch};
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::mujoco::{CompiledModels, StepLimit};
 use palpate::sim::probe::resting_pose;
 use palpate::sim::scene::SimulatorKind;
@@ -125,7 +125,7 @@ fn a_slow_touch_is_the_kinematic_one() {
                         && reading.ideal().is_some_and(|ideal| ideal.force_n > 0.0)
                 };
                 let rest = readings.iter().rev().find(rests).unwrap();
-                (contact(touch).p_wc, resting_pose.ideal().unwrap().force_n)
+                (contact(touch).p_wc, rest.ideal().unwrap().force_n)
             });
             apart = apart.max((kinematic.0 - dynamic.0).norm());
             stronger = stronger.max((dynamic.1 / kinematic.1 - 1.0).abs());
@@ -143,7 +143,7 @@ fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
     for reading in readings {
         let Some(counts) = pdc(reading) else { continue };
         // The tare averages the noise of one or two counts; only a contact exceeds this.
-        above = if counts - resting_pose > detection.threshold_counts { above + 1 } else { 0 };
+        above = if counts - rest > detection.threshold_counts { above + 1 } else { 0 };
         if above == detection.frames {
             return reading.ideal().map_or(0.0, |ideal| ideal.force_n);
         }
@@ -217,7 +217,7 @@ fn a_finger_without_skin_finds_the_surface() {
         let cast = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let mut cast = cast.probe(1).unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
-        let Surface::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let ObjectShape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         let (mut off, mut apart): (f64, f64) = (0.0, 0.0);
         for target in environment.task().zone().unwrap().grid(3) {
             let approach = environment.task().approach(&target.as_slice().into()).unwrap();
@@ -303,7 +303,7 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
         let approach = environment.task().approach(&[0.01, 0.5].into()).unwrap();
         let found = contact(simulator.probe(seed).unwrap().touch(&approach).unwrap());
-        let Surface::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let ObjectShape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         (bvh.closest_point(&found.p_wc).distance_m, found)
     };
     let none = "{finger_m=0, finger_deg=0, object_m=0, object_deg=0}";
@@ -327,7 +327,7 @@ fn a_force_sensor_tells_contact_where_no_fluid_does() {
         let sets = [ARM, body, "effects={skin={}, wrench={}}", "touch.detection_n=0.4"];
         let environment = environment("container_finger.toml", &sets);
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
-        let Surface::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let ObjectShape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         for seed in 0..3 {
             let mut probe = simulator.probe(seed).unwrap();
             for target in [[0.0, 0.5], [0.03, 0.47]] {

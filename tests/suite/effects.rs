@@ -4,7 +4,7 @@ use crate::common::shipped;
 use palpate::math::seed;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::frame::FRAME_S;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::finger::effects::effect::EffectSwitch;
 use palpate::sim::finger::{Effects, FingertipState};
 use palpate::sim::{Environment, Scene};
@@ -105,7 +105,8 @@ fn an_effect_that_is_off_has_no_state() {
 fn a_finger_without_effects_feels_what_its_skin_feels() {
     let environment =
         shipped::environment("container_finger.toml", &["effects={skin={}, fluid={}}"]);
-    let (tip, Surface::Mesh { bvh, .. }) = (environment.fingertip().unwrap(), environment.shape())
+    let (tip, ObjectShape::Mesh { bvh, .. }) =
+        (environment.fingertip().unwrap(), environment.shape())
     else {
         panic!()
     };

@@ -78,7 +78,7 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
         let mut touches = Observations::new(1);
         for touch in &row.touches {
             let [x, y, _] = touch.contact.unwrap();
-            touches.push(&[x], y);
+            touches.push_height(&[x], y);
             let Some(fit) = &touch.fit else { continue };
             let best = best_on_grid(&bounds, &touches, [240, 30]);
             fits += 1;
@@ -107,7 +107,7 @@ fn fits_of_a_known_noise_reach_the_global_maximum() {
     let mut fits = 0;
     for touch in &row.touches {
         let p_w = touch.contact.unwrap().into();
-        touches.push(&zone.place(&p_w), zone.height_m(&p_w));
+        touches.push_height(&zone.place(&p_w), zone.height_m(&p_w));
         let Some(fit) = &touch.fit else { continue };
         let best = best_on_grid(&bounds, &touches, [16, 19]);
         fits += 1;
@@ -124,12 +124,12 @@ fn fits_touch_by_touch_reach_what_cold_fits_reach() {
     let (mut fits, mut gaps) = (0, Vec::new());
     for trial in 0..4 {
         let mut touches = Observations::new(2);
-        let mut fits_so_far = RefitSequence::of(&KERNEL);
+        let mut fits_so_far = RefitSequence::new(&KERNEL);
         for i in 0..90 {
             let step = f64::from(trial) * 0.377 + f64::from(i);
             let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
             let bump = (-40.0 * ((place[0] - 0.6).powi(2) + (place[1] - 0.4).powi(2))).exp();
-            touches.push(&place, 1.0 - place[0] * place[0] + 0.3 * bump);
+            touches.push_height(&place, 1.0 - place[0] * place[0] + 0.3 * bump);
             let fit = fits_so_far.fit(&bounds, &touches);
             if i >= 20 && i % 5 == 0 {
                 let cold = bounds.fit(&KERNEL, &touches);
@@ -167,7 +167,7 @@ fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
             for i in 0..count {
                 let step = shift + f64::from(i);
                 let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
-                touches.push(&place, surface(place[0], place[1]));
+                touches.push_height(&place, surface(place[0], place[1]));
             }
             let fit = bounds.fit(&KERNEL, &touches);
             gaps.push(best_on_grid(&bounds, &touches, [32, 4]) - fit.log_likelihood);
@@ -189,7 +189,7 @@ fn a_fit_of_many_touches_reaches_the_global_maximum() {
         for i in 0..1100 {
             let step = f64::from(i);
             let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
-            touches.push(&place, surface(place[0], place[1]));
+            touches.push_height(&place, surface(place[0], place[1]));
         }
         let fit = bounds.fit(&KERNEL, &touches);
         let best = best_on_grid(&bounds, &touches, [6, 2]);
@@ -203,7 +203,7 @@ fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
     let mut touches = Observations::new(2);
     for i in 0..64u64 {
         let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
-        touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
+        touches.push_height(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
     }
     let bounds = search_box(MeanModel::Zero, vec![(0.005, 1.0).into(); 2]);
     let fit = bounds.fit(&KERNEL, &touches).hyperparameters;
@@ -230,7 +230,7 @@ fn a_fit_in_six_dimensions_finds_what_draws_were_made_with() {
                 (along.iter().zip(&x).map(|(a, x)| a * x).sum::<f64>() + phase).cos()
             };
             let sum: f64 = waves.iter().map(height).sum();
-            touches.push(&x, (2.0 / 400.0f64).sqrt() * sum);
+            touches.push_height(&x, (2.0 / 400.0f64).sqrt() * sum);
         }
         let bounds = search_box(MeanModel::Zero, vec![(0.05, 5.0).into(); 6]);
         let fit = bounds.fit(&KERNEL, &touches);
@@ -247,7 +247,7 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
     let mut touches = Observations::new(1);
     for i in 0..12 {
         let x = -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75 % 1.0);
-        touches.push(&[x], 1000.0 + toy(x));
+        touches.push_height(&[x], 1000.0 + toy(x));
     }
     let free = search_box(MeanModel::Constant, vec![(0.02, 4.0).into()]);
     let found = free.fit(&KERNEL, &touches).hyperparameters;
@@ -277,17 +277,19 @@ fn of_several_kernels_the_likeliest_is_taken() {
     let mut chosen = Vec::new();
     for surface in [smooth as fn(f64) -> f64, edged] {
         let mut touches = Observations::new(1);
-        (0..25).for_each(|i| touches.push(&[0.16 * f64::from(i)], surface(0.16 * f64::from(i))));
+        (0..25).for_each(|i| {
+            touches.push_height(&[0.16 * f64::from(i)], surface(0.16 * f64::from(i)))
+        });
         let names = ["matern_32", "squared_exponential"].map(String::from);
-        let mut choice = KernelSelection::between(&names);
+        let mut choice = KernelSelection::new(&names);
         let fit = choice.fit(&bounds, &touches);
         let alone: Vec<Fit> =
             names.iter().map(|name| bounds.fit(kernel::by_name(name).unwrap(), &touches)).collect();
         let best = alone.iter().map(|fit| fit.log_likelihood).fold(f64::MIN, f64::max);
         assert_eq!(fit.log_likelihood, best);
         assert_eq!(fit.factorisations, alone.iter().map(|fit| fit.factorisations).sum::<u32>());
-        let mut again = KernelSelection::between(&names);
-        again.follow(&fit);
+        let mut again = KernelSelection::new(&names);
+        again.select(&fit);
         let at = |choice: &KernelSelection| {
             Posterior::new(choice.kernel(), fit.hyperparameters.clone(), touches.clone())
         };
@@ -297,8 +299,8 @@ fn of_several_kernels_the_likeliest_is_taken() {
         chosen.push(fit.kernel.unwrap());
     }
     assert_eq!(chosen, ["squared_exponential", "matern_32"]);
-    let mut one = KernelSelection::between(&["matern_52".into()]);
+    let mut one = KernelSelection::new(&["matern_52".into()]);
     let mut touches = Observations::new(1);
-    touches.push(&[0.1], 0.2);
+    touches.push_height(&[0.1], 0.2);
     assert_eq!(one.fit(&bounds, &touches).kernel, None);
 }

@@ -257,7 +257,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     sleep(Duration::from_millis(1500));
     let chain = ArmSettings::default().chain().unwrap();
     let on_change = BackendSettings { status_on_change: true, ..network.settings.clone() };
-    let lab = RosArm::join(&on_change, &chain).unwrap();
+    let lab = RosArm::connect_over(&on_change, &chain).unwrap();
     for service in Service::COMMON {
         lab.call(&service).unwrap_or_else(|fault| panic!("{}: {fault}", service.name("/pa10")));
     }
@@ -265,7 +265,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     // The wrong mapping gets no answer, and the message names the setting.
     let other =
         BackendSettings { service_mapping: MappingKind::Enhanced, patience_s: 2.0, ..on_change };
-    let lab = RosArm::join(&other, &chain).unwrap();
+    let lab = RosArm::connect_over(&other, &chain).unwrap();
     let fault = lab.call(&Service::Hold).unwrap_err().to_string();
     assert!(
         fault.contains("did not answer within 2 s") && fault.contains("service_mapping"),
@@ -314,7 +314,7 @@ fn only_the_named_interfaces_are_used() {
     let with_lo = counts();
     assert!(with_lo[0] > before[0] && with_lo[1] == before[1], "{before:?} {with_lo:?}");
     let settings = BackendSettings { interfaces: vec!["lo".into()], ..network.settings.clone() };
-    let lab = RosArm::join(&settings, &ArmSettings::default().chain().unwrap()).unwrap();
+    let lab = RosArm::connect_over(&settings, &ArmSettings::default().chain().unwrap()).unwrap();
     assert_eq!(counts()[1], before[1]);
     drop((lab, twin));
     if Path::new("/sys/class/net/dds0").exists() {
@@ -323,7 +323,8 @@ fn only_the_named_interfaces_are_used() {
         drop(twin);
         let unknown =
             BackendSettings { interfaces: vec!["wlan7".into()], ..network.settings.clone() };
-        let fault = RosArm::join(&unknown, &ArmSettings::default().chain().unwrap()).err().unwrap();
+        let fault =
+            RosArm::connect_over(&unknown, &ArmSettings::default().chain().unwrap()).err().unwrap();
         assert!(
             fault.to_string().contains("wlan7") && fault.to_string().contains("dds0"),
             "{fault}"

@@ -16,7 +16,7 @@ fn four_thousand_touches_need_at_most_three_squares_of_doubles() {
     let mut touches = Observations::new(2);
     for i in 0..n {
         let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
-        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
+        touches.push_height(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
     }
     let at = Hyperparameters {
         signal_sd: 1.0,

@@ -7,7 +7,7 @@ use palpate::experiment::Experiment;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::pose::pose;
 use palpate::sim::Scene;
-use palpate::sim::placement::{Facing, Side, Up, rotation_deg, size};
+use palpate::sim::placement::{Facing, Side, Up, propose_size, rotation_deg};
 use palpate::sim::scene::Unit;
 use std::fmt::Write;
 use std::fs;
@@ -155,13 +155,13 @@ fn turns_are_those_that_are_named() {
 
 #[test]
 fn sizes_are_guessed_from_what_a_finger_can_explore() {
-    assert_eq!(size(200.0, None), (Unit::Mm, 1.0));
-    assert_eq!(size(0.2, None), (Unit::M, 1.0));
-    assert_eq!(size(20.0, None), (Unit::Cm, 1.0));
-    assert_eq!(size(8.0, Some(Unit::In)), (Unit::In, 1.0));
+    assert_eq!(propose_size(200.0, None), (Unit::Mm, 1.0));
+    assert_eq!(propose_size(0.2, None), (Unit::M, 1.0));
+    assert_eq!(propose_size(20.0, None), (Unit::Cm, 1.0));
+    assert_eq!(propose_size(8.0, Some(Unit::In)), (Unit::In, 1.0));
     // Without a plausible unit the mesh is scaled to the size of a hand, in readable numbers.
     for (extent, unit) in [(2.0, None), (4000.0, None), (1e-5, None), (30.0, Some(Unit::M))] {
-        let (unit, scale) = size(extent, unit);
+        let (unit, scale) = propose_size(extent, unit);
         let size_m = extent * unit.metres_per_unit() * scale;
         assert!((0.14..0.16).contains(&size_m), "{extent} {unit} {scale}");
         assert!(format!("{scale:e}").len() < 8, "{scale:e}");

@@ -17,7 +17,7 @@ fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> SuiteComparison {
     };
     let named = [("random", random), ("own", own), ("oracle", oracle)];
     let contenders = named.map(contender).into();
-    SuiteComparison { against: "random".into(), objects: vec!["it".into()], contenders }
+    SuiteComparison { reference: "random".into(), objects: vec!["it".into()], contenders }
 }
 
 proptest! {
@@ -65,7 +65,7 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
         let logs = rows.map(|row| {
             let is_whole = row.failure.is_none();
             assert!(is_whole && row.touches.iter().all(|it| it.stall.is_none()), "{name}");
-            (CHECK_MEASURES[0].of)(&row, simulation.experiment()).unwrap()
+            (CHECK_MEASURES[0].value)(&row, simulation.experiment()).unwrap()
         });
         logs.sum::<f64>() / f64::from(trials)
     };

@@ -156,7 +156,7 @@ fn every_object_stands_in_one_half() {
         let of = |half: &str| {
             let cells =
                 sweep_cases(Path::new(&format!("experiments/suite/{kind}{half}.toml"))).unwrap();
-            sweep_cases.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
+            cells.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
         };
         let [choosing, reporting] = ["choosing", "reporting"].map(of);
         assert_eq!((choosing.len(), reporting.len()), (12, 12));

@@ -4,7 +4,7 @@ use crate::common::shipped::environment;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::geometry::sweep::Capsule;
 use palpate::sim::Environment;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use proptest::prelude::*;
 use std::sync::{Arc, LazyLock};
@@ -78,7 +78,7 @@ proptest! {
     #[test]
     fn the_finger_stops_at_the_surface(x in -0.04..0.04f64, z in 0.44..0.54f64, is_bird in any::<bool>()) {
         let environment = if is_bird { &*BIRD } else { &*CONTAINER };
-        let Surface::Mesh { bvh, .. } = environment.shape() else { unreachable!() };
+        let ObjectShape::Mesh { bvh, .. } = environment.shape() else { unreachable!() };
         let finger = &environment.scene().finger;
         let ahead_w = environment.task().approach(&[x, z].into()).unwrap().direction_w();
         let start = nalgebra::Point3::new(x, -0.5, z);

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::probe::resting_pose;
 use palpate::sim::reach;
 use palpate::sim::{Environment, Scene};
@@ -111,7 +111,7 @@ fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
                 environment,
                 &environment.task().approach(&target.as_slice().into()).unwrap(),
             );
-            fingers.extend(resting_pose.map(|rest| (target, (x_zw * resting_pose.p_wt).y)));
+            fingers.extend(rest.map(|rest| (target, (x_zw * rest.p_wt).y)));
         }
     }
     let is_reachable = |place: &Vec<f64>| {
@@ -159,8 +159,8 @@ fn reach_is_what_letting_every_finger_down_finds() {
             scene.zone.as_mut().unwrap().depth_m = None;
             scene.zone.as_mut().unwrap().rotation_deg = [0.0, 0.0, 20.0 * rng.random::<f64>()];
             let bvh = MeshBvh::new(random_relief(rng, rough_m));
-            let Surface::Mesh { report, .. } = profile.shape() else { unreachable!() };
-            let shape = Surface::Mesh { bvh, report: report.clone() };
+            let ObjectShape::Mesh { report, .. } = profile.shape() else { unreachable!() };
+            let shape = ObjectShape::Mesh { bvh, report: report.clone() };
             let environment = Environment::with_shape(scene, shape).unwrap();
             let places = environment.task().zone().unwrap().grid(15);
             let heights: Vec<_> =

@@ -215,7 +215,7 @@ proptest! {
         prop_assert_eq!(recorder.step(&Command::default()).unwrap_err(), lost.clone());
         recording.end(1.0, &TrialEnd { failure: Some("it was lost".into()), is_interrupted: false }).unwrap();
 
-        let recorded = RecordedTrial::of(paper.0.lock().unwrap().clone()).unwrap();
+        let recorded = RecordedTrial::from_bytes(paper.0.lock().unwrap().clone()).unwrap();
         prop_assert_eq!(&recorded.about, &about);
         prop_assert_eq!(recorded.tick_count, ticks.len() + 2);
         prop_assert_eq!(recorded.ending.clone().unwrap().failure.unwrap(), "it was lost");
@@ -251,7 +251,7 @@ proptest! {
         if is_cut {
             bytes.truncate(cut.index(bytes.len()));
         }
-        match RecordedTrial::of(bytes) {
+        match RecordedTrial::from_bytes(bytes) {
             Ok(recorded) => prop_assert!(recorded.ticks().count() <= recorded.tick_count),
             Err(error) => prop_assert!(!error.to_string().is_empty()),
         }
@@ -340,7 +340,7 @@ fn a_recording_without_slips_is_read_as_ever() {
     let (bytes, _) = short(40);
     let shorter = without_slips(&bytes);
     assert!(shorter != bytes);
-    let [now, before] = [bytes, shorter].map(|bytes| RecordedTrial::of(bytes).unwrap());
+    let [now, before] = [bytes, shorter].map(|bytes| RecordedTrial::from_bytes(bytes).unwrap());
     assert_eq!((now.tick_count, &now.touches), (before.tick_count, &before.touches));
     let mut told = 0;
     for (now, before) in now.ticks().zip(before.ticks()) {
@@ -422,14 +422,15 @@ fn what_others_read_is_what_was_read() {
 fn a_file_that_was_cut_is_read_up_to_the_cut() {
     // More than the 64 kB that LZ4 compresses as one block.
     let (bytes, _) = short(160);
-    let whole = RecordedTrial::of(bytes.clone()).unwrap();
+    let whole = RecordedTrial::from_bytes(bytes.clone()).unwrap();
     assert!(whole.ending.is_some());
-    let head =
-        (0..bytes.len()).find(|&at| RecordedTrial::of(bytes[..at].to_vec()).is_ok()).unwrap();
+    let head = (0..bytes.len())
+        .find(|&at| RecordedTrial::from_bytes(bytes[..at].to_vec()).is_ok())
+        .unwrap();
     assert!(head < 2000, "the first {head} bytes are needed to know what it is of");
     let (mut before, mut partly) = ((0, 0), 0);
     for at in (head..bytes.len()).step_by((bytes.len() - head) / 200) {
-        let cut = RecordedTrial::of(bytes[..at].to_vec()).unwrap();
+        let cut = RecordedTrial::from_bytes(bytes[..at].to_vec()).unwrap();
         let now = (cut.tick_count, cut.touches.len());
         assert!(now.0 >= before.0 && now.1 >= before.1, "{at}: {now:?} after {before:?}");
         assert_eq!(cut.ticks().count(), cut.tick_count);
@@ -439,10 +440,10 @@ fn a_file_that_was_cut_is_read_up_to_the_cut() {
     assert_eq!(before, (whole.tick_count, whole.touches.len()));
     assert!(partly > 0, "no cut in the midst of a touch was read up to the cut");
     for at in [0, 3, 8, head - 1] {
-        let error = RecordedTrial::of(bytes[..at].to_vec()).unwrap_err();
+        let error = RecordedTrial::from_bytes(bytes[..at].to_vec()).unwrap_err();
         assert!(error.to_string().contains("the metadata `palpate` is missing"), "{at}: {error}");
     }
-    let error = RecordedTrial::of(b"a text that is something else".to_vec()).unwrap_err();
+    let error = RecordedTrial::from_bytes(b"a text that is something else".to_vec()).unwrap_err();
     assert!(error.to_string().contains("does not begin like an MCAP file"), "{error}");
 }
 
@@ -650,7 +651,7 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let names: Vec<_> = parts.iter().map(|part| part.file_name().unwrap()).collect();
     assert_eq!(names, ["active-0000.mcap", "active-0000-part-2.mcap", "active-0000-part-3.mcap"]);
     for (part, (made, touches)) in parts.iter().zip([0, 2, 4].into_iter().zip(touched)) {
-        assert_eq!(RecordedTrial::read(part).unwrap().made, made);
+        assert_eq!(RecordedTrial::read(part).unwrap().earlier_touches, made);
         let replay = replayed(part, &[]).unwrap();
         assert_eq!((replay.touches, replay.is_cut, replay.difference), (touches, false, None));
     }

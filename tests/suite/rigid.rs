@@ -9,7 +9,7 @@ use palpate::explore::probe::{Contact, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::sim::Environment;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::mjcf;
 use palpate::sim::mjcf::ModelPurpose;
 use palpate::sim::mujoco::{CompiledModels, Plant, compile};
@@ -38,7 +38,7 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
         ],
     );
     scene.solver.collision = Some(collision);
-    let shape = Surface::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
+    let shape = ObjectShape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     let environment = Arc::new(Environment::with_shape(scene, shape).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let mut probe = simulator.probe(0).unwrap();

@@ -5,7 +5,7 @@ use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::explore::probe::servo::Servo;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::Environment;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::kinematic::KinematicBackend;
 use palpate::sim::simulator::Simulator;
 use std::sync::{Arc, Mutex};
@@ -20,7 +20,7 @@ fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<To
 
 /// Distance of a touch's contact from the mesh.
 fn off_surface_m(environment: &Environment, contact: &Contact) -> f64 {
-    let Surface::Mesh { bvh, .. } = environment.shape() else { panic!("no mesh") };
+    let ObjectShape::Mesh { bvh, .. } = environment.shape() else { panic!("no mesh") };
     bvh.closest_point(&contact.p_wc).distance_m
 }
 

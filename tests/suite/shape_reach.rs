@@ -19,7 +19,7 @@ fn tip_first(finger: &Finger) -> impl Fn(&UnitVector3<f64>) -> Vector3<f64> + Sy
 /// Reachability with tip-first approaches from any direction.
 fn touched(mesh: &MeshBvh, spots: &[SurfacePoint], radius_m: f64) -> Vec<bool> {
     let axis_w = tip_first(&Finger::default());
-    FingerReach { radius_m, axis_w: &axis_w, lowest_m: None }.touches(mesh, spots)
+    FingerReach { radius_m, axis_w: &axis_w, lowest_m: None }.reachable(mesh, spots)
 }
 
 fn spread(mesh: Mesh, count: usize) -> (MeshBvh, Vec<SurfacePoint>) {
@@ -111,7 +111,7 @@ fn what_the_object_stands_on_is_in_the_way() {
     let axis_w = tip_first(&Finger::default());
     let reach = FingerReach { radius_m, axis_w: &axis_w, lowest_m: Some(0.2 - ball_m) };
     let limit = (radius_m - ball_m) / (radius_m + ball_m);
-    for (spot, is_touched) in spots.iter().zip(reach.touches(&mesh, &spots)) {
+    for (spot, is_touched) in spots.iter().zip(reach.reachable(&mesh, &spots)) {
         let up = (spot.point.z - 0.2) / ball_m;
         // A face tilts by up to half of one of its 40 rings.
         if (up - limit).abs() > 0.05 {
@@ -142,6 +142,6 @@ fn the_finger_behind_the_tip_must_fit_too() {
         ahead.cross(&Vector3::new(0.3, 0.5, 0.8)).normalize() * Finger::default().length_m
     };
     let reach = FingerReach { radius_m: 0.007, axis_w: &first, lowest_m: None };
-    assert_eq!(reach.touches(&mesh, &spot), [true]);
-    assert_eq!(FingerReach { axis_w: &across, ..reach }.touches(&mesh, &spot), [false]);
+    assert_eq!(reach.reachable(&mesh, &spot), [true]);
+    assert_eq!(FingerReach { axis_w: &across, ..reach }.reachable(&mesh, &spot), [false]);
 }

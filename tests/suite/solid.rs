@@ -11,7 +11,7 @@ use palpate::geometry::coarse::coarse;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
 use palpate::report::files::png;
-use palpate::report::solid::{Frame, PlannerSurfaces, counts, figure, section};
+use palpate::report::solid::{PlannerSurfaces, SurfaceFrame, counts, figure, section};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -144,7 +144,7 @@ fn a_corner_may_lie_far_back() {
     let triangles: Vec<[u32; 3]> = (1..rim).map(|i| [0, i, i + 1]).collect();
     let sd_m = vec![1e-3; vertices.len()];
     let mesh = (vertices, triangles.clone());
-    let frame = Frame { mesh, sd_m, ..Frame::default() };
+    let frame = SurfaceFrame { mesh, sd_m, ..SurfaceFrame::default() };
     let fan = PlannerSurfaces {
         planner: "fan".into(),
         frames: vec![frame],
@@ -211,7 +211,7 @@ fn nothing_and_little_can_be_shown() {
     let drawn = |of: PlannerSurfaces, counts: &[u32]| figure(&[of], None, counts);
     assert_eq!(drawn(none, &[6]), None);
     let mut bare = sequence("bare", 6, 0.02);
-    bare.frames[0] = Frame { touches: 4, ..Frame::default() };
+    bare.frames[0] = SurfaceFrame { touches: 4, ..SurfaceFrame::default() };
     assert!(section(slice::from_ref(&bare), None, 0).unwrap().contains("\"corners\":\"\""));
     assert_eq!(drawn(bare.clone(), &[4]), None);
     assert!(drawn(bare, &[4, 6]).is_some());
@@ -242,11 +242,11 @@ fn files_hold_the_surface_that_was_given() {
     let nets = Mesh::new(&nets.0, &nets.1).unwrap().0;
     for mesh in [nets, of_suite("mug.glb"), of_suite("coin.glb")] {
         let count = mesh.vertices().len();
-        let given = Frame {
+        let given = SurfaceFrame {
             mesh: (mesh.vertices().to_vec(), mesh.triangles().to_vec()),
             sd_m: (0..count).map(|i| 1e-5 * i as f64).collect(),
             error_m: (0..count).map(|i| -1e-6 * i as f64).collect(),
-            ..Frame::default()
+            ..SurfaceFrame::default()
         };
         let points = given.points(vec!["a belief".into()]);
         for (name, text) in [("it.ply", points.ply()), ("it.obj", points.obj())] {

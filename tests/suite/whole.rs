@@ -17,7 +17,7 @@ use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
 use palpate::report::{findings, whole};
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Target};
 use rand_chacha::ChaCha8Rng;
@@ -300,7 +300,7 @@ fn a_ball_beside_the_object_is_refused() {
     let scene: Scene = toml::from_str(text).unwrap();
     let mesh = mesh(sphere);
     let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();
-    let shape = Surface::Mesh { bvh: MeshBvh::new(mesh), report: report.into() };
+    let shape = ObjectShape::Mesh { bvh: MeshBvh::new(mesh), report: report.into() };
     let error = Environment::with_shape(scene, shape).err().unwrap().to_string();
     assert!(error.contains("around.centre_m"), "{error}");
 }

@@ -15,7 +15,7 @@ pub fn place(i: usize) -> [f64; 2] {
 pub fn touches(count: usize) -> Observations {
     let mut touches = Observations::new(2);
     for place in (0..count).map(place) {
-        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
+        touches.push_height(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
     }
     touches
 }

@@ -69,7 +69,7 @@ impl FreeSpaceBound {
     /// Truncates the belief where its mean exceeds the bound by more than its softness, largest
     /// violation first, once per place; not where the absence of a surface is more likely than a
     /// surface below the bound.
-    pub(super) fn cut(&self, belief: &mut Posterior, silhouette: &Silhouette) {
+    pub(super) fn truncate(&self, belief: &mut Posterior, silhouette: &Silhouette) {
         let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
         let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);
         let mut scratch = Scratch::default();
@@ -77,7 +77,8 @@ impl FreeSpaceBound {
         let places = bounds.iter().map(|bound| bound.place);
         let mut means = FixedPlaceMeans::at(belief, places);
         for _ in 0..CUTS_MAX {
-            let excess = means.of(belief).iter().zip(&bounds).map(|(mean, at)| mean - at.height_m);
+            let excess =
+                means.update(belief).iter().zip(&bounds).map(|(mean, at)| mean - at.height_m);
             let mut above: Vec<(usize, f64)> = (excess.enumerate())
                 .filter(|(i, excess)| *excess > soft_sd && !bounds[*i].is_done)
                 .collect();

@@ -55,14 +55,14 @@ impl SurfaceEvidence {
     }
 
     /// Adds a contact at `p_w` of a touch at `target`.
-    pub(super) fn met(&mut self, target: &[f64], p_w: &Point3<f64>) {
+    pub(super) fn add_contact(&mut self, target: &[f64], p_w: &Point3<f64>) {
         let target = flat(&self.zone.local(target, 0.0));
         let contact = flat(&self.zone.x_wz().inverse_transform_point(p_w));
         self.contacts.push([target, contact]);
     }
 
     /// Adds the final place of a touch's hull, and whether the touch was a miss.
-    pub(super) fn passed(&mut self, swept: &SweptVolume, has_missed: bool) {
+    pub(super) fn add_hull(&mut self, swept: &SweptVolume, has_missed: bool) {
         let tip = flat(&self.zone.x_wz().inverse_transform_point(&swept.p_wt));
         let hull = Stadium::new(&swept.finger, tip);
         if has_missed {

@@ -70,7 +70,7 @@ struct FitState {
 
 impl RefitSequence {
     /// Creates an empty sequence.
-    pub fn of(kernel: &'static dyn Kernel) -> Self {
+    pub fn new(kernel: &'static dyn Kernel) -> Self {
         Self { kernel, free: FitState::default(), bound: FitState::default() }
     }
 
@@ -178,7 +178,7 @@ impl SearchBox {
     /// A noise with a lower bound (the sensor's) is fitted, and is set to the bound if less would
     /// be more likely.
     pub fn fit(&self, kernel: &'static dyn Kernel, observations: &Observations) -> Fit {
-        RefitSequence::of(kernel).fit(self, observations)
+        RefitSequence::new(kernel).fit(self, observations)
     }
 
     /// Returns the hyperparameters before any touch: the geometric middle of the box.
@@ -384,9 +384,9 @@ pub struct KernelSelection {
 impl KernelSelection {
     /// Creates a selection between the kernels of these names, the first one until there is a fit.
     /// Unknown names are skipped; if none is left, the kernel is the squared exponential.
-    pub fn between(names: &[String]) -> Self {
+    pub fn new(names: &[String]) -> Self {
         let candidate = |(name, kernel): &(&'static str, &'static dyn Kernel)| {
-            (*name, RefitSequence::of(*kernel))
+            (*name, RefitSequence::new(*kernel))
         };
         let known = KERNELS.iter().filter(|(name, _)| names.iter().any(|asked| asked == name));
         let mut candidates: Vec<_> = known.map(candidate).collect();
@@ -425,7 +425,7 @@ impl KernelSelection {
     }
 
     /// Selects the kernel of `fit`.
-    pub fn follow(&mut self, fit: &Fit) {
+    pub fn select(&mut self, fit: &Fit) {
         let named =
             self.candidates.iter().position(|(name, _)| Some(*name) == fit.kernel.as_deref());
         self.chosen = named.unwrap_or(0);

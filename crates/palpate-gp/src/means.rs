@@ -38,7 +38,7 @@ impl FixedPlaceMeans {
     /// Returns the means of `belief`, to which only heights may have been added since
     /// [`at`](Self::at): for m places and n observations, m·n operations, and one correlation per
     /// place and new height.
-    pub fn of(&mut self, belief: &Posterior) -> &[f64] {
+    pub fn update(&mut self, belief: &Posterior) -> &[f64] {
         let Hyperparameters { mean, length_scales, .. } = belief.hyperparameters();
         let observations = belief.observations();
         let many = self.places.len();
@@ -253,7 +253,7 @@ mod tests {
             let mut means = FixedPlaceMeans::at(&belief, places.iter().map(|place| &place[..]));
             for added in [[0.5, 0.5], [0.1, 0.9]] {
                 let mut scratch = Scratch::default();
-                for (place, mean) in places.iter().zip(means.of(&belief)) {
+                for (place, mean) in places.iter().zip(means.update(&belief)) {
                     assert!((belief.mean(place, &mut scratch) - mean).abs() < 1e-12);
                 }
                 belief.add(&added, 0.4).unwrap();

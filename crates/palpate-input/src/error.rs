@@ -1,6 +1,6 @@
 //! Error of invalid input or state: place, problem, value, allowed values, and remedy.
 
-use crate::words::brief;
+use crate::words::shorten;
 use std::fmt;
 use std::path::Path;
 
@@ -40,7 +40,7 @@ impl InputError {
 
     /// Sets the value found, shortened if it is long.
     pub fn value(mut self, value: impl fmt::Display) -> Self {
-        self.0.value = Some(brief(&value.to_string()));
+        self.0.value = Some(shorten(&value.to_string()));
         self
     }
 

@@ -4,7 +4,7 @@
 const SHOWN_MAX: usize = 60;
 
 /// Formats a value for a message: long numbers in powers of ten, other long values shortened.
-pub fn brief(text: &str) -> String {
+pub fn shorten(text: &str) -> String {
     if text.chars().count() <= SHOWN_MAX {
         return text.into();
     }

@@ -43,7 +43,7 @@ impl RosArm {
     ///
     /// # Errors
     /// The errors of [`connect`](Self::connect), and an error if this build lacks the transport.
-    pub fn join(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
+    pub fn connect_over(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
         let open = super::connect(settings, Side::Explorer, Service::COMMON.into())?;
         Self::connect(settings, chain, open)
     }
@@ -74,7 +74,7 @@ impl RosArm {
     }
 
     /// Returns a backend on this arm; use one at a time.
-    pub fn body(self: &Arc<Self>) -> RosBackend {
+    pub fn backend(self: &Arc<Self>) -> RosBackend {
         let period_s = 1.0 / self.settings().rate_hz;
         let capabilities = Capabilities::simulated(&self.chain, period_s);
         RosBackend {
@@ -92,7 +92,7 @@ impl RosArm {
     /// # Errors
     /// The first check that fails.
     pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
-        check_start(&mut self.body(), &self.chain, &self.settings().gates, 0)
+        check_start(&mut self.backend(), &self.chain, &self.settings().gates, 0)
     }
 
     fn settings(&self) -> &BackendSettings {

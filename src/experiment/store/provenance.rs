@@ -3,7 +3,7 @@
 
 use super::files::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use palpate_input::files;
 use palpate_input::words::hex;
 use serde_json::{Value, json};
@@ -41,7 +41,7 @@ impl InputHashes {
     pub(super) fn of(simulation: &Simulation) -> Result<Self, RunError> {
         let mut content = Self::default();
         let experiment = simulation.experiment();
-        if let (Surface::Mesh { report, .. }, Some(object)) =
+        if let (ObjectShape::Mesh { report, .. }, Some(object)) =
             (simulation.environment().shape(), &experiment.scene.object)
         {
             content.add("scene.object.mesh", report.sha256.clone(), Some(&object.mesh));

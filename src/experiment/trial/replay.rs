@@ -146,7 +146,7 @@ fn made(recorded: &RecordedTrial) -> Result<Vec<TouchRow>, InputError> {
             ))
         })
     };
-    recorded.touches.iter().take(recorded.made).map(read).collect()
+    recorded.touches.iter().take(recorded.earlier_touches).map(read).collect()
 }
 
 /// Returns a recorded row in this version's format: version 0.1 wrote targets without a name.

@@ -24,7 +24,7 @@ const BYTES_MAX: usize = 1_600_000;
 pub(super) const LEAST_SHARE: f64 = 1e-4;
 
 /// Interactive view of a belief, touch by touch.
-pub struct Shell<'a> {
+pub struct InteractiveView<'a> {
     /// Colour maps: name in the scripts, and label. The first one is the default.
     pub colours: &'a [(&'a str, &'a str)],
     /// Whether the true surface is visible by default; `None` if it is not known.
@@ -38,7 +38,7 @@ pub struct Shell<'a> {
     pub scripts: &'a [&'a str],
 }
 
-impl Shell<'_> {
+impl InteractiveView<'_> {
     /// Returns the section as HTML around `data` for the scripts: `planners`, each with its `name`
     /// and its `frames`. The default is the first planner after its last frame.
     pub fn html(&self, data: &Value) -> String {

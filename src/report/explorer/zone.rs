@@ -1,6 +1,6 @@
 //! Interactive view of beliefs over a zone: values on a grid after many touch counts, in few bytes.
 
-use super::{LEAST_SHARE, PARTS, Shell, counts, encode, encode_log, short};
+use super::{InteractiveView, LEAST_SHARE, PARTS, counts, encode, encode_log, short};
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{self, Axis, Length};
@@ -35,7 +35,8 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
         run.experiment.initial_touches,
         drawn_caption(run)
     );
-    Ok(Shell { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }.html(&data))
+    Ok(InteractiveView { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }
+        .html(&data))
 }
 
 const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \

@@ -6,7 +6,7 @@ use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::Area;
 use crate::report::heat_map::{HeatMap, MapValue};
-use crate::report::legend::{Sheet, Swatch, miss_entry};
+use crate::report::legend::{FigureLayout, Swatch, miss_entry};
 use crate::report::replay::{Replay, drawn_caption};
 use crate::report::style::{self, INITIAL, PLANNED};
 use palpate_explore::belief::HeightField;
@@ -94,7 +94,7 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
     let size = [width, shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0];
     let entries = curves::entries(run, [found]);
     let panels = (shape.area, [step_px, 0.0]);
-    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
+    let mut sheet = FigureLayout::new(size, panels, (width - LEFT_PX, ""), entries);
     let colour = style::planner(&run.experiment.planners, planner);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
         let above = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
@@ -149,7 +149,7 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let width = LEFT_PX + 2.0 * step_px;
     let size = [width, shape.area.bottom() + 108.0];
     let panels = (shape.area, [step_px, 0.0]);
-    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
+    let mut sheet = FigureLayout::new(size, panels, (width - LEFT_PX, ""), entries);
     let shape = Panel { area: sheet.area(0, 0.0), ..shape };
     // The zone's part of a panel, all of it unless the zone is far from square.
     let [[left, bottom], [right, top]] = [shape.at(x[0], z[0]), shape.at(x[1], z[1])];

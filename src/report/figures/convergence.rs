@@ -7,7 +7,7 @@ use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Sheet, Swatch};
+use crate::report::legend::{FigureLayout, Swatch};
 use crate::report::style::{self, FAINT_INK};
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
@@ -77,7 +77,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let legend = (WIDTH - 2.0 * LEFT_PX, "");
     let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
     let panels = (first, [PANEL.0 + GAP.0, PANEL.1 + GAP.1]);
-    let mut sheet = Sheet::new(size, panels, legend, swatches.chain(dashed));
+    let mut sheet = FigureLayout::new(size, panels, legend, swatches.chain(dashed));
     for (i, measure) in shown.into_iter().enumerate() {
         let area = sheet.area(i % 2, (i / 2) as f64);
         let constant = constant.filter(|_| measure.id == R.id);

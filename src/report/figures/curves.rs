@@ -4,7 +4,7 @@ use super::ReportFigure;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
-use crate::report::legend::{Sheet, Swatch, miss_entry};
+use crate::report::legend::{FigureLayout, Swatch, miss_entry};
 use crate::report::replay::{self, NO_BELIEF, Replay, drawn_caption};
 use crate::report::style::{self, FAINT_INK, INITIAL, INK, PLANNED, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
@@ -46,7 +46,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let step = [PANEL.0 + GAP.0, shape.area.height + GAP.1];
     let legend_px = counts.len() as f64 * step[0];
     let size = [MARGIN.0 + legend_px, MARGIN.1 + planners.len() as f64 * step[1]];
-    let mut sheet = Sheet::new(size, (shape.area, step), (legend_px, ""), entries(run, []));
+    let mut sheet = FigureLayout::new(size, (shape.area, step), (legend_px, ""), entries(run, []));
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
             let area = sheet.area(column, row as f64);

@@ -4,7 +4,7 @@ use super::ReportFigure;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Sheet, miss_entry, touch_entries};
+use crate::report::legend::{FigureLayout, miss_entry, touch_entries};
 use crate::report::relief::{ON_RELIEF, Relief, ReliefPanel, Space};
 use crate::report::replay::{self, Grid, NO_BELIEF, Replay, drawn_caption};
 use crate::report::style;
@@ -53,7 +53,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX];
     let entries = touch_entries().into_iter().chain(miss_entry(run));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
+    let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
     let [low, high] = space.height_m;
     let axis = Axis::linear(low, high, 5.0);
     let relief = |canvas: &mut Canvas, panel: &ReliefPanel, heights: Vec<Option<f64>>| {

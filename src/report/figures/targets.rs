@@ -5,7 +5,7 @@ use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::Area;
-use crate::report::legend::{Sheet, Swatch, miss_entry};
+use crate::report::legend::{FigureLayout, Swatch, miss_entry};
 use crate::report::replay;
 use crate::report::style::{self, FAINT_INK, INITIAL, PLANNED, dot};
 use crate::report::table::digits;
@@ -63,7 +63,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let width = (LEFT_PX + rows.len() as f64 * step_px).max(WIDTH_MIN_PX);
     let size = [width, TOP_PX + shape.area.height + 60.0];
     let panels = (shape.area, [step_px, 0.0]);
-    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
+    let mut sheet = FigureLayout::new(size, panels, (width - LEFT_PX, ""), entries);
     for (column, row) in rows.iter().enumerate() {
         let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
         let canvas = &mut sheet.canvas;

@@ -3,10 +3,10 @@
 
 use super::panel::{View, inner, scale};
 use super::section::{TRUTH_TRIANGLES, deviation_range};
-use super::{Frame, PlannerSurfaces};
+use super::{PlannerSurfaces, SurfaceFrame};
 use crate::report::axes::{Axis, MM, colour_bar};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{MISS, Sheet, touch_entries};
+use crate::report::legend::{FigureLayout, MISS, touch_entries};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use palpate_geometry::coarse::coarse;
@@ -36,7 +36,8 @@ pub fn figure(
 ) -> Option<String> {
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
     let frames = sequences.iter().flat_map(|sequence| &sequence.frames);
-    let drawn: Vec<&Frame> = frames.filter(|frame| counts.contains(&frame.touches)).collect();
+    let drawn: Vec<&SurfaceFrame> =
+        frames.filter(|frame| counts.contains(&frame.touches)).collect();
     let touches = || sequences.iter().flat_map(|sequence| &sequence.touches);
     let meshes = drawn.iter().map(|frame| &frame.mesh).chain(&truth);
     let contacts = touches().filter_map(|touch| touch.contact_w.as_ref());
@@ -53,7 +54,7 @@ pub fn figure(
     let rows = sequences.iter().flat_map(|it| [false, true].map(|is_behind| (it, is_behind)));
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows.clone().count() as f64 * PANEL.1 + FOOT_PX];
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
+    let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
     let px_per_m = scale(&points, first);
     for (row, (sequence, is_behind)) in rows.enumerate() {
         let area = |column: usize| sheet.area(column, row as f64);

@@ -22,14 +22,14 @@ pub struct PlannerSurfaces {
     /// Name of the planner.
     pub planner: String,
     /// Touches, in order.
-    pub touches: Vec<Touch>,
+    pub touches: Vec<SolidTouch>,
     /// Believed surfaces, by increasing touch count.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<SurfaceFrame>,
 }
 
 /// Touch of a whole object.
 #[derive(Clone, Copy, Debug)]
-pub struct Touch {
+pub struct SolidTouch {
     /// Target point.
     pub aim_w: Point3<f64>,
     /// Unit vector of the finger's motion.
@@ -42,7 +42,7 @@ pub struct Touch {
 
 /// Believed surface.
 #[derive(Clone, Debug, Default)]
-pub struct Frame {
+pub struct SurfaceFrame {
     /// Number of touches.
     pub touches: u32,
     /// Vertices in `W`, in metres, and triangles of them, counter-clockwise seen from outside;
@@ -58,7 +58,7 @@ pub struct Frame {
     pub score: String,
 }
 
-impl Frame {
+impl SurfaceFrame {
     /// Returns the vertices with their normals, σ and errors, coloured by σ from 0 to the largest,
     /// and the triangles; `comments` describe the file.
     pub fn points(&self, comments: Vec<String>) -> PointCloud {

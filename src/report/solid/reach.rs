@@ -3,7 +3,7 @@
 use super::panel::{View, scale};
 use super::section::TRUTH_TRIANGLES;
 use crate::report::canvas::Area;
-use crate::report::legend::{Sheet, Swatch};
+use crate::report::legend::{FigureLayout, Swatch};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
@@ -46,7 +46,7 @@ pub fn picture(
     let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
     let entries = entries.map(|(_, swatch, words)| (swatch, words));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ""), entries);
+    let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ""), entries);
     let px_per_m = scale(&points, first);
     for (column, is_behind) in [false, true].into_iter().enumerate() {
         let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);

@@ -1,9 +1,11 @@
 //! Interactive section of the page: a believed surface touch by touch, to turn and to colour.
 //! Lengths are in millimetres, and meshes are encoded as compact text.
 
-use super::{Frame, PlannerSurfaces, Touch};
+use super::{PlannerSurfaces, SolidTouch, SurfaceFrame};
 use crate::report::axes::{self, MM};
-use crate::report::explorer::{self, LEAST_SHARE, PARTS, Shell, encode, encode_log, short};
+use crate::report::explorer::{
+    self, InteractiveView, LEAST_SHARE, PARTS, encode, encode_log, short,
+};
 use crate::report::style;
 use anyhow::ensure;
 use base64::Engine;
@@ -50,7 +52,7 @@ pub fn section(
         Some(_) => " Green: the true surface in front of the belief.",
         None => "",
     };
-    let shell = Shell {
+    let shell = InteractiveView {
         colours: if data["error_range"].is_null() { &COLOURS[..1] } else { &COLOURS },
         truth: truth.as_ref().map(|_| false),
         class: "surface",
@@ -133,7 +135,7 @@ fn error_range<'a>(errors_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> 
 
 /// Encodes a belief with its values between the ends of deviations and of errors, in metres.
 fn coded<'a>(
-    frame: &'a Frame,
+    frame: &'a SurfaceFrame,
     cube: Cube,
     (deviations, errors): ([f64; 2], Option<[f64; 2]>),
 ) -> anyhow::Result<Value> {
@@ -157,7 +159,7 @@ fn coded<'a>(
 }
 
 /// Returns a touch, relative to the middle of everything.
-fn marked(touch: &Touch, cube: Cube) -> Value {
+fn marked(touch: &SolidTouch, cube: Cube) -> Value {
     let from_middle = |p_w| <[f64; 3]>::from((p_w - cube.middle()) * MM.per_m).map(short);
     json!({
         "aim": from_middle(touch.aim_w),

@@ -5,7 +5,7 @@ mod robot;
 mod scenery;
 mod text;
 
-use super::environment::{CLEARANCE_M, Environment, Surface};
+use super::environment::{CLEARANCE_M, Environment, ObjectShape};
 use super::scene::Scene;
 use super::solver::{Collision, Integrator, Sdf};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -130,7 +130,7 @@ fn collision_geometry(environment: &Environment) -> Option<String> {
 /// can meet from targets in the zone; places where the approach meets nothing get the lowest
 /// height.
 fn height_field(environment: &Environment) -> Option<String> {
-    let Surface::Mesh { bvh, .. } = environment.shape() else { return None };
+    let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return None };
     let (scene, zone) = (environment.scene(), environment.task().zone()?);
     let margin_m = scene.finger.radius_m + scene.finger.length_m;
     let side = |[low, high]: [f64; 2]| [low - margin_m, high + margin_m];

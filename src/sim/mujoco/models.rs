@@ -3,7 +3,7 @@
 
 use super::{Plant, compile, lacking};
 use crate::sim::Environment;
-use crate::sim::environment::{Surface, invalid};
+use crate::sim::environment::{ObjectShape, invalid};
 use crate::sim::finger::plate;
 use crate::sim::mjcf::{self, ModelPurpose};
 use crate::sim::solver::Collision;
@@ -30,13 +30,13 @@ impl CompiledModels {
     /// needs a closed mesh and the object has none.
     pub fn new(environment: &Environment) -> Result<Self, InputError> {
         let step_s = environment.scene().solver.step_s;
-        let whole = Self::at(environment, step_s)?;
+        let whole = Self::with_step(environment, step_s)?;
         let Some(limit) = StepLimit::of(environment, &whole.plant)? else { return Ok(whole) };
         match limit.limit_s {
             limit_s if step_s <= limit_s => Ok(whole),
             limit_s if limit_s >= SHORTEST_S => {
                 let count = (step_s / limit_s).ceil() as u32;
-                let divided = Self::at(environment, step_s / f64::from(count))?;
+                let divided = Self::with_step(environment, step_s / f64::from(count))?;
                 Ok(Self { substeps: Some(Substeps { count, step_s, limit }), ..divided })
             }
             _ => Err(InputError::new(format!(
@@ -50,7 +50,7 @@ impl CompiledModels {
     /// # Errors
     /// If MuJoCo refuses the scene, or the scene's collision needs a closed mesh and the object has
     /// none.
-    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, InputError> {
+    pub fn with_step(environment: &Environment, step_s: f64) -> Result<Self, InputError> {
         check_inside(environment)?;
         let text = mjcf::scene(environment, ModelPurpose::Dynamic { step_s });
         let plant = Arc::new(compile(&text.ok_or_else(|| lacking("an object"))?)?);
@@ -60,7 +60,7 @@ impl CompiledModels {
 
 /// Checks that the mesh is closed if signed distances are needed.
 fn check_inside(environment: &Environment) -> Result<(), InputError> {
-    let Surface::Mesh { report, .. } = environment.shape() else { return Ok(()) };
+    let ObjectShape::Mesh { report, .. } = environment.shape() else { return Ok(()) };
     let edges = report.border_edges.count + report.non_manifold_edges.count;
     match environment.scene().solver.collision {
         Some(Collision::Sdf) if edges > 0 => Err(InputError::new(format!(

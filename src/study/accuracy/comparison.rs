@@ -54,7 +54,7 @@ pub struct AccuracyComparison {
     #[serde(skip)]
     touches: Vec<TouchResults>,
     #[serde(skip)]
-    advantages_m: Vec<Option<f64>>,
+    differences_m: Vec<Option<f64>>,
 }
 
 /// Cheapest scene within a tolerance.
@@ -87,8 +87,8 @@ impl AccuracyComparison {
         let (mut reference, touches) = reference.measured(&scene, &trials, None, None)?;
         let rounds = if effort.pairs == 0 { effort.touches } else { effort.pairs };
         reference.wall_s = median(&wall_times_s([&scene], &trials.targets(), rounds)?.concat());
-        let advantages_m = paired_differences(&scene, effort)?;
-        reference.verdict_m = difference(&paired_differences_m, None);
+        let differences_m = paired_differences(&scene, effort)?;
+        reference.verdict_m = difference(&differences_m, None);
         let criterion = match criterion {
             Some(Criterion::Verdict(m)) => Some(Criterion::Verdict(Some(margin_m(m, &reference)?))),
             other => other,
@@ -103,7 +103,7 @@ impl AccuracyComparison {
             effort,
             trials,
             touches,
-            paired_differences_m,
+            differences_m,
         })
     }
 
@@ -136,16 +136,16 @@ impl AccuracyComparison {
                 .map(|[reference_s, wall_s]| (*wall_s, wall_s / reference_s))
                 .unzip(),
         };
-        let advantages_m = paired_differences(scene, self.effort)?;
+        let differences_m = paired_differences(scene, self.effort)?;
         // If many trials fail, the remaining ones are not comparable.
-        let ended = self.advantages_m.iter().flatten().count() as f64;
-        let change = difference(&paired_differences_m, Some(&self.advantages_m))
+        let ended = self.differences_m.iter().flatten().count() as f64;
+        let change = difference(&differences_m, Some(&self.differences_m))
             .filter(|change| change.trials as f64 >= (1.0 - EXCEEDANCE_MAX) * ended);
         Ok(Variant {
             wall_s: median(&walls_s),
             time_ratio: median(&ratios),
             time_ratio_interval: median_interval(&ratios, 0),
-            verdict_m: difference(&paired_differences_m, None),
+            verdict_m: difference(&differences_m, None),
             verdict_change_m: change,
             ..variant
         })

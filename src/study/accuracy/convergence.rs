@@ -3,7 +3,7 @@
 use super::level::{FidelityLevel, SensorModel};
 use super::touches::{TargetTrials, noise_free};
 use crate::experiment::statistics::mean;
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use crate::sim::probe::resting_pose;
 use crate::sim::scene::SimulatorKind;
 use crate::sim::simulator::Simulator;
@@ -120,7 +120,7 @@ pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<C
             0.01,
         );
         let environment = Environment::build(level.apply(scene))?;
-        let (Some(skin), Surface::Mesh { bvh, .. }) =
+        let (Some(skin), ObjectShape::Mesh { bvh, .. }) =
             (environment.fingertip().and_then(|tip| tip.skin()), environment.shape())
         else {
             return Ok(None);
@@ -167,7 +167,7 @@ fn pressed(environment: &Arc<Environment>) -> anyhow::Result<Option<Vec<f64>>> {
     };
     let home_w = chain.forward(&chain.home).translation.vector;
     let ahead_w = approach.direction_w();
-    let gap_m = (resting_pose.p_wt.coords - home_w).dot(&ahead_w);
+    let gap_m = (rest.p_wt.coords - home_w).dot(&ahead_w);
     let far_m = (gap_m - NEAR_M).max(0.0);
     let ticks = |way_m: f64, speed_m_s: f64| (way_m / (speed_m_s * PERIOD_S)).round() as usize;
     let mut go = |speed_m_s: f64, count: usize| {

@@ -1,7 +1,7 @@
 //! Touches of a scene without sensor noise, so that only the model differs: contacts, loads, times.
 
 use crate::experiment::truth::Truth;
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use crate::sim::finger::FingertipState;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
@@ -161,7 +161,8 @@ pub fn noise_free(scene: &Scene) -> Scene {
 /// the end of its rest on the object; `None` without a skin or a contact.
 pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
     let environment = simulator.environment();
-    let (tip, Surface::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
+    let (tip, ObjectShape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape())
+    else {
         return None;
     };
     let zone = environment.task().zone()?;

@@ -7,7 +7,7 @@ use super::tolerance::{Origin, Tolerance};
 use super::touches::{TargetTrials, TouchResults, finger_bytes, noise_free, surface_rmse_m};
 use super::verdict::Relevance;
 use crate::experiment::statistics::{PairedDifference, median};
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use crate::sim::{Environment, Scene};
 use palpate_explore::probe::Contact;
 use palpate_input::config::Rules;
@@ -182,7 +182,7 @@ fn off_surface_m(environment: &Environment, contact: &Contact) -> Option<f64> {
     let p_wc = contact.p_wc;
     match (environment.nearest_true_point(&p_wc), environment.shape()) {
         (Some(nearest), _) => Some((nearest - p_wc).norm()),
-        (None, Surface::Mesh { bvh, .. }) => Some(bvh.closest_point(&p_wc).distance_m),
-        (None, Surface::Function(_)) => None,
+        (None, ObjectShape::Mesh { bvh, .. }) => Some(bvh.closest_point(&p_wc).distance_m),
+        (None, ObjectShape::Function(_)) => None,
     }
 }

@@ -75,7 +75,7 @@ impl TrialLine {
     pub fn of(row: &TrialRow, experiment: &Experiment) -> Self {
         let values = CHECK_MEASURES
             .iter()
-            .filter_map(|judged| Some((judged.id.to_owned(), (judged.of)(row, experiment)?)))
+            .filter_map(|judged| Some((judged.id.to_owned(), (judged.value)(row, experiment)?)))
             .collect();
         Self {
             trial: row.trial,

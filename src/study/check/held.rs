@@ -136,7 +136,7 @@ fn planner_of(
                 |(new, old): &(&TrialLine, &TrialLine)| Some(value(new)? - value(old)?);
             is_known.then(|| (judged, pairs.iter().filter_map(difference).collect()))
         });
-        judgements = rules.judge(&differences.collect::<Vec<_>>());
+        judgements = rules.evaluate(&differences.collect::<Vec<_>>());
     }
     let verdict = match (is_identical, &failed) {
         (true, _) => Verdict::Identical,
@@ -199,7 +199,10 @@ impl CheckOptions {
 
     /// Evaluates a planner's measures from the differences of its trials; the first measure
     /// decides.
-    pub fn judge(&self, differences: &[(&'static CheckMeasure, Vec<f64>)]) -> Vec<MeasureResult> {
+    pub fn evaluate(
+        &self,
+        differences: &[(&'static CheckMeasure, Vec<f64>)],
+    ) -> Vec<MeasureResult> {
         let sequences: Vec<ConfidenceSequence> = differences
             .iter()
             .map(|(_, values)| ConfidenceSequence::new(values, self.batch, self.alpha))

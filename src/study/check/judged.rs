@@ -17,7 +17,7 @@ pub struct CheckMeasure {
     pub is_log: bool,
     /// Computes its value from the touches after the initial ones; `None` if the trial has no
     /// value.
-    pub of: fn(&TrialRow, &Experiment) -> Option<f64>,
+    pub value: fn(&TrialRow, &Experiment) -> Option<f64>,
 }
 
 /// Lower bound on errors and path lengths before taking the logarithm.
@@ -72,7 +72,7 @@ impl CheckMeasure {
         title: &'static str,
         of: fn(&TrialRow, &Experiment) -> Option<f64>,
     ) -> Self {
-        Self { id, title, is_log: true, of }
+        Self { id, title, is_log: true, value: of }
     }
 
     const fn share(

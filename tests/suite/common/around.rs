@@ -11,7 +11,7 @@ use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::robot::Finger;
 use palpate::sim::Environment;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::task::touch::TouchSettings;
 use palpate::task::{Aim, Approach, Ball, Task};
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub fn simulation(field: Field, settings: &str) -> Simulation {
     let experiment: Experiment = toml::from_str(&text).unwrap();
     let vertices_of = mesh(field);
     let (_, report) = Mesh::new(vertices_of.vertices(), vertices_of.triangles()).unwrap();
-    let shape = Surface::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
+    let shape = ObjectShape::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
     let environment = Environment::with_shape(experiment.scene.clone(), shape).unwrap();
     Simulation::in_environment(experiment, Arc::new(environment)).unwrap()
 }

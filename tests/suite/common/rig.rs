@@ -200,7 +200,7 @@ impl Rig {
     /// Touches places at these fractions of the zone, until one fails.
     pub fn touch(&self, lab: &Arc<RosArm>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
         let task = self.simulator.environment().task();
-        let body = Box::new(lab.body());
+        let body = Box::new(lab.backend());
         let mut servo = match self.simulator.servo_within(body, 0, &self.settings.interlocks) {
             Ok(servo) => servo,
             Err(fault) => return vec![Err(fault)],

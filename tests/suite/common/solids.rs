@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use ndshape::{RuntimeShape, Shape};
 use palpate::geometry::mesh::Mesh;
 use palpate::geometry::solids::Triangles;
-use palpate::report::solid::{Frame, PlannerSurfaces, Touch};
+use palpate::report::solid::{PlannerSurfaces, SolidTouch, SurfaceFrame};
 
 /// Radius of the ring's centre line about y, and of its tube.
 const RING_M: f64 = 0.045;
@@ -61,7 +61,7 @@ pub fn ring() -> Mesh {
 
 /// A belief after `touches` of `most`: between ball and ring, with the smallest deviation near
 /// touches.
-fn frame(touches: &[Touch], most: usize, cell_m: f64) -> Frame {
+fn frame(touches: &[SolidTouch], most: usize, cell_m: f64) -> SurfaceFrame {
     let share = touches.len() as f64 / most as f64;
     let blend = |p_w: &Point3<f64>| {
         let ball_m = (p_w.coords - MIDDLE).norm() - BALL_M;
@@ -73,7 +73,7 @@ fn frame(touches: &[Touch], most: usize, cell_m: f64) -> Frame {
         let near_m = contacts.map(|contact| (contact - p_w).norm()).fold(0.1, f64::min);
         2e-4 + 0.012 * (1.0 - (-(near_m / 0.03).powi(2)).exp())
     };
-    Frame {
+    SurfaceFrame {
         touches: touches.len() as u32,
         sd_m: mesh.0.iter().map(sd_m).collect(),
         error_m: mesh.0.iter().map(ring_m).collect(),
@@ -85,7 +85,7 @@ fn frame(touches: &[Touch], most: usize, cell_m: f64) -> Frame {
 /// A planner's touches from all sides, with a miss every seventh time, and its beliefs after each
 /// from the fourth on.
 pub fn sequence(planner: &str, most: usize, cell_m: f64) -> PlannerSurfaces {
-    let touches: Vec<Touch> = (0..most)
+    let touches: Vec<SolidTouch> = (0..most)
         .map(|i| {
             // Golden angles spread directions evenly, from a different start for each planner.
             let height = 1.0 - 2.0 * (i as f64 + 0.5) / most as f64;
@@ -94,7 +94,7 @@ pub fn sequence(planner: &str, most: usize, cell_m: f64) -> PlannerSurfaces {
             let out = Vector3::new(across * cosine, across * sine, height);
             let flat = Vector3::new(out.x, 0.0, out.z).normalize() * RING_M;
             let aim_w = Point3::from(MIDDLE + flat + out * TUBE_M);
-            Touch {
+            SolidTouch {
                 aim_w,
                 along_w: -out,
                 contact_w: (i % 7 != 6).then_some(aim_w),

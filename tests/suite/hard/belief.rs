@@ -135,7 +135,7 @@ fn smooth(count: u32) -> Vec<(f64, f64)> {
 
 fn observations(touches: &[(f64, f64)]) -> Observations {
     let mut all = Observations::new(1);
-    touches.iter().for_each(|(x, y)| all.push(&[*x], *y));
+    touches.iter().for_each(|(x, y)| all.push_height(&[*x], *y));
     all
 }
 

@@ -7,7 +7,7 @@ use palpate::error::InputError;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::sim::environment::Surface;
+use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::study::accuracy::touches::{ReferenceLoad, reference_load};
@@ -69,7 +69,7 @@ pub fn touch_solid_with(
 
 /// Builds the environment of `scene` with `mesh` as its object.
 pub fn environment_of(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, InputError> {
-    let shape = Surface::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
+    let shape = ObjectShape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     Environment::with_shape(scene, shape).map(Arc::new)
 }
 
@@ -119,7 +119,7 @@ impl CheckedTouch {
     }
 
     fn off_surface_m(&self) -> Option<f64> {
-        let Surface::Mesh { bvh, .. } = self.environment.as_ref()?.shape() else { return None };
+        let ObjectShape::Mesh { bvh, .. } = self.environment.as_ref()?.shape() else { return None };
         Some(bvh.closest_point(&self.contact()?.p_wc).distance_m)
     }
 
@@ -138,7 +138,7 @@ impl CheckedTouch {
         let Some((environment, load)) = self.environment.as_ref().zip(self.load.as_ref()) else {
             return Outcome::Stable;
         };
-        let Surface::Mesh { bvh, .. } = environment.shape() else { return Outcome::Stable };
+        let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return Outcome::Stable };
         let centre = load.motion.x_wt.translation.vector.into();
         let apart_m = bvh.closest_point(&centre).distance_m;
         let least_m = CORE_SHARE * environment.scene().finger.radius_m;

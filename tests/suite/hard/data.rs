@@ -21,7 +21,7 @@ fn spread(count: u32) -> Vec<f64> {
 
 fn data(pairs: impl IntoIterator<Item = (f64, f64)>) -> Observations {
     let mut touches = Observations::new(1);
-    pairs.into_iter().for_each(|(x, y)| touches.push(&[x], y));
+    pairs.into_iter().for_each(|(x, y)| touches.push_height(&[x], y));
     touches
 }
 
@@ -176,7 +176,7 @@ fn active_touch_escapes_the_toys_lattice() {
     assert_eq!(alias.hyperparameters.length_scales, flat.hyperparameters.length_scales);
     for _ in 0..17 {
         let next = least_sure(&posterior);
-        touches.push(&[next], toy(next));
+        touches.push_height(&[next], toy(next));
         posterior = believe("off the lattice", &touches, 0.0, 4.0).1;
     }
     assert!(posterior.hyperparameters().length_scales[0] < 0.25);

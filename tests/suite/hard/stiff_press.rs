@@ -162,8 +162,8 @@ impl WallPress {
 
     /// Force with steps of `step_s`, pressed for `pressed_s`.
     fn force(&self, step_s: f64, pressed_s: f64) -> Result<PressForce, String> {
-        let models =
-            CompiledModels::at(&self.environment, step_s).map_err(|error| error.to_string())?;
+        let models = CompiledModels::with_step(&self.environment, step_s)
+            .map_err(|error| error.to_string())?;
         let mut body = DynamicBackend::new(&self.environment, &models).map_err(|_| "no body")?;
         let resting_s = self.way_m / APPROACH_M_S + pressed_s - LOOK_S;
         let (mut peak_n, mut resting) = (0.0_f64, Vec::new());
@@ -296,7 +296,8 @@ fn long(ticks: f64) -> Outcome {
     };
     let run = || -> Result<Outcome, Fault> {
         let lost = Fault::Lost { time_s: 0.0 };
-        let models = CompiledModels::at(&press.environment, 0.002).map_err(|_| lost.clone())?;
+        let models =
+            CompiledModels::with_step(&press.environment, 0.002).map_err(|_| lost.clone())?;
         let mut body = DynamicBackend::new(&press.environment, &models)?;
         let chain = press.environment.chain().ok_or(lost)?;
         let mut last = Reading::default();

@@ -58,10 +58,10 @@ pub enum Fault {
     },
     /// A movement within reach exceeded its timeout: an obstacle blocks it, or the joints do not
     /// follow.
-    #[error("at {time_s:.3} s the movement to {phase} timed out; joints at {q:.3?}")]
+    #[error("at {time_s:.3} s the movement to {goal} timed out; joints at {q:.3?}")]
     Late {
         /// Target of the movement.
-        phase: &'static str,
+        goal: &'static str,
         /// Time since reset, s.
         time_s: f64,
         /// Joint positions, rad or m.

@@ -48,7 +48,7 @@ impl HeightField {
         let contacts = Observations::new(zone.dimension());
         Self {
             ceiling: settings.free_space.then(|| FreeSpaceBound::new(&zone)),
-            kernels: KernelSelection::between(settings.kernel.names()),
+            kernels: KernelSelection::new(settings.kernel.names()),
             presence: SurfaceEvidence::new(&zone),
             has_missed: false,
             zone,
@@ -68,7 +68,7 @@ impl HeightField {
         self.has_missed = *touch == Touch::Miss;
         let reached = match touch {
             Touch::Contact(contact) => {
-                self.presence.met(target, &contact.p_wc);
+                self.presence.add_contact(target, &contact.p_wc);
                 let place = self.zone.place(&contact.p_wc);
                 let height = self.zone.height_m(&contact.p_wc);
                 let slope = self.slope(&contact.normal_w);
@@ -87,7 +87,7 @@ impl HeightField {
     /// Adds the volume swept by the last touch: the surface is below it after a contact, and absent
     /// there after a miss.
     pub fn observe_swept(&mut self, swept: &SweptVolume) {
-        self.presence.passed(swept, self.has_missed);
+        self.presence.add_hull(swept, self.has_missed);
         if let Some(ceiling) = self.ceiling.as_mut().filter(|_| !self.has_missed) {
             ceiling.lower(&self.zone, swept);
         }
@@ -143,7 +143,7 @@ impl HeightField {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn condition(&mut self, fit: &Fit) -> Result<(), CovarianceError> {
-        self.kernels.follow(fit);
+        self.kernels.select(fit);
         let (posterior, _) = self.posterior(fit.hyperparameters.clone())?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
@@ -172,7 +172,7 @@ impl HeightField {
             }
         };
         if let Some(ceiling) = &self.ceiling {
-            ceiling.cut(&mut posterior, &self.presence.silhouette());
+            ceiling.truncate(&mut posterior, &self.presence.silhouette());
         }
         Ok((posterior, left_sd))
     }

@@ -30,11 +30,11 @@ pub struct HandEyeEstimate {
     /// Pose of the body.
     pub body: CalibrationBody,
     /// Indentation of the finger before contact is detected; see [`Outline::meet`].
-    pub give_m: f64,
+    pub indentation_m: f64,
     /// Gain of the lateral contact position: measured over actual.
     pub gain: f64,
     /// Measured lateral position of a central contact.
-    pub aside_m: f64,
+    pub lateral_offset_m: f64,
 }
 
 /// Number of fitted parameters: three each for the finger's position, its rotation and the body,
@@ -89,9 +89,9 @@ impl<'a> HandEyeFit<'a> {
         HandEyeEstimate {
             correction: Isometry3::identity(),
             body,
-            give_m: START_M,
+            indentation_m: START_M,
             gain: 1.0,
-            aside_m: 0.0,
+            lateral_offset_m: 0.0,
         }
     }
 }
@@ -114,9 +114,9 @@ impl Problem for HandEyeFit<'_> {
                 turn * state.correction.rotation,
             ),
             body: state.body.moved(body.into()),
-            give_m: state.give_m + step[9] * GIVE_M,
+            indentation_m: state.indentation_m + step[9] * GIVE_M,
             gain: state.gain + step[10] * GAIN,
-            aside_m: state.aside_m + step[11] * ASIDE_M,
+            lateral_offset_m: state.lateral_offset_m + step[11] * ASIDE_M,
         }
     }
 
@@ -125,16 +125,16 @@ impl Problem for HandEyeFit<'_> {
     fn residuals(&self, state: &HandEyeEstimate) -> DVector<f64> {
         let meetings = self.touches.iter().map(|touch| {
             let x_wt = touch.x_wt * state.correction;
-            self.outline.contact(&state.body, &x_wt, state.give_m)
+            self.outline.contact(&state.body, &x_wt, state.indentation_m)
         });
         let meetings: Vec<(Point3<f64>, f64)> = meetings.collect();
         let depths = (meetings.iter().zip(self.touches))
             .map(|((_, short_m), touch)| (short_m + touch.pressed_m) / DEPTH_SD_M);
         let sides = (self.felt.iter()).map(|&(i, felt_m)| {
-            (felt_m - state.aside_m - state.gain * meetings[i].0.y) / FELT_SD_M
+            (felt_m - state.lateral_offset_m - state.gain * meetings[i].0.y) / FELT_SD_M
         });
         let plausible_m = if self.outline.is_soft() { ASIDE_M } else { ASIDE_EXACT_M };
-        let aside = [state.aside_m / plausible_m];
+        let aside = [state.lateral_offset_m / plausible_m];
         DVector::from_vec(depths.chain(sides).chain(aside).collect())
     }
 

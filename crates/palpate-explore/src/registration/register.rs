@@ -33,9 +33,9 @@ pub struct RegistrationResult {
     /// Number of contacts left out as outliers.
     pub outliers: usize,
     /// Number of misses and interrupted touches.
-    pub lost: usize,
+    pub failed: usize,
     /// Fault that ended the touches early; earlier touches count.
-    pub ended: Option<Fault>,
+    pub fault: Option<Fault>,
 }
 
 impl RegistrationResult {
@@ -58,15 +58,15 @@ impl RegistrationResult {
         sure["body_sd"] = value(Array::from_iter([g, h, i]));
         sure["undetermined"] = value(Array::from_iter(self.undetermined.iter().copied()));
         sure["residual_rms_m"] = value(self.rms_m);
-        sure["give_m"] = value(self.found.give_m);
+        sure["give_m"] = value(self.found.indentation_m);
         sure["gain"] = value(self.found.gain);
         sure["condition"] = value(self.condition);
         for (key, count) in
-            [("contacts", self.contacts), ("outliers", self.outliers), ("lost", self.lost)]
+            [("contacts", self.contacts), ("outliers", self.outliers), ("lost", self.failed)]
         {
             sure[key] = value(count as i64);
         }
-        if let Some(fault) = &self.ended {
+        if let Some(fault) = &self.fault {
             sure["ended"] = value(fault.to_string());
         }
         let mut tables = DocumentMut::new();
@@ -133,7 +133,7 @@ pub fn register(
         });
     }
     let told = conclude(&touches, robot, body, made_count)?;
-    Ok(RegistrationResult { ended: ended.map(|(_, fault)| fault), ..told })
+    Ok(RegistrationResult { fault: ended.map(|(_, fault)| fault), ..told })
 }
 
 /// Fits the poses to `touches`, of `of` that were made.
@@ -163,7 +163,7 @@ pub fn conclude(
         rms_m: (squares / used.len().max(1) as f64).sqrt(),
         contacts: touches.len(),
         outliers: touches.len() - used.len(),
-        lost: of - touches.len(),
-        ended: None,
+        failed: of - touches.len(),
+        fault: None,
     })
 }

@@ -1,6 +1,6 @@
 //! Errors of a configuration, with their place.
 
-use crate::words::brief;
+use crate::words::shorten;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -24,7 +24,7 @@ impl fmt::Display for Origin {
         match self {
             Self::File { path, line: Some(line) } => write!(f, "{}:{line}", path.display()),
             Self::File { path, line: None } => write!(f, "{}", path.display()),
-            Self::Set(text) => write!(f, "--set {}", brief(text)),
+            Self::Set(text) => write!(f, "--set {}", shorten(text)),
         }
     }
 }
@@ -58,7 +58,7 @@ impl ConfigError {
 
     /// Creates the error of a value that is not allowed.
     pub fn not_allowed(origin: Origin, key: String, value: String, allowed: String) -> Self {
-        let message = format!("`{key}` = {}: allowed is {allowed}", brief(&value));
+        let message = format!("`{key}` = {}: allowed is {allowed}", shorten(&value));
         let (key, value, allowed) = (Some(key), Some(value), Some(allowed));
         Self { key, value, allowed, ..Self::new(origin, message) }
     }
@@ -70,7 +70,7 @@ impl ConfigError {
         value: Option<String>,
         allowed: String,
     ) -> Self {
-        let shown = value.as_ref().map_or(String::new(), |value| format!(" = {}", brief(value)));
+        let shown = value.as_ref().map_or(String::new(), |value| format!(" = {}", shorten(value)));
         let message = format!("`{key}`{shown}: {allowed}");
         Self { key: Some(key), value, allowed: Some(allowed), ..Self::new(origin, message) }
     }
@@ -85,7 +85,7 @@ impl ConfigError {
     pub(super) fn assignment(text: &str) -> Self {
         let message = format!(
             "--set {}: use key=value, with dots between tables, e.g. gp.noise=[1e-4,0.1]",
-            brief(text)
+            shorten(text)
         );
         Self { message, origin: None, key: None, value: Some(text.into()), allowed: None }
     }

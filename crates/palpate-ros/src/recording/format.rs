@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::{Capabilities, Command, IdealContact, Reading, Sample, Wrench};
 use palpate_explore::robot::finger::Frame;
 use palpate_input::error::InputError;
-use palpate_input::words::brief;
+use palpate_input::words::shorten;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -98,7 +98,7 @@ fn number<T: FromStr>(texts: &BTreeMap<String, String>, name: &str) -> Result<T,
 }
 
 fn bad(texts: &BTreeMap<String, String>, name: &str) -> InputError {
-    let found = texts.get(name).map_or("missing".into(), |found| format!("\"{}\"", brief(found)));
+    let found = texts.get(name).map_or("missing".into(), |found| format!("\"{}\"", shorten(found)));
     InputError::new(format!("in its metadata `{name}` is {found}"))
 }
 

@@ -26,7 +26,7 @@ pub struct RecordedTrial {
     /// Touches.
     pub touches: Vec<TouchMessage<'static>>,
     /// Number of touches made before the recording began, in a trial that was continued.
-    pub made: usize,
+    pub earlier_touches: usize,
     /// Number of ticks, including resets.
     pub tick_count: usize,
     /// End of the trial; `None` for a truncated file.
@@ -42,14 +42,16 @@ impl RecordedTrial {
     /// If it cannot be read, or is not a recording or is damaged. A truncated file is not damaged:
     /// it ends early.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Self::of(files::bytes(path, FILE_MAX).map_err(|error| InputError::new(error.to_string()))?)
+        Self::from_bytes(
+            files::bytes(path, FILE_MAX).map_err(|error| InputError::new(error.to_string()))?,
+        )
     }
 
     /// Reads the recording in `bytes`.
     ///
     /// # Errors
     /// The errors of [`read`](Self::read).
-    pub fn of(bytes: Vec<u8>) -> Result<Self, InputError> {
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self, InputError> {
         let bytes: Arc<[u8]> = bytes.into();
         let (mut about, mut ending) = (None, None);
         let (mut touches, mut made, mut tick_count) = (Vec::new(), 0, 0);
@@ -70,7 +72,7 @@ impl RecordedTrial {
                 "not a palpate recording, or truncated at the start: the metadata `palpate` is missing",
             )
         })?;
-        Ok(Self { about, touches, made, tick_count, ending, bytes })
+        Ok(Self { about, touches, earlier_touches: made, tick_count, ending, bytes })
     }
 
     /// Returns its ticks, from the first.

@@ -5,7 +5,7 @@ mod reach;
 pub use reach::FingerReach;
 
 use crate::sim::Environment;
-use crate::sim::environment::Surface;
+use crate::sim::environment::ObjectShape;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::around::Surface;
 use palpate_explore::task::approach::attitude;
@@ -125,7 +125,7 @@ impl TrueShape {
     /// closed; `None` for other environments.
     pub fn from_environment(environment: &Environment) -> Option<Self> {
         let ball = environment.task().ball()?;
-        let Surface::Mesh { bvh, report } = environment.shape() else { return None };
+        let ObjectShape::Mesh { bvh, report } = environment.shape() else { return None };
         let shape = Self::new(bvh.clone(), report.is_closed());
         if !report.is_closed() {
             return Some(shape);
@@ -152,7 +152,7 @@ impl TrueShape {
 
     /// Adds the part that a finger can touch.
     pub fn with_reach(self, reach: &FingerReach) -> Self {
-        let is_reachable = Some(reach.touches(&self.bvh, &self.samples));
+        let is_reachable = Some(reach.reachable(&self.bvh, &self.samples));
         Self { is_reachable, ..self }
     }
 

@@ -37,7 +37,7 @@ impl FingerReach<'_> {
     /// side are tried.
     ///
     /// The mesh must be closed; its outside is the free space.
-    pub fn touches(&self, mesh: &MeshBvh, spots: &[SurfacePoint]) -> Vec<bool> {
+    pub fn reachable(&self, mesh: &MeshBvh, spots: &[SurfacePoint]) -> Vec<bool> {
         let spread: Vec<UnitVector3<f64>> = directions(DIRECTIONS).collect();
         let (low, high) = mesh.mesh().bounds();
         let tolerance_m = TOLERANCE * (high - low).norm();

@@ -76,7 +76,7 @@ pub struct HeldOutResult {
 
 impl HeldOutResult {
     /// Returns the score over all loads.
-    pub fn whole(&self) -> Score {
+    pub fn overall(&self) -> Score {
         Score::of(self.loads.iter().map(|(_, score)| score))
     }
 }

@@ -32,5 +32,5 @@ impl Validate for CollisionEffect {
 impl Effect for CollisionEffect {
     type State = ();
 
-    const NEEDS: Requirement = Requirement::Nothing;
+    const REQUIRES: Requirement = Requirement::Nothing;
 }

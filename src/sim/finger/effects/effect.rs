@@ -15,7 +15,7 @@ pub trait Effect: Validate + Clone + Default + 'static {
     type State: Clone + Debug + Default;
 
     /// The effect that this one requires.
-    const NEEDS: Requirement = Requirement::Skin;
+    const REQUIRES: Requirement = Requirement::Skin;
 
     /// Whether the effect fills a channel of the tactile frame.
     const FILLS_FRAMES: bool = false;

@@ -74,7 +74,7 @@ fn check_resolution(skin: &SkinEffect, rules: &mut Rules) {
 impl Effect for SkinEffect {
     type State = ();
 
-    const NEEDS: Requirement = Requirement::Nothing;
+    const REQUIRES: Requirement = Requirement::Nothing;
 }
 
 /// Skin of a fingertip; constant.

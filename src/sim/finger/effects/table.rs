@@ -45,7 +45,7 @@ macro_rules! effects {
         impl Effects {
             /// Returns every effect with its defaults.
             pub fn all() -> Self {
-                Self { $($name: Some(<$Effect>::complete()),)* ..Self::default() }
+                Self { $($name: Some(<$Effect>::full_settings()),)* ..Self::default() }
             }
 
             /// Returns whether a tactile frame has any channel.

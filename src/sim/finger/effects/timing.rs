@@ -32,7 +32,7 @@ fn check_timing(timing: &TimingEffect, rules: &mut Rules) {
 impl Effect for TimingEffect {
     type State = ();
 
-    const NEEDS: Requirement = Requirement::Frames;
+    const REQUIRES: Requirement = Requirement::Frames;
 
     /// Returns the switch of the whole effect, and that of the command delay alone, with frames as
     /// close to those without `[timing]` as its settings allow: one in each batch.

@@ -99,7 +99,7 @@ impl CollisionMonitor {
 
 impl Interlock for CollisionMonitor {
     fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
-        let ahead = StoppingPath::of(now, qdot, self.reaction_s);
+        let ahead = StoppingPath::new(now, qdot, self.reaction_s);
         let limit = self.clearance_m;
         if let Some((q, distance_m)) = &self.looked
             && distance_m - ahead.farthest_m(q) > limit

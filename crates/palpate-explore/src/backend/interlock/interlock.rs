@@ -48,7 +48,7 @@ pub struct RobotState {
     pub sent: Joints,
     /// Commanded movement of each joint since its position reading last changed, rad or m: how far
     /// the robot may be beyond `q`.
-    pub unseen: Joints,
+    pub unconfirmed_motion: Joints,
     /// Pose of the fingertip.
     pub x_wt: Isometry3<f64>,
     /// Jacobian at the fingertip.
@@ -110,9 +110,9 @@ impl<'a> StoppingPath<'a> {
     /// Returns the path if `qdot` is commanded for one tick, takes effect `reaction_s` later, and
     /// is then braked; and if the robot has moved as commanded since its position reading last
     /// changed.
-    pub fn of(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> Self {
+    pub fn new(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> Self {
         let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
-        Self { now, from: now.q, by: now.unseen + qdot * time_s }
+        Self { now, from: now.q, by: now.unconfirmed_motion + qdot * time_s }
     }
 
     /// Returns the largest motion of any point of the robot until the end of the path, with the

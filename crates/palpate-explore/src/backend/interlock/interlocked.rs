@@ -62,7 +62,7 @@ impl Interlocked {
                 q,
                 qdot: Joints::zeros(),
                 sent: Joints::zeros(),
-                unseen: Joints::zeros(),
+                unconfirmed_motion: Joints::zeros(),
                 x_wt,
                 jacobian: Jacobian::zeros(),
                 load: None,
@@ -120,9 +120,9 @@ impl Interlocked {
         now.time_s = reading.time_s;
         // The robot rests during a pause between two ticks.
         let moved_s = passed_s.clamp(0.0, HELD_TICKS * now.period_s);
-        let unseen = (now.unseen + now.sent * moved_s)
+        let unseen = (now.unconfirmed_motion + now.sent * moved_s)
             .zip_map(&(now.q - before), |unseen, by| if by == 0.0 { unseen } else { 0.0 });
-        now.unseen = unseen;
+        now.unconfirmed_motion = unseen;
         (now.x_wt, now.jacobian) = now.chain.jacobian(&now.q);
         now.load = reading.wrench.map(|Wrench { force_n, torque_nm }| {
             let rest = *self.rest.get_or_insert(Wrench { force_n, torque_nm });
@@ -254,7 +254,7 @@ impl Backend for Interlocked {
         self.way_back.postures.clear();
         (self.fault, self.rest) = (None, None);
         (self.now.tick, self.now.sent) = (0, Joints::zeros());
-        (self.now.unseen, self.now.time_s) = (Joints::zeros(), self.reading.time_s);
+        (self.now.unconfirmed_motion, self.now.time_s) = (Joints::zeros(), self.reading.time_s);
         self.take().map_err(|fault| self.latch(fault))?;
         Ok(&self.reading)
     }

@@ -69,8 +69,8 @@ struct Standstill {
 impl Interlock for Standstill {
     fn reading(&mut self, now: &RobotState, _: &Reading) -> Result<(), Trip> {
         for (i, joint) in now.chain.joints.iter().enumerate() {
-            let unseen_m = now.unseen[i].abs() * now.reaches_m[i];
-            if now.unseen[i] == 0.0 {
+            let unseen_m = now.unconfirmed_motion[i].abs() * now.reaches_m[i];
+            if now.unconfirmed_motion[i] == 0.0 {
                 self.since_s[i] = None;
                 continue;
             }

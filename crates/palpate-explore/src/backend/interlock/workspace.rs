@@ -63,7 +63,7 @@ impl WorkspaceBox {
 
 impl Interlock for Workspace {
     fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
-        let ahead = StoppingPath::of(now, qdot, self.reaction_s);
+        let ahead = StoppingPath::new(now, qdot, self.reaction_s);
         let farthest_m = ahead.farthest_m(&now.q);
         for room in &self.rooms {
             if room.clearance_m(now, &now.q) > farthest_m {
@@ -87,7 +87,7 @@ struct Depth {
 impl Interlock for Depth {
     fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
         let left_m = |p_w| self.margin_m - self.space.distance_m(&p_w);
-        let ahead = StoppingPath::of(now, qdot, self.reaction_s);
+        let ahead = StoppingPath::new(now, qdot, self.reaction_s);
         if left_m(now.x_wt.translation.vector.into()) > ahead.farthest_m(&now.q) {
             return Ok(());
         }

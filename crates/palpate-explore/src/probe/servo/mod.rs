@@ -241,7 +241,7 @@ impl Servo {
                 return Ok(());
             }
             if time_s > deadline_s {
-                return Err(Fault::Late { phase: "home", time_s, q: q.clone() });
+                return Err(Fault::Late { goal: "home", time_s, q: q.clone() });
             }
         }
     }
@@ -278,7 +278,7 @@ impl Servo {
             Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
                 Fault::OutOfReach { goal: phase, time_s, distance_m, angle_rad }
             }
-            _ => Fault::Late { phase, time_s, q: self.q.clone() },
+            _ => Fault::Late { goal: phase, time_s, q: self.q.clone() },
         }
     }
 

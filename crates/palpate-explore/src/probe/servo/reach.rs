@@ -148,7 +148,7 @@ impl ArmReach {
 
     /// Returns the clearance constraints, with this fraction of the margins.
     fn clear(&self, around: &Ball, slack: f64) -> ClearanceConstraints {
-        ClearanceConstraints::of(around, &self.robot, self.standoff_m, slack)
+        ClearanceConstraints::new(around, &self.robot, self.standoff_m, slack)
     }
 
     /// Moves around the object from `q` to `to`; returns the final joints and the stop on the way,
@@ -301,7 +301,7 @@ const MARGIN_PLANNED: f64 = 1.0;
 impl ClearanceConstraints {
     /// Returns the constraints for the ball that a finger of `robot` travels `around`, at
     /// `standoff_m` from it, with this fraction of the margins.
-    fn of(around: &Ball, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
+    fn new(around: &Ball, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
         let radius_m = around.radius_m - standoff_m - robot.finger.bulge_m();
         let home_w = Point3::from(robot.chain.forward(&robot.chain.home).translation.vector);
         let [beyond, margin] =

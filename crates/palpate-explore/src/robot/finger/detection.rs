@@ -22,7 +22,7 @@ pub enum ContactChannels {
 
 impl ContactChannels {
     /// Whether a sensor with these channels supports this detection.
-    pub fn is_heard(self, pressure: bool, electrodes: bool) -> bool {
+    pub fn is_supported(self, pressure: bool, electrodes: bool) -> bool {
         let [by_pressure, by_electrodes] = self.by();
         by_pressure && pressure || by_electrodes && electrodes
     }
@@ -115,7 +115,7 @@ impl Detector {
         let Some(tare) = &self.tare else { return false };
         let pressure = tare.pdc_counts.is_some() && frame.pdc_counts.is_some();
         let electrodes = tare.electrode_counts.is_some() && frame.electrode_counts.is_some();
-        self.detection.by.is_heard(pressure, electrodes)
+        self.detection.by.is_supported(pressure, electrodes)
     }
 
     /// Updates with a frame and returns whether there is contact. A frame without usable channels
