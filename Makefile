@@ -212,11 +212,13 @@ test-python: install-python
 	# Runs outside the source folder, so that the installed package is tested.
 	cd python/tests && $(abspath $(DEPS)/python/bin/pytest)
 
-# Builds the guides and the Python reference as a site in target/docs-site; a broken link is an error. It always
-# rebuilds all pages, because Sphinx does not repeat warnings for unchanged pages.
+# Builds the guides and the references of Python and Rust as a site in target/docs-site; a broken link is an error.
+# It always rebuilds all pages, because Sphinx does not repeat warnings for unchanged pages.
 docs: install-python
 	rm -rf target/docs-site
 	$(DEPS)/python/bin/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -c docs -d target/docs-tree . target/docs-site
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
+	cp -r target/doc target/docs-site/rust
 
 # Runs the notebooks and stores their outputs, to be committed.
 notebooks: install-python

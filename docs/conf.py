@@ -1,4 +1,4 @@
-"""The site of these pages, built by `make docs`.
+"""The site of these pages, built by `make docs`, which adds the Rust API as the folder `rust`.
 
 The source is the whole repository, so that a link means on the site what it means in the files: to another page, or
 to a file, which is then copied. Warnings are errors, so that a link to nothing ends the build.
@@ -6,6 +6,8 @@ to a file, which is then copied. Warnings are errors, so that a link to nothing 
 
 import re
 from pathlib import Path
+
+from sphinx.errors import ExtensionError
 
 ROOT = Path(__file__).parents[1]
 
@@ -84,10 +86,17 @@ hard-cases
 """
 
 
+# The command for the Rust API in the index, and the link that replaces it: the site contains the API.
+RUST_COMMAND = "Rust by `cargo doc --no-deps --open`"
+RUST_LINK = '<a href="../rust/palpate/index.html">Rust</a>'
+
+
 def add_contents(app, docname, source):
-    """Appends the sidebar's list to the index."""
+    """Links the Rust API from the index, and appends the sidebar's list."""
     if docname == root_doc:
-        source[0] += CONTENTS
+        if RUST_COMMAND not in source[0]:
+            raise ExtensionError(f"{docname} lacks the text {RUST_COMMAND}")
+        source[0] = source[0].replace(RUST_COMMAND, RUST_LINK) + CONTENTS
 
 
 # Docstrings of attributes as they are written, by name.
