@@ -196,7 +196,7 @@ pub(crate) struct Episode {
     score: f64,
     /// Number of touches made.
     pub(crate) count: usize,
-    /// Rows of the touches, from `World::told`.
+    /// Rows of the touches, from `ExplorationScene::told`.
     pub(crate) observations: Vec<f32>,
     /// Means, then standard deviations on the grid, in the unit of heights.
     pub(crate) believed: Vec<f32>,

@@ -32,7 +32,7 @@ fn showing_slow<T>(
 }
 
 /// Shows each step of `begun` that runs longer than `patience`. Of many shorter steps it shows one
-/// every [`SEVERAL`] times `patience`.
+/// every [`REPORT_INTERVAL`] times `patience`.
 fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) {
     let mut shown = Instant::now();
     while let Ok(mut step) = begun.recv() {

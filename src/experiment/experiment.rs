@@ -1,6 +1,6 @@
 //! Experiments: planners × trials on one scene.
 //!
-//! Only the [`Experiment::identity`] decides what a row contains. Other settings may change on a
+//! Only the [`Experiment::row_settings`] decides what a row contains. Other settings may change on a
 //! finished run: new trials and planners are added to the existing rows. Rows of trials or planners
 //! that are no longer listed are kept but not shown.
 

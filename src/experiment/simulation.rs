@@ -102,7 +102,7 @@ impl Simulation {
         Ok(Self { scan_notice: scanned, ..Self::made(experiment, truth)? })
     }
 
-    /// Builds the simulation as [`within`](Self::within) does, with a ground truth sampled before.
+    /// Builds the simulation as [`in_environment`](Self::in_environment) does, with a ground truth sampled before.
     /// Without a known truth only truth-free measures are computed.
     ///
     /// # Errors

@@ -72,7 +72,7 @@ pub(super) fn unreachable_directions(task: &Task, foot_w: &Point3<f64>) -> Optio
 const MISMATCH_RATIO: f64 = 20.0;
 
 // Largest ratio of sizes at which an object fits its zone.
-// heuristic: far below `MISMATCH`.
+// heuristic: far below `MISMATCH_RATIO`.
 const FIT_RATIO_MAX: f64 = 5.0;
 
 /// Returns a notice if the object, which spans `low` to `high` in the frame of `zone`, is far

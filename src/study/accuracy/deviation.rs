@@ -139,7 +139,7 @@ impl TouchShare {
     }
 }
 
-/// Returns the share at which `k` or more of `n` have probability [`TAIL`].
+/// Returns the share at which `k` or more of `n` have probability [`TAIL_PROBABILITY`].
 fn lower(k: f64, n: f64) -> f64 {
     let (mut low, mut high) = (0.0, if k > 0.0 { k / n } else { 0.0 });
     for _ in 0..60 {

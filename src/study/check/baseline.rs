@@ -57,7 +57,7 @@ pub struct TrialLine {
     /// Reason of a failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Values of its measures, by [`Judged::id`](super::judged::Judged::id).
+    /// Values of its measures, by [`CheckMeasure::id`](super::judged::CheckMeasure::id).
     pub values: BTreeMap<String, f64>,
 }
 

@@ -43,7 +43,7 @@ pub struct HeightField {
 }
 
 impl HeightField {
-    /// Creates a belief without data. Kernels are selected [`between`](Choice::between).
+    /// Creates a belief without data. Kernels are selected [`between`](KernelSelection::new).
     pub fn new(zone: Zone, settings: GpSettings) -> Self {
         let contacts = Observations::new(zone.dimension());
         Self {

@@ -106,11 +106,11 @@ pub struct PlannerEntry {
     pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
 }
 
-/// Factory of the planners of one name: a built-in [`Entry`], or one that a program adds to its
+/// Factory of the planners of one name: a built-in [`PlannerEntry`], or one that a program adds to its
 /// simulation.
 pub trait PlannerFactory: Send + Sync {
     /// Name in an experiment's list; a name other than a built-in one's is an
-    /// [external](super::is_own) planner's.
+    /// [external](super::is_external) planner's.
     fn name(&self) -> &str;
 
     /// Source text that determines the plans; its hash becomes part of a run's identity. `None` for

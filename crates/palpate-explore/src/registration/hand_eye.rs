@@ -29,7 +29,7 @@ pub struct HandEyeEstimate {
     pub correction: Isometry3<f64>,
     /// Pose of the body.
     pub body: CalibrationBody,
-    /// Indentation of the finger before contact is detected; see [`Outline::meet`].
+    /// Indentation of the finger before contact is detected; see [`Outline::contact`].
     pub indentation_m: f64,
     /// Gain of the lateral contact position: measured over actual.
     pub gain: f64,

@@ -157,7 +157,7 @@ impl Task {
         self.contains(&Target::Aim(*aim))
     }
 
-    /// Approximates [`reaches`](Self::reaches) for this direction and the ball's centre: computed
+    /// Approximates [`is_reachable`](Self::is_reachable) for this direction and the ball's centre: computed
     /// once per cell of directions, for use in searches. Always true without a limit of reach and a
     /// lowest z.
     pub fn is_probably_reachable(&self, aim: &Aim) -> bool {

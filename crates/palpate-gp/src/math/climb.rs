@@ -101,7 +101,7 @@ impl<'a> Climb<'a> {
         (!self.is_done).then_some(&self.asked)
     }
 
-    /// Passes the value and gradient at the [`asked`](Self::asked) place. A value that is not
+    /// Passes the value and gradient at the requested place. A value that is not
     /// finite marks an infeasible place.
     pub fn observe(&mut self, value: f64, gradient: &[f64]) {
         self.top.evaluations += 1;

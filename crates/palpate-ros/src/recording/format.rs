@@ -39,7 +39,7 @@ pub struct TrialEnd {
     pub is_interrupted: bool,
 }
 
-/// Name of the metadata entry of an [`About`].
+/// Name of the metadata entry of an [`RecordingMetadata`].
 pub(super) const ABOUT: &str = "palpate";
 
 /// Name of the metadata entry of an [`Ending`].
