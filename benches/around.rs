@@ -8,10 +8,10 @@
 mod curves;
 
 use curves::{Curve, draw, print, seconds};
-use palpate::explore::around::SpatialGpSettings;
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
+use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
 use palpate::report::style;
 use palpate::sim::probe::exact_probe;

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 use palpate::explore::probe::Touch;
-use palpate::geometry::spread::direction;
+use palpate::geometry::low_discrepancy::direction;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};

@@ -47,5 +47,5 @@ pub use palpate_explore::{backend, robot, task};
 pub use palpate_geometry as geometry;
 pub use palpate_gp as gp;
 pub use palpate_gp::math;
-pub use palpate_input::{config, error, files, words};
+pub use palpate_input::{config, error, files, format};
 pub use palpate_ros as ros;

@@ -3,8 +3,8 @@
 use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::measure::shape::{ShapeMetrics, TrueShape};
 use palpate::experiment::truth::Truth;
-use palpate::explore::around::SpatialGpSettings;
 use palpate::explore::gp_settings::GpSettings;
+use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::sim::Environment;
 
 pub(crate) use palpate::explore::belief::Belief as Known;

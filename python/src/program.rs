@@ -2,7 +2,7 @@
 
 use crate::planner::PythonFactory;
 use palpate::cli::Host;
-use palpate::experiment::trial::entrant;
+use palpate::experiment::trial::planner_names;
 use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
 
@@ -33,5 +33,5 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
 /// Names of the built-in planners.
 #[pyfunction]
 pub(crate) fn planners() -> Vec<&'static str> {
-    entrant::known_planners().map(|(name, _)| name).collect()
+    planner_names::known_planners().map(|(name, _)| name).collect()
 }

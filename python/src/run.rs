@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArrayDyn};
 use palpate::experiment::store;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::report::replay::Replay;
-use palpate::report::{tables, whole};
+use palpate::report::{tables, whole_object};
 use palpate::task;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -103,7 +103,7 @@ impl Run {
         let experiment = &self.0.experiment;
         let known = if experiment.scene.around.is_some() {
             let touches = row.touches.get(..touch as usize).unwrap_or_default();
-            whole::belief(experiment, touches).map_err(errors::other)?.map(Known::from)
+            whole_object::belief(experiment, touches).map_err(errors::other)?.map(Known::from)
         } else {
             let replay = Replay::of(experiment, row, touch).map_err(errors::other)?;
             replay.map(|replay| Known::HeightField(replay.belief))

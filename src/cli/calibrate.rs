@@ -13,7 +13,7 @@ use crate::sim::finger::effects::friction::FrictionEffect;
 use crate::sim::finger::effects::sensor;
 use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::{PlateRecording, Recordings};
-use crate::{files, words};
+use crate::{files, format};
 use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 use serde::de::DeserializeOwned;
@@ -116,7 +116,7 @@ fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
     let name = path.display();
     let text = files::text(path, files::TEXT_MAX).with_context(|| format!("cannot read {name}"))?;
     serde_json::from_str(&text).map_err(|error| {
-        let (line, what) = (error.line(), words::json(&error));
+        let (line, what) = (error.line(), format::json(&error));
         anyhow!("{name}:{line}: not a recording: {what}")
     })
 }

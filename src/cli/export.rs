@@ -9,7 +9,7 @@ use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::report::points::PointCloud;
 use crate::report::replay::{self, Replay};
-use crate::report::{figures, files, style, whole};
+use crate::report::{figures, files, style, whole_object};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
@@ -159,8 +159,8 @@ fn closed_surface(
     let planner = args.planner();
     let of = || format!("{planner} has no fit after {touches} touches");
     let row = replay::row(run, planner).with_context(of)?;
-    let truth = whole::truth(run);
-    let frame = whole::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
+    let truth = whole_object::truth(run);
+    let frame = whole_object::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
     let frame = frame.with_context(of)?;
     ensure!(
         !frame.mesh.1.is_empty(),

@@ -1,7 +1,7 @@
 //! Lookup of experiments and scenes by name: `bird` finds `experiments/bird.toml`.
 
 use anyhow::bail;
-use palpate_input::{files, words};
+use palpate_input::{files, format};
 use std::path::{Path, PathBuf};
 
 /// Folder of the shipped experiments.
@@ -25,7 +25,7 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
         return Ok(found);
     }
     let word = name.to_string_lossy();
-    let known = words::nearest(&word, &file_stems(folder));
+    let known = format::nearest(&word, &file_stems(folder));
     let meant = known.map_or(String::new(), |known| format!(", did you mean `{known}`?"));
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
 }

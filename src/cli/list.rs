@@ -4,7 +4,7 @@ use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::terminal::{Outcome, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::MEASURES;
-use crate::experiment::trial::entrant;
+use crate::experiment::trial::planner_names;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
 use schemars::schema_for;
@@ -75,7 +75,7 @@ fn scenes() -> Vec<[String; 2]> {
 
 /// Names and descriptions of all planners.
 pub(super) fn planners() -> Vec<[String; 2]> {
-    entrant::known_planners().map(|(name, about)| [name, about].map(String::from)).collect()
+    planner_names::known_planners().map(|(name, about)| [name, about].map(String::from)).collect()
 }
 
 fn measures() -> Vec<[String; 2]> {

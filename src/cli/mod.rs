@@ -1,12 +1,12 @@
 //! The command line.
 
 mod accuracy;
-mod align;
 mod calibrate;
 mod check;
 mod columns;
 mod compare;
 mod completions;
+mod deprecated_commands;
 mod export;
 mod find;
 mod host;
@@ -14,20 +14,20 @@ mod known_body;
 mod list;
 mod new;
 mod output;
-mod patience;
 mod plan;
 mod prepare;
 mod progress;
 mod reference;
 mod register;
-mod renamed;
+mod register_cloud;
 mod replay;
 mod report;
 mod run;
 mod scan;
+mod serve;
 mod show;
+mod slow_steps;
 mod terminal;
-mod twin;
 mod watch;
 
 pub use host::Host;
@@ -84,7 +84,7 @@ enum Command {
     /// Measure the error and time of simulation levels and effects of a scene.
     Accuracy(accuracy::Args),
     /// Serve a simulated robot over ROS topics in real time.
-    Twin(twin::Args),
+    Twin(serve::Args),
     /// Register the finger, a ball, a plate or an object by touch.
     Register(register::Args),
     /// Replay a recorded trial and compare commands and results.
@@ -140,15 +140,16 @@ pub fn main(commit: &str) -> ExitCode {
 /// Runs the program for a host on `arguments`, the first of which is the program's name; returns
 /// the exit code.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
-    let outcome =
-        renamed::translate(arguments.into_iter().collect()).and_then(|(arguments, note)| {
+    let outcome = deprecated_commands::translate(arguments.into_iter().collect()).and_then(
+        |(arguments, note)| {
             let cli = Cli::from_arg_matches(&command().get_matches_from(arguments))
                 .unwrap_or_else(|error| error.exit());
             if let Some(note) = note {
                 cli.talk.note(note);
             }
             run_command(cli, host)
-        });
+        },
+    );
     match outcome {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::Failed) => 1,
@@ -171,7 +172,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Compare(args) => compare::run(&args),
         Command::Check(args) => check::run(&args, talk),
         Command::Accuracy(args) => accuracy::run(&args, talk),
-        Command::Twin(args) => twin::run(&args, talk),
+        Command::Twin(args) => serve::run(&args, talk),
         Command::Register(args) => register::run(&args, talk),
         Command::Replay(args) => replay::run(&args, talk),
         Command::Calibrate(args) => calibrate::run(&args),

@@ -1,6 +1,6 @@
 //! Preparation of files for a run: invalid input is an error, likely mistakes are notes on stderr.
 
-use super::patience::report_slow_steps;
+use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;

@@ -1,11 +1,11 @@
 //! `palpate register`.
 
-use super::align::{CloudArgs, align};
 use super::find::{SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;
 use super::output::Overwrite;
 use super::prepare::{prepare_arm, prepare_simulator};
 use super::progress::{progress_bar, step};
+use super::register_cloud::{CloudArgs, align};
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};

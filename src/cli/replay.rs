@@ -5,7 +5,7 @@ use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::trial::recorded_trial::parts;
 use crate::experiment::trial::replay::{self, Difference, Replay};
 use anyhow::Context;
-use palpate_input::words::shorten;
+use palpate_input::format::shorten;
 use palpate_ros::recording::RecordedTrial;
 use serde_json::json;
 use std::path::PathBuf;

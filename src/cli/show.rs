@@ -2,8 +2,8 @@
 
 use super::find::{SCENES, find, is_experiment};
 use super::output::Overwrite;
-use super::patience::report_slow_steps;
 use super::prepare::{check_applicable, prepare_environment, prepare_simulator};
+use super::slow_steps::report_slow_steps;
 use super::terminal::{Outcome, Verbosity, print};
 use super::watch::{WatchArgs, watch};
 use crate::experiment::experiment::Experiment;
@@ -22,7 +22,7 @@ use anyhow::{Context, bail, ensure};
 use nalgebra::{Point3, UnitVector3};
 use palpate_explore::task::{Ball, DIRECTIONS};
 use palpate_geometry::import::import_with;
-use palpate_geometry::spread::directions;
+use palpate_geometry::low_discrepancy::directions;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

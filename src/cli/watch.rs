@@ -9,7 +9,7 @@ use crate::experiment::trial::row::TrialRow;
 use crate::sim::Scene;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
-use palpate_explore::backend::watched::{LiveView, Watched};
+use palpate_explore::backend::live_view::{LiveView, Watched};
 use palpate_explore::planner;
 use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::servo::Servo;

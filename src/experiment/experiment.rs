@@ -6,15 +6,15 @@
 
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::report_settings::{ReportSettings, TOUCHES_MAX};
-use crate::experiment::trial::entrant::{self, ORACLE};
+use crate::experiment::trial::planner_names::{self, ORACLE};
 use crate::experiment::trial::row::TrialId;
 use crate::experiment::truth::scan_truth::ScanTruth;
 use crate::sim::Scene;
-use palpate_explore::around::SpatialGpSettings;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
 use palpate_explore::robot::arm::ArmSettings;
+use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use schemars::JsonSchema;
@@ -333,15 +333,15 @@ impl Validate for Experiment {
                 .into()
         });
         rules.require("planners", "[]", !self.planners.is_empty(), || {
-            entrant::allowed_names("").join(", ")
+            planner_names::allowed_names("").join(", ")
         });
         for (i, name) in self.planners.iter().enumerate() {
             let is_removed = REMOVED.contains(&name.as_str());
             rules.require(&format!("planners[{i}]"), format!("\"{name}\""), !is_removed, || {
-                let names = entrant::allowed_names(name).join(", ");
+                let names = planner_names::allowed_names(name).join(", ");
                 format!("one of {names}; pi and ei were removed")
             });
-            rules.one_of(&format!("planners[{i}]"), name, &entrant::allowed_names(name));
+            rules.one_of(&format!("planners[{i}]"), name, &planner_names::allowed_names(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
             let is_seen = name != ORACLE || self.backend.kind == BackendKind::Simulated;

@@ -1,7 +1,7 @@
 //! Settings of a run's report. They do not affect rows, so they may change on a finished run.
 
 use crate::experiment::measure::MEASURES;
-use crate::experiment::trial::entrant;
+use crate::experiment::trial::planner_names;
 use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -60,7 +60,7 @@ impl Validate for ReportSettings {
         }
         for (key, names) in [("planners", &self.planners), ("baselines", &self.baselines)] {
             for (i, name) in names.iter().enumerate() {
-                rules.one_of(&format!("{key}[{i}]"), name, &entrant::allowed_names(name));
+                rules.one_of(&format!("{key}[{i}]"), name, &planner_names::allowed_names(name));
             }
         }
         rules.optional_number("goal_touches", self.goal_touches.map(f64::from), 1.0..=TOUCHES_MAX);

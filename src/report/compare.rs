@@ -10,10 +10,10 @@ use super::legend::{FigureLayout, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
 use crate::experiment::measure::Direction;
-use crate::experiment::measure::outline::TENTHS;
+use crate::experiment::measure::silhouette::TENTHS;
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::statistics::mean;
-use crate::experiment::trial::entrant::ORACLE;
+use crate::experiment::trial::planner_names::ORACLE;
 use crate::study::compare::{
     BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric, interquartile,
     profile, win_probability,

@@ -28,7 +28,7 @@ pub mod tables {
     pub mod comparison;
     pub mod summary;
 }
-pub mod whole;
+pub mod whole_object;
 
 pub use figures::ReportFigure;
 
@@ -83,7 +83,7 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
     let text =
         |name| palpate_input::files::text(&folder.join(name), palpate_input::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
-    let explorer = explorer::zone::section(run)? + &whole::section(run)?;
+    let explorer = explorer::zone::section(run)? + &whole_object::section(run)?;
     let files = [settings.as_deref(), manifest.as_deref()];
     let html = page::html(run, analysis, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use nalgebra::{Point3, UnitVector3, Vector2};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{DIRECTIONS, Task, Zone};
-use palpate_geometry::spread::directions;
+use palpate_geometry::low_discrepancy::directions;
 
 /// Notice that a soft finger without tables gets those of a BioTac.
 pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger gets the default \

@@ -5,12 +5,12 @@
 //! log RMSE), divided by that of the reference planner in the same trial, so that objects of
 //! different sizes count equally. Smaller is better; the reference has score 1.
 
-use super::check::judged::CHECK_MEASURES;
-use crate::experiment::measure::outline::TENTHS;
+use super::check::measures::CHECK_MEASURES;
+use crate::experiment::measure::silhouette::TENTHS;
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::statistics::{RESAMPLES, central_95, mean};
 use crate::experiment::store::Run;
-use crate::experiment::trial::entrant::ORACLE;
+use crate::experiment::trial::planner_names::ORACLE;
 use crate::experiment::trial::row::{TouchRow, TrialRow, planner_rows};
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;

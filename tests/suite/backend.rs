@@ -3,7 +3,7 @@
 use crate::common::shipped;
 use palpate::backend::delay::DelayedBackend;
 use palpate::backend::interlock::{InterlockSettings, Interlocked, SafetyContext};
-use palpate::backend::watched::Watched;
+use palpate::backend::live_view::Watched;
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::robot::{Finger, Robot};

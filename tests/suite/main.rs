@@ -32,7 +32,6 @@ mod finger;
 mod finger_parts;
 mod finger_signals;
 mod fit;
-mod floors;
 mod folders;
 mod formats;
 mod fuzz;
@@ -47,11 +46,11 @@ mod interlocks;
 mod lab;
 #[cfg(feature = "mujoco")]
 mod lab_faults;
+mod layers;
 mod memory;
 mod meshes;
 mod messages;
 mod models;
-mod needs;
 mod newcomer;
 mod no_truth;
 mod notices;
@@ -64,6 +63,7 @@ mod reach;
 mod recording;
 mod reference;
 mod registration;
+mod relevance;
 mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]

@@ -3,7 +3,7 @@
 use crate::common::program::palpate;
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::study::check::judged::CHECK_MEASURES;
+use palpate::study::check::measures::CHECK_MEASURES;
 use palpate::study::compare::{Entrant, ObjectResult, SuiteComparison, gap_closed, geometric};
 use proptest::prelude::*;
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! Tests of figures and pages of synthetic runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
-use palpate::experiment::measure::outline::SilhouetteMetrics;
 use palpate::experiment::measure::shape::ShapeMetrics;
+use palpate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
 use palpate::experiment::report_settings::Claim;
 use palpate::experiment::statistics::analysis::Analysis;

@@ -3,8 +3,8 @@
 
 use crate::common::around::{belief, belief_with, meet, simulation, trial};
 use nalgebra::{Point3, Vector3};
-use palpate::explore::around::{ImplicitSurface, SpatialGpSettings};
-use palpate::geometry::spread::directions;
+use palpate::explore::whole_object::{ImplicitSurface, SpatialGpSettings};
+use palpate::geometry::low_discrepancy::directions;
 use palpate::task::Aim;
 
 /// Belief after touches of a ball of 40 mm from 30 sides.

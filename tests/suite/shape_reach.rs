@@ -5,8 +5,8 @@ use nalgebra::{UnitVector3, Vector3};
 use palpate::experiment::measure::shape::{FingerReach, TrueShape};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::import::import;
+use palpate::geometry::low_discrepancy::{SurfacePoint, over_surface};
 use palpate::geometry::mesh::Mesh;
-use palpate::geometry::spread::{SurfacePoint, over_surface};
 use palpate::robot::finger::Finger;
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use palpate::math::banded::Banded;
-use palpate::sim::finger::shell::sheet::{Material, Sheet};
+use palpate::sim::finger::shell::elastic_sheet::{Material, Sheet};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 const SILICONE: Material = Material { young_pa: 1.552e6, poisson: 0.3165, thickness_m: 1.6e-3 };

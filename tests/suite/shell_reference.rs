@@ -10,7 +10,7 @@ use palpate::math::banded::{Banded, Factor};
 use palpate::robot::finger::Finger;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::samples::Lattice;
-use palpate::sim::finger::shell::sheet::{Material, Sheet};
+use palpate::sim::finger::shell::elastic_sheet::{Material, Sheet};
 use palpate::sim::finger::shell::springs::UnilateralSprings;
 use std::collections::HashMap;
 

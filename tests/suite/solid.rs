@@ -7,7 +7,7 @@ use crate::page::{CLOCK, DRIVER, browser_or_note, log};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::Point3;
-use palpate::geometry::coarse::coarse;
+use palpate::geometry::decimate::coarse;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
 use palpate::report::files::png;

@@ -7,9 +7,9 @@ use crate::common::rig::ARM;
 use crate::common::rig::{Rig, STAGE, patient};
 use palpate::explore::probe::Touch;
 use palpate::ros::arm::RosArm;
+use palpate::ros::server::serve::services;
 use palpate::ros::settings::BackendSettings;
 use palpate::ros::topics::{CommandMessage, Service, Side, TactileMessage};
-use palpate::ros::twin::serve::services;
 
 /// Compares the contact over topics with that of the body itself at the same place.
 fn compare(scene: &str, settings: BackendSettings) {

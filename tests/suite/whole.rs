@@ -9,14 +9,14 @@ use palpate::experiment::store::Run;
 use palpate::experiment::store::resolved;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
-use palpate::explore::around::{ImplicitSurface, Surface};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner;
 use palpate::explore::planner::Planner;
+use palpate::explore::whole_object::{ImplicitSurface, Surface};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
-use palpate::report::{findings, whole};
+use palpate::report::{findings, whole_object};
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Target};
@@ -51,7 +51,7 @@ fn last_share(row: &TrialRow) -> f64 {
 
 /// The surface after the touches of a row.
 fn surface(simulation: &Simulation, row: &TrialRow) -> Surface {
-    let belief = whole::belief(simulation.experiment(), &row.touches).unwrap().unwrap();
+    let belief = whole_object::belief(simulation.experiment(), &row.touches).unwrap().unwrap();
     belief.surface().unwrap().clone()
 }
 

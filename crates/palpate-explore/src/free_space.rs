@@ -19,8 +19,8 @@
 //! that it then lies below the bound, the odds of no surface are (1 − p) : p·Φ(z): beside an edge
 //! on which the finger came to rest there is no surface, rather than one far below.
 
-use super::presence::Silhouette;
 use super::probe::SweptVolume;
+use super::surface_evidence::Silhouette;
 use crate::task::Zone;
 use palpate_gp::math::normal;
 use palpate_gp::means::FixedPlaceMeans;

@@ -45,15 +45,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod around;
 pub mod backend;
 pub mod belief;
 pub mod control;
 mod free_space;
 pub mod gp_settings;
 pub mod planner;
-pub mod presence;
 pub mod probe;
 pub mod registration;
 pub mod robot;
+pub mod surface_evidence;
 pub mod task;
+pub mod whole_object;

@@ -38,18 +38,18 @@
 
 mod bounds;
 pub mod bvh;
-pub mod coarse;
+pub mod decimate;
 pub mod distance;
 pub mod implicit;
 pub mod import;
-pub mod inside;
+pub mod low_discrepancy;
 pub mod mesh;
+pub mod point_in_mesh;
 pub mod primitives;
 pub mod raw;
 pub mod repair;
 pub mod report;
 pub mod solids;
-pub mod spread;
 pub mod surfaces;
 pub mod sweep;
 mod topology;

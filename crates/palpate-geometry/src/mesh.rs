@@ -2,7 +2,7 @@
 
 use super::primitives::extent;
 use nalgebra::{Isometry3, Point3};
-use palpate_input::words::hex;
+use palpate_input::format::hex;
 use sha2::{Digest, Sha256};
 
 /// A triangle mesh, in metres.

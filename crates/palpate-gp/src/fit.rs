@@ -6,7 +6,7 @@ use super::likelihood::{Likelihood, ProfiledLikelihood};
 use super::observations::Observations;
 use super::scan::{Grid, Scan};
 use super::search_box::{SearchBox, SignalModel, TouchNoise};
-use crate::math::climb::{BfgsOptions, Climb, climb};
+use crate::math::bfgs::{BfgsOptions, Climb, climb};
 use crate::math::optimize::{Bounds, Stop};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Error of invalid input or state: place, problem, value, allowed values, and remedy.
 
-use crate::words::shorten;
+use crate::format::shorten;
 use std::fmt;
 use std::path::Path;
 

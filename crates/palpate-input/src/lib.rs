@@ -32,4 +32,4 @@
 pub mod config;
 pub mod error;
 pub mod files;
-pub mod words;
+pub mod format;

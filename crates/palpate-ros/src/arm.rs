@@ -2,8 +2,8 @@
 //! received messages as readings.
 
 use super::link::Link;
-use super::mailbox::{LatestMessages, Mailbox, TopicState, refused};
 use super::net_ft::{NetFt, NetFtSettings, Record};
+use super::receiver::{LatestMessages, Mailbox, TopicState, refused};
 use super::settings::BackendSettings;
 use super::status::ArmStatus;
 use super::topics::{Service, Side, Topic};

@@ -26,21 +26,21 @@ pub mod arm;
 pub mod definition;
 pub mod joints;
 pub mod link;
-pub mod mailbox;
 pub mod message;
 pub mod net_ft;
 pub mod network;
+pub mod receiver;
 pub mod recording;
 #[cfg(feature = "ros1")]
 mod ros1;
 #[cfg(feature = "ros2")]
 mod ros2;
+pub mod server;
 pub mod settings;
 pub mod status;
 pub mod tactile;
 pub mod topics;
 pub mod transport;
-pub mod twin;
 
 use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]

@@ -5,13 +5,13 @@
 //! of the page, and the names that a claim may use.
 
 pub mod metrics;
-pub mod outline;
 pub mod shape;
+pub mod silhouette;
 
 use self::Direction::{Less, More, Neither};
 use self::metrics::{Metrics, calibration, rmse};
-use self::outline::SilhouetteMetrics;
 use self::shape::ShapeMetrics;
+use self::silhouette::SilhouetteMetrics;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use std::fmt;
 

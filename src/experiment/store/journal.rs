@@ -1,7 +1,7 @@
 //! `touches.jsonl`: the touches of a real arm, stored one by one, so that an interrupted trial
 //! loses none.
 
-use super::files::{RunError, io_error};
+use super::io::{RunError, io_error};
 use crate::experiment::trial::row::TouchRow;
 use palpate_input::files;
 use serde::{Deserialize, Serialize};

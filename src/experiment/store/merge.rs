@@ -1,6 +1,6 @@
 //! Merging of a run's shards into the same bytes as a run in one process.
 
-use super::files::{RunError, io_error};
+use super::io::{RunError, io_error};
 use super::provenance::InputHashes;
 use super::rows;
 use super::surface::{self, SURFACE};

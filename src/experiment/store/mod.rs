@@ -12,7 +12,7 @@
 //! `resolved.toml` marks a run's folder: it is written first and never removed. A folder with it
 //! and without a row, or with only the partial files of a crash, is started again.
 
-mod files;
+mod io;
 mod journal;
 mod merge;
 mod provenance;
@@ -20,13 +20,13 @@ mod resolved;
 mod rows;
 mod surface;
 
-pub use files::{RunError, write_whole};
+pub use io::{RunError, write_whole};
 pub use journal::{JOURNAL, Journal, JournalEntry};
 pub use merge::merge;
 pub use provenance::MANIFEST;
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
-use self::files::{io_error, remove};
+use self::io::{io_error, remove};
 use self::provenance::{CONTENT, InputHashes};
 use self::surface::{MESH, SURFACE};
 use crate::experiment::experiment::Experiment;

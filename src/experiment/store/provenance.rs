@@ -1,11 +1,11 @@
 //! `content.json`: hashes of inputs that decide a run's rows and are not in its `resolved.toml`.
 //! `manifest.json`: the programs that wrote the run.
 
-use super::files::{RunError, io_error, write_changed, write_whole};
+use super::io::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
 use crate::sim::environment::ObjectShape;
 use palpate_input::files;
-use palpate_input::words::hex;
+use palpate_input::format::hex;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! `resolved.toml`: the experiment of a run with all defaults.
 
-use super::files::{RunError, check_equal, write_changed};
+use super::io::{RunError, check_equal, write_changed};
 use crate::experiment::experiment::Experiment;
 use palpate_input::error::InputError;
 use palpate_input::files;

@@ -1,10 +1,10 @@
 //! Lines of `trials.jsonl`.
 
-use super::files::{RunError, io_error};
+use super::io::{RunError, io_error};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{FAR_M, MEASURES};
 use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
-use crate::{files, words};
+use crate::{files, format};
 use std::cmp::Ordering;
 use std::collections::HashSet;
 use std::fs::File;
@@ -59,7 +59,7 @@ pub(super) fn copy(from: &mut File, bytes: &Range<u64>, to: &mut impl Write) -> 
 
 /// Describes the error in a line; the parser's own line number is always 1.
 fn line_error(error: &serde_json::Error) -> String {
-    format!("column {}: {}", error.column(), words::json(error))
+    format!("column {}: {}", error.column(), format::json(error))
 }
 
 /// Checks that a row fits the experiment, regardless of the trials and planners that it lists.

@@ -1,6 +1,6 @@
 //! `surface.csv`: ground truth of a run on its test grid. `surface.obj`: that of a whole object.
 
-use super::files::{RunError, check_equal, io_error, write_whole};
+use super::io::{RunError, check_equal, io_error, write_whole};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::truth::Truth;
 use palpate_geometry::import::import;

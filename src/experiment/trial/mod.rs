@@ -1,8 +1,8 @@
 //! A trial, Algorithm 1 of Yi et al. 2016: touch, fit and plan in a loop; and its row.
 
 mod belief_shape;
-pub mod entrant;
 mod oracle;
+pub mod planner_names;
 pub mod recorded_trial;
 pub mod replay;
 pub mod row;
@@ -13,7 +13,7 @@ pub(super) use oracle::{GroundTruth, OracleFactory};
 use self::row::{TouchRow, TrialRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
-use crate::experiment::measure::outline::SilhouetteMetrics;
+use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::planner::{self, PlannerFactory};

@@ -4,19 +4,19 @@
 
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::statistics::mean;
-use crate::experiment::trial::entrant::ORACLE;
+use crate::experiment::trial::planner_names::ORACLE;
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::probe::exact_probe;
-use palpate_explore::around::ImplicitSurface;
-use palpate_explore::around::surface::steepness;
 use palpate_explore::belief::Belief;
 use palpate_explore::planner::candidates::{Candidates, free_aim};
 use palpate_explore::planner::sample::random_aim;
 use palpate_explore::planner::search::Search;
 use palpate_explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use palpate_explore::task::{Aim, Target};
-use palpate_geometry::spread::SurfacePoint;
+use palpate_explore::whole_object::ImplicitSurface;
+use palpate_explore::whole_object::surface::steepness;
+use palpate_geometry::low_discrepancy::SurfacePoint;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! Row of a trial: one line of `trials.jsonl`.
 
 use crate::experiment::measure::metrics::Metrics;
-use crate::experiment::measure::outline::SilhouetteMetrics;
 use crate::experiment::measure::shape::ShapeMetrics;
+use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::Fallback;
 use palpate_explore::task::Target;

@@ -4,11 +4,11 @@
 use crate::experiment::experiment::Experiment;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use nalgebra::Point3;
-use palpate_explore::around::surface::steepness;
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::planner::sample::target_from_fractions;
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Target, Task};
+use palpate_explore::whole_object::surface::steepness;
 use palpate_gp::math::seed;
 use palpate_gp::posterior::Scratch;
 use rand::RngExt;

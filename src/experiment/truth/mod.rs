@@ -46,7 +46,7 @@ use crate::experiment::measure::metrics::{Metrics, calibration, rmse};
 use crate::sim::Environment;
 use crate::sim::reach;
 use palpate_explore::task::Zone;
-use palpate_geometry::coarse::coarse;
+use palpate_geometry::decimate::coarse;
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::Posterior;
 use std::sync::Arc;

@@ -6,7 +6,7 @@ pub(super) mod curves;
 pub(super) mod surfaces;
 pub(super) mod targets;
 
-pub use super::whole::FIGURE as SOLIDS;
+pub use super::whole_object::FIGURE as SOLIDS;
 pub use surfaces::FIGURE as SURFACES;
 
 use crate::experiment::store::Run;

@@ -9,7 +9,7 @@ use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, MISS, touch_entries};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
-use palpate_geometry::coarse::coarse;
+use palpate_geometry::decimate::coarse;
 use palpate_geometry::mesh::Mesh;
 
 const PANEL: (f64, f64) = (236.0, 258.0);

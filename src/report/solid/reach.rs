@@ -7,7 +7,7 @@ use crate::report::legend::{FigureLayout, Swatch};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
-use palpate_geometry::coarse::coarse;
+use palpate_geometry::decimate::coarse;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::solids::Triangles;
 

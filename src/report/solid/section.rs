@@ -11,7 +11,7 @@ use anyhow::ensure;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Point3, Vector3};
-use palpate_geometry::coarse::coarse;
+use palpate_geometry::decimate::coarse;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::solids::Triangles;

@@ -1,11 +1,11 @@
 //! Stored baseline of a regression test: a file of JSON lines, a header and a line per trial.
 
-use super::judged::CHECK_MEASURES;
+use super::measures::CHECK_MEASURES;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use palpate_input::error::InputError;
 use palpate_input::files;
-use palpate_input::words::hex;
+use palpate_input::format::hex;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

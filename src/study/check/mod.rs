@@ -5,10 +5,12 @@
 //! ([`sequence`]) decides. [`judged`] lists the measures.
 
 pub mod baseline;
-pub mod held;
-pub mod judged;
+pub mod measures;
+pub mod regression;
 pub mod sequence;
 
 pub use baseline::StoredBaseline;
-pub use held::{CheckOptions, CheckResult, MeasureResult, PlannerResult, differences, run_check};
-pub use judged::Verdict;
+pub use measures::Verdict;
+pub use regression::{
+    CheckOptions, CheckResult, MeasureResult, PlannerResult, differences, run_check,
+};

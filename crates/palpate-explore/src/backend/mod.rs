@@ -8,9 +8,9 @@ mod backend;
 pub mod delay;
 mod fault;
 pub mod interlock;
+pub mod live_view;
 pub mod pace;
 pub mod trace;
-pub mod watched;
 
 pub use crate::robot::sensor::{IdealContact, Sample, Wrench};
 pub use backend::{Backend, Capabilities, Command, Reading};

@@ -2,8 +2,8 @@
 
 use crate::free_space::FreeSpaceBound;
 use crate::gp_settings::{Band, GpSettings};
-use crate::presence::SurfaceEvidence;
 use crate::probe::{SweptVolume, Touch};
+use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
 use nalgebra::Vector3;
 use palpate_gp::covariance::CovarianceError;

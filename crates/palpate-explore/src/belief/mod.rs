@@ -4,9 +4,9 @@ mod height_field;
 
 pub use height_field::HeightField;
 
-use super::around::{ImplicitSurface, Scope, SpatialGpSettings};
 use super::gp_settings::GpSettings;
 use super::probe::{SweptVolume, Touch};
+use super::whole_object::{ImplicitSurface, Scope, SpatialGpSettings};
 use crate::robot::Finger;
 use crate::task::{Approach, Region, Target, Task};
 use palpate_gp::Posterior;

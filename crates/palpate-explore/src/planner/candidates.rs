@@ -3,9 +3,9 @@
 
 use super::plan::{Fallback, Plan};
 use super::sample::{in_ball, random_aim};
-use crate::around::ImplicitSurface;
-use crate::around::surface::{Surface, SurfaceField, steepness};
 use crate::task::Aim;
+use crate::whole_object::ImplicitSurface;
+use crate::whole_object::surface::{Surface, SurfaceField, steepness};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,8 @@
 //! Sampling of targets without a model: points of the unit square, mapped to the zone or object.
 
-use crate::around::Scope;
 use crate::belief::Belief;
 use crate::task::{Aim, Ball, Target, Zone};
+use crate::whole_object::Scope;
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -9,7 +9,7 @@ use super::settings::PlanningSettings;
 use super::sobol;
 use crate::belief::HeightField;
 use crate::task::Zone;
-use palpate_gp::math::climb::{BfgsOptions, Climb};
+use palpate_gp::math::bfgs::{BfgsOptions, Climb};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::Bounds;
 use palpate_gp::posterior::Scratch;

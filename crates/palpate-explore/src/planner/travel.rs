@@ -10,9 +10,9 @@ use super::candidates::{Candidates, explore_unknown};
 use super::plan::{Plan, PlannerEntry};
 use super::sample::random_aim;
 use super::search::Search;
-use crate::around::ImplicitSurface;
 use crate::belief::{Belief, HeightField};
 use crate::task::{Aim, Region, Target};
+use crate::whole_object::ImplicitSurface;
 use palpate_gp::posterior::Scratch;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {

@@ -6,7 +6,7 @@ use super::touch::TouchSettings;
 use super::zone::Zone;
 use crate::robot::Finger;
 use nalgebra::{UnitVector3, Vector3};
-use palpate_geometry::spread::directions;
+use palpate_geometry::low_discrepancy::directions;
 use palpate_input::error::InputError;
 use std::fmt;
 use std::sync::{Arc, OnceLock};

@@ -16,7 +16,7 @@ use super::source::Source;
 use crate::raw::RawMesh;
 use palpate_input::error::InputError;
 use palpate_input::files::without_bom;
-use palpate_input::words;
+use palpate_input::format;
 
 /// Prefixes of extensions that do not affect the geometry.
 const HARMLESS_EXTENSIONS: [&str; 4] =
@@ -70,7 +70,7 @@ fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), InputError> {
 fn root(json: &[u8]) -> Result<Root, InputError> {
     Root::from_slice(json).map_err(|error| {
         let (line, column) = (error.line(), error.column());
-        InputError::new(format!("JSON: line {line}, column {column}: {}", words::json(&error)))
+        InputError::new(format!("JSON: line {line}, column {column}: {}", format::json(&error)))
     })
 }
 

@@ -1,7 +1,7 @@
 //! General mathematics, independent of touch.
 
 pub mod banded;
-pub mod climb;
+pub mod bfgs;
 pub mod direct;
 pub mod least_squares;
 pub mod normal;

@@ -1,6 +1,6 @@
 //! Tests of the optimisers: DIRECT evaluates the places of NLopt's; climbs converge in few steps.
 
-use palpate_gp::math::climb::{BfgsOptions, Climb, climb};
+use palpate_gp::math::bfgs::{BfgsOptions, Climb, climb};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::{Bounds, Stop};
 

@@ -1,6 +1,6 @@
 //! Errors of a configuration, with their place.
 
-use crate::words::shorten;
+use crate::format::shorten;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;

@@ -7,7 +7,7 @@ mod rules;
 pub use error::{ConfigError, Origin};
 pub use rules::{Rules, Validate};
 
-use crate::{files, words};
+use crate::{files, format};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -212,7 +212,7 @@ impl Loader {
             let allowed: Vec<String> = names.collect();
             let key = join(path.rsplit_once('.').map_or(".", |(parent, _)| parent), &unknown);
             let key = self.given(&key);
-            let nearest = words::nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
+            let nearest = format::nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
             let nearest = nearest.map_or(String::new(), |key| format!(", did you mean `{key}`?"));
             let allowed = allowed.join(", ");
             let message = format!("unknown key `{key}`{nearest}; allowed here: {allowed}");
@@ -231,7 +231,7 @@ impl Loader {
         }
         let key = String::from(path);
         let value = self.value(&key).map(|value| value.to_string());
-        let allowed = words::allowed(message).or_else(|| self.choices::<T>(&key));
+        let allowed = format::allowed(message).or_else(|| self.choices::<T>(&key));
         let message =
             allowed.map_or_else(|| message.to_owned(), |allowed| format!("allowed is {allowed}"));
         let key = self.given(&key);
@@ -251,7 +251,7 @@ impl Loader {
         }
         *value = Value::String(UNKNOWN.into());
         let error = serde_path_to_error::deserialize::<_, T>(table).err()?;
-        words::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
+        format::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
     }
 
     /// Returns the value under the dotted `key`.

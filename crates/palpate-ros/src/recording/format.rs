@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::{Capabilities, Command, IdealContact, Reading, Sample, Wrench};
 use palpate_explore::robot::finger::Frame;
 use palpate_input::error::InputError;
-use palpate_input::words::shorten;
+use palpate_input::format::shorten;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;

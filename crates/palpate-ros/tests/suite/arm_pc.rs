@@ -2,9 +2,9 @@
 
 use palpate_ros::joints::JointNames;
 use palpate_ros::message::{JointTrajectory, JointTrajectoryPoint};
+use palpate_ros::server::arm_computer::ArmPc;
 use palpate_ros::topics::CommandTopic;
 use palpate_ros::transport::Packet;
-use palpate_ros::twin::arm_pc::ArmPc;
 use proptest::prelude::*;
 
 const PERIOD_S: f64 = 0.002;

@@ -7,12 +7,12 @@ pub use reach::FingerReach;
 use crate::sim::Environment;
 use crate::sim::environment::ObjectShape;
 use nalgebra::{Point3, UnitVector3, Vector3};
-use palpate_explore::around::Surface;
 use palpate_explore::task::approach::attitude;
+use palpate_explore::whole_object::Surface;
 use palpate_geometry::bvh::MeshBvh;
-use palpate_geometry::inside::{Crossing, spans_inside};
+use palpate_geometry::low_discrepancy::{SurfacePoint, in_square, over_surface};
 use palpate_geometry::mesh::Mesh;
-use palpate_geometry::spread::{SurfacePoint, in_square, over_surface};
+use palpate_geometry::point_in_mesh::{Crossing, spans_inside};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{UnitVector3, Vector3};
 use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::low_discrepancy::{SurfacePoint, directions};
 use palpate_geometry::primitives::{nearest_on_segment, normal};
-use palpate_geometry::spread::{SurfacePoint, directions};
 use palpate_geometry::sweep::Capsule;
 use rayon::prelude::*;
 

@@ -4,8 +4,8 @@
 //! smallest. This module has that energy; `settle` minimises it. `Membrane::balance` minimises it
 //! with the rays by which the skin meets an object.
 
-use super::sheet::{Material, Sheet, SheetState};
-use super::softness::Softness;
+use super::compliance::Softness;
+use super::elastic_sheet::{Material, Sheet, SheetState};
 use super::springs::UnilateralSprings;
 use crate::sim::finger::foundation::{Balance, Column, ColumnResponse, SkinContact};
 use crate::sim::finger::samples::{Lattice, Node, SkinSample};

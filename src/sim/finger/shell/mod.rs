@@ -4,8 +4,8 @@
 //! with fluid, core and object, under the rays by which the skin meets an object. `settle`
 //! minimises that energy, with `springs` for the places that may touch.
 
+mod compliance;
+pub mod elastic_sheet;
+mod equilibrium;
 pub mod membrane;
-mod settle;
-pub mod sheet;
-mod softness;
 pub mod springs;

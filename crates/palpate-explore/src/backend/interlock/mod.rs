@@ -6,20 +6,20 @@
 
 mod collision;
 mod force;
-pub mod gates;
 #[allow(clippy::module_inception)]
 mod interlock;
 mod interlocked;
 mod limits;
 mod sensors;
 mod settings;
+pub mod start_checks;
 mod tracking;
 mod workspace;
 
-pub use gates::{GateSettings, check_start};
 pub use interlock::{Interlock, InterlockEntry, RobotState, SafetyContext};
 pub use interlocked::Interlocked;
 pub use settings::{InterlockSettings, defaults};
+pub use start_checks::{GateSettings, check_start};
 
 /// All interlocks in the order in which they act: those that limit a command come before those that
 /// check the result.
@@ -44,6 +44,6 @@ pub const FORMER_KEYS: [(&str, f64); 7] = [
     ("interlocks.follow_s", tracking::VELOCITY_S),
     ("interlocks.retract_m_s", force::RETRACT_M_S),
     ("interlocks.retract_rise_n", force::RETRACT_RISE_N),
-    ("gates.hold_s", gates::HOLD_S),
-    ("gates.still", gates::START_TOLERANCE),
+    ("gates.hold_s", start_checks::HOLD_S),
+    ("gates.still", start_checks::START_TOLERANCE),
 ];

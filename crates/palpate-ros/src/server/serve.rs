@@ -1,7 +1,7 @@
 //! Loop of a twin: receives commands, runs one tick of the simulated robot, sends readings, in real
 //! time.
 
-use super::arm_pc::ArmPc;
+use super::arm_computer::ArmPc;
 use super::failure::{FAILURES, FailingSender, FailureEffect, by_name};
 use crate::joints::JointNames;
 use crate::link::Link;

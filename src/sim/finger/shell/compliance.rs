@@ -4,7 +4,7 @@
 //! antisymmetrically under the rest. Its stiffness separates into two matrices of half the size and
 //! half the bandwidth, and a solution costs half.
 
-use super::sheet::Sheet;
+use super::elastic_sheet::Sheet;
 use nalgebra::Matrix3;
 use palpate_gp::math::banded::{Banded, Factor};
 use palpate_gp::math::simd::Quad;

@@ -4,6 +4,6 @@
 //! [`arm_pc`] is the layer between network and servos, [`failure`] the injected failures,
 //! [`serve`](mod@serve) the loop.
 
-pub mod arm_pc;
+pub mod arm_computer;
 pub mod failure;
 pub mod serve;

@@ -1,7 +1,7 @@
 //! Regression test: repeats trials until each planner's verdict is decided.
 
 use super::baseline::{StoredBaseline, TrialLine, settings_hash};
-use super::judged::{CHECK_MEASURES, CheckMeasure, Verdict};
+use super::measures::{CHECK_MEASURES, CheckMeasure, Verdict};
 use super::sequence::ConfidenceSequence;
 use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Progress};

@@ -1,7 +1,7 @@
 //! `palpate register MESH --cloud CLOUD`: registers a contact cloud to a mesh (ICP).
 
 use super::known_body::numbers;
-use super::patience::report_slow_steps;
+use super::slow_steps::report_slow_steps;
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan_truth::read_cloud;

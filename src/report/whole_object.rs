@@ -11,10 +11,10 @@ use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use anyhow::Context;
 use nalgebra::Point3;
-use palpate_explore::around::{ImplicitSurface, Scope};
 use palpate_explore::task::Task;
+use palpate_explore::whole_object::{ImplicitSurface, Scope};
 use palpate_geometry::bvh::MeshBvh;
-use palpate_geometry::coarse::coarse;
+use palpate_geometry::decimate::coarse;
 
 // Largest number of triangles of a surface that is drawn.
 // heuristic: a page stays a few megabytes.

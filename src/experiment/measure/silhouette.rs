@@ -1,7 +1,7 @@
 //! Errors of the estimated silhouette of an object.
 
 use crate::experiment::truth::Truth;
-use palpate_explore::presence::SurfaceEvidence;
+use palpate_explore::surface_evidence::SurfaceEvidence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
