@@ -1,5 +1,5 @@
-"""Prints the licences of every package that is built into the program, or into what the arguments name
-(`--package NAME`), with their texts."""
+"""Prints the licences, with their texts, of all packages that are built into the program, or into the package given by
+`--package NAME`."""
 
 import json
 import subprocess

@@ -31,7 +31,7 @@ WHOLE = {"CARGO_INCREMENTAL": "0"}
 SKIPPED = "cost: skipped, no valgrind (Debian: apt-get install valgrind)"
 HEAD = """\
 # Instructions of one trial of each planner, set-up subtracted. `make check-cost` compares the program
-# with this table; `tests/cost.py --write` counts again.
+# with this table; `tests/cost.py --write` updates it.
 """
 
 
@@ -203,7 +203,7 @@ def compare(table, counts):
     for first, *others in lines:
         print(first.ljust(widths[0]), *(it.rjust(width) for it, width in zip(others, widths[1:])), sep="  ")
     worst = next(verdict for verdict in ("MISSING", "WORSE", "new", "ok", "better") if verdict in verdicts)
-    print(f"{worst} ({100 * table['tolerance']:g} % are borne)")
+    print(f"{worst} (tolerance {100 * table['tolerance']:g} %)")
     return 1 if worst in ("MISSING", "WORSE") else 0
 
 

@@ -27,7 +27,7 @@ sbatch --quiet --wait --dependency="afterok:$array" --kill-on-invalid-dep=yes --
 exec "$palpate" report "$out" --merge $(echo $parts)
 EOF
 if [ ! -s "$out/trials.jsonl" ]; then
-    echo "$out: not merged, a shard was lost; the same line goes on ($out-*.log say more)" >&2
+    echo "$out: not merged, a shard was lost; submit the same line again to continue (details: $out-*.log)" >&2
     exit 1
 fi
-echo "$out: palpate report $out draws it"
+echo "$out: merged; to draw it: palpate report $out"

@@ -195,7 +195,7 @@ class Workers:
             worker.interrupt()
 
     def forget(self, worker: Worker) -> None:
-        """Forgets a finished worker."""
+        """Removes a finished worker."""
         self._live.discard(worker)
 
 

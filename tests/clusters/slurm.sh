@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Runs a command beside a Slurm of one node, whose files all lie in FOLDER and which talks to itself alone;
-# as root, in a network namespace of its own: unshare --net bash slurm.sh FOLDER COMMAND...
+# Runs a command with a Slurm cluster of one node, which keeps its files in FOLDER and uses only the loopback
+# device. Usage, as root: unshare --net bash slurm.sh FOLDER COMMAND...
 set -eu
 here=$(realpath "$1")
 shift
 ip link set lo up
-# Slurm opens no port where there is no address but 127.0.0.1.
+# Slurm opens no port if 127.0.0.1 is the only address.
 ip addr add 10.77.0.1/32 dev lo
 node=$(hostname -s)
 mkdir -p "$here/state" "$here/spool" "$here/munge"

@@ -1,27 +1,27 @@
 #!/usr/bin/env bash
-# The toy in eight shards by GNU parallel and by Slurm, one of whose tasks is killed and submitted again: the
-# rows are the bytes of a run in one process. Usage: test.sh PALPATE, from the project's folder.
+# Runs the toy in eight shards by GNU parallel and by Slurm, and compares the rows with those of one process, byte
+# by byte. One Slurm task is killed and submitted again. Usage: test.sh PALPATE, from the project's folder.
 set -eu
 export PALPATE=$1
 has_parallel() { command -v parallel >/dev/null; }
 has_slurm() { command -v sbatch slurmd munged >/dev/null && unshare --net true 2>/dev/null; }
-has_parallel || echo "GNU parallel: skipped, it is not there (Debian: apt-get install parallel)"
-has_slurm || echo "Slurm: skipped, it is not there (Debian: apt-get install slurm-wlm munge), or this is not root"
+has_parallel || echo "GNU parallel: skipped, not installed (Debian: apt-get install parallel)"
+has_slurm || echo "Slurm: skipped, not installed (Debian: apt-get install slurm-wlm munge) or not root"
 has_parallel || has_slurm || exit 0
 
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 export OUT=$scratch EXPERIMENT=$scratch/toy.toml
 
-# Twenty-four trials of a toy of its own, so that a task takes long enough to be killed.
+# 24 trials, so that a task runs long enough to be killed.
 "$PALPATE" --quiet run toy --shard 1/1 --out "$scratch/toy" --set trials=1 >/dev/null
 sed 's/^trials = .*/trials = 24/' "$scratch/toy/resolved.toml" >"$EXPERIMENT"
 "$PALPATE" --quiet run "$EXPERIMENT" --no-report --out "$OUT/whole" >/dev/null
 
-# Whether the run in a folder has the rows of the whole.
+# Compares the rows of the run in folder $1 with those of one process.
 same() {
     cmp "$OUT/whole/trials.jsonl" "$1/trials.jsonl"
-    echo "$2: the bytes of a run in one process"
+    echo "$2: rows identical to those of one process"
 }
 
 if has_parallel; then
@@ -34,7 +34,7 @@ by_slurm() {
     submit=(experiments/slurm/submit.sh "$EXPERIMENT" 8 "$OUT/by-slurm")
     "${submit[@]}" >/dev/null 2>"$OUT/lost.txt" &
     submitted=$!
-    # The first task that has written a row and has not written all is killed.
+    # Kills the first unfinished task that has written a row.
     for _ in $(seq 2000); do
         for part in "$OUT"/by-slurm-*-of-8; do
             rows=$(cat "$part/trials.jsonl" 2>/dev/null | wc -l)
@@ -44,7 +44,7 @@ by_slurm() {
     done
     killed=$(wc -l <"$part/trials.jsonl")
     if wait "$submitted"; then
-        echo "Slurm: a task was killed, and nobody noticed" >&2
+        echo "Slurm: submit.sh returned 0 although a task was killed" >&2
         return 1
     fi
     grep -q "not merged" "$OUT/lost.txt"

@@ -80,9 +80,9 @@ fn a_trial_is_counted_by_valgrind() {
     let count: u64 = counted.parse().unwrap();
     assert!(count > 100_000, "{count}");
     let (code, said) = script.run(&[]);
-    assert!(code == Some(0) && said.contains("ok (2 % are borne)"), "{said}");
+    assert!(code == Some(0) && said.contains("ok (tolerance 2 %)"), "{said}");
     let (code, said) = script.check(&text.replace(counted, &(count * 9 / 10).to_string()));
-    assert!(code == Some(1) && said.contains("WORSE (2 % are borne)"), "{said}");
+    assert!(code == Some(1) && said.contains("WORSE (tolerance 2 %)"), "{said}");
 }
 
 /// Returns the output of `python` code that uses the script's functions.
