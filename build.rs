@@ -1,4 +1,5 @@
-//! Lets every built binary find MuJoCo's shared library without environment variables.
+//! Build script: lets every built binary find MuJoCo's shared library without environment
+//! variables.
 
 use std::env;
 

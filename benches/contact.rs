@@ -25,7 +25,7 @@ use std::time::Instant;
 const PLACES: usize = 60;
 const TIMED: usize = 6;
 
-/// Steps of one measurement, and measurements of which the best counts.
+/// Steps of one measurement, and number of measurements, of which the fastest counts.
 const STEPS: u32 = 50;
 const TURNS: usize = 10;
 

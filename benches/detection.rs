@@ -21,9 +21,9 @@ use rayon::prelude::*;
 const APPROACHES: u64 = 40;
 /// Frames at rest before the first approach.
 const REST: usize = 20;
-/// Force from which on contact counts as not detected.
+/// Force above which contact counts as not detected.
 const MOST_N: f64 = 5.0;
-/// Speeds: so slow that nothing is overrun; slow; and the default of a touch.
+/// Approach speeds: one without overrun, a slow one, and the default of a touch.
 const SPEEDS_M_S: [f64; 3] = [0.5e-3, 5e-3, 0.02];
 /// Duration without contact, for each kind of sensor.
 const HOURS: f64 = 10.0;

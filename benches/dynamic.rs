@@ -1,4 +1,5 @@
-//! Cost of a touch of a dynamic body, and of each of its parts; one thread, best of several.
+//! Cost of a touch of a dynamic body, and of each of its parts; one thread, minimum of several
+//! measurements.
 
 use nalgebra::Isometry3;
 use palpate::backend::Command;
@@ -16,7 +17,7 @@ use std::time::Instant;
 
 const TURNS: usize = 5;
 
-/// Returns the least of several measurements.
+/// Returns the minimum of several measurements.
 fn best(mut run: impl FnMut() -> f64) -> f64 {
     (0..TURNS).map(|_| run()).fold(f64::INFINITY, f64::min)
 }

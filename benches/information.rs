@@ -80,8 +80,8 @@ const BELIEFS: [(&str, &[&str]); 4] = [
     ("both", &["gp.normals=true", "gp.free_space=true"]),
 ];
 
-/// Arguments that are not experiments: source of the contacts, and planner; without one of a pair,
-/// both are run.
+/// Arguments that are not experiments: source of the contacts, and planner; if one is missing, both
+/// of its values are run.
 const WORDS: [&str; 4] = ["own", "estimated", "active", "slope"];
 
 fn main() {

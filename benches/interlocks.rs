@@ -32,7 +32,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the time of a tick while the arm sways about home, as fast as a travelling arm.
+/// Returns the time of a tick while the arm oscillates about home at the speed of travel.
 fn tick_us(body: &mut dyn Backend, chain: &Chain) -> anyhow::Result<f64> {
     body.reset(1)?;
     let mut command = Command { qdot: vec![0.0; chain.joints.len()] };

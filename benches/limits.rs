@@ -1,7 +1,6 @@
 //! Efficiency of each piece of a trial relative to the machine, on one thread: its operations and
-//! bytes in a second as fractions of those of a matrix product and of a triad over long arrays.
-//! Pieces are timed in turns, so that other load affects all alike; numbers are medians over
-//! rounds.
+//! bytes in a second, as fractions of a matrix product's and of a triad's over long arrays. Pieces
+//! are timed in turns, so that other load affects all alike; numbers are medians over rounds.
 //!
 //! `cargo bench --bench limits -- PART` times the pieces whose name contains PART.
 

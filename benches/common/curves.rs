@@ -18,7 +18,7 @@ pub struct Curve {
     pub values: Vec<(f64, f64)>,
 }
 
-/// Returns the seconds of one call: the least of three rounds of some ten milliseconds each, or of
+/// Returns the seconds of one call: the minimum of three rounds of about ten milliseconds, or of
 /// one call that takes longer than a second.
 pub fn seconds(mut work: impl FnMut()) -> f64 {
     let begun = Instant::now();

@@ -226,10 +226,8 @@ impl Belief {
         Ok((places.reshape(points.py(), means_m)?, places.reshape(points.py(), sds_m)?))
     }
 
-    /// Mean surface from a grid of `cells` along its longest side (whole objects only): vertices
-    /// (n, 3), metres; triangles (m, 3), counter-clockwise from outside; and the standard deviation
-    /// of the surface along the normal at each vertex, shape (n,), metres. All are empty if the
-    /// belief contains no surface.
+    /// Mean surface from a grid of `cells` along its longest side (whole objects only). All are
+    /// empty if the belief contains no surface.
     #[pyo3(signature = (cells = 64))]
     fn mesh<'py>(&self, py: Python<'py>, cells: u32) -> PyResult<Solid<'py>> {
         let surface = self.around("mesh")?.surface();

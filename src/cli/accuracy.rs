@@ -1,4 +1,4 @@
-//! `palpate accuracy`.
+//! Command `palpate accuracy`.
 
 use super::columns::{EMPTY_CELL, aligned_rows, cell, duration, without_empty};
 use super::find::{SCENES, find};

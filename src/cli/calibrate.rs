@@ -1,4 +1,4 @@
-//! `palpate calibrate`.
+//! Command `palpate calibrate`.
 
 use super::columns::{aligned, cell};
 use super::terminal::{Outcome, print};

@@ -1,4 +1,4 @@
-//! `palpate check`.
+//! Command `palpate check`.
 
 use super::find::{EXPERIMENTS, find};
 use super::output::Overwrite;

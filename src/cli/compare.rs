@@ -1,4 +1,4 @@
-//! `palpate compare`.
+//! Command `palpate compare`.
 
 use super::output::{Overwrite, make_folder};
 use super::terminal::{Outcome, print};

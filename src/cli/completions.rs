@@ -1,4 +1,4 @@
-//! `palpate completions`.
+//! Command `palpate completions`.
 
 use super::terminal::{Outcome, print};
 use clap_complete::{Shell, generate};

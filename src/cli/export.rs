@@ -1,4 +1,4 @@
-//! `palpate export`.
+//! Command `palpate export`.
 
 use super::find::{SCENES, find};
 use super::output::Overwrite;

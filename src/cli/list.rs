@@ -1,4 +1,4 @@
-//! `palpate list`.
+//! Command `palpate list`.
 
 use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::terminal::{Outcome, print};
@@ -20,7 +20,7 @@ pub(super) struct Args {
     kind: Option<Kind>,
 }
 
-/// Kinds of things that can be listed.
+/// Kinds of listed items.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Kind {
     /// Experiments: files in experiments/, here or beside the program.

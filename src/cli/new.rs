@@ -1,4 +1,4 @@
-//! `palpate new`.
+//! Command `palpate new`.
 
 use super::output::{Overwrite, make_folder};
 use super::terminal::{Outcome, print};

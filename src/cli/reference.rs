@@ -1,4 +1,4 @@
-//! `palpate reference`.
+//! Command `palpate reference`.
 
 use crate::report::compare;
 use crate::report::reference::{columns, measures, rows, settings};

@@ -1,4 +1,4 @@
-//! `palpate register`.
+//! Command `palpate register`.
 
 use super::find::{SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;

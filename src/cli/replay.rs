@@ -1,4 +1,4 @@
-//! `palpate replay`.
+//! Command `palpate replay`.
 
 use super::prepare::prepare_simulation;
 use super::terminal::{Outcome, Verbosity, print};

@@ -1,4 +1,4 @@
-//! `palpate report`.
+//! Command `palpate report`.
 
 use super::host::Host;
 use super::terminal::{Outcome, print};

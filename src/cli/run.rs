@@ -1,4 +1,4 @@
-//! `palpate run`.
+//! Command `palpate run`.
 
 use super::compare;
 use super::find::{EXPERIMENTS, find};

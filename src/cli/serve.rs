@@ -1,4 +1,4 @@
-//! `palpate twin`.
+//! Command `palpate twin`.
 
 use super::find::{EXPERIMENTS, SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;

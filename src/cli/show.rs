@@ -1,4 +1,4 @@
-//! `palpate show`.
+//! Command `palpate show`.
 
 use super::find::{SCENES, find, is_experiment};
 use super::output::Overwrite;

@@ -51,7 +51,7 @@ fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) 
     }
 }
 
-/// Multiple of the patience after which one of many short steps is shown.
+/// Multiple of the timeout after which one of many short steps is shown.
 const REPORT_INTERVAL: u32 = 3;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Notices about an experiment's numbers: each explains what limits their meaning, and what to do.
+//! Notices about an experiment's results: each explains what limits their meaning, and what to do.
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
@@ -12,11 +12,11 @@ use palpate_explore::task::Zone;
 // heuristic: a quarter.
 const FEW_SHARE: f64 = 0.25;
 
-/// Share of a surface that counts as all of it.
+/// Share of the surface above which it counts as complete.
 // heuristic: the missing part is invisible in a figure.
 const FULL_SHARE: f64 = 0.99;
 
-/// A notice is given for an R above the first with a centred R below the second.
+/// Thresholds of R and of centred R: a notice is given above the first and below the second.
 // heuristic: a constant height reaches the first on most objects.
 const HIGH_R: f64 = 0.999;
 const LOW_CENTRED_R: f64 = 0.9;

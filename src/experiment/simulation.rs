@@ -44,8 +44,8 @@ impl Simulation {
         Self::new_with_progress(experiment, &|_| ())
     }
 
-    /// Builds the simulation as [`new`](Self::new) does, and calls `tell` with the name of each
-    /// slow step when it starts.
+    /// Builds the simulation as [`new`](Self::new) does, and reports the name of each slow step to
+    /// `tell`.
     ///
     /// # Errors
     /// See [`new`](Self::new).
@@ -179,7 +179,7 @@ impl Simulation {
         self.truth.shape.as_ref()
     }
 
-    /// Exploration task: the part of the scene that the robot knows.
+    /// Exploration task: the part of the scene that is given to the robot.
     pub fn task(&self) -> &Task {
         self.environment().task()
     }

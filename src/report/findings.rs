@@ -43,7 +43,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
     verified.into_iter().chain(found.into_iter().flatten()).collect()
 }
 
-/// Returns the touches after which each planner has found the surface, by the mean of Eq. 5.
+/// Returns the touch count from which each planner has found the surface, by the mean of Eq. 5.
 fn r_needed(run: &Run, curves: &[Curve]) -> Option<String> {
     let constant = constant_r(run.truth.heights_m.iter().flatten())
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));
@@ -55,7 +55,7 @@ fn r_needed(run: &Run, curves: &[Curve]) -> Option<String> {
 /// Name of a planner with its curve.
 type Curve<'a> = (&'a str, Vec<CurvePoint>);
 
-/// Returns the words on each planner that has some, after its name; `None` if no planner has.
+/// Returns a clause for each planner that has one, after its name; `None` if no planner has.
 fn each(curves: &[Curve], words: impl Fn(&[CurvePoint]) -> Option<String>) -> Option<Vec<String>> {
     let found =
         curves.iter().filter_map(|(name, points)| Some(format!("{name} {}", words(points)?)));
@@ -104,7 +104,7 @@ fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
     Some(format!("After {count} touches the mean R (Eq. 5) is: {found}."))
 }
 
-/// Returns the accuracy of the believed shapes of whole objects after the last drawn touch.
+/// Returns the accuracy of the estimated surfaces of whole objects after the last drawn touch.
 fn shapes(run: &Run, curves: &[Curve]) -> Option<String> {
     let count = run.experiment.drawn_touch_counts().into_iter().next_back()?;
     let words = |points: &[CurvePoint]| {
@@ -130,7 +130,7 @@ fn median(point: &CurvePoint, measure: &Measure) -> Option<String> {
     Some(digits(measure.unit.per_si * point.of(measure)?.median))
 }
 
-/// Returns the touches after which each planner meets a goal, and keeps meeting it.
+/// Returns the touch count from which each planner stays within a goal.
 fn needed(
     run: &Run,
     curves: &[Curve],

@@ -15,7 +15,7 @@ use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 
-/// Score of a missing belief.
+/// Text of the score of a missing belief.
 pub const NO_BELIEF: &str = "not reached in this trial";
 
 /// Belief of one planner after some touches of the drawn trial.

@@ -25,7 +25,7 @@ pub const FRAME: &str = "#9a9a9a";
 pub const TRUTH: &str = "#009e73";
 /// Colour of the initial touches, which all planners share.
 pub const INITIAL: &str = "#0046c8";
-/// Colour of touches chosen by a planner.
+/// Colour of touches selected by a planner.
 pub const PLANNED: &str = "#d00000";
 /// Returns the colour of a touch.
 pub fn touch(is_initial: bool) -> &'static str {

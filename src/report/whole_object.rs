@@ -42,7 +42,8 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     solid::section(&sequences, mesh, experiment.report.trial)
 }
 
-/// Figure of believed whole objects, by planner and touch count; none for a run over a zone.
+/// Figure of estimated surfaces of whole objects, by planner and touch count; `None` for a run over
+/// a zone.
 pub const FIGURE: ReportFigure = ReportFigure {
     name: "solids",
     caption: |run| {

@@ -62,8 +62,8 @@ impl Environment {
         Self::build_with_progress(scene, &|_| ())
     }
 
-    /// Builds an environment like [`build`](Self::build), and calls `tell` with the name of each
-    /// step that takes long for a large mesh, as the step begins.
+    /// Builds an environment like [`build`](Self::build), and reports each step that takes long for
+    /// a large mesh to `tell`.
     ///
     /// # Errors
     /// The errors of [`build`](Self::build).

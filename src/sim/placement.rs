@@ -28,9 +28,9 @@ pub enum Side {
 /// Axis of a mesh file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Up {
-    /// y is up: the rule of glTF and the habit of most programs that write OBJ.
+    /// The y axis: the rule of glTF, and usual in OBJ files.
     Y,
-    /// z is up, as is usual in CAD.
+    /// The z axis, usual in CAD.
     Z,
 }
 

@@ -89,8 +89,9 @@ pub fn resting_pose(environment: &Environment, approach: &Approach) -> Option<Re
     Some(RestingPose { p_wt: start_w + ahead_w.scale(hit.travel_m), hit })
 }
 
-/// Returns how far behind the depth range the centre of the fingertip's hemisphere turns back.
-/// Around a whole object this is as near as for every other body, for there may be a table below.
+/// Returns the distance behind the depth range at which the centre of the fingertip's hemisphere
+/// turns back. Around a whole object this is as near as for every other body, for there may be a
+/// table below.
 fn turnaround_distance_m(environment: &Environment, approach: &Approach) -> f64 {
     match approach.obstacle {
         Some(_) => environment.scene().finger.radius_m + BEYOND_M,

@@ -97,9 +97,7 @@ impl SimulatedFinger {
         Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }
 
-    /// Writes the data of a control tick of `period_s` into `reading`: tactile frames that arrived,
-    /// the reading of a force/torque sensor under the load `mount` (in `T`), and the true load if
-    /// no sensor measures it.
+    /// Writes the sensor data of a control tick of `period_s` into `reading`.
     pub fn write_reading(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.samples.clear();
         reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));

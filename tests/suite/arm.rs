@@ -185,7 +185,7 @@ mod mujoco {
         }
     }
 
-    /// At zero command against gravity, from the start and after a motion that changes the load.
+    /// Tests zero command against gravity, from the start and after a motion that changes the load.
     /// With a proportional servo alone the arm sags 6 degrees in this time.
     #[test]
     fn servos_do_not_sag() {

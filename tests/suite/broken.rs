@@ -5,7 +5,7 @@ use std::process::Output;
 
 use crate::common::program::{EXPERIMENT, SCENE, folder, palpate};
 
-/// Cases that were not rejected as required.
+/// Cases that were not rejected with the required message.
 #[derive(Default)]
 struct Accepted(Vec<String>);
 

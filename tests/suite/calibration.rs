@@ -20,8 +20,8 @@ fn coarse() -> FingerConstants {
     model
 }
 
-/// Bounds: 85 counts and 95 % of the signs (one sensor's counts predict the other's with an error
-/// of 69 and 82), and a smaller error than the no-change predictor at every load.
+/// Tests the errors: at most 85 counts and at least 95 % of the signs (one sensor's counts predict
+/// the other's with errors of 69 and 82), and less than the no-change predictor at every load.
 #[test]
 fn constants_of_one_sensor_predict_the_other() {
     let held_out =

@@ -127,7 +127,8 @@ fn rows_are_held_against_a_baseline() {
     assert_eq!(text.lines().count(), 9);
 }
 
-/// Command line: write a baseline, compare, a damaged baseline, another experiment.
+/// Tests the command line: it writes a baseline, compares, and rejects a damaged baseline and
+/// another experiment.
 #[test]
 fn a_check_says_by_its_exit_code() {
     let folder = tempfile::tempdir().unwrap();
@@ -167,7 +168,7 @@ fn a_check_says_by_its_exit_code() {
     assert!(code == Some(2) && said.contains("toy.jsonl:4:"), "{said}");
 }
 
-/// The paper's planner, but away from the zone's border, to be worse.
+/// The paper's planner with targets moved away from the zone's border, so that it is worse.
 struct Shy {
     own: Box<dyn Planner>,
     margin: f64,

@@ -65,8 +65,8 @@ fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..Default::default() })]
 
-    /// Any posture, including limits and singularities, and any goal, mostly out of reach, with
-    /// velocities beyond any arm.
+    /// Tests any posture, including limits and singularities, and any goal, mostly out of reach,
+    /// with velocities beyond any arm.
     #[test]
     fn limits_hold_for_any_goal(
         fractions in prop::array::uniform7(prop_oneof![Just(0.0), Just(1.0), Just(0.5), 0.0..1.0]),
@@ -89,7 +89,7 @@ proptest! {
     }
 }
 
-/// Out along -y at 0.1 m/s until the elbow is straight and beyond, and back.
+/// Moves the tip out along -y at 0.1 m/s until the elbow is straight and beyond, and back.
 #[test]
 fn a_goal_that_leaves_the_reach_and_returns_is_met_again() {
     let chain = arm();
@@ -124,7 +124,8 @@ fn the_wrist_passes_its_singularity() {
     assert!(off < 1e-3, "{off}");
 }
 
-/// In towards the base until E1, which alone shortens the arm, is at its limit, and out again.
+/// Moves the tip towards the base until E1, which alone shortens the arm, is at its limit, and out
+/// again.
 #[test]
 fn a_goal_beyond_a_joints_limit_is_met_again_on_its_way_back() {
     let chain = arm();
@@ -142,7 +143,7 @@ fn a_goal_beyond_a_joints_limit_is_met_again_on_its_way_back() {
     assert!(off < 1e-4, "{off}");
 }
 
-/// Upright, all axes lie in one plane and no direction along the arm can be commanded.
+/// Tests an upright arm: all axes lie in one plane, so no direction along the arm can be commanded.
 #[test]
 fn the_arm_leaves_its_upright_posture() {
     let chain = arm();
@@ -296,7 +297,7 @@ mod mujoco {
     use palpate::sim::mujoco::{Plant, compile};
     use std::sync::Arc;
 
-    /// From rest, 60 mm along -y at 0.02 m/s with masses, friction and servos.
+    /// Moves 60 mm from rest along -y at 0.02 m/s with masses, friction and servos.
     #[test]
     fn an_approach_stays_on_its_line() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");

@@ -29,7 +29,7 @@ fn sds(by: ContactChannels, threshold_sds: f64, frames: u32) -> Detection {
     Detection { by, threshold_sds: Some(threshold_sds), frames, ..Detection::default() }
 }
 
-/// An untouched sensor without its skin: noise only.
+/// A sensor without contact and without its skin: noise only.
 struct Untouched {
     electrodes: Electrodes,
     fluid: FluidEffect,

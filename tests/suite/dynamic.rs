@@ -100,9 +100,9 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
     assert!(force < 1e-3 && place < 1e-5, "{force} {place}");
 }
 
-/// Same approach, detection and rest. Servos take 40 ms (arm) to stop the finger, so it ends
-/// deeper; after ten time constants of the controller (0.2 s) the remaining difference is one tick
-/// of a slow approach.
+/// Compares a dynamic and a kinematic touch with the same approach, detection and rest. Servos take
+/// 40 ms (arm) to stop the finger, so it ends deeper; after ten time constants of the controller
+/// (0.2 s) the remaining difference is one tick of a slow approach.
 #[test]
 fn a_slow_touch_is_the_kinematic_one() {
     let slow = [
@@ -134,7 +134,8 @@ fn a_slow_touch_is_the_kinematic_one() {
     }
 }
 
-/// Force when the pressure has exceeded its threshold for the required frames.
+/// Returns the force at the tick at which the pressure has exceeded its threshold for the required
+/// frames.
 fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
     let detection = &environment.scene().touch.detection;
     let pdc = |reading: &Reading| reading.frames().last().and_then(|frame| frame.pdc_counts);
@@ -230,8 +231,9 @@ fn a_finger_without_skin_finds_the_surface() {
     }
 }
 
-/// The limit is √(m / k). A skin with 100 times larger constants bears 100 times the force at the
-/// same depth, so with a 100 times larger force limit the step limit is a tenth.
+/// Tests that the limit of the time step is √(m / k). A skin with 100 times larger constants bears
+/// 100 times the force at the same depth, so with a 100 times larger force limit the step limit is
+/// a tenth.
 #[test]
 fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_not() {
     let soft = environment("container_finger.toml", &[ARM, DYNAMIC, DRY]);

@@ -64,7 +64,7 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations, levels: [usize; 2]) 
     best
 }
 
-/// Fits of whole trials in sequence, each started from the previous one, and cold fits.
+/// Runs the fits of whole trials in sequence, each started from the previous one, and cold fits.
 #[test]
 fn fits_of_the_toys_trials_reach_the_global_maximum() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -143,7 +143,8 @@ fn fits_touch_by_touch_reach_what_cold_fits_reach() {
     assert!(fits == 56 && short <= 1 && worst < 0.05, "{short} of {fits}, worst {worst}");
 }
 
-/// An oblique edge; a long wave with a short one on it; a plateau with a steep rim.
+/// Returns three surfaces: an oblique edge; a long wave with a short one on it; a plateau with a
+/// steep rim.
 fn hard_surfaces() -> [fn(f64, f64) -> f64; 3] {
     [
         |x, z| if x + 0.3 * z < 0.6 { 0.0 } else { 1.0 },

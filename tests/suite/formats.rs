@@ -1,5 +1,5 @@
 //! Tests of STL and PLY, binary and text: the same mesh as from OBJ, files that the program writes,
-//! and hostile files.
+//! and malformed files.
 
 use std::fmt::Write;
 use std::fs;

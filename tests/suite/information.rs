@@ -76,8 +76,8 @@ fn the_surface_is_below_what_the_finger_has_swept() {
     }
 }
 
-/// Contacts on two ridges, with a sweep to some depth between them. A bound slightly below the mean
-/// lowers it; a bound far below indicates an edge, and the mean stays.
+/// Tests contacts on two ridges, with a sweep to some depth between them. A bound slightly below
+/// the mean lowers it; a bound far below indicates an edge, and the mean stays.
 #[test]
 fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
     let believe = |depth_m: Option<f64>| {

@@ -108,7 +108,7 @@ fn frozen(speed_m_s: f64, noise: f64) -> (f64, String) {
     (fake.places()[400][1] - fake.last()[1], fault.to_string())
 }
 
-/// Positions that repeat exactly, and positions with noise only.
+/// Compares positions that repeat exactly with positions that have noise only.
 #[test]
 fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
     for speed_m_s in [0.0001, 0.001, 0.003, 0.005, 0.015, 0.04, 0.1] {
@@ -192,7 +192,8 @@ fn a_single_spike_of_force_is_none() {
     (0..300).for_each(|tick| assert!(body.step(&command(7, tick)).is_ok()));
 }
 
-/// Nothing is read during planning, and noise may repeat the earlier value.
+/// Tests that a pause does not count as a frozen electrode: there are no readings during planning,
+/// and noise may repeat the earlier value.
 #[test]
 fn an_electrode_that_reads_the_same_before_and_after_a_pause_is_not_frozen() {
     let world = World {
@@ -258,7 +259,7 @@ fn too_much_force_is_left_by_the_way_it_came_and_no_farther_than_said() {
     assert_eq!(fake.last()[1], deepest);
 }
 
-/// A hook would block the retraction.
+/// Tests a hook, which would block the retraction.
 #[test]
 fn going_back_ends_where_the_force_rises() {
     let caught = std::sync::Mutex::new(0.0f64);
@@ -340,8 +341,8 @@ fn no_touch_of_a_shipped_scene_comes_near_one() {
     }
 }
 
-/// If no sensor stops the finger, an interlock does: the depth of the zone, or the box around the
-/// paths.
+/// Tests that interlocks stop a finger without sensors: the depth of the zone, or the box around
+/// the paths.
 #[test]
 fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
     let environment = shipped::environment("container_finger.toml", &[]);
@@ -365,7 +366,7 @@ fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// For any command, up to ten times a joint's limits.
+    /// Tests any command, up to ten times a joint's limits.
     #[test]
     fn whatever_is_commanded_limits_hold_and_the_tip_stays_in_its_box(
         wild in prop::collection::vec(prop::array::uniform7(-1.0f64..1.0), 1..12),

@@ -114,7 +114,8 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
     }
 }
 
-/// A peer written from the table of topics alone makes a touch, with the messages of either driver.
+/// An independent peer, written from the table of topics alone, makes a touch with the messages of
+/// either driver.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
@@ -144,7 +145,7 @@ fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
     }
 }
 
-/// Commands at 250 Hz to an independent peer, which answers each.
+/// Sends commands at 250 Hz to an independent peer, which answers each.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_loop_loses_nothing_at_250_hz() {
@@ -243,8 +244,8 @@ fn a_run_that_was_halted_goes_on() {
     twin.end();
 }
 
-/// Status published once and latched; services in another participant than the topics, discovered
-/// two seconds later, with the request identity in the payload.
+/// Tests a status that is published once and latched, and services in another participant than the
+/// topics, discovered two seconds later, with the request identity in the payload.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_of_another_implementation_is_heard_and_answers() {

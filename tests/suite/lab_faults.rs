@@ -68,7 +68,7 @@ fn told(what: &str, seen_s: Option<f64>, rest_s: Option<f64>, said: &str) {
     assert!([seen_s, rest_s].into_iter().flatten().all(|time_s| time_s < NOT_SEEN_S), "{what}");
 }
 
-/// Failures on the arm's side, and the explorer's message for each.
+/// Tests failures on the arm's side and the explorer's message for each.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn what_fails_on_the_arms_side_stops_the_exploration() {
@@ -104,7 +104,7 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
     assert!(other.is_empty(), "{other:?}");
 }
 
-/// Network disturbances that do not lose the arm: the exploration continues.
+/// Tests network disturbances that do not lose the arm: the exploration continues.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn loss_latency_and_noise_are_lived_with() {
@@ -214,7 +214,7 @@ fn a_second_publisher_of_commands_stops_the_arm() {
     assert!(said.contains("two publishers") || said.contains("2 publishers"), "{said}");
 }
 
-/// States in which an explorer does not start.
+/// Tests states in which an explorer does not start.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_that_speaks_otherwise_is_not_moved() {

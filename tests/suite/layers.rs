@@ -1,4 +1,4 @@
-//! Tests of layers: within a package a module imports only from lower layers, and files have no
+//! Tests of layers: a module imports only from lower layers of its package, and files have no
 //! circular imports. The compiler checks both between packages.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,4 +1,4 @@
-//! Tests of the two commands from an unprepared mesh to a report.
+//! Tests of the two commands from a mesh to a report: `palpate new` and `palpate run`.
 
 use crate::common::program::{fails, palpate, stderr, succeeds};
 use crate::common::shapes::sphere_mesh;

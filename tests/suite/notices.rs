@@ -51,7 +51,8 @@ fn a_scene_that_means_what_it_says_is_told_nothing() {
     assert_eq!(stderr(&output), "");
 }
 
-/// Fingers of three radii on the container: the error does not grow with the difference from 7 mm.
+/// Tests fingers of three radii on the container: the error does not grow with the difference from
+/// 7 mm.
 #[test]
 fn a_soft_finger_of_another_radius_has_no_bias_of_the_difference() {
     for radius in ["0.006", "0.007", "0.008"] {

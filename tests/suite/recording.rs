@@ -137,7 +137,7 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
     bits
 }
 
-/// Any bit pattern, including NaN and infinity.
+/// Generates any bit pattern, including NaN and infinity.
 fn any_number() -> impl Strategy<Value = f64> + Clone {
     prop_oneof![any::<u64>().prop_map(f64::from_bits), -10.0..10.0]
 }

@@ -125,11 +125,10 @@ fn touches(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4))]
 
-    /// Without noise the registration is exact for any pose of the finger, and an outlier of half a
-    /// centimetre is rejected: to 0.02 mm and 0.1° for a rigid finger; to 0.2 mm and 0.3° for a
-    /// soft one, for which compliance, gain and contact side are also estimated. The roll is
-    /// determined by a corner of the tip only: 0.3° for a rigid finger, with an error of 0.16° once
-    /// in 200 cases; for a soft one three standard deviations of the fit.
+    /// Tests that registration without noise is exact for any pose of the finger, and that an
+    /// outlier of half a centimetre is rejected. The roll is determined by a corner of the tip
+    /// only: 0.3° for a rigid finger, with an error of 0.16° once in 200 cases; for a soft one
+    /// three standard deviations of the fit.
     #[test]
     fn exact_touches_give_the_finger_back(
         place in prop::array::uniform3(-3e-3..3e-3),
@@ -251,8 +250,8 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     assert!(turn_deg[0].abs() < 4.0 * x_sd_deg.max(0.3), "{turn_deg:?} {x_sd_deg}");
 }
 
-/// A correction equal to the error puts the finger in its believed pose; without a correction the
-/// chain is unchanged exactly.
+/// A correction equal to the error restores the nominal pose of the finger; without a correction
+/// the chain is unchanged exactly.
 #[test]
 fn a_correction_moves_the_tool() {
     let plain = ArmSettings::default();

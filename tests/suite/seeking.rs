@@ -47,7 +47,7 @@ fn what_contacts_have_in_common_is_not_averaged_away() {
     }
 }
 
-/// Two distant balls.
+/// Returns the field of two distant balls.
 fn apart(p: Vector3<f64>) -> f64 {
     let one = |x: f64| (p - Vector3::x() * x).norm() - 0.016;
     one(-0.045).min(one(0.045))

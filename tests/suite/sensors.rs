@@ -20,7 +20,7 @@ use palpate::sim::finger::{ContactLoad, Effects, Fingertip, FingertipState};
 use palpate::sim::simulated_finger::SimulatedFinger;
 use std::sync::Arc;
 
-/// Frames of an untouched finger.
+/// Frames of a finger without contact.
 fn untouched(effects: &Effects, count: usize) -> Vec<Frame> {
     let tip = Fingertip::new(&Finger::default(), effects);
     let mut feel = FingertipState::new(&tip, &stream(5, 0, "finger"));
@@ -74,7 +74,7 @@ fn correlation(noise_correlation: f64) -> (f64, [f64; ELECTRODES]) {
     (sum / (ELECTRODES * (ELECTRODES - 1) / 2) as f64, sd)
 }
 
-/// Three real sensors have 0.26 to 0.34.
+/// Compares the correlation with that of three real sensors, 0.26 to 0.34.
 #[test]
 fn electrodes_share_a_part_of_their_noise() {
     let (shared, sd) = correlation(ElectrodesEffect::default().noise_correlation);
@@ -120,7 +120,7 @@ fn sensors_vary_as_much_as_is_said() {
     }
 }
 
-/// Baselines of two real sensors, compared.
+/// Compares the baselines of two real sensors.
 #[test]
 fn resistances_vary_as_those_of_real_sensors() {
     let text = include_str!("../data/biotac_flat_plate.json");

@@ -77,10 +77,8 @@ fn concentric_spheres_are_the_difference_of_their_radii_apart() {
     }
 }
 
-/// A cube of side a, moved along one of them by d: the exposed face is at distance d from the other
-/// cube; the face within it is at the smaller of d and the distance to its own rim, (a³ - (a -
-/// 2d)³) / 6a² on average; of each of the four sides a share d/a protrudes, by d/2 on average. The
-/// overlap is a - d of a + d.
+/// Tests a cube of side a, moved along one side by d. The exposed face is at distance d from the
+/// other cube. The overlap is a - d of a + d.
 #[test]
 fn a_box_moved_sideways_is_as_far_off_as_geometry_says() {
     let (a, d): (f64, f64) = (0.1, 0.01);

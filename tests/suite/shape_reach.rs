@@ -52,8 +52,8 @@ fn all_of_a_convex_object_is_reached() {
     }
 }
 
-/// Two plates with a gap: a finger thin enough for an oblique approach reaches the inner faces, a
-/// thicker one neither.
+/// Tests two plates with a gap: a finger thin enough for an oblique approach reaches both inner
+/// faces, a thicker one reaches neither.
 #[test]
 fn a_gap_is_reached_into_by_a_finger_that_fits() {
     for (gap_m, fits) in [(0.013, false), (0.05, true)] {

@@ -89,7 +89,7 @@ fn electrodes_answer_tangential_force_as_real_ones_do() {
     }
 }
 
-/// Correlation and ratios of known slopes.
+/// Tests correlation and ratios of known slopes.
 #[test]
 fn agreement_is_pearsons_correlation_and_least_squares() {
     let measured = std::array::from_fn(|i| (i as f64 - 9.0) * 10.0);
@@ -219,8 +219,8 @@ fn the_point_of_contact_is_known_under_shear() {
     assert!(plane.0 <= 2.0 && plane_sheared.0 <= 2.0, "{plane:?} {plane_sheared:?}");
 }
 
-/// Planes against the pad of fingers of several sizes: the contact is found, also with an open
-/// electrode; without a signal none is found.
+/// Presses planes against the pad of fingers of several sizes: the contact is found, also with an
+/// open electrode; without a signal none is found.
 #[test]
 fn a_plane_is_found_by_a_finger_of_any_size_and_without_an_electrode() {
     for radius_m in [5e-3, 7e-3, 1e-2] {

@@ -235,8 +235,8 @@ fn a_correction_never_adds_energy() {
     }
 }
 
-/// Edges, a needle and a corner, 2 mm deep, with moduli at the limits, jumps of a millimetre, and
-/// retraction.
+/// Presses edges, a needle and a corner 2 mm deep, with moduli at the limits, jumps of a
+/// millimetre, and retraction.
 #[test]
 fn nothing_makes_it_diverge() {
     let blade = box_corners(point(-0.05, -2e-4, -0.05), point(0.05, 2e-4, 0.0));

@@ -49,7 +49,7 @@ fn ends(skin: &Skin, object: &Object, pitch_deg: f64, depth_m: f64) -> ContactLo
     (0..40).map(|_| press(skin, object, &x_wt, &mut pressed)).last().unwrap()
 }
 
-/// Bounds: 2 % of force and pressure up to 1 mm, 5 % up to 1.5 mm, with ticks of 10 µm.
+/// Tests 2 % of force and pressure up to 1 mm and 5 % up to 1.5 mm, with ticks of 10 µm.
 #[test]
 fn ticks_stay_near_where_the_shell_ends() {
     let skin = shell([24, 16], CAVITY_PA_M3);
@@ -78,8 +78,9 @@ fn ticks_stay_near_where_the_shell_ends() {
     });
 }
 
-/// Within 8 % of 36 × 24 cells at 1 mm. The load of an edge or a nose of the size of a cell depends
-/// on the position of the nodes, as do all loads at half the depth.
+/// Tests that the default cells are within 8 % of 36 × 24 cells at 1 mm. The load of an edge or a
+/// nose of the size of a cell depends on the position of the nodes, as do all loads at half the
+/// depth.
 #[test]
 fn the_default_cells_are_fine_enough() {
     let [coarse, fine] = [[24, 16], [36, 24]].map(|cells| shell(cells, CAVITY_PA_M3));

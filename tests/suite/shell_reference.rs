@@ -182,8 +182,8 @@ impl Other {
 // heuristic: the force then changes by less than a thousandth.
 const CORRECTIONS: usize = 8;
 
-/// 0.70 and 2.40 N at 0.5 and 1 mm on 36 × 24 cells; the skin's shell, which is clamped along the
-/// nail and has an exact volume, needs 0.82 and 3.11 N.
+/// Compares with 0.70 and 2.40 N at 0.5 and 1 mm on 36 × 24 cells; the skin's shell, which is
+/// clamped along the nail and has an exact volume, needs 0.82 and 3.11 N.
 #[test]
 fn its_elements_find_its_forces_on_the_flat_pulp() {
     let depths_m: Vec<f64> = (1..=10).map(|step| 1e-4 * f64::from(step)).collect();

@@ -134,7 +134,7 @@ fn the_page_holds_what_was_given() {
     }
 }
 
-/// Indices that need two more bytes: each triangle of a fan uses the first vertex.
+/// Tests indices that need two more bytes: each triangle of a fan uses the first vertex.
 #[test]
 fn a_corner_may_lie_far_back() {
     let rim = 400;
@@ -231,8 +231,8 @@ fn a_figure_reads_well_and_has_a_panel_for_each_count_and_side() {
     }
 }
 
-/// Area, volume and bounds of a mesh written to a file and read back, to the tenth of a micrometre
-/// of the files.
+/// Compares area, volume and bounds of a mesh written to a file and read back, to the tenth of a
+/// micrometre of the files.
 #[test]
 fn files_hold_the_surface_that_was_given() {
     let folder = tempfile::tempdir().unwrap();

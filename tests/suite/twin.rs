@@ -39,7 +39,7 @@ fn an_arm_behind_topics_touches_where_the_body_itself_does() {
     compare(ARM, patient());
 }
 
-/// A Shadow hand, commands without names, and joints with other names.
+/// Tests a Shadow hand, commands without names, and joints with other names.
 #[test]
 fn other_drivers_and_other_names_touch_there_too() {
     let mut settings = patient();

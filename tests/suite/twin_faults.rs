@@ -59,7 +59,7 @@ fn injected<'a>(names: &[&'a str], at_s: f64) -> Vec<(&'a str, f64, Option<f64>)
     names.iter().map(|&name| (name, at_s, None)).collect()
 }
 
-/// Every failure of the arm's side, and the explorer's message.
+/// Tests every failure of the arm's side and the explorer's message.
 #[test]
 fn the_explorer_says_what_failed() {
     std::thread::scope(|scope| {
@@ -229,7 +229,7 @@ fn rig(speed_m_s: f64, failures: &[(&str, f64, Option<f64>)]) -> Rig {
     Rig::with(ARM, &sets, BackendSettings::default(), failures)
 }
 
-/// The dynamic arm, one failure after another in the middle of a movement.
+/// Injects one failure after another while the dynamic arm moves.
 #[cfg(feature = "mujoco")]
 #[test]
 #[ignore = "needs the machine for itself: make test-faults"]

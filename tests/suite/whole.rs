@@ -39,7 +39,8 @@ fn plate(p: Vector3<f64>) -> f64 {
     q.map(|x| x.max(0.0)).norm() - 0.0025
 }
 
-/// Two balls that touch in a point, blended where they are closer than a millimetre.
+/// Returns the field of two balls that touch in a point, blended where they are closer than a
+/// millimetre.
 fn touching(p: Vector3<f64>) -> f64 {
     let one = |x: f64| (p - Vector3::x() * x).norm() - 0.03;
     one(-0.0295).min(one(0.0295))

@@ -16,7 +16,7 @@ pub struct Piece {
     pub flops: f64,
     /// Bytes read and written that do not stay in registers; 0 if they are not counted.
     pub bytes: f64,
-    /// Does the work once.
+    /// Runs the piece once.
     pub run: Box<dyn FnMut()>,
 }
 

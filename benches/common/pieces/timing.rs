@@ -11,7 +11,7 @@ const SAMPLE_S: f64 = 2e-3;
 pub struct Timed {
     /// Name of the piece.
     pub name: String,
-    /// Median time of doing it once.
+    /// Median time of one execution.
     pub time_s: f64,
     /// Operations in a second, 1e9; `None` if they are not counted.
     pub gflops: Option<f64>,
@@ -56,7 +56,7 @@ pub fn time(pieces: &mut [Piece], rounds: usize) -> Vec<Timed> {
         .collect()
 }
 
-/// Returns how often a piece is done in a sample.
+/// Returns the number of repetitions of a piece in a sample.
 fn calibrated(piece: &mut Piece) -> usize {
     let mut count = 1;
     while seconds(piece, count) < SAMPLE_S {

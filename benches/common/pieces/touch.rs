@@ -56,8 +56,8 @@ fn geometry(bvh: &MeshBvh) -> Vec<Piece> {
     ]
 }
 
-/// Times a tick of a soft finger that moves to and fro by 0.5 mm about the position in which its
-/// skin is `gap_m` from the ball.
+/// Times a tick of a soft finger that oscillates by 0.5 mm about the position in which its skin is
+/// `gap_m` from the ball.
 fn finger_tick(bvh: &MeshBvh, model: SkinModel, name: &str, gap_m: f64) -> Piece {
     let finger = Finger::default();
     let effects =

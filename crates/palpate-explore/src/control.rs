@@ -41,8 +41,8 @@ pub struct JointMotion {
 }
 
 /// Resolved-rate control (Whitney 1969) with feed-forward: `qdot = J⁺ · (twist + GAIN_PER_S ·
-/// error) + N · posture`, with J⁺ damped near singularities and the null space N pulling towards
-/// the chain's home and away from joint limits; then limited.
+/// error) + N · posture`, then limited. J⁺ is damped near singularities; the null space N moves the
+/// joints towards home and away from their limits.
 ///
 /// Motion towards a limit or singularity slows down there; commands never jump.
 #[derive(Clone, Debug)]
@@ -298,9 +298,9 @@ fn regular(square: &Matrix6<f64>, rest: &Vector6<f64>) -> Option<Vector6<f64>> {
     Some(square.cholesky()?.solve(rest))
 }
 
-/// Computes the damped inverse: in the eigenvectors u of `Jᴰ Jᴰᵀ`, a direction of singular value σ
-/// is multiplied by `σ / (σ² + λ²)` with `λ² = SINGULAR² − σ²` below SINGULAR and 0 above (after
-/// Nakamura and Hanafusa 1986). Also returns the damping, 0 to 1.
+/// Computes the damped inverse (after Nakamura and Hanafusa 1986). In the eigenvectors of `Jᴰ Jᴰᵀ`,
+/// a direction of singular value σ is multiplied by `σ / (σ² + λ²)`, with `λ² = SINGULAR² − σ²`
+/// below SINGULAR and 0 above. Also returns the damping, 0 to 1.
 fn damped(
     square: Matrix6<f64>,
     twist: &Vector6<f64>,

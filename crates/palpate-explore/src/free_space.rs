@@ -31,8 +31,8 @@ use palpate_gp::{Hyperparameters, Observation, Posterior};
 /// zone that takes more than a few touches.
 const PER_SIDE: usize = 41;
 
-/// Largest number of places at which a belief is truncated; a heuristic: a few for every touch
-/// whose bound can still be violated.
+/// Largest number of places at which a belief is truncated. Largest number of places at which a
+/// belief is truncated; a heuristic: a few for every touch whose bound can still be violated.
 const CUTS_MAX: usize = 16;
 
 /// Smallest softness of a bound, as a fraction of the signal's standard deviation; a heuristic: the
@@ -67,8 +67,8 @@ impl FreeSpaceBound {
     }
 
     /// Truncates the belief where its mean exceeds the bound by more than its softness, largest
-    /// violation first, once per place; not where the absence of a surface is more likely than a
-    /// surface below the bound.
+    /// violation first, once per place. Places are skipped where the absence of a surface is more
+    /// likely than a surface below the bound.
     pub(super) fn truncate(&self, belief: &mut Posterior, silhouette: &Silhouette) {
         let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
         let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);

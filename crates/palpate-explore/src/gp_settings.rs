@@ -92,11 +92,11 @@ pub struct Priors {
 }
 
 impl Default for GpSettings {
-    /// Heuristics: length scales up to the zone's side, beyond which data cannot distinguish them
-    /// from a constant; noise large enough that the covariance of a few hundred touches stays
-    /// regular, and at most a hundredth of the relief, above which an unresolved curve is explained
-    /// as noise; a signal range that never binds on heights that vary; slope noise from that of a
-    /// mesh's facets to one that carries no information.
+    /// Returns the default bounds. Heuristics: length scales up to the zone's side, beyond which
+    /// data cannot distinguish them from a constant; noise large enough that the covariance of a
+    /// few hundred touches stays regular, and at most a hundredth of the relief, above which an
+    /// unresolved curve is explained as noise; a signal range that never binds on heights that
+    /// vary; slope noise from that of a mesh's facets to one that carries no information.
     fn default() -> Self {
         Self {
             kernel: Kernels::One("squared_exponential".into()),

@@ -27,6 +27,7 @@ use palpate_gp::{
 };
 use std::cell::OnceCell;
 
+/// Probability of a surface one radius beyond a contact, on the side of the hull's middle.
 /// Probability of a surface one radius beyond a contact, on the side of the hull's middle: that for
 /// a hull resting on its middle, minus `LESS_AT_THE_RIM` times (distance of the contact from the
 /// middle / radius)². Estimated from the touches of a Sobol sequence on the suite's tuning objects,
@@ -103,7 +104,7 @@ impl SurfaceEvidence {
 /// objects by the mean squared error of p after 10, 30 and 60 touches.
 const PRIOR: f64 = -0.2;
 
-/// Variance n² of the evidence, in units of the signal's.
+/// Noise variance n² of the evidence, in units of the signal's.
 const NOISE_VARIANCE: f64 = 0.1;
 
 /// Threshold c: the space between two contacts is not always surface.

@@ -36,9 +36,9 @@ impl Box3 {
         Self { low: a.inf(b).inf(c).coords - centre, high: a.sup(b).sup(c).coords - centre }
     }
 
-    /// Returns the margins by which a box grows so that a moving capsule meets the box no earlier
-    /// than a ray from its end p0 meets the grown box: the Minkowski sum with the bounding box of
-    /// the capsule.
+    /// Returns the margins by which a box grows to contain the moving capsule: the Minkowski sum
+    /// with the bounding box of the capsule. A capsule meets the box no earlier than a ray from its
+    /// end p0 meets the grown box.
     pub fn swept(capsule: &Capsule) -> Self {
         let draw = capsule.p0_w - capsule.p1_w;
         let zero = Vector3::zeros();

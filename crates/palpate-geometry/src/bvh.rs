@@ -319,8 +319,8 @@ impl MeshBvh {
         self.mesh.corners(triangle as usize)
     }
 
-    /// Passes to `ask` the triangles of some parts whose boxes have a lower bound below the limit,
-    /// near ones first within each part. `ask` returns the new limit.
+    /// Passes to `visit` the triangles of some parts whose boxes have a lower bound below the
+    /// limit, near ones first within each part. `ask` returns the new limit.
     #[inline]
     pub(super) fn visit(
         &self,

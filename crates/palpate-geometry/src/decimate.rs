@@ -8,11 +8,11 @@ use std::collections::HashMap;
 /// Ratio between consecutive cell sizes; a heuristic.
 const FINER: f64 = 0.9;
 
-/// Returns the mesh reduced to at most `most` triangles, or unchanged if it has no more: the
+/// Returns the mesh reduced to at most `most` triangles, or unchanged if it has no more. The
 /// vertices of a cubic cell are merged into their mean, and triangles without three distinct
-/// corners are removed (Rossignac and Borrel, *Multi-resolution 3D approximations for rendering
-/// complex scenes*, 1993). Cells are as small as possible. If a surface of area A is folded so that
-/// even cells of √(12 A / `most`) give more triangles, the result has more.
+/// corners are removed (Rossignac and Borrel 1993). Cells are as small as possible. If a surface of
+/// area A is folded so that even cells of √(12 A / `most`) give more triangles, the result has
+/// more.
 ///
 /// No vertex moves by more than a cell's diagonal, 6 √(A / `most`). The two sides of a thin wall
 /// remain separate: vertices with opposite normals are not merged. A closed mesh remains closed;

@@ -41,9 +41,9 @@ pub fn direction(number: usize, count: usize) -> UnitVector3<f64> {
     UnitVector3::new_normalize(Vector3::new(across * turn.cos(), across * turn.sin(), z))
 }
 
-/// Returns `count` points of the surface, each for an equal part of its area: one at the centre of
-/// each stratum of the area accumulated over triangles in their order; the position within a
-/// triangle follows from the sequence of the square, folded along the diagonal.
+/// Returns `count` points of the surface, each for an equal part of its area. Each point is at the
+/// centre of a stratum of the area accumulated over the triangles; its position within the triangle
+/// follows from the sequence of the square, folded along the diagonal.
 pub fn over_surface(mesh: &Mesh, count: usize) -> Vec<SurfacePoint> {
     let doubled_m2 = |[a, b, c]: [Point3<f64>; 3]| (b - a).cross(&(c - a)).norm();
     let stratum_m2 = mesh.iter_corners().map(doubled_m2).sum::<f64>() / count as f64;
@@ -75,7 +75,7 @@ mod tests {
         assert!((GOLDEN.recip() - GOLDEN - 1.0).abs() < 1e-15);
     }
 
-    /// The mean of n random directions would have a length of √(1/n).
+    /// Tests the mean of n directions; that of random ones would have a length of √(1/n).
     #[test]
     fn directions_have_unit_length_and_no_mean() {
         for count in [1, 2, 64, 200] {
@@ -116,7 +116,7 @@ mod tests {
         assert!(octants.iter().all(|&on| on.abs_diff(500) < 30), "{octants:?}");
     }
 
-    /// The mean of x·y over a square, whose variance is 7/144: random points have an error of
+    /// Tests the mean of x·y over a square, whose variance is 7/144; random points have an error of
     /// √(variance / n). These points have a tenth of that; a fold that tears the square along its
     /// diagonal would have a quarter.
     #[test]

@@ -150,8 +150,8 @@ mod tests {
             prop_assert_eq!(torus(1.0, 0.4).contains(&Point3::from(at)), from_tube < 0.0);
         }
 
-        /// Two boxes that share a part of a face, a third that overlaps, a fourth within the first,
-        /// and a separate ball: at any place, including lattice planes.
+        /// Tests two boxes that share a part of a face, a third that overlaps, a fourth within the
+        /// first, and a separate ball, at any place including lattice planes.
         #[test]
         fn pieces_may_touch_overlap_and_nest(
             at in prop::array::uniform3(prop_oneof![-0.5f64..4.5, (0..9).prop_map(|i| f64::from(i) * 0.5 + 0.25)]),
@@ -195,7 +195,7 @@ mod tests {
         }
     }
 
-    /// A line through the centres of a box in a box and of a separate one.
+    /// Tests a line through the centres of a box in a box and of a separate one.
     #[test]
     fn a_line_is_inside_from_where_it_enters_to_where_it_leaves() {
         let boxes = all_of(&[

@@ -125,7 +125,7 @@ impl Factor {
 }
 
 vectorised_fn! {
-    /// Eight sums in registers hide each other's latency.
+    /// Replaces each lane b by L⁻¹·b; eight sums in registers hide each other's latency.
     fn solve_lower_lanes<'a, V: Vector, const N: usize>(
         factor: &'a Factor,
         lanes: &'a mut [[f64; N]],

@@ -1,5 +1,6 @@
 //! Hyperparameters by maximum likelihood (Rasmussen & Williams 2006, section 5.4.1): a coarse scan
-//! finds the hills of the profiled likelihood, and BFGS climbs those that may be the highest.
+//! finds the local maxima of the profiled likelihood, and BFGS refines those that may be the
+//! highest.
 
 use super::kernel::{Hyperparameters, KERNELS, Kernel};
 use super::likelihood::{Likelihood, ProfiledLikelihood};
@@ -36,16 +37,15 @@ pub struct Fit {
     pub stop: Stop,
 }
 
-/// Up to this many observations each fit scans the whole box: with few touches the optimum changes
-/// often, and the factors of the scan grow with the observations. A heuristic: they need 8 MB.
+/// Number of observations up to which each fit scans the whole box. (reason in a second sentence) A
+/// heuristic: they need 8 MB.
 const SCAN_ALWAYS: usize = 128;
 /// Growth of the observations since the last scan at which a larger fit scans again; in between it
 /// climbs from the last optimum; a heuristic.
 const SCAN_AGAIN: f64 = 1.2;
-/// With more observations than this, the scan uses every second one, with twice as many every
-/// fourth, and so on: hundreds determine the positions of the hills, and their heights are not
-/// needed. A heuristic: with 150 of 300, surfaces of two scales and surfaces with edges were
-/// confused.
+/// Number of observations above which the scan uses every second one, with twice as many every
+/// fourth, and so on. A heuristic: with 150 of 300, surfaces of two scales and surfaces with edges
+/// were confused.
 const HALVED: usize = 1024;
 
 /// Sequence of fits of growing observations with one kernel; each starts from the last one's
@@ -195,21 +195,21 @@ impl SearchBox {
     }
 }
 
-/// A climb ends where its predicted gain is below 1e-4 nat, which no data can resolve; most need a
-/// tenth of the budget. The first step is a third of the distance between two places of the scan;
-/// heuristics.
+/// Options of a climb: it ends at a predicted gain of 1e-4 nat, which no data can resolve. The
+/// first step is a third of the distance between two places of the scan; heuristics.
 const MANNER: BfgsOptions =
     BfgsOptions { first_step: 0.05, gain: 1e-4, relative_gain: 0.0, budget: 100 };
-/// A climb is stopped if it would stay below the highest optimum even with this many times its
-/// predicted gain; a heuristic. See [`SearchBox::fit`] for the optima that this misses.
+/// Factor on the predicted gain; a climb is stopped if it would stay below the highest optimum even
+/// then; a heuristic. See [`SearchBox::fit`] for the optima that this misses.
 const HOPE: f64 = 4.0;
-/// A climb also stops this close to the highest optimum, in units of the box's sides, if it is
-/// below it.
+/// Distance from the highest optimum, in units of the box's sides, at which a lower climb stops.
 const SAME_TOP: f64 = 0.02;
-/// Largest number of hills of the scan that are climbed; a heuristic: sufficient for the fits of
-/// the toy that were compared with a dense grid.
+/// Largest number of local maxima of the scan that are refined. Largest number of hills of the scan
+/// that are climbed; a heuristic: sufficient for the fits of the toy that were compared with a
+/// dense grid.
 const CLIMBS: usize = 2;
-/// Optima that differ by less, in nats, are the same; a heuristic: above the likelihood's rounding.
+/// Difference in nats below which optima are the same; a heuristic: above the likelihood's
+/// rounding.
 const GAIN_MIN: f64 = 1e-6;
 /// Largest drop of the log likelihood, in nats, at another noise for which a climb from there is
 /// worth trying; a heuristic.

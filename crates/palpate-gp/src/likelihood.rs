@@ -23,7 +23,7 @@ pub struct Likelihood<'a> {
     mean: MeanModel,
     observations: &'a Observations,
     dense: Dense,
-    /// L⁻¹·y, then A⁻¹·y if a gradient is requested.
+    /// Buffer: L⁻¹·y, then A⁻¹·y if a gradient is requested.
     weights: Vec<f64>,
     scratch: Vec<f64>,
     /// Weights of a pair of places; see [`DerivativeCovariance::add_length_gradient`].

@@ -203,9 +203,9 @@ impl Posterior {
         self.gradient_with_slopes(weights, (derivatives, row), gradient);
     }
 
-    /// Returns the leave-one-out z-scores of the heights: the deviation of each from its prediction
-    /// by all others, in standard deviations, z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the covariance s²·A
-    /// (Rasmussen & Williams 2006, Eqs. 5.10 to 5.12). n³/2 operations.
+    /// Returns the leave-one-out z-scores of the heights: z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the
+    /// covariance s²·A (Rasmussen & Williams 2006, Eqs. 5.10 to 5.12). Each is the deviation of a
+    /// height from its prediction by all others, in standard deviations. n³/2 operations.
     pub fn loo_z_scores(&self) -> Vec<f64> {
         let mut unit = Vec::new();
         let z = |i: usize| {

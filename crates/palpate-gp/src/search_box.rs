@@ -74,8 +74,8 @@ impl SearchBox {
         parameters.map(f64::ln).collect()
     }
 
-    /// Moves to a third of the lengths and the middle noises: a start from which a fit in a corner
-    /// of its box detects that new touches show a rougher surface.
+    /// Sets `logs` to a third of the lengths and the middle noises: a start from which a fit in a
+    /// corner of its box detects a rougher surface.
     pub(super) fn shorter_lengths(&self, logs: &mut [f64], lower: &[f64], upper: &[f64]) {
         let lengths = self.length_scales.len();
         logs.iter_mut().take(lengths).for_each(|log| *log -= 3f64.ln());

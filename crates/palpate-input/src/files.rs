@@ -1,4 +1,4 @@
-//! Reading and writing of files named by users.
+//! Reading and writing of user files.
 //!
 //! Only regular files of a bounded size are read, since a pipe or a device may block or never end.
 //! Writes do not follow symbolic links, so that a run's folder cannot change a file outside.

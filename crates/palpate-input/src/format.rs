@@ -1,4 +1,4 @@
-//! Formatting of values and parser messages for the authors of settings.
+//! Formatting of values and of parser errors for messages to users.
 
 /// Largest number of characters of a value in a message; a heuristic.
 const SHOWN_MAX: usize = 60;

@@ -372,7 +372,7 @@ impl Backend for RosBackend {
         &self.capabilities
     }
 
-    /// Does not move the arm; starts sending zero velocities.
+    /// Starts sending zero velocities, without moving the arm.
     fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
         self.latched()?;
         let lab = Arc::clone(&self.lab);

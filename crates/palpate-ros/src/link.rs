@@ -18,7 +18,7 @@ const COUNTED_S: f64 = 0.1;
 /// A send operation, run by the thread.
 type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), InputError> + Send>;
 
-/// Largest number of pending jobs; older ones are obsolete.
+/// Largest number of pending jobs; beyond it the oldest is dropped.
 const JOBS_MAX: usize = 256;
 
 #[derive(Default)]

@@ -184,7 +184,7 @@ messages! {
     /// The state of a device.
     diagnostic_msgs/DiagnosticStatus {
         "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\n"
-        /// 0 ok, 1 warn, 2 error, 3 stale.
+        /// Level of the status: 0 ok, 1 warn, 2 error, 3 stale.
         byte level,
         /// Name of the device.
         string name,
@@ -349,7 +349,7 @@ messages! {
 
     /// Request of a service without arguments. ROS 2 has no empty message, so it contains one byte.
     std_srvs/TriggerRequest {
-        /// Unused.
+        /// Placeholder byte, always 0.
         uint8 structure_needs_at_least_one_member,
     }
 

@@ -45,8 +45,8 @@ pub struct LatestMessages {
     pub commanded: Option<Instant>,
     /// Whether the arm is commanded to zero velocity in the absence of other commands.
     pub is_engaged: bool,
-    /// Whether the arm has been ready to move since it was engaged: from then on a status that
-    /// refuses motion is a fault, however short it is.
+    /// Whether the arm has been ready to move since it was engaged; from then on any status that
+    /// forbids motion is a fault, however short.
     pub is_ready: bool,
     /// Time origin.
     pub since: Option<Instant>,
@@ -82,7 +82,7 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// Returns one without messages.
+    /// Creates a mailbox without messages.
     pub fn new(names: JointNames, settings: BackendSettings) -> Self {
         let heard = LatestMessages { since: Some(Instant::now()), ..LatestMessages::default() };
         Self { names, settings, heard: Mutex::new(heard) }

@@ -100,7 +100,8 @@ pub const DOMAIN_MAX: u16 = 232;
 const RATE_MAX_HZ: f64 = 500.0;
 
 impl Default for BackendSettings {
-    /// Heuristics, except the rate, which is the usual rate of joint states.
+    /// Returns the defaults; all are heuristics, except the rate, which is the usual rate of joint
+    /// states.
     fn default() -> Self {
         Self {
             kind: BackendKind::Simulated,

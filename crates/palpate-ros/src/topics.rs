@@ -213,8 +213,8 @@ impl Service {
     pub const COMMON: [Self; 5] =
         [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
 
-    /// Whether a second call has no further effect: false for a bias, which may be taken under load
-    /// the second time, and for a twin's failure, which it would end.
+    /// Whether the call is idempotent: false for a bias, which may be taken under load the second
+    /// time, and for a twin's failure, which a second call ends.
     pub fn is_idempotent(&self) -> bool {
         matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
     }

@@ -265,7 +265,7 @@ pub enum Direction {
     Less,
     /// More is better.
     More,
-    /// Neither is better; planners are not compared in it.
+    /// No direction; planners are not compared in it.
     Neither,
 }
 
@@ -276,7 +276,7 @@ pub enum Aggregate {
     Mean,
     /// Median with its bootstrap interval.
     Median,
-    /// Both; the median where only one fits.
+    /// Mean and median; the median where only one fits.
     Both,
 }
 

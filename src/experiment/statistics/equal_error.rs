@@ -154,9 +154,9 @@ fn curves(
     planner_rows(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
 }
 
-/// Returns when the planners of each pair reach the second's median error at `goal_index` in a
-/// sample of the pairs, as the index of the comparison (over a zone, touches after the initial
-/// ones) and the median path length to it, m.
+/// Returns when the planners of each pair reach the second planner's median error at `goal_index`,
+/// and the median path length to it, m. (index of the comparison: over a zone, touches after the
+/// initial ones)
 fn reach_goal(
     medians: &[ErrorCurve<RankedValues>; 2],
     sample: &[usize],

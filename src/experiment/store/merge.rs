@@ -1,4 +1,4 @@
-//! Merging of a run's shards into the same bytes as a run in one process.
+//! Merging of a run's shards; the result is byte-identical to a run in one process.
 
 use super::io::{RunError, io_error};
 use super::provenance::InputHashes;

@@ -18,7 +18,7 @@ pub(super) const CONTENT: &str = "content.json";
 /// File that lists the programs that wrote a run.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Largest scan that is hashed.
+/// Maximum size of a scan that is hashed.
 const SCAN_MAX: u64 = 1 << 30;
 
 /// Prefix of the keys of planners; the name follows.

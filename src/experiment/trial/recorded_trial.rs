@@ -61,8 +61,7 @@ pub fn run(
     row.unwrap_or_else(|fault| TrialRow::not_started(trial, planner.name(), &fault))
 }
 
-/// # Errors
-/// A fault before the first touch.
+/// Records a trial of `planner` to `path`, continuing after the touches `made`.
 fn record(
     simulation: &Simulation,
     (trial, planner): (u32, &dyn PlannerFactory),

@@ -94,9 +94,9 @@ fn signed_distance(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
     }
 }
 
-/// Predicted contact of a touch at `target`, with its standard deviation: the height at a place;
-/// around an object the distance before the aimed point, or 0 with the ball's radius as deviation
-/// if no contact is predicted.
+/// Returns the predicted contact of a touch at `target` with its standard deviation. At a place it
+/// is the height; around an object the distance before the aimed point, or 0 with the ball's radius
+/// as deviation if no contact is predicted.
 fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
     match belief {
         Belief::HeightField(field) => height(field, target.place()?),

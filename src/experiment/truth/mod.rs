@@ -78,7 +78,7 @@ const CALIBRATION_STEP: usize = 4;
 
 impl Truth {
     /// Samples the environment's surface on a grid of `per_side` points along each side of the
-    /// zone; calls `tell` with the name of each step when it starts.
+    /// zone; reports the name of each step to `tell`.
     pub fn sample(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
         let Some(zone) = environment.task().zone() else {
             return Self::whole_object(environment.mesh());

@@ -1,4 +1,4 @@
-//! Interactive part of the page: one planner's belief touch by touch, to turn and to colour. This
+//! Interactive view of the page: a planner's belief after each touch, to turn and to colour. This
 //! module writes its frame: choices, slider, texts, data, script.
 //!
 //! It uses a few hundred lines of own script. A plotting library would add three to four megabytes

@@ -26,7 +26,8 @@ fn caption(run: &Run) -> String {
     )
 }
 
-/// Returns the planner drawn: the one that maximises this map, if it is there.
+/// Returns the planner to draw: `active`, which maximises this map, if it is drawn; otherwise the
+/// first.
 fn planner(run: &Run) -> Option<&str> {
     let planners = run.experiment.drawn_planners();
     planners.iter().find(|&&name| name == "active").or(planners.first()).copied()
@@ -47,12 +48,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     })
 }
 
-/// Returns the standard deviation at `place` that a touch aimed there could still remove.
+/// Returns the standard deviation at `place` that a touch can still reduce.
 fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f64 {
     belief.planning_posterior().map_or(f64::NAN, |known| known.variance(place, scratch).sqrt())
 }
 
-/// Returns the place of the largest deviation: the planner's, or else that of `read`.
+/// Returns the place of the largest deviation: that of the plan, or else of `read`.
 fn maximum<'a>(replay: &'a Replay, read: &'a [MapValue]) -> Option<&'a [f64]> {
     let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.stall.is_none());
     let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));

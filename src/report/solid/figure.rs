@@ -1,4 +1,4 @@
-//! Figure of believed surfaces: a row for each planner and each side, a column for each touch
+//! Figure of estimated surfaces: a row for each planner and each side, a column for each touch
 //! count.
 
 use super::panel::{View, inner, scale};
@@ -26,9 +26,9 @@ const UNKNOWN: [u32; 2] = [0xcdcdcd; 2];
 /// Position in the colour map of the true surface, which has no values.
 const PLAIN: f64 = 0.6;
 
-/// Draws the surfaces after some touch counts from the front and from behind, coloured by their
-/// standard deviation, with the touches on them and the true surface on the right, as SVG; `None`
-/// if there is nothing to draw, or no value to colour by. All have one scale.
+/// Draws the surfaces after some touch counts as SVG, from the front and from behind, coloured by
+/// their standard deviation. Touches lie on them, and the true surface is on the right. Returns
+/// `None` if there is nothing to draw, or no value to colour by. All have one scale.
 pub fn figure(
     sequences: &[PlannerSurfaces],
     truth: Option<&Mesh>,

@@ -23,7 +23,7 @@ pub struct PlannerSurfaces {
     pub planner: String,
     /// Touches, in order.
     pub touches: Vec<SolidTouch>,
-    /// Believed surfaces, by increasing touch count.
+    /// Estimated surfaces, by increasing touch count.
     pub frames: Vec<SurfaceFrame>,
 }
 
@@ -34,13 +34,13 @@ pub struct SolidTouch {
     pub aim_w: Point3<f64>,
     /// Unit vector of the finger's motion.
     pub along_w: Vector3<f64>,
-    /// Contact point; `None` for a miss or a touch broken off.
+    /// Contact point; `None` for a miss or an aborted touch.
     pub contact_w: Option<Point3<f64>>,
     /// Whether it is one of the initial touches, which all planners share.
     pub is_initial: bool,
 }
 
-/// Believed surface.
+/// Estimated surface.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceFrame {
     /// Number of touches.

@@ -1,4 +1,4 @@
-//! Interactive section of the page: a believed surface touch by touch, to turn and to colour.
+//! Interactive section of the page: the estimated surface after each touch, to turn and to colour.
 //! Lengths are in millimetres, and meshes are encoded as compact text.
 
 use super::{PlannerSurfaces, SolidTouch, SurfaceFrame};

@@ -96,8 +96,8 @@ pub(super) struct SkinContact {
     pub sample: usize,
     pub section_m2: f64,
     pub gap_m: f64,
-    /// Whether there is fluid under the column; a dry column feels no pressure and displaces
-    /// nothing.
+    /// Whether there is fluid under the column; the fluid's pressure does not act on a dry column,
+    /// which displaces nothing.
     pub wet: bool,
     /// Indentation; negative if only a bulging skin would reach the object.
     pub indentation_m: f64,

@@ -113,9 +113,9 @@ impl Patches {
         size_of_val(self.patches.as_slice())
     }
 
-    /// Returns the ranges of samples whose rays may meet the object in pose `x_wt`, in order, each
-    /// with the parts of it that they may meet, and the distance off the axis at which the rays may
-    /// start.
+    /// Returns the ranges of samples whose rays may meet the object in pose `x_wt`, in order. Each
+    /// has the parts of the object that it may meet, and the distance off the axis at which the
+    /// rays may start.
     pub fn near<'a>(
         &'a self,
         bvh: &'a MeshBvh,

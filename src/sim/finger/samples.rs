@@ -5,7 +5,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::robot::finger::profile::{Layers, Profile};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Golden section of a turn: successive points never line up.
+/// Golden angle as a fraction of a turn: successive points never line up.
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
 /// Step of the central differences over the skin: along it as a fraction of the distance between

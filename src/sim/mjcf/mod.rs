@@ -101,10 +101,9 @@ pub fn scene(environment: &Environment, mode: ModelPurpose) -> Option<String> {
     ))
 }
 
-/// Returns the collision geometry for a finger without skin: the object as a height field, as the
-/// convex hull of its mesh (computed by MuJoCo, so every hollow is filled), or as the signed
-/// distance field of its mesh, interpolated in MuJoCo's octree, with the options of the contact
-/// search.
+/// Returns the collision geometry for a finger without skin, with the options of the contact
+/// search. It is a height field, the convex hull of the mesh (computed by MuJoCo, so every hollow
+/// is filled), or its signed distance field (interpolated in MuJoCo's octree).
 fn collision_geometry(environment: &Environment) -> Option<String> {
     let solver = &environment.scene().solver;
     let (kind, option) = match solver.collision.unwrap_or_default() {

@@ -28,9 +28,9 @@ pub fn version() -> &'static str {
     mujoco_rs::mujoco_version()
 }
 
-/// MuJoCo's message if it takes an errno left by its own allocation for that of a number: glibc
-/// sets ENOMEM where the heap of the main arena cannot grow, although it then allocates elsewhere.
-/// Another thread has another arena.
+/// Message of MuJoCo when it reports an errno left by its own allocation as an error of a number.
+/// (glibc sets ENOMEM if the heap of the main arena cannot grow, and allocates elsewhere) Another
+/// thread has another arena.
 const SPURIOUS: &str = "unknown error in attribute";
 
 /// Compiles a model; with an implicit integrator, its servos become those of a [`Plant`].

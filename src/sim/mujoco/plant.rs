@@ -211,9 +211,8 @@ impl Plant {
     }
 
     /// Returns the reading of the force/torque sensor during the last step, transformed to `T`
-    /// about its origin: the load of everything beyond the sensor, that is, the wrench on the
-    /// fingertip plus the weight and inertia of adapter and finger. It is zero in a scene without
-    /// the sensor.
+    /// about its origin. It is the wrench on the fingertip plus the weight and inertia of adapter
+    /// and finger. It is zero in a scene without the sensor.
     pub fn mount_wrench(&self) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
         // MuJoCo gives the force of the link on the finger; the sensor reads the opposite.

@@ -14,7 +14,7 @@ use std::sync::Arc;
 // heuristic: the default of experiments.
 const GRID: usize = 31;
 
-/// Whether a scene needs an effect.
+/// Relevance of an effect in a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Relevance {

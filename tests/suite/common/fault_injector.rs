@@ -8,7 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
-/// Kinds of failure, from a given tick on.
+/// Kinds of failure that begin at a given tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Failure {
     /// NaN pressure.

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// Meeting point of the ends; clones are the same hub.
+/// Shared hub of the ends; clones refer to the same hub.
 #[derive(Clone, Default)]
 pub struct Hub(Arc<Mutex<Ends>>);
 
@@ -21,7 +21,7 @@ struct Ends {
 struct End {
     id: u64,
     side: Side,
-    /// Incoming messages; `None` only wakes the receiver.
+    /// Queue of incoming messages; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
 }
 

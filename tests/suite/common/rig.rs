@@ -81,7 +81,7 @@ pub struct Wire {
     pub cuts_received: Arc<AtomicBool>,
 }
 
-/// An explorer's end behind a wire.
+/// An explorer's end of a connection that can be cut.
 struct Wired {
     end: Memory,
     wire: Wire,
@@ -250,7 +250,7 @@ impl Rig {
     }
 
     #[cfg(feature = "mujoco")]
-    /// Way in which the tip came to rest after `since_s`. It must be at rest now.
+    /// Movement until the tip came to rest after `since_s`. It must be at rest now.
     pub fn rest(&self, since_s: f64) -> Rest {
         let track = self.track.lock().unwrap();
         let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();

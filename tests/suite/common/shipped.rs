@@ -30,7 +30,7 @@ pub fn toy(x: f64) -> f64 {
     if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
 }
 
-/// Fails with both numbers unless they agree within `tolerance`.
+/// Panics with both numbers unless they agree within `tolerance`.
 #[track_caller]
 pub fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");

@@ -102,7 +102,7 @@ impl CheckedTouch {
         }
     }
 
-    /// Requires such a contact or none, and a lawful movement in either case.
+    /// Requires such a contact or none, and a movement within the limits in either case.
     pub fn on_surface_or_missed(&self, tolerance_m: f64) -> Outcome {
         if let Some(why) = &self.refused {
             return Outcome::Faulted(why.clone());

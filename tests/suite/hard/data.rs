@@ -40,8 +40,7 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
     }
 }
 
-/// Fits the data and checks the laws for any data set: every number is finite, σ is at most the
-/// prior's, and σ is nowhere smaller than n touches of that very place would make it.
+/// Fits the data and checks the laws for any data set.
 ///
 /// Reason for the last law: an estimate Σ wᵢ·yᵢ has an error of noise²·‖w‖² and, each height having
 /// the prior's deviation s, of at least s²·(1 − √n·‖w‖)²; the minimum of the sum is s²·noise² /
@@ -163,9 +162,9 @@ fn a_flat_plate_is_believed_where_it_was_touched_and_no_farther() {
     }
 }
 
-/// The toy's wave is 1 at every quarter: touched only there it looks like a plate to any belief.
-/// But active touch continues at the largest variance and must find the wave before it has made as
-/// many touches again.
+/// The toy's wave is 1 at every quarter: with touches only there, every belief is flat. But active
+/// touch continues at the largest variance and must find the wave before it has made as many
+/// touches again.
 #[test]
 fn active_touch_escapes_the_toys_lattice() {
     let lattice = |i: u32| -2.0 + 0.25 * f64::from(i);

@@ -54,7 +54,7 @@ impl FingerOnWall {
         TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.r_at()))
     }
 
-    /// State of an untouched finger.
+    /// State of a finger without contact.
     pub fn untouched(&self) -> FingertipState {
         FingertipState::new(&self.tip, &seed::stream(0, 0, "finger"))
     }

@@ -170,7 +170,7 @@ fn release(steps: f64, _: f64) -> Outcome {
     })
 }
 
-/// Pressed in, dragged aside and back, and released: friction and skin dissipate energy and never
+/// Presses in, drags aside and back, and releases: friction and skin dissipate energy and never
 /// create it.
 fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = effects();
@@ -363,7 +363,7 @@ pub fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
     })
 }
 
-/// Within a fifth of the force on sixteen thousand points, at the depth of a touch.
+/// Requires a force within a fifth of that on sixteen thousand points, at the depth of a touch.
 fn few_points(count: f64, _: f64) -> Outcome {
     let force_n = |samples: usize| {
         let mut effects = effects();

@@ -55,7 +55,7 @@ fn cases() -> impl Iterator<Item = &'static Case> {
     GROUPS.iter().flat_map(|(_, cases)| *cases)
 }
 
-/// At the nominal period or step; `make hard-cases` runs the others.
+/// Runs every case at the nominal period or step; `make hard-cases` runs the others.
 #[test]
 fn every_case_holds_where_it_must() {
     let cases: Vec<&Case> = cases().collect();
@@ -103,8 +103,8 @@ fn a_panic_is_a_broken_law() {
     assert!(matches!(verdict.outcome, Outcome::Wrong(_)) && !verdict.explained);
 }
 
-/// Measured: 5000 times; at the next value, 10 000, the force at rest has an error of 6.2 %, where
-/// 5 % is allowed. The bound is a fifth of the measured value.
+/// Tests that the force at rest stays within 5 % with a skin a thousand times stiffer. The bound is
+/// a fifth of the measured value.
 #[cfg(feature = "mujoco")]
 #[test]
 fn a_skin_a_thousand_times_stiffer_keeps_the_force_at_rest_in_steps_as_given() {

@@ -200,7 +200,7 @@ fn sizes(radius_m: f64, period_s: f64) -> Outcome {
     on(mesh, [0.0; 2], period_s, 1.0)
 }
 
-/// Same contact and force as at the origin, to the remaining digits.
+/// Requires the same contact and force as at the origin, to the remaining digits.
 fn far(distance_m: f64, period_s: f64) -> Outcome {
     let [near, far] = [0.0, distance_m].map(|by_m| {
         let mut scene = scene(period_s);
@@ -215,7 +215,7 @@ fn far(distance_m: f64, period_s: f64) -> Outcome {
     all([far.on_surface(1e-3), near.agrees(&far, distance_m, 1e-4)])
 }
 
-/// Same contact and force as on a plain wall.
+/// Requires the same contact and force as on a plain wall.
 fn same_as_wall(mesh: Option<Mesh>, period_s: f64, tolerance_m: f64) -> Outcome {
     let (Some(mesh), Some(plain)) = (mesh, super::solids::mesh(wall(0.05), [0.0; 3])) else {
         return Outcome::Wrong("no mesh".into());

@@ -10,7 +10,8 @@ use palpate::geometry::solids::box_mesh;
 use palpate::sim::finger::Effects;
 use palpate::sim::finger::effects::skin::SkinModel;
 
-/// A finger a hundred times as large has a million times the volume.
+/// Reason for wrong results of a stiff fluid: a finger a hundred times as large has a million times
+/// the volume.
 const STIFF_FLUID: &str =
     "pressed at once, the pressure of a fluid this stiff for its volume is not found in one press";
 
@@ -146,7 +147,8 @@ fn deep(depth_mm: f64, _: f64) -> Outcome {
     })
 }
 
-/// In and out at 20 mm/s the forces depend on depth only, and the work is recovered.
+/// Requires that forces depend on depth only when moving in and out at 20 mm/s, and that the work
+/// is recovered.
 fn release(depth_mm: f64, period_s: f64) -> Outcome {
     with_finger(&shell(), |setup| {
         let ticks = (1e-3 * depth_mm / (SPEED_M_S * period_s)).ceil().max(1.0) as u32;
@@ -194,7 +196,7 @@ fn held(count: f64, period_s: f64) -> Outcome {
     })
 }
 
-/// Two millimetres in, tick by tick and at once, and away.
+/// Moves two millimetres in, tick by tick and at once, and away.
 fn pushed_into(solid: palpate::geometry::solids::Triangles) -> Outcome {
     let setup = mesh(solid, [0.0; 3]).and_then(|mesh| FingerOnWall::before(mesh, &shell(), 1.0));
     let Some(setup) = setup else { return Outcome::Wrong("no object".into()) };

@@ -1,4 +1,4 @@
-//! Hard cases of the skin's stiffness relative to the time step: a body with masses presses its
+//! Hard cases of the skin's stiffness relative to the time step. A body with masses presses its
 //! finger on a wall along a given path, and its force is compared with that of a run with shorter
 //! steps.
 
@@ -253,9 +253,10 @@ impl ForceDeviation {
 const TIMES: [f64; 15] =
     [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, 1e6];
 
-/// Largest stiffness factor of a PA-10's skin, relative to a BioTac's, with steps of `step_s`,
-/// `divided` as in a scene or unchanged: the largest of [`TIMES`] up to which the force at rest is
-/// within [`TOLERANCE`] of a refined run's, or 0; and the next one with its result.
+/// Returns the largest stiffness factor of a PA-10's skin, relative to a BioTac's, with steps of
+/// `step_s`, `divided` as in a scene or unchanged. It is the largest of [`TIMES`] up to which the
+/// force at rest is within [`TOLERANCE`] of a refined run's, or 0; the second value is the next
+/// factor with its result.
 pub fn stiffness_margin(step_s: f64, divided: bool) -> (f64, Option<(f64, String)>) {
     let mut margin = 0.0;
     for times in TIMES {
@@ -288,8 +289,8 @@ fn at_peak(times: f64, step_s: f64, arm: bool) -> Outcome {
     }
 }
 
-/// Pressed, then commanded to rest: the position at the end is that after a second, within a
-/// hundredth of the depth, and no joint moves faster than that implies.
+/// Presses, then commands rest: the final position is that after a second within a hundredth of the
+/// depth, and no joint moves faster than that implies.
 fn long(ticks: f64) -> Outcome {
     let Some(press) = WallPress::new(1.0, 0.002, true) else {
         return Outcome::Wrong("nothing to press".into());

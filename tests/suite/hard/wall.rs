@@ -197,7 +197,8 @@ fn many(count: f64, period_s: f64) -> Outcome {
     Outcome::Stable
 }
 
-/// Within the finger's travel in one tick and one tactile frame of the touch at 0.25 ms.
+/// Requires the contact to within the finger's travel in one tick and one tactile frame of the
+/// touch at 0.25 ms.
 fn refined(times: f64, _: f64) -> Outcome {
     let [fine, coarse] =
         [0.00025, 0.0025 * times].map(|period_s| touch_wall(noise_free(&scene(period_s))));

@@ -22,7 +22,7 @@ pub struct Capabilities {
     pub period_s: f64,
     /// Whether `reset` restores the same state for the same seed.
     pub resettable: bool,
-    /// Whether its time runs by itself, in real time.
+    /// Whether the backend runs in real time.
     pub real_time: bool,
 }
 

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 /// Largest delay of a command; a heuristic: far beyond the controller's stability limit.
 pub const DELAY_MAX_S: f64 = 1.0;
 
-/// A backend that applies every command some ticks later; until the first one arrives it is
-/// commanded to rest.
+/// A backend that delays every command by some ticks; before the first command takes effect, the
+/// robot is commanded to rest.
 pub struct DelayedBackend {
     inner: Box<dyn Backend>,
     ticks: usize,

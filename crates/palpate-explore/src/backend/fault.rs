@@ -143,8 +143,7 @@ pub enum Fault {
         /// Cause.
         cause: LinkFault,
     },
-    /// The backend cannot be built from its scene, or cannot continue for a reason that no caller
-    /// distinguishes.
+    /// The backend cannot be built from its scene, or cannot continue for another reason.
     #[error(transparent)]
     Invalid(#[from] InputError),
 }

@@ -1,4 +1,4 @@
-//! Wraps a backend: publishes its joint state and runs it in real time.
+//! Backend wrapper that publishes the joint state and runs in real time.
 
 use super::{Backend, Capabilities, Command, Fault, Reading};
 use nalgebra::Point3;
@@ -104,5 +104,5 @@ impl Backend for Watched {
 /// much less.
 const GRAIN_S: f64 = 0.004;
 
-/// Delay above which lost time is not made up, as after planning; a heuristic.
+/// Delay above which lost time is skipped, as after planning; a heuristic.
 const LATE_S: f64 = 0.1;

@@ -275,9 +275,9 @@ impl HeightField {
     }
 }
 
-/// Factor that makes the 95 % band cover that share of the leave-one-out deviations `z`: the
-/// smallest that covers (n + 1)·95 % of n, or all of them where that exceeds n, in units of 1.96.
-/// It is at least 1, since a few contacts do not show the largest deviations.
+/// Returns the calibration factor of the 95 % band: the smallest that covers (n + 1)·95 % of the n
+/// leave-one-out z-scores `z`, or all of them if that exceeds n, in units of 1.96. It is at least
+/// 1, since a few contacts do not show the largest deviations.
 fn sd_inflation(z: &[f64]) -> f64 {
     let mut far: Vec<f64> = z.iter().map(|z| z.abs()).collect();
     far.sort_by(f64::total_cmp);

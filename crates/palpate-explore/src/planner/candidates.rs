@@ -55,8 +55,8 @@ impl<'a> Candidates<'a> {
         Some(Self { belief, surface, all: all.collect() })
     }
 
-    /// Plans a touch at the candidate with the highest score whose approach is free, or from time
-    /// to time into unexplored space. Plans a random touch if the belief has no surface.
+    /// Plans a touch at the candidate with the highest score whose approach is free; every few
+    /// touches, one into unexplored space. Plans a random touch if the belief has no surface.
     pub fn plan(
         belief: &ImplicitSurface,
         rng: &mut ChaCha8Rng,
@@ -168,8 +168,8 @@ fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> 
     true
 }
 
-/// While the ball around the contacts is smaller than this share of the whole ball, one touch in
-/// `EVERY` goes into unexplored space; heuristics.
+/// Fraction of the whole ball below which the ball around the contacts counts as unexplored, and
+/// interval between touches into unexplored space; heuristics.
 const KNOWN: f64 = 0.6;
 const EVERY: usize = 5;
 
@@ -182,8 +182,8 @@ const SIDES: usize = 5;
 /// Holes smaller than this share of the ball's radius are ignored; a heuristic.
 const HOLE: f64 = 0.15;
 
-/// Returns an aim into the largest hole between all contacts and swept space, if it is the turn of
-/// one and a large, reachable hole exists.
+/// Returns an aim into the largest reachable hole between contacts and swept space; `None` if it is
+/// not due or no hole is large enough.
 pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;

@@ -1,4 +1,4 @@
-//! Planners: they choose the next target from the belief alone.
+//! Planners: they select the next target from the belief alone.
 //!
 //! To add a planner, write its file here and add a line to [`PLANNERS`].
 

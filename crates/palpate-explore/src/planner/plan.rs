@@ -1,4 +1,4 @@
-//! The planner trait: chooses the next target from the belief alone.
+//! The planner trait: selects the next target from the belief alone.
 
 use super::settings::PlanningSettings;
 use crate::belief::{Belief, HeightField};
@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A planner: chooses targets from the belief, without access to the ground truth.
+/// A planner: selects targets from the belief, without access to the ground truth.
 ///
 /// ```
 /// use palpate_explore::belief::Belief;
@@ -36,12 +36,12 @@ pub trait Planner: Send {
 /// The choice of a planner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Where to touch.
+    /// Target of the touch.
     pub target: Target,
     /// Standard deviation at the target, if the planner computed it: the root of the belief's
     /// variance.
     pub sd_m: Option<f64>,
-    /// Reason for a fallback to a random target, if the planner's own rule could not decide.
+    /// Reason for a fallback to a random target, if there was one.
     pub fallback: Option<Fallback>,
 }
 
@@ -52,8 +52,8 @@ impl Plan {
     }
 }
 
-/// Reasons why a planner's own rule could not decide. The target is then random, because a fixed
-/// pattern might coincide with a pattern of the surface.
+/// Reasons for a fallback of a planner. The target is then random, because a fixed pattern might
+/// coincide with a pattern of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fallback {

@@ -1,4 +1,4 @@
-//! Maximisation of an acquisition function over a zone: DIRECT finds the hills, and BFGS climbs
+//! Maximisation of an acquisition function over a zone: DIRECT finds local maxima, and BFGS refines
 //! several of them together.
 //!
 //! The function is evaluated for lists of places, which costs less than single evaluations.
@@ -23,7 +23,7 @@ const SAME_TARGET: f64 = 1e-6;
 /// rounding error of a covariance with the smallest noise allowed; a heuristic.
 const LOST_IN_ROUNDING: f64 = 1e-5;
 
-/// Number of hills climbed; see [`MARGIN`].
+/// Number of local maxima refined; see [`MARGIN`].
 const HILLS: usize = 8;
 
 /// Margin that DIRECT adds around the zone, as a fraction of its sides; places outside are clamped
@@ -33,8 +33,8 @@ const HILLS: usize = 8;
 /// with the margin and eight climbs 73 times, and 500 evaluations 76 times.
 const MARGIN: f64 = 0.1;
 
-/// A climb is stopped if it would stay below the highest even with this many times its predicted
-/// gain; a heuristic.
+/// Factor on the predicted gain; a climb is stopped if it would stay below the highest even then; a
+/// heuristic.
 const GAIN_FACTOR: f64 = 4.0;
 
 /// First step of a climb in units of the zone's sides, half the distance between two hills; and the
@@ -42,7 +42,8 @@ const GAIN_FACTOR: f64 = 4.0;
 const FIRST_STEP: f64 = 0.02;
 const RELATIVE_GAIN: f64 = 1e-6;
 
-/// Places closer than this belong to the same hill, in units of the zone's sides; a heuristic.
+/// Distance below which places belong to the same local maximum, in units of the zone's sides; a
+/// heuristic.
 const SAME_HILL: f64 = 0.04;
 
 /// Step of a central difference in units of the zone's sides, near the cube root of the rounding

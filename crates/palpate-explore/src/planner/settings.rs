@@ -27,7 +27,8 @@ pub struct PlanningSettings {
 }
 
 impl Default for PlanningSettings {
-    /// Heuristic: over a hundred touches, more evaluations rarely find a larger variance.
+    /// Returns the default search budget. Heuristic: over a hundred touches, more evaluations
+    /// rarely find a larger variance.
     fn default() -> Self {
         Self {
             direct_evaluations: 500,
@@ -51,7 +52,8 @@ pub struct IntegratedVarianceSettings {
 }
 
 impl Default for IntegratedVarianceSettings {
-    /// Heuristic: about twice as many as a trial of a hundred touches resolves.
+    /// Returns the default number of places. Heuristic: about twice as many as a trial of a hundred
+    /// touches resolves.
     fn default() -> Self {
         Self { places: 256 }
     }
@@ -72,7 +74,8 @@ pub struct SilhouetteSettings {
 }
 
 impl Default for SilhouetteSettings {
-    /// Heuristic: twice as many candidates bring no gain on the suite.
+    /// Returns the defaults of `silhouette`. Heuristic: twice as many candidates bring no gain on
+    /// the suite.
     fn default() -> Self {
         Self { places: 256, candidates: 500, touch_way_m: None }
     }
@@ -89,7 +92,8 @@ pub struct OracleSettings {
 }
 
 impl Default for OracleSettings {
-    /// Heuristic: a trial of thirty touches takes a second or two, with free space ten times that.
+    /// Returns the defaults of `oracle`. Heuristic: a trial of thirty touches takes a second or
+    /// two, with free space ten times that.
     fn default() -> Self {
         Self { candidates: 120, refit: false }
     }
@@ -104,7 +108,8 @@ pub struct SlopeSettings {
 }
 
 impl Default for SlopeSettings {
-    /// Heuristic: a place of average slope counts twice as much as a flat one.
+    /// Returns the defaults of `slope`. Heuristic: a place of average slope counts twice as much as
+    /// a flat one.
     fn default() -> Self {
         Self { weight: 1.0 }
     }
@@ -119,8 +124,8 @@ pub struct TravelSettings {
 }
 
 impl Default for TravelSettings {
-    /// Heuristic: of 10, 15 and 20, the value with the fewest touches to equal error on container
-    /// and bird; see `docs/paper.md`.
+    /// Returns the defaults of `travel`. Heuristic: of 10, 15 and 20, the value with the fewest
+    /// touches to equal error on container and bird; see `docs/paper.md`.
     fn default() -> Self {
         Self { tour: 15 }
     }
@@ -135,7 +140,7 @@ pub struct UcbSettings {
 }
 
 impl Default for UcbSettings {
-    /// Heuristic: about the upper end of the 95 % band.
+    /// Returns the defaults of `ucb`. Heuristic: about the upper end of the 95 % band.
     fn default() -> Self {
         Self { sds: 2.0 }
     }

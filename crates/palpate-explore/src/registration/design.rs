@@ -76,8 +76,8 @@ const SPARE: usize = 2;
 /// Allowed penetration of the body by a candidate away from its point of contact.
 const INTO_M: f64 = 2e-4;
 
-/// Mean distance that a finger travels after its pressure passes the threshold until it is held and
-/// read: the frames that must agree, half a frame for the first, and the press.
+/// Mean travel of the finger from the pressure threshold until it is read: the frames that must
+/// agree, half a frame for the first, and the press.
 pub fn pressed_m(robot: &Robot, touch: &TouchSettings) -> f64 {
     if !robot.is_soft {
         return 0.0;
@@ -113,9 +113,9 @@ impl Candidate {
 }
 
 impl Design {
-    /// Returns the `count` most informative touches of `body`: greedily the one that shrinks the
-    /// parameters' ellipsoid most, among those that `robot` reaches. Then they are simulated in the
-    /// order of execution, and those that cannot follow their predecessor are dropped.
+    /// Selects the `count` most informative touches of `body` that `robot` reaches, greedily by the
+    /// volume of the parameters' ellipsoid (D-optimal design). Then they are simulated in the order
+    /// of execution, and those that cannot follow their predecessor are dropped.
     ///
     /// # Errors
     /// If the robot reaches too few, or they would determine too little.

@@ -41,7 +41,7 @@ pub struct HandEyeEstimate {
 /// and three for the sensing.
 pub const PARAMETERS: usize = 6 + CalibrationBody::PARAMETERS + 3;
 
-/// Plausible position error of the finger on its mount; a heuristic: assembled by hand.
+/// Plausible position error of the finger on its mount; a heuristic: manual assembly.
 const FINGER_M: f64 = 0.01;
 const FINGER_RAD: f64 = 0.2;
 /// Plausible values of the skin's indentation and the electrodes' gain; heuristics.
@@ -57,7 +57,7 @@ const ASIDE_EXACT_M: f64 = 1e-6;
 const START_M: f64 = 3e-4;
 
 /// Expected scatter of a touch's depth, and of its lateral position; heuristics from simulated
-/// touches, `docs/your-robot.md`.
+/// touches.
 const DEPTH_SD_M: f64 = 5e-5;
 const FELT_SD_M: f64 = 3e-4;
 
@@ -169,8 +169,8 @@ pub fn parameters(body: &CalibrationBody) -> [(&'static str, f64); PARAMETERS] {
     ]
 }
 
-/// Largest fraction of a parameter's squared direction in undetermined directions for which it
-/// still counts as determined; a heuristic.
+/// Largest fraction of a parameter's squared direction in undetermined directions for a determined
+/// parameter; a heuristic.
 const LOST: f64 = 0.05;
 
 /// Returns the parameters that a fit leaves undetermined.

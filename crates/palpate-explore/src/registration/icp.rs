@@ -1,4 +1,4 @@
-//! Registers a contact cloud to a mesh (point-to-plane ICP, Chen and Medioni 1992).
+//! Registration of a contact cloud to a mesh (point-to-plane ICP, Chen and Medioni 1992).
 
 use super::register::pose_table;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};

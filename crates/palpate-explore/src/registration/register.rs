@@ -1,4 +1,4 @@
-//! Makes the touches of a design and fits the poses.
+//! Registration by touch: makes the touches of a design and fits the poses.
 
 use super::design::{Design, pressed_m};
 use super::hand_eye::{

@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A target: the next touch as selected by a planner.
+/// Target of the next touch, as selected by a planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(into = "TargetOut", try_from = "TargetIn")]
 #[schemars(with = "TargetOut")]

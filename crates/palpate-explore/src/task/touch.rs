@@ -34,15 +34,16 @@ pub struct TouchSettings {
     pub frames: usize,
     /// Force at which the finger retracts without reading, N.
     pub force_limit_n: f64,
-    /// Rise of the pressure (PDC) at which it retracts without reading, counts.
+    /// Rise of the pressure (PDC) at which the finger retracts without reading, counts.
     pub pressure_limit_counts: f64,
     /// Point of the finger that is recorded as the contact.
     pub point: ContactEstimate,
 }
 
 impl Default for TouchSettings {
-    /// Heuristics, except the detection: the approach is slow enough that the skin is indented by
-    /// less than a millimetre before the pressure detects contact.
+    /// Returns the default settings of a touch. Heuristics, except the detection: the approach is
+    /// slow enough that the skin is indented by less than a millimetre before the pressure detects
+    /// contact.
     fn default() -> Self {
         Self {
             period_s: None,

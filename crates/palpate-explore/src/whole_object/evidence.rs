@@ -103,10 +103,10 @@ impl TouchEvidence {
         self.ways.iter().flat_map(|way| way.places_w(ball).map(|p_w| (p_w, way.radius_m)))
     }
 
-    /// Returns the observations of the field relative to `prior`: 0 at each contact, with the
-    /// normal as its gradient if `normals` is set; and, at the centre of each swept ball inside
-    /// `ball`, the distance to the nearest contact. That is the upper bound of a distance there,
-    /// and the swept radius the lower bound: the standard deviation is that of a uniform
+    /// Returns the observations of the field relative to `prior`. At each contact the field is 0,
+    /// with the normal as its gradient if `normals` is set. At the centre of each swept ball inside
+    /// `ball` it is the distance to the nearest contact. That is the upper bound of a distance
+    /// there, and the swept radius the lower bound: the standard deviation is that of a uniform
     /// distribution between them. `noise_m` is the unit of the noise.
     pub fn observations(
         &self,

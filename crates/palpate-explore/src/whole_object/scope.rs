@@ -6,8 +6,9 @@ use nalgebra::Point3;
 use palpate_geometry::primitives::extent;
 use std::sync::Arc;
 
-/// Common offset of the surface found by a soft finger: on the twelve tuning objects, in 36 trials
-/// of 60 touches, 0.1 to 0.8 mm outwards, median 0.3 mm.
+/// Common offset of the surface that a soft finger estimates. Common offset of the surface found by
+/// a soft finger: on the twelve tuning objects, in 36 trials of 60 touches, 0.1 to 0.8 mm outwards,
+/// median 0.3 mm.
 const SOFT_OFFSET_M: f64 = 3e-4;
 
 /// A ball that contains the object, and the finger that touches it.

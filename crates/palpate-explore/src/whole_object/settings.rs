@@ -54,7 +54,8 @@ pub enum PriorShape {
 pub const KERNELS: [&str; 2] = ["matern_52", "matern_32"];
 
 impl Default for SpatialGpSettings {
-    /// Heuristics, tuned on the tuning half of the suite; see docs/whole-objects.md.
+    /// Returns the defaults. Heuristics, tuned on the tuning half of the suite; see
+    /// docs/whole-objects.md.
     fn default() -> Self {
         Self {
             kernel: KERNELS[0].into(),

@@ -120,7 +120,7 @@ impl<'a> Climb<'a> {
         self.plan_step();
     }
 
-    /// Returns an upper bound of the final value, if the remaining gain is at most `times` the
+    /// Returns an upper bound of the final value, assuming a remaining gain of at most `times` the
     /// predicted one.
     pub fn upper_bound(&self, times: f64) -> f64 {
         self.top.value + times * self.left
@@ -161,15 +161,14 @@ impl<'a> Climb<'a> {
         }
     }
 
-    /// Initialises with a small curvature, so that every axis is worth a step until its curvature
-    /// is known.
+    /// Sets a small initial curvature, so that every axis is searched until its curvature is known.
     fn init_hessian(&mut self) {
         let count = self.here.len();
         let little = (PRESUMED * self.enough()).max(f64::MIN_POSITIVE);
         (0..count).for_each(|i| self.curvature[i * count + i] = little);
     }
 
-    /// Returns the gain below which a step is not worth taking.
+    /// Returns the gain below which a step ends the climb.
     fn enough(&self) -> f64 {
         self.manner.gain + self.manner.relative_gain * self.top.value.abs()
     }

@@ -183,10 +183,11 @@ pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMat
     jacobian
 }
 
-/// Returns the covariance of the parameters at `state` of a robust fit with clustered residuals,
-/// A⁻¹ (Σ g gᵀ) A⁻¹ · n/(n − 1) with A = JᵀWJ and the n clusters' gradients g = Σ Jᵢᵀ wᵢ rᵢ (Liang
-/// & Zeger 1986). Residuals without a cluster, those of priors, count in A only. Returns `None` if
-/// A is singular.
+/// Returns the covariance of the parameters at `state` of a robust fit with clustered residuals
+/// (Liang & Zeger 1986). Returns the covariance of the parameters at `state` of a robust fit with
+/// clustered residuals, A⁻¹ (Σ g gᵀ) A⁻¹ · n/(n − 1) with A = JᵀWJ and the n clusters' gradients g
+/// = Σ Jᵢᵀ wᵢ rᵢ (Liang & Zeger 1986). Residuals without a cluster, those of priors, count in A
+/// only. Returns `None` if A is singular.
 pub fn clustered_covariance<P: Problem>(
     problem: &P,
     state: &P::State,

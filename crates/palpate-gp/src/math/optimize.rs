@@ -1,4 +1,4 @@
-//! Common types of the optimisers, which maximise in a box; and a compass search.
+//! Common types of the optimisers, which maximise in a box, and a compass search.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -296,9 +296,9 @@ proptest! {
         }
     }
 
-    /// Holds for all three ways of adding: one by one, by conditioning anew, or as a fantasy. One
-    /// by one, the first entries of L⁻¹k* keep their bits and one more square is added to their
-    /// sum, so that only the rounding of that sum could raise the variance.
+    /// Compares the three ways of adding a touch: one by one, by conditioning anew, or as a
+    /// fantasy. One by one, the first entries of L⁻¹k* keep their bits and one more square is added
+    /// to their sum, so that only the rounding of that sum could raise the variance.
     #[test]
     fn a_touch_never_raises_the_variance((at, touches) in any_belief(), place in [-1.5..1.5f64, -1.5..1.5f64]) {
         let prior = at.signal_sd.powi(2);

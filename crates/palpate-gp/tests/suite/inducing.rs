@@ -105,9 +105,7 @@ fn through_all_of_them_it_is_exact() {
     }
 }
 
-/// The smaller the residual, the closer the posterior is to the exact one; with a residual of a
-/// tenth of the noise, its means are within a tenth of the noise and its standard deviations within
-/// a tenth of the exact ones.
+/// Tests that the posterior approaches the exact one as the residual decreases.
 #[test]
 fn it_says_how_near_it_is() {
     let touches = touches(1500);

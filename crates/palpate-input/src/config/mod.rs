@@ -29,7 +29,7 @@ pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// A word that is not a valid name of any setting.
+/// Placeholder that is not a valid name of any setting.
 const UNKNOWN: &str = "\u{0}";
 
 /// A configuration during loading.
@@ -38,7 +38,7 @@ pub struct Loader {
     sources: Vec<Source>,
     /// Keys set on the command line, with their text as typed.
     sets: Vec<(String, String)>,
-    /// A table that is read as another one, and that one.
+    /// Pair of table names: the table that is given, and the table as which it is read.
     read_as: Option<[&'static str; 2]>,
 }
 
@@ -113,7 +113,7 @@ impl Loader {
         ConfigError { allowed: Some(remedy.into()), ..ConfigError::new(origin, message) }
     }
 
-    /// If `key` names a file, replaces it by that file's table.
+    /// Replaces `key` by the table in the file that it names, if it names a file.
     ///
     /// # Errors
     /// If the file cannot be read or is not TOML.

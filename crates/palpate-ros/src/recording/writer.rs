@@ -31,8 +31,8 @@ pub fn wall_clock() -> u64 {
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Chunk size at which a chunk is written although its touch is not done; a heuristic: a minute of
-/// the PA-10. The address space is reserved in advance, so that ticks do not allocate.
+/// Chunk size at which a chunk is written before its touch ends; a heuristic: a minute of the
+/// PA-10. The address space is reserved in advance, so that ticks do not allocate.
 const CHUNK_MAX: u64 = 16 << 20;
 
 /// A recording, shared by the recorded backend and the program that runs its trial.

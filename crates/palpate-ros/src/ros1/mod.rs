@@ -46,9 +46,8 @@ pub struct Ros1 {
     waiting: Arc<Mutex<HashMap<u64, Sender<TriggerResponse>>>>,
 }
 
-/// Disables the loading of TLS certificates, which ROS 1 does not use: each attempt to reach a dead
-/// publisher would load them again and delay messages for 200 ms. Call it before any thread runs,
-/// at the start of a program.
+/// Disables TLS certificates, which ROS 1 does not use; loading them for each dead publisher would
+/// delay messages by 200 ms. Call it before any thread runs, at the start of a program.
 pub fn spare_certificates() {
     // SAFETY: no other thread reads the environment yet.
     unsafe {
@@ -225,7 +224,7 @@ impl Transport for Ros1 {
         self.census.publishers(topic)
     }
 
-    /// Returns true: a call queries the master for the server itself.
+    /// Returns true, because a call queries the master for the server itself.
     fn is_served(&mut self, _: &Service) -> bool {
         true
     }

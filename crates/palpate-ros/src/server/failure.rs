@@ -27,7 +27,7 @@ pub enum FailureEffect {
     Lose,
     /// Stops sending on a topic.
     Cease(Topic),
-    /// Repeats the first message of a topic, with new stamps.
+    /// Repeats the first message of a topic with new stamps.
     Freeze(Topic),
     /// Changes packets.
     Change(fn(&mut Packet, &mut FailureState)),

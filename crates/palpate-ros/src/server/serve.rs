@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 /// Largest joint speed at rest, rad/s or m/s; a heuristic: above the sag of the servos.
 const REST: f64 = 2e-3;
 
-/// Largest delay, in ticks, that a twin makes up; with more it skips time.
+/// Largest delay, in ticks, that a twin catches up; beyond it the twin skips time.
 const SLACK_TICKS: u32 = 10;
 
 /// Rate at which the arm's state, joints and force are published, as by drivers.
@@ -140,7 +140,7 @@ impl Twin {
         })
     }
 
-    /// Serves until `stop` becomes true; `tell` receives events with their time since 1970.
+    /// Serves until `stop` becomes true; passes events with their time since 1970 to `tell`.
     ///
     /// # Errors
     /// If the simulated robot cannot continue.

@@ -54,7 +54,8 @@ fn it_moves_after_a_command_to_stand_still_only() {
     moving();
 }
 
-/// Stops after 28 ms without a command and a ramp of 10 ms, and never accelerates meanwhile.
+/// Tests that the arm stops after 28 ms without a command and a ramp of 10 ms, and never
+/// accelerates meanwhile.
 #[test]
 fn when_commands_cease_it_stops_and_brakes_and_tells() {
     let mut pc = moving();
@@ -152,7 +153,7 @@ fn what_is_no_command_of_this_arm_stops_it() {
     }
 }
 
-/// Commands are not clamped: one beyond a limit cannot be intended.
+/// Tests that a command beyond a limit stops the arm and is not clamped.
 #[test]
 fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
     for fast in [1e9, LIMIT * 1.001, -LIMIT * 1.001] {
@@ -169,7 +170,7 @@ fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
     assert_eq!(pc.advance(0.102), [0.1, LIMIT, 0.1]);
 }
 
-/// Names decide, not their order.
+/// Tests that joint names decide the order, not their position in the message.
 #[test]
 fn swapped_names_move_the_joints_that_they_name() {
     let mut pc = moving();

@@ -190,7 +190,7 @@ impl TrueShape {
         metrics.with_coverage(ratios)
     }
 
-    /// Compares the closed mesh `believed` with the true surface.
+    /// Compares the closed mesh `estimated` with the true surface.
     pub fn compare(&self, believed: &Mesh) -> ShapeMetrics {
         let bvh = MeshBvh::new(believed.clone());
         let from_true_m = distances_m(&self.samples, &bvh);

@@ -31,10 +31,9 @@ pub struct FingerReach<'a> {
 }
 
 impl FingerReach<'_> {
-    /// Whether the finger can touch the surface at each of `spots`: on a straight path from outside
-    /// the ball around the mesh to the pose where its hemisphere rests on the surface there,
-    /// nothing stops it before the tolerance. The normal and an even spread of directions on its
-    /// side are tried.
+    /// Whether the finger can touch the surface at each of `spots`: a straight path from outside
+    /// the ball around the mesh to the pose at rest is free up to the tolerance. The normal and an
+    /// even spread of directions on its side are tried.
     ///
     /// The mesh must be closed; its outside is the free space.
     pub fn reachable(&self, mesh: &MeshBvh, spots: &[SurfacePoint]) -> Vec<bool> {

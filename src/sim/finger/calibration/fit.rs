@@ -103,7 +103,7 @@ pub fn fit(
     }
 }
 
-/// Returns the best of the fits from stiff and from soft skins.
+/// Returns the best fit over starts with stiff and with soft skins.
 fn lowest(problem: &Calibration) -> Result<DVector<f64>, FitError> {
     let starts = if problem.free.is_empty() { &SOFTER[..1] } else { &SOFTER[..] };
     let mut best: Option<(f64, DVector<f64>)> = None;
@@ -152,7 +152,7 @@ const LOAD_ROLL_RAD: f64 = 0.1;
 /// Number of a session's parameters other than rolls: offset, gain, pitch.
 const SHARED: usize = 3;
 
-/// Residual of a pose without a solution, so that no step goes there.
+/// Residual of a pose without a solution, large enough that no step accepts it.
 const IMPOSSIBLE: f64 = 1e6;
 
 // Step of the finite differences, as a fraction of a unit.

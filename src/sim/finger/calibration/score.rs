@@ -25,9 +25,9 @@ pub struct Score {
     pub model_counts: f64,
     /// Error of the no-change predictor.
     pub no_change_counts: f64,
-    /// Error of the best predictor with the session's offset as the only change.
+    /// Error of the predictor that changes only the session's offset.
     pub offset_counts: f64,
-    /// Error of the predictor that each electrode changes by the mean over the other sensors'
+    /// Error of the predictor that changes each electrode by its mean over the other sensors'
     /// loads; `None` without other sensors.
     pub mean_change_counts: Option<f64>,
     /// Number of entries with a measured change of more than 100 counts.

@@ -68,7 +68,7 @@ impl Session {
         }
     }
 
-    /// Returns the mean counts over the presses of a hand with a normal force about a roll. `carry`
+    /// Returns the mean counts over manual presses with a normal force about a roll. `carry`
     /// changes the closed fraction of each gap, given the direction that faces the plate. Returns
     /// `None` if a pose has no solution.
     pub(super) fn mean_counts(

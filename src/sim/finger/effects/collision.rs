@@ -17,7 +17,7 @@ pub struct CollisionEffect {
 }
 
 impl Default for CollisionEffect {
-    /// Returns a table at the height of the arm's default base.
+    /// Returns the default: a table at the height of the arm's base.
     fn default() -> Self {
         Self { table_m: 0.0 }
     }

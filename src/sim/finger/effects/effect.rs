@@ -20,8 +20,8 @@ pub trait Effect: Validate + Clone + Default + 'static {
     /// Whether the effect fills a channel of the tactile frame.
     const FILLS_FRAMES: bool = false;
 
-    /// Change of the load once in each step, after the effects above it in the table; `None` if the
-    /// load stays unchanged.
+    /// Hook that changes the load once in each step, after the effects above it in the table;
+    /// `None` if the load stays unchanged.
     const ON_LOAD: Option<OnLoad<Self>> = None;
 
     /// Returns the state at the start of a trial.

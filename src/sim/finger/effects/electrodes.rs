@@ -228,7 +228,8 @@ fn power(base: f64, exponent: f64) -> f64 {
     if exponent == 1.0 || base == 1.0 { base } else { raised(base, exponent) }
 }
 
-/// Separate from [`power`], because the compiler would otherwise always compute it.
+/// Computes the power; separate from [`power`], because the compiler would otherwise always compute
+/// it.
 #[inline(never)]
 fn raised(base: f64, exponent: f64) -> f64 {
     base.powf(exponent)

@@ -34,8 +34,7 @@ impl Effect for TimingEffect {
 
     const REQUIRES: Requirement = Requirement::Frames;
 
-    /// Returns the switch of the whole effect, and that of the command delay alone, with frames as
-    /// close to those without `[timing]` as its settings allow: one in each batch.
+    /// Returns two switches: the whole effect, and the command delay alone.
     fn switches() -> Vec<EffectSwitch<Option<Self>>> {
         let is_on =
             |timing: &Option<Self>| timing.as_ref().is_some_and(|t| t.control_delay_s > 0.0);

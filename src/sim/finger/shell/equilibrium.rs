@@ -208,9 +208,9 @@ impl Membrane {
         promised_j
     }
 
-    /// Combines slowly converging corrections in the same direction: minimises over their
-    /// combination (Anderson 1965, with one correction before the last), if it is a descent
-    /// direction. `there` is the start of the last one. Returns the predicted energy gain.
+    /// Combines slowly converging corrections in the same direction by Anderson acceleration
+    /// (Anderson 1965, with one previous correction), if the result is a descent direction. `there`
+    /// is the start of the last one. Returns the predicted energy gain.
     fn anderson_step(&self, promised_j: f64, state: &mut ShellState) -> f64 {
         let ShellState { here, there, correction_m, last_m, residual_n, .. } = state;
         let (mut along, mut apart) = (0.0, 0.0);

@@ -90,7 +90,7 @@ pub struct SafetyContext {
     pub travel_m_s: f64,
 }
 
-/// Unavoidable path of a robot: one more tick, then braking to rest. It is a straight line in joint
+/// Stopping path of a robot: one more tick, then braking to rest. It is a straight line in joint
 /// space, since braking preserves the direction of the joint velocities.
 pub struct StoppingPath<'a> {
     now: &'a RobotState,
@@ -107,9 +107,9 @@ pub const GRAIN_M: f64 = 1e-3;
 const LOOKS: usize = 32;
 
 impl<'a> StoppingPath<'a> {
-    /// Returns the path if `qdot` is commanded for one tick, takes effect `reaction_s` later, and
-    /// is then braked; and if the robot has moved as commanded since its position reading last
-    /// changed.
+    /// Returns the stopping path after `qdot` is commanded for one tick and takes effect
+    /// `reaction_s` later. It assumes that the robot has moved as commanded since its position
+    /// reading last changed.
     pub fn new(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> Self {
         let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
         Self { now, from: now.q, by: now.unconfirmed_motion + qdot * time_s }
@@ -122,9 +122,8 @@ impl<'a> StoppingPath<'a> {
         ends.dot(&self.now.reaches_m)
     }
 
-    /// Returns the first clearance below `least_m` along the path, if the `clearance_m` of a
-    /// posture cannot decrease faster than points move: from each posture the path advances by its
-    /// clearance (conservative advancement). Returns `None` if there is none.
+    /// Returns the first clearance below `least_m` along the path, by conservative advancement:
+    /// `clearance_m` must not decrease faster than points move. Returns `None` if there is none.
     pub fn below(&self, least_m: f64, mut clearance_m: impl FnMut(&Joints) -> f64) -> Option<f64> {
         let length_m = self.by.abs().dot(&self.now.reaches_m);
         let mut part = 0.0;
@@ -144,7 +143,7 @@ impl<'a> StoppingPath<'a> {
     }
 }
 
-/// Returns the time in which the joints come to rest from `qdot` together, each within its
+/// Returns the time in which all joints come to rest together from `qdot`, each within its
 /// deceleration limit.
 pub fn stopping_s(now: &RobotState, qdot: &Joints) -> f64 {
     let joints = now.chain.joints.iter().zip(qdot.iter());

@@ -136,13 +136,13 @@ impl Interlocked {
         self.interlocks.iter_mut().try_for_each(|one| one.command(&self.now, qdot))
     }
 
-    /// Returns the trip that forbids even the current position at rest.
+    /// Returns the trip that forbids the current position even at rest.
     fn trip_at_rest(&mut self) -> Option<Trip> {
         let is_at_rest = self.now.sent == Joints::zeros();
         is_at_rest.then(|| self.shorten(&mut Joints::zeros()).err()).flatten()
     }
 
-    /// Returns the fault of a robot that must be moved by hand.
+    /// Returns the fault of a robot that an operator must jog.
     fn blocked_start_fault(&self, trip: &Trip) -> Fault {
         let joints = self.now.chain.joints.iter().zip(self.now.chain.home.iter());
         let home: Vec<_> = joints.map(|(joint, q)| format!("{} {q:.3}", joint.name)).collect();
@@ -165,7 +165,7 @@ impl Interlocked {
         Err(other.unwrap_or(first))
     }
 
-    /// Brakes and refuses all further commands.
+    /// Latches a fault: brakes and rejects all further commands.
     fn latch(&mut self, fault: Fault) -> Fault {
         self.fault = Some(fault.clone());
         fault

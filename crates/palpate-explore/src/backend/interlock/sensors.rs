@@ -73,9 +73,9 @@ impl Interlock for SensorTimeout {
 /// Number of consecutive frames at an end of the range.
 const FRAMES: u32 = 2;
 
-/// Number of consecutive frames with the same value that cannot be chance, whatever time lies
-/// between them: there are no readings while the next touch is planned. With a noise of several
-/// counts, two frames are equal with probability 0.1, and this many with 1e-5.
+/// Number of consecutive equal values that counts as frozen, whatever the time between frames:
+/// there are no readings during planning. With a noise of several counts, two frames are equal with
+/// probability 0.1, and this many with 1e-5.
 const STILL_FRAMES: u32 = 6;
 
 const NOTHING: [Still; ELECTRODES] =

@@ -69,7 +69,7 @@ pub mod defaults {
 }
 
 impl Default for InterlockSettings {
-    /// No touch of the built-in scenes comes close to these limits.
+    /// Returns the default limits; no touch of the built-in scenes comes close to them.
     fn default() -> Self {
         Self {
             tip_speed_m_s: None,

@@ -48,12 +48,12 @@ pub const POSITION: InterlockEntry = InterlockEntry {
     },
 };
 
-/// Movement of any point of the robot that a position reading must show.
+/// Movement of any point of the robot that must appear in its position readings.
 // heuristic: three steps of an encoder of 1e-4 rad at a reach of 1 m.
 const SEEN_M: f64 = 3e-4;
 
-/// Movement of any point of the robot after which it is stopped earlier, and that earlier time, as
-/// a fraction of the joint state timeout.
+/// Movement of any point after which the robot is stopped earlier, and that earlier time as a
+/// fraction of the joint state timeout.
 // heuristic: including the braking distance from 0.1 m/s, below 10 mm; and later than the age limit
 // of 50 ms of joint states over topics, so that a topic without messages is reported as such.
 const BLIND_M: f64 = 5e-3;

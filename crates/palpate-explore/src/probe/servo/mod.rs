@@ -22,7 +22,8 @@ pub use crate::task::approach::BEYOND_M;
 pub use reach::{ArmReach, check_reach};
 pub(super) use reach::{standoff, turning_point};
 
-/// Position tolerance at the end of a movement; a heuristic: below what a touch resolves.
+/// Position tolerance at the end of a movement. Position tolerance at the end of a movement; a
+/// heuristic: below what a touch resolves.
 const ARRIVED_M: f64 = 5e-5;
 
 /// Distance beyond the stand-off up to which a finger moves there directly; a heuristic: smaller

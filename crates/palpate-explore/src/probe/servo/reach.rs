@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_geometry::sweep::Capsule;
 use palpate_input::error::InputError;
 
-/// Returns the pose of the tip in front of everything that may be touched.
+/// Returns the stand-off pose of the tip, in front of the zone of possible contact.
 pub(in crate::probe) fn standoff(
     robot: &Robot,
     standoff_m: f64,
@@ -32,7 +32,7 @@ pub(in crate::probe) fn standoff(
     Isometry3::from_parts(p_wt.into(), approach.r_wt())
 }
 
-/// Returns the pose of the tip behind everything that may be touched.
+/// Returns the turning pose of the tip, behind the zone of possible contact.
 pub(in crate::probe) fn turning_point(robot: &Robot, approach: &Approach) -> Isometry3<f64> {
     let ahead_w = approach.direction_w().into_inner();
     let hull_w = ahead_w * robot.finger.radius_m;
@@ -151,8 +151,8 @@ impl ArmReach {
         ClearanceConstraints::new(around, &self.robot, self.standoff_m, slack)
     }
 
-    /// Moves around the object from `q` to `to`; returns the final joints and the stop on the way,
-    /// if any: over the top of the ball.
+    /// Moves around the object from `q` to `to`, over the top of the ball if needed; returns the
+    /// final joints and the intermediate stop, if any.
     fn around(
         &self,
         q: &Joints,
@@ -184,9 +184,8 @@ impl ArmReach {
         self.allows(&line, &self.clear(around, slack)).then_some(line)
     }
 
-    /// Returns the path home from `q`: first of the tip, then of the joints, which may by then be
-    /// wound up or have the elbow on the other side; or of the joints alone. `None` if there is
-    /// none.
+    /// Returns the path home from `q`: of the tip first and then of the joints, or of the joints
+    /// alone. `None` if there is none.
     fn homeward(&self, q: &Joints, approach: &Approach, slack: f64) -> Option<Vec<PathSegment>> {
         let around = approach.obstacle.as_ref()?;
         let by_tip = || {
@@ -281,7 +280,7 @@ const REACTION: f64 = 2.0;
 /// Clearance constraints of a checked motion.
 #[derive(Clone, Copy)]
 struct ClearanceConstraints {
-    /// Ball that the links, and the hand during travel, stay out of.
+    /// Ball that the links, and during travel the hand, must not enter.
     ball: (Point3<f64>, f64),
     /// Lowest z of the links that carry the finger; the finger's own paths stay above it too.
     lowest_m: Option<f64>,
@@ -382,9 +381,9 @@ impl ArmReach {
         self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > least_m)
     }
 
-    /// Whether the joints are within their limits, the tip in its box, the links outside the ball,
-    /// and the links that carry the finger above the lowest z; on an approach, hand and finger may
-    /// enter the ball.
+    /// Whether the posture keeps all constraints: joint limits, the tip's box, links outside the
+    /// ball, and the links that carry the finger above the lowest z. On an approach, hand and
+    /// finger may enter the ball.
     fn is_clear(&self, q: &Joints, clear: &ClearanceConstraints, is_approach: bool) -> bool {
         let slack_rad = clear.slack * SLACK_RAD;
         let within = self.robot.chain.joints.iter().zip(q.iter()).all(|(joint, q)| {
@@ -451,7 +450,8 @@ mod tests {
         (ArmReach::new(&robot, &touch).unwrap(), approach)
     }
 
-    /// Behind the object, after a touch of a PA-10: the hand would move through the object.
+    /// Tests an approach behind the object after a touch of a PA-10: the hand would move through
+    /// the object.
     #[test]
     fn a_line_of_the_joints_through_the_object_is_refused_and_the_tip_goes_around() {
         let (reach, approach) = reach();
@@ -464,7 +464,7 @@ mod tests {
         assert!(matches!(legs[..], [PathSegment::Around(_), .., PathSegment::Home]), "{legs:?}");
     }
 
-    /// The elbow is on the other side, from where moving the tip home does not bring it back.
+    /// Tests an elbow on the other side, from where moving the tip home does not bring it back.
     #[test]
     fn joints_are_home_in_the_end_on_whichever_side_the_elbow_was() {
         let (reach, approach) = reach();

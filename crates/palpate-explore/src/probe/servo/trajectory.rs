@@ -118,9 +118,9 @@ impl VelocityProfile {
 /// Number of poses checked along one path for clearance; a heuristic.
 const LOOKS: usize = 48;
 
-/// A path around a centre: the tip moves along a great circle while its distance from the centre
-/// changes linearly; the finger is carried along the circle, its direction is turned from the first
-/// to the last by the shortest rotation, and it is rolled about that direction.
+/// A path around a centre. The tip moves along a great circle while its distance from the centre
+/// changes linearly. The finger's direction is turned by the shortest rotation from the first to
+/// the last, and the finger is rolled about that direction.
 ///
 /// At the fraction t of the path, with rotation vectors a, b, c of those three turns in `W`:
 /// `R(t) = exp(t a) exp(t b) exp(t c) R(0)` and `p(t) = centre + ρ(t) exp(t a) u`.

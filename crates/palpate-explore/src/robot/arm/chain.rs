@@ -185,9 +185,9 @@ impl Chain {
         frames
     }
 
-    /// For each joint, the largest distance from its axis of any point that it moves within
-    /// `beyond_m` of `T`, in m: an upper bound of the motion of such a point per rad. 1 for a
-    /// prismatic joint.
+    /// Returns for each joint the largest distance from its axis of any point that it moves within
+    /// `beyond_m` of `T`, m; 1 for a prismatic joint. It is an upper bound of the motion of such a
+    /// point per rad.
     pub fn reaches_m(&self, beyond_m: f64) -> Joints {
         let end_m = self.flange.translation.vector.norm() + self.tool.translation.vector.norm();
         let mut reaches = Joints::zeros();
@@ -205,9 +205,9 @@ impl Chain {
         reaches
     }
 
-    /// Returns [`forward`](Self::forward) with the geometric Jacobian: column i is `[a × (p_T −
-    /// p_i); a]` for a revolute and `[a; 0]` for a prismatic joint i, with its axis a and origin
-    /// p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).
+    /// Returns [`forward`](Self::forward) with the geometric Jacobian (Siciliano et al. 2009,
+    /// Robotics, Eq. 3.30). Column i is `[a × (p_T − p_i); a]` for a revolute and `[a; 0]` for a
+    /// prismatic joint i, with its axis a and origin p_i in `W`.
     pub fn jacobian(&self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
         let mut x = self.base;
         let mut axes = [(Vector3::zeros(), Vector3::zeros()); MAX_JOINTS];

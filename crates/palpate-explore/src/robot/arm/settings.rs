@@ -41,9 +41,9 @@ pub struct ArmSettings {
 pub const TOOL_KG: f64 = 0.15;
 
 impl Default for ArmSettings {
-    /// A PA-10 with its base at `W`: at home the elbow is up and the finger points along -y, 45
-    /// degrees up, 0.56 m in front of the base's axis and 0.48 m above its foot. The mount leaves
-    /// space for a force/torque sensor and an adapter.
+    /// Returns a PA-10 with its base at `W`. At home the elbow is up and the finger points along
+    /// -y, 45 degrees up, 0.56 m in front of the base's axis and 0.48 m above its foot. The mount
+    /// leaves space for a force/torque sensor and an adapter.
     fn default() -> Self {
         Self {
             model: MODELS[0].0.into(),

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// noise of 19 electrodes.
 const LEAST_COUNTS: f64 = 10.0;
 
-/// Resting value below which an electrode counts as open: when pressed hardest, an intact one reads
-/// 259 (MiaoLi/syntouchcontact, F2).
+/// Resting value below which an electrode counts as open: an intact one reads at least 259 under
+/// load (MiaoLi/syntouchcontact, F2).
 pub(super) const OPEN_COUNTS: f64 = 200.0;
 
 /// Estimator of the point of contact.

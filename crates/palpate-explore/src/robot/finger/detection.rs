@@ -50,8 +50,8 @@ pub struct Detection {
 }
 
 impl Default for Detection {
-    /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: a heuristic, 30 ms; the
-    /// latter waits for 10.
+    /// Returns the default detection. Threshold: tams_biotac and balakumar-s/biotac_force_net.
+    /// Frames: a heuristic, 30 ms; the latter waits for 10.
     fn default() -> Self {
         Self {
             by: ContactChannels::Pressure,
@@ -236,9 +236,8 @@ impl RestState {
         self.variance_of += f64::from(u8::from(!first));
     }
 
-    /// Computes the evidence of contact, in standard deviations of a normal distribution: the rise
-    /// of the pressure, and the joint change of all electrodes in either direction; `None` for a
-    /// channel that is missing in the frame or at rest.
+    /// Computes the evidence of contact, in standard deviations of a normal distribution, from the
+    /// pressure and from all electrodes.
     ///
     /// A channel's difference over its standard deviation, t, follows Student's distribution with
     /// as many degrees of freedom as frames determine the latter, and is mapped to the normal z of

@@ -15,13 +15,15 @@ const FACET_M: f64 = 4.3994e-3;
 const FACET_NORMAL: [f64; 3] = [0.5, 0.0, -0.866_025_403_784_438_6];
 /// Skin thickness: 1.56 to 1.62 mm over sides and pulp.
 const SKIN_M: f64 = 1.6e-3;
-/// The pad at the pulp is this much thicker than the sides, most at `BULGE_X_M`: 8.31 mm.
+/// Additional thickness of the pad at the pulp over that of the sides, largest at `BULGE_X_M`: 8.31
+/// mm.
 const BULGE_M: f64 = 1.31e-3;
 const BULGE_X_M: f64 = -7.0e-3;
 /// Curvature of the bulge, bulge = `BULGE_M` − c (x − `BULGE_X_M`)²: 8.02 mm at x = 0 and 8.03 mm
 /// at −13.6.
 const BULGE_FALL_PER_M: f64 = 6.0;
-/// The tip's corner, 45° from −z: 8.72 mm there, 8.30 mm at 30°, almost nothing at 0.
+/// Height of the tip's corner, 45° from −z: outer radius 8.72 mm there and 8.30 mm at 30°; nearly
+/// no addition at 0°.
 const CORNER_M: f64 = 1.175e-3;
 const CORNER_WIDTH: f64 = 0.041;
 /// Depth of the apex below the sides: 6.65 mm.

@@ -27,9 +27,9 @@ pub struct Finger {
 }
 
 impl Default for Finger {
-    /// The BioTac: the outer skin lies 7.0 mm from the axis at the sides, and the sensing part is
-    /// 28 mm long (FEM mesh of NVlabs/biotac_sim). The pitch is a heuristic, half-way between
-    /// contact at the apex and at the pad.
+    /// Returns the shape of a BioTac: outer skin 7.0 mm from the axis at the sides, sensing part 28
+    /// mm long (FEM mesh of NVlabs/biotac_sim). The pitch is a heuristic, half-way between contact
+    /// at the apex and at the pad.
     fn default() -> Self {
         Self { radius_m: BIOTAC_RADIUS_M, length_m: 0.021, pitch_deg: 45.0 }
     }

@@ -17,11 +17,11 @@ pub struct ForceTorqueTip {
     count: f64,
 }
 
-/// Returns the point of a sphere of `radius_m` about the origin at which a pure force produces the
-/// wrench `(f, τ)`, pressing inwards: `p = (f × τ) / |f|² − λ f` with `|p| = radius` (Bicchi,
-/// Salisbury and Brock 1993, Int. J. Robotics Research 12, point contact with friction). If
-/// measurement error makes the line of action miss the sphere, returns the sphere's nearest point.
-/// Returns `None` for a force of less than 0.1 N.
+/// Returns the point of a sphere of `radius_m` about the origin at which a pure, inward force
+/// produces the wrench `(f, τ)`: `p = (f × τ) / |f|² − λ f` with `|p| = radius`. (source in the
+/// second sentence) J. Robotics Research 12, point contact with friction). If measurement error
+/// makes the line of action miss the sphere, returns the sphere's nearest point. Returns `None` for
+/// a force of less than 0.1 N.
 pub fn point_on_sphere(radius_m: f64, wrench: &Wrench) -> Option<Point3<f64>> {
     let Wrench { force_n: f, torque_nm } = wrench;
     let squared = f.norm_squared();

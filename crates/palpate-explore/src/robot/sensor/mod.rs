@@ -60,7 +60,7 @@ pub trait Sensor: Send {
         None
     }
 
-    /// Whether the touch must end to protect the sensor.
+    /// Whether the touch must be aborted to protect the sensor.
     fn is_overloaded(&self) -> bool {
         false
     }
