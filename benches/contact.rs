@@ -53,7 +53,7 @@ fn main() -> anyhow::Result<()> {
         ("height field", &[rigid]),
         ("hull", &[rigid, "solver.collision=\"hull\""]),
     ];
-    let cast = environment(&["body=\"cast\"", rigid])?;
+    let cast = environment(&["simulator=\"swept\"", rigid])?;
     let truth: Vec<Rest> = (touches::targets(cast.scene(), PLACES, 0).into_iter())
         .filter_map(|target| true_rest(&cast, target.numbers()))
         .collect();
@@ -65,7 +65,7 @@ fn main() -> anyhow::Result<()> {
     println!("| hull swept onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
     let mut first_us = None;
     for (name, sets) in bodies {
-        let dynamic = |arm: &[&str]| environment(&[sets, arm, &["body=\"dynamic\""]].concat());
+        let dynamic = |arm: &[&str]| environment(&[sets, arm, &["simulator=\"dynamic\""]].concat());
         let on_arm = dynamic(&["arm={links=\"C\"}"])?;
         let (rests, depth_m, words) = match on_arm.fingertip() {
             Some(_) => (None, DEEP_M, "as cast | | | | |".into()),

@@ -27,7 +27,7 @@ fn main() -> anyhow::Result<()> {
         ("container_pa10.toml", &[][..]),
         ("bird_pa10.toml", &[]),
         ("container_pa10.toml", &["effects={}", "touch.approach_m_s=0.005"]),
-        ("container_finger.toml", &["body=\"dynamic\""]),
+        ("container_finger.toml", &["simulator=\"dynamic\""]),
         ("container_finger.toml", &["arm.model=\"pa10\""]),
         ("container_finger.toml", &[]),
     ] {

@@ -131,7 +131,7 @@ fn distance(exact: &Posterior, induced: &InducingPosterior, places: &[[f64; 2]])
         "{:>8}{:>8}{:>18.4}{:>18.4}{:>14.3} to {:.3}",
         exact.observations().len(),
         induced.posterior.observations().len(),
-        induced.left_sd / exact.hyperparameters().noise_sd,
+        induced.nystrom_residual_sd / exact.hyperparameters().noise_sd,
         mean.fold(0.0, f64::max),
         sds().fold(f64::INFINITY, f64::min),
         sds().fold(0.0, f64::max),

@@ -13,7 +13,7 @@ pub const MEAN_RMSE: Measure = Measure {
     id: "mean_rmse_m",
     title: "RMSE, mean over touches",
     unit: METRES,
-    direction: Direction::Less,
+    direction: Direction::Minimise,
     aggregate: Aggregate::Median,
     scale: PanelAxis::Log,
     in_tables: true,

@@ -1,4 +1,4 @@
-//! Touches of the object of an `[around]` scene from directions spread evenly over the sphere, at
+//! Touches of the object of an `[whole_object]` scene from directions spread evenly over the sphere, at
 //! its middle and beside it; prints their outcomes and their distance from the mesh.
 //!
 //!     cargo run --release --example touch_around -- scenes/container_around_finger.toml 60
@@ -40,7 +40,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
         println!("{notice}");
     }
     let task = environment.task();
-    let ball = *task.ball().ok_or("the scene has no [around]")?;
+    let ball = *task.ball().ok_or("the scene has no [whole_object]")?;
     let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return Err("no mesh".into()) };
     let mut probe = simulator.probe(1)?;
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();

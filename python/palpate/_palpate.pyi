@@ -206,13 +206,13 @@ class Scene:
             SimulationError: if the scene cannot be built.
         """
     @staticmethod
-    def of_mesh(
+    def from_mesh(
         vertices_m: npt.ArrayLike,
         triangles: npt.ArrayLike,
         *,
         x_m: Sequence[float],
         z_m: Sequence[float],
-        body: str = "cast",
+        simulator: str = "swept",
         seed: int = 0,
         **settings: Any,
     ) -> Scene:
@@ -222,16 +222,19 @@ class Scene:
             vertices_m: vertices, shape (n, 3), metres.
             triangles: vertex indices, shape (m, 3).
             x_m, z_m: zone (low, high), metres.
-            body: "cast", "kinematic" or "dynamic".
+            simulator: "swept", "kinematic" or "dynamic".
             seed, settings: as for `load`.
 
         Raises:
             SimulationError: if the mesh is unusable, or has no surface in the zone.
         """
     @staticmethod
+    def of_mesh(*arguments: Any, **settings: Any) -> Scene:
+        """Former name of `from_mesh`, with `body` in place of `simulator`."""
+    @staticmethod
     def _load(path: str, sets: Sequence[str], seed: int) -> Scene: ...
     @staticmethod
-    def _of_mesh(
+    def _from_mesh(
         path: str,
         sets: Sequence[str],
         seed: int,

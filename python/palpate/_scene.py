@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +23,33 @@ def load(path: str | os.PathLike[str], seed: int, /, **settings: Any) -> _palpat
     return _palpate.Scene._load(os.fspath(found(path, "scenes")), assignments(settings), seed)
 
 
-def of_mesh(
+def of_mesh(*arguments: Any, **settings: Any) -> _palpate.Scene:
+    """Implements `Scene.of_mesh`, the name of `Scene.from_mesh` in version 0.1."""
+    warnings.warn("use Scene.from_mesh(…, simulator=…)", DeprecationWarning, stacklevel=2)
+    former = {"cast": "swept", "function": "analytic"}
+    if "body" in settings:
+        body = settings.pop("body")
+        settings["simulator"] = former.get(body, body)
+    return _palpate.Scene.from_mesh(*arguments, **settings)
+
+
+def from_mesh(
     vertices_m: npt.ArrayLike,
     triangles: npt.ArrayLike,
     x_m: list[float],
     z_m: list[float],
-    body: str,
+    simulator: str,
     seed: int,
     /,
     **settings: Any,
 ) -> _palpate.Scene:
-    """Implements `Scene.of_mesh`."""
+    """Implements `Scene.from_mesh`."""
     zone = toml({"x_m": x_m, "z_m": z_m})
-    text = f'body = {toml(body)}\nzone = {zone}\nobject = {{ mesh = "mesh" }}\n'
+    text = f'simulator = {toml(simulator)}\nzone = {zone}\nobject = {{ mesh = "mesh" }}\n'
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.toml"
         file.write_text(text)
-        return _palpate.Scene._of_mesh(
+        return _palpate.Scene._from_mesh(
             os.fspath(file),
             assignments(settings),
             seed,

@@ -22,7 +22,7 @@ Observation: a dict of arrays; the unit of heights is half of the zone's widest 
 Info: "rmse_m", "centred_r" and "max_error_m" of the belief, absent if no belief is fitted, and "failure", the reason
 of an early end, or None.
 
-Whole object (a scene with `[around]`); the unit is the ball's radius, the origin its centre:
+Whole object (a scene with `[whole_object]`); the unit is the ball's radius, the origin its centre:
 
 Action: shape (6,), from -1 to 1: a vector of any length towards the finger's side, and the aimed point, clipped to the
 ball. Both are vectors in space, which unlike angles have no discontinuity and no pole: close actions are close in

@@ -117,7 +117,7 @@ impl Belief {
     /// Variance that a touch with this target can still reduce, square metres: `variance`,
     /// conditioned also on targets without contact or with contact elsewhere. The planner `active`
     /// selects its maximum.
-    fn reducible_variance<'py>(
+    fn explorable_variance<'py>(
         &self,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
@@ -141,7 +141,7 @@ impl Belief {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("has_surface")?;
         let places = Places::of(points, belief.zone().dimension())?;
-        let silhouette = belief.presence().silhouette();
+        let silhouette = belief.surface_evidence().silhouette();
         let likely = silhouette.is_likely(places.each.iter().map(Vec::as_slice));
         let values = likely.iter().map(|&is_likely| f64::from(u8::from(is_likely))).collect();
         places.reshape(points.py(), values)

@@ -72,9 +72,9 @@ impl PlannerChannel {
 /// Reasons for a missing target.
 pub(crate) enum NoTarget {
     /// The planner failed, or the run was stopped, for this reason.
-    Said(String),
+    Failed(String),
     /// The planner exceeded the time limit.
-    Late(Duration),
+    Timeout(Duration),
 }
 
 impl TrialEnd {
@@ -83,18 +83,18 @@ impl TrialEnd {
     /// # Errors
     /// If there is no target.
     pub(crate) fn ask(&self, belief: Known) -> Result<Vec<f64>, NoTarget> {
-        let gone = || NoTarget::Said("the planner's thread has ended".into());
+        let gone = || NoTarget::Failed("the planner's thread has ended".into());
         self.requests.send(belief).map_err(|_| gone())?;
         let begun = Instant::now();
         while begun.elapsed() < BUSY_WAIT {
             if let Ok(reply) = self.replies.try_recv() {
-                return reply.map_err(NoTarget::Said);
+                return reply.map_err(NoTarget::Failed);
             }
             std::thread::yield_now();
         }
         match self.replies.recv_timeout(self.limit) {
-            Ok(reply) => reply.map_err(NoTarget::Said),
-            Err(RecvTimeoutError::Timeout) => Err(NoTarget::Late(self.limit)),
+            Ok(reply) => reply.map_err(NoTarget::Failed),
+            Err(RecvTimeoutError::Timeout) => Err(NoTarget::Timeout(self.limit)),
             Err(RecvTimeoutError::Disconnected) => Err(gone()),
         }
     }

@@ -84,8 +84,8 @@ impl PythonPlanner {
         let StartedPlanner { planner, desk } = begun.as_ref().map_err(Clone::clone)?;
         if let Some(desk) = desk {
             return desk.ask(belief.clone()).map_err(|no_target| match no_target {
-                NoTarget::Said(reason) => reason,
-                NoTarget::Late(limit) => {
+                NoTarget::Failed(reason) => reason,
+                NoTarget::Timeout(limit) => {
                     // A failure here has no consequence.
                     Python::attach(|py| planner.call_method0(py, "abandon").is_ok());
                     format!("the planner did not return within {} s", limit.as_secs_f64())

@@ -60,10 +60,10 @@ impl Run {
 
     #[getter]
     fn ball(&self) -> PyResult<Ball> {
-        let Some(around) = &self.0.experiment.scene.around else {
+        let Some(around) = &self.0.experiment.scene.whole_object else {
             return Err(errors::not_over_zone("ball", "zone, truth()"));
         };
-        let ball = around.ball().ok_or_else(|| errors::other("[around] is incomplete"))?;
+        let ball = around.ball().ok_or_else(|| errors::other("[whole_object] is incomplete"))?;
         Ok(Ball(ball))
     }
 
@@ -101,7 +101,7 @@ impl Run {
     fn belief(&self, trial: u32, planner: &str, touch: u32) -> PyResult<Belief> {
         let row = self.row(trial, planner)?;
         let experiment = &self.0.experiment;
-        let known = if experiment.scene.around.is_some() {
+        let known = if experiment.scene.whole_object.is_some() {
             let touches = row.touches.get(..touch as usize).unwrap_or_default();
             whole_object::belief(experiment, touches).map_err(errors::other)?.map(Known::from)
         } else {

@@ -16,7 +16,7 @@ use palpate::sim::simulator::Simulator;
 use palpate::task::{self, Approach};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -116,21 +116,32 @@ impl Scene {
     }
 
     /// Creates a scene from a mesh in the world frame, touched along -y: vertices (n, 3), metres;
-    /// triangles (m, 3), vertex indices; the zone, metres; the body; other arguments as in `load`.
+    /// triangles (m, 3), vertex indices; the zone, metres; the simulator; other arguments as in `load`.
     #[staticmethod]
-    #[pyo3(signature = (vertices_m, triangles, *, x_m, z_m, body = "cast", seed = 0, **settings))]
-    fn of_mesh<'py>(
+    #[pyo3(signature = (vertices_m, triangles, *, x_m, z_m, simulator = "swept", seed = 0, **settings))]
+    fn from_mesh<'py>(
         vertices_m: Bound<'py, PyAny>,
         triangles: Bound<'py, PyAny>,
         x_m: [f64; 2],
         z_m: [f64; 2],
-        body: &str,
+        simulator: &str,
         seed: u64,
         settings: Option<Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = vertices_m.py();
-        let arguments = (vertices_m, triangles, x_m, z_m, body, seed);
-        py.import("palpate._scene")?.call_method("of_mesh", arguments, settings.as_ref())
+        let arguments = (vertices_m, triangles, x_m, z_m, simulator, seed);
+        py.import("palpate._scene")?.call_method("from_mesh", arguments, settings.as_ref())
+    }
+
+    /// Former name of `from_mesh`.
+    #[staticmethod]
+    #[pyo3(signature = (*arguments, **settings))]
+    fn of_mesh<'py>(
+        arguments: &Bound<'py, PyTuple>,
+        settings: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let scene = arguments.py().import("palpate._scene")?;
+        scene.call_method("of_mesh", arguments, settings)
     }
 
     #[staticmethod]
@@ -141,7 +152,7 @@ impl Scene {
 
     /// Loads a scene's file with the mesh in place of its object.
     #[staticmethod]
-    fn _of_mesh(
+    fn _from_mesh(
         py: Python<'_>,
         path: PathBuf,
         sets: Vec<String>,
@@ -207,7 +218,7 @@ impl Scene {
             Some(zone) => zone.dimension().to_string(),
             None => "around an object".into(),
         };
-        format!("Scene(body {}, {explored})", scene.body.name())
+        format!("Scene(simulator {}, {explored})", scene.simulator.name())
     }
 }
 

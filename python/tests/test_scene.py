@@ -29,20 +29,26 @@ def sphere(rings=60):
     return SPHERE_M + RADIUS_M * points, np.concatenate(triangles)
 
 
-@pytest.mark.parametrize("body", ["cast", "kinematic"])
-def test_a_sphere_is_touched_where_it_is(body):
-    scene = palpate.Scene.of_mesh(*sphere(), x_m=(-0.02, 0.02), z_m=(0.49, 0.51), body=body)
+@pytest.mark.parametrize("simulator", ["swept", "kinematic"])
+def test_a_sphere_is_touched_where_it_is(simulator):
+    scene = palpate.Scene.from_mesh(*sphere(), x_m=(-0.02, 0.02), z_m=(0.49, 0.51), simulator=simulator)
     assert isinstance(scene, palpate.Scene)
     touch = scene.touch([0.01, 0.5])
     assert touch.outcome == "contact"
-    assert np.linalg.norm(touch.p_wc - SPHERE_M) == pytest.approx(RADIUS_M, abs={"cast": 1e-4}.get(body, 3e-3))
+    assert np.linalg.norm(touch.p_wc - SPHERE_M) == pytest.approx(RADIUS_M, abs={"swept": 1e-4}.get(simulator, 3e-3))
     assert np.linalg.norm(touch.normal_w) == pytest.approx(1.0)
     place = np.array([[0.0, 0.5], [0.015, 0.505]])
     away = np.hypot(place[:, 0], place[:, 1] - 0.5)
     heights_m = np.sqrt(RADIUS_M**2 - away**2) + SPHERE_M[1] - scene.zone.datum_y_m
     assert scene.true_height(place) == pytest.approx(heights_m, abs=1e-4)
-    assert (touch.time_s is None) == (body == "cast")
+    assert (touch.time_s is None) == (simulator == "swept")
     assert "Touch" in repr(touch) and "Scene" in repr(scene)
+
+
+def test_the_former_names_are_read():
+    with pytest.warns(DeprecationWarning, match="from_mesh"):
+        scene = palpate.Scene.of_mesh(*sphere(), x_m=(-0.02, 0.02), z_m=(0.49, 0.51), body="cast")
+    assert scene.touch([0.01, 0.5]).time_s is None
 
 
 def test_meshes_go_out_and_come_in_again(tmp_path):
@@ -50,7 +56,7 @@ def test_meshes_go_out_and_come_in_again(tmp_path):
     vertices_m, triangles = scene.mesh()
     assert vertices_m.shape[1] == triangles.shape[1] == 3
     low, high = scene.zone.lower, scene.zone.upper
-    again = palpate.Scene.of_mesh(vertices_m, triangles, x_m=(low[0], high[0]), z_m=(low[1], high[1]))
+    again = palpate.Scene.from_mesh(vertices_m, triangles, x_m=(low[0], high[0]), z_m=(low[1], high[1]))
     target = (low + high) / 2
     assert again.touch(target).p_wc == pytest.approx(scene.touch(target).p_wc, abs=1e-9)
     palpate.write_mesh(tmp_path / "bird.stl", vertices_m, triangles)
@@ -67,8 +73,8 @@ def test_what_is_wrong_is_said():
         scene.touch([99.0])
     vertices_m, triangles = sphere(4)
     with pytest.raises(SimulationError):
-        palpate.Scene.of_mesh(vertices_m, triangles, x_m=(5, 6), z_m=(5, 6))
+        palpate.Scene.from_mesh(vertices_m, triangles, x_m=(5, 6), z_m=(5, 6))
     with pytest.raises(SimulationError):
-        palpate.Scene.of_mesh(vertices_m, triangles - 1, x_m=(-0.02, 0.02), z_m=(0.49, 0.51))
+        palpate.Scene.from_mesh(vertices_m, triangles - 1, x_m=(-0.02, 0.02), z_m=(0.49, 0.51))
     with pytest.raises(ValueError):
-        palpate.Scene.of_mesh(vertices_m[:, :2], triangles, x_m=(-0.02, 0.02), z_m=(0.49, 0.51))
+        palpate.Scene.from_mesh(vertices_m[:, :2], triangles, x_m=(-0.02, 0.02), z_m=(0.49, 0.51))

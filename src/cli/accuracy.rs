@@ -114,12 +114,12 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let is_verdict = matches!(args.tolerance, Some(Criterion::Verdict(_)));
     let is_of_effects = args.against == Some(Origin::Scene);
     let has_levels = !is_of_effects && !is_verdict;
-    let has_effects = (is_of_effects || args.against.is_none()) && scene.body.moves_finger();
+    let has_effects = (is_of_effects || args.against.is_none()) && scene.simulator.moves_finger();
     if !has_levels && !has_effects {
-        let body = scene.body.name();
+        let body = scene.simulator.name();
         ensure!(
-            scene.body.moves_finger(),
-            "{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\""
+            scene.simulator.moves_finger(),
+            "{path}: simulator = \"{body}\" has no effects; effects need simulator = \"kinematic\""
         );
         bail!("--against: --tolerance verdict compares with the scene; use --against scene");
     }

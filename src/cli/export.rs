@@ -104,7 +104,7 @@ fn belief(args: &Args) -> anyhow::Result<Outcome> {
         };
     args.force.check_files(out, &files::FORMATS)?;
     let mut run = Run::read(&args.path)?;
-    let is_around = run.experiment.scene.around.is_some();
+    let is_around = run.experiment.scene.whole_object.is_some();
     ensure!(
         run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
         "{} explored a curve, which has no mesh; its figures show it",

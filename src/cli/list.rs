@@ -66,7 +66,7 @@ fn scenes() -> Vec<[String; 2]> {
     let about = |name: &String| {
         let loaded = find(Path::new(name), SCENES).and_then(|path| {
             let scene = Scene::load(&path, &[])?;
-            Ok(format!("body = \"{}\"", scene.body.name()))
+            Ok(format!("simulator = \"{}\"", scene.simulator.name()))
         });
         [name.clone(), loaded.unwrap_or_else(|error| format!("{error:#}"))]
     };

@@ -42,7 +42,7 @@ pub(super) struct Args {
     finger: FingerKind,
     /// Let a glTF mesh read buffers outside its own folder.
     #[arg(long)]
-    outside_buffers: bool,
+    allow_external_buffers: bool,
     /// Folder for both files.
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     out: PathBuf,
@@ -57,7 +57,7 @@ impl Args {
     }
 
     fn read(&self, metres_per_unit: f64) -> anyhow::Result<Mesh> {
-        Ok(import_with(&self.mesh, metres_per_unit, self.outside_buffers)?.0)
+        Ok(import_with(&self.mesh, metres_per_unit, self.allow_external_buffers)?.0)
     }
 
     fn is_here(&self) -> bool {
@@ -68,12 +68,12 @@ impl Args {
 /// Kinds of finger that can touch the object.
 #[derive(Clone, Copy, Default, PartialEq, clap::ValueEnum)]
 enum FingerKind {
-    /// A rigid fingertip, swept to first contact: body = "cast".
+    /// A rigid fingertip, swept to first contact: simulator = "swept".
     #[default]
     Rigid,
-    /// A soft BioTac on a stage: body = "kinematic".
+    /// A soft BioTac on a stage: simulator = "kinematic".
     Soft,
-    /// A soft BioTac on a Mitsubishi PA-10, stepped by MuJoCo: body = "dynamic".
+    /// A soft BioTac on a Mitsubishi PA-10, stepped by MuJoCo: simulator = "dynamic".
     Arm,
 }
 
@@ -225,12 +225,13 @@ impl MeshPlacement {
         };
         let mesh = toml::Value::from(mesh.to_string_lossy().into_owned());
         let [x_m, z_m] = [zone.x_m, zone.z_m.unwrap_or_default()];
-        let outside = if args.outside_buffers { "outside_buffers = true\n" } else { "" };
+        let outside =
+            if args.allow_external_buffers { "allow_external_buffers = true\n" } else { "" };
         let datum_y_m = zone.datum_y_m();
         let depth_m = zone.depth_m.unwrap_or_default();
         Ok(format!(
             "# Scene of {}, guessed by `palpate new`; change any number.\n\
-             body = \"{body}\"\n\n\
+             simulator = \"{body}\"\n\n\
              [object]\n\
              mesh = {mesh}\n\
              unit = \"{unit}\"                 # of the file's numbers: m, cm, mm, um, in\n\

@@ -39,8 +39,8 @@ pub(super) fn prepare_environment(
 /// Rejects a scene of a whole object for a command that needs a zone.
 pub(super) fn needs_zone(scene: &Scene, path: &Path) -> anyhow::Result<()> {
     ensure!(
-        scene.around.is_none(),
-        "{}: [around] explores a whole object, but this command needs one side of it; allowed is a \
+        scene.whole_object.is_none(),
+        "{}: [whole_object] explores a whole object, but this command needs one side of it; allowed is a \
          scene with [zone]",
         path.display()
     );

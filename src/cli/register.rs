@@ -5,7 +5,7 @@ use super::known_body::KnownBodyArgs;
 use super::output::Overwrite;
 use super::prepare::{prepare_arm, prepare_simulator};
 use super::progress::{progress_bar, step};
-use super::register_cloud::{CloudArgs, align};
+use super::register_cloud::{CloudArgs, register_cloud};
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     args.force.check_file(&out)?;
     if let Some(cloud) = &args.cloud.cloud {
         let position_m = args.body.at.unwrap_or_default();
-        return align((&args.file, cloud), position_m, &args.cloud, &out, talk);
+        return register_cloud((&args.file, cloud), position_m, &args.cloud, &out, talk);
     }
     let path = find(&args.file, SCENES)?;
     let (scene, settings) = match is_experiment(&path) {

@@ -33,7 +33,7 @@ pub(super) struct CloudArgs {
 
 /// Registers the points of `cloud` to `mesh` from the initial position `position_m` of the mesh's
 /// origin in the cloud's frame, and writes the pose to `out`.
-pub(super) fn align(
+pub(super) fn register_cloud(
     (mesh, cloud): (&Path, &Path),
     position_m: [f64; 3],
     args: &CloudArgs,

@@ -231,10 +231,10 @@ fn run_missing(
     let simulation = prepare_simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
     let experiment = simulation.experiment();
-    if args.record && !experiment.scene.body.moves_finger() && !simulation.is_real() {
-        let body = experiment.scene.body.name();
+    if args.record && !experiment.scene.simulator.moves_finger() && !simulation.is_real() {
+        let body = experiment.scene.simulator.name();
         bail!(
-            "--record: body = \"{body}\" does not move, so there is nothing to record; allowed are \
+            "--record: simulator = \"{body}\" does not move, so there is nothing to record; allowed are \
              \"kinematic\" and \"dynamic\""
         );
     }

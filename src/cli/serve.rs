@@ -11,7 +11,7 @@ use crate::sim::{Scene, known_body};
 use anyhow::{Context, bail};
 use palpate_ros::connect;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
-use palpate_ros::server::serve::{Injection, Twin, services};
+use palpate_ros::server::serve::{Injection, SimulatedRobotServer, services};
 use palpate_ros::settings::BackendKind;
 use palpate_ros::topics::Side;
 use serde_json::json;
@@ -99,9 +99,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let scene = environment.scene();
     let (Some(body), Some(robot)) = (simulator.body()?, environment.robot()) else {
         bail!(
-            "{}: body = \"{}\" does not move; allowed are \"kinematic\" and \"dynamic\"",
+            "{}: simulator = \"{}\" does not move; allowed are \"kinematic\" and \"dynamic\"",
             args.path.display(),
-            scene.body.name()
+            scene.simulator.name()
         );
     };
     let effects = &scene.effects;
@@ -115,8 +115,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let stop = stop_on_interrupt("ticks")?;
     let open = connect(&settings, Side::Arm, services())?;
     let injections = args.inject.clone();
-    let mut twin = Twin::new(body, &robot.chain, &settings, open, injections, args.seed)
-        .context("cannot start the simulated robot")?;
+    let mut twin =
+        SimulatedRobotServer::new(body, &robot.chain, &settings, open, injections, args.seed)
+            .context("cannot start the simulated robot")?;
     let mut written = Ok(());
     twin.run(&stop, &mut |time_unix_s, event| {
         let line = json!({ "time_unix_s": time_unix_s, "event": event });

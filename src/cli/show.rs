@@ -48,9 +48,9 @@ pub(super) struct Args {
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<Unit>,
-    /// Let a .gltf mesh read buffers outside its folder; in a scene use object.outside_buffers.
+    /// Let a .gltf mesh read buffers outside its folder; in a scene use object.allow_external_buffers.
     #[arg(long)]
-    outside_buffers: bool,
+    allow_external_buffers: bool,
     /// Change one setting of a scene or experiment; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -92,9 +92,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         ("--set", !args.set.is_empty(), is_toml, "a scene or an experiment (.toml)"),
         (
             "--outside-buffers",
-            args.outside_buffers,
+            args.allow_external_buffers,
             is_mesh,
-            "a mesh; in a scene use object.outside_buffers",
+            "a mesh; in a scene use object.allow_external_buffers",
         ),
         ("--unit", args.unit.is_some(), is_mesh, "a mesh; in a scene use object.unit"),
     ];
@@ -114,7 +114,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
             let name = path.display();
             let (_, report) = report_slow_steps(talk, |tell| {
                 tell(&format!("reading {name}"));
-                import_with(&path, metres, args.outside_buffers)
+                import_with(&path, metres, args.allow_external_buffers)
             })?;
             format!("{name}\n{report}\nto explore it: palpate new {name}")
         }

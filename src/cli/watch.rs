@@ -9,7 +9,7 @@ use crate::experiment::trial::row::TrialRow;
 use crate::sim::Scene;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
-use palpate_explore::backend::live_view::{LiveView, Watched};
+use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
 use palpate_explore::planner;
 use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::servo::Servo;
@@ -57,14 +57,14 @@ pub(super) fn watch(
     let planner = planner(args, &experiment)?;
     let simulation = prepare_simulation(experiment, talk)?;
     let Some(body) = simulation.simulator().body()? else {
-        let (path, body) = (path.display(), simulation.experiment().scene.body.name());
+        let (path, body) = (path.display(), simulation.experiment().scene.simulator.name());
         bail!(
-            "{path}: body = \"{body}\" does not move; allowed are \"kinematic\" and \
+            "{path}: simulator = \"{body}\" does not move; allowed are \"kinematic\" and \
              \"dynamic\""
         );
     };
     let window = Window::open(simulation.environment(), &format!("Palpate: {}", path.display()))?;
-    let (body, sight) = Watched::new(body, args.speed);
+    let (body, sight) = ViewedBackend::new(body, args.speed);
     let servo = simulation.servo(Box::new(body), simulation.body_seed(args.trial))?;
     let mut probe = ReportingProbe { servo, sight: sight.clone(), count: 0 };
     let number = args.trial;

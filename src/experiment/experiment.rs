@@ -94,6 +94,18 @@ const EXACT_TOUCHES_MAX: u32 = 2000;
 // heuristic: balances resolution and cost.
 const GRID: u32 = 31;
 
+/// Keys of version 0.1, and their present names.
+const FORMER_KEYS: [[&str; 2]; 8] = [
+    ["gp.free_places", "gp.free_space_samples"],
+    ["gp.widening", "gp.sd_inflation"],
+    ["gp.compared_every", "gp.evaluate_every"],
+    ["planning.lbfgs_evaluations", "planning.bfgs_evaluations"],
+    ["planning.silhouette.touch_way_m", "planning.silhouette.travel_cost_m"],
+    ["planning.ucb.sds", "planning.ucb.kappa"],
+    ["truth.within_m", "truth.search_radius_m"],
+    ["truth.neighbours", "truth.contacts_min"],
+];
+
 impl Experiment {
     /// Returns an experiment of `trials` trials of `touches` touches with each planner on `scene`,
     /// with default settings.
@@ -157,20 +169,23 @@ impl Experiment {
         files.iter().try_for_each(|set| loader.set(set))?;
         INCLUDED.iter().try_for_each(|key| loader.include(key))?;
         others.iter().try_for_each(|set| loader.set(set))?;
+        loader.read_former_keys("", &FORMER_KEYS)?;
         let legacy_keys = Scene::resolve(&mut loader, "scene.")?;
         loader.resolve_path("truth.scan");
-        if loader.has_value("scene.around") {
+        if loader.has_value("scene.whole_object") {
             // Version 0.1 also wrote the settings of a zone's belief here, all of them.
             let is_of_zone = ["gp.mean", "gp.signal", "gp.free_space"];
             match is_of_zone.iter().all(|key| loader.has_value(key)) {
                 true => drop(loader.take("gp")),
-                false => loader.read_as("gp", "space"),
+                false => loader.read_as("gp", "space")?,
             }
         }
         // Version 0.1 wrote settings of planners that were removed.
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
         take_former_keys(&mut loader)?;
+        let former_names = loader.take_former_names();
         let mut experiment: Self = loader.finish()?;
+        experiment.scene.former_names = former_names;
         experiment.scene.effects.legacy_keys = legacy_keys;
         if experiment.backend.kind != BackendKind::Simulated {
             experiment.backend.complete(experiment.scene.arm.as_ref());
@@ -233,7 +248,7 @@ impl Experiment {
 
     /// Error measure that ranks the planners.
     pub fn error_measure(&self) -> &'static Measure {
-        match self.scene.around {
+        match self.scene.whole_object {
             None => &RMSE,
             Some(_) => &CHAMFER,
         }
@@ -255,10 +270,10 @@ impl Experiment {
     }
 
     /// Whether the belief after `count` touches is compared with the ground truth. Around a whole
-    /// object a comparison takes longer than a touch, so only every `compared_every` touches and
+    /// object a comparison takes longer than a touch, so only every `evaluate_every` touches and
     /// the last are compared.
     pub fn is_evaluated(&self, count: u32) -> bool {
-        let every = self.scene.around.as_ref().map_or(1, |_| self.space.compared_every);
+        let every = self.scene.whole_object.as_ref().map_or(1, |_| self.space.evaluate_every);
         count >= self.initial_touches && (count == self.touches || count.is_multiple_of(every))
     }
 
@@ -296,7 +311,7 @@ pub fn is_name_character(c: char) -> bool {
 impl Experiment {
     /// Checks the settings that do not apply around a whole object.
     fn check_whole_object(&self, rules: &mut Rules) {
-        if self.scene.around.is_none() {
+        if self.scene.whole_object.is_none() {
             return;
         }
         for (i, name) in self.planners.iter().enumerate() {

@@ -12,11 +12,11 @@ use palpate_ros::settings::BackendKind;
 pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> {
     let (kind, interlocks) = (experiment.backend.kind, &experiment.backend.interlocks);
     let scene = &experiment.scene;
-    let mut needed = match &scene.around {
+    let mut needed = match &scene.whole_object {
         _ if is_known => Vec::new(),
         Some(around) => vec![
-            ("scene.around.centre_m", "[0.0, -0.65, 0.5]", around.centre_m.is_some()),
-            ("scene.around.radius_m", "0.1", around.radius_m.is_some()),
+            ("scene.whole_object.centre_m", "[0.0, -0.65, 0.5]", around.centre_m.is_some()),
+            ("scene.whole_object.radius_m", "0.1", around.radius_m.is_some()),
         ],
         None => vec![(
             "scene.zone.depth_m",

@@ -34,9 +34,11 @@ pub struct ReportSettings {
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// Figure or section of the publication.
-    pub place: String,
+    #[serde(alias = "place")]
+    pub source: String,
     /// Text of the claim.
-    pub says: String,
+    #[serde(alias = "says")]
+    pub text: String,
     /// Number of touches after which it applies.
     pub touches: u32,
     /// Names of the measures that test it.

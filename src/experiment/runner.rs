@@ -226,7 +226,7 @@ pub fn run_real(
             if let Err(error) = journal.add(entry(Some(touched.row.clone()), None)) {
                 let message = error.to_string();
                 unstored = Some(error);
-                return Err(Fault::Unrecorded { time_s, message });
+                return Err(Fault::RecordingFailed { time_s, message });
             }
             is_asked = stop.load(Ordering::Relaxed);
             if is_asked { Err(Fault::Stopped { time_s }) } else { Ok(()) }

@@ -29,7 +29,7 @@ fn error_on(contender: &Entrant, object: usize) -> Option<Estimate> {
 
 fn judged(error: Option<Estimate>) -> Cell {
     let interval = error.and_then(|error| error.interval);
-    Cell::estimate(error).with_verdict(interval, 1.0, Direction::Less)
+    Cell::estimate(error).with_verdict(interval, 1.0, Direction::Minimise)
 }
 
 /// Returns a table with a row for each planner, over all objects.
@@ -68,7 +68,7 @@ pub fn overall(compared: &SuiteComparison) -> Table {
     for contender in &compared.contenders {
         let on = |word: &str| {
             let intervals = all.iter().map(|object| error_on(contender, *object)?.interval);
-            let verdicts = intervals.map(|it| verdict(it, 1.0, Direction::Less));
+            let verdicts = intervals.map(|it| verdict(it, 1.0, Direction::Minimise));
             Cell::from(format!("{} of {count}", verdicts.filter(|it| *it == Some(word)).count()))
         };
         let mean_of = |of: fn(&ObjectResult) -> Option<f64>| {
@@ -142,7 +142,7 @@ fn sentence(compared: &SuiteComparison) -> Option<String> {
     let others = compared.contenders.iter().filter(|it| it.name != *against);
     let verdicts = others.map(|it| {
         let interval = geometric(&it.scores(), SEED).and_then(|error| error.interval);
-        (it.name.as_str(), verdict(interval, 1.0, Direction::Less))
+        (it.name.as_str(), verdict(interval, 1.0, Direction::Minimise))
     });
     let words = [
         format!("a smaller error than {against}"),

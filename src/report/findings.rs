@@ -32,7 +32,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
         return vec!["No trial has reached its first fit, so there are no results yet.".into()];
     }
     let verified = verified(run, &curves);
-    let found = if run.experiment.scene.around.is_some() {
+    let found = if run.experiment.scene.whole_object.is_some() {
         vec![shapes(run, &curves), against_baseline(run, &curves)]
     } else if run.truth.is_known() {
         let (needed, against) = (r_needed(run, &curves), against_baseline(run, &curves));
@@ -216,7 +216,8 @@ fn touches_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Str
     let id = run.experiment.error_measure().id;
     let found = analysis.equal_errors.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
-    let verdicts = found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Less)));
+    let verdicts =
+        found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Minimise)));
     let words = ["fewer touches", "more touches", "about as many (no established difference)"];
     let words = words.map(String::from);
     let clauses = clauses(verdicts.map(by_verdict), ["needs", "need"], words)?;

@@ -142,9 +142,9 @@ pub fn measures() -> String {
     let mut table = Table::new(heads.map(Column::new));
     for measure in MEASURES {
         let better = match measure.direction {
-            Direction::Less => "less",
-            Direction::More => "more",
-            Direction::Neither => "neither",
+            Direction::Minimise => "less",
+            Direction::Maximise => "more",
+            Direction::Undirected => "neither",
         };
         let columns: Vec<String> =
             measure.columns().iter().map(|name| format!("`{name}`")).collect();

@@ -101,7 +101,7 @@ impl<'a> Replay<'a> {
     /// Returns whether the belief is drawn at each of `places`: a Gaussian process has a value
     /// everywhere, also where the zone reaches past the object.
     pub fn is_drawn<'p>(&self, places: impl IntoIterator<Item = &'p [f64]>) -> Vec<bool> {
-        self.belief.presence().silhouette().is_likely(places)
+        self.belief.surface_evidence().silhouette().is_likely(places)
     }
 
     /// Draws the touches on a flat panel: a cross for a contact, a diamond of this stroke width for

@@ -287,9 +287,9 @@ pub fn verdict(
     let [low, high] = interval?;
     let [is_less, is_more] = [high < even, low > even];
     match direction {
-        Direction::Neither => None,
-        Direction::Less if is_less => Some("better"),
-        Direction::More if is_more => Some("better"),
+        Direction::Undirected => None,
+        Direction::Minimise if is_less => Some("better"),
+        Direction::Maximise if is_more => Some("better"),
         _ => (is_less || is_more).then_some("worse"),
     }
 }

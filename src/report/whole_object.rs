@@ -14,7 +14,7 @@ use nalgebra::Point3;
 use palpate_explore::task::Task;
 use palpate_explore::whole_object::{ImplicitSurface, Scope};
 use palpate_geometry::bvh::MeshBvh;
-use palpate_geometry::decimate::coarse;
+use palpate_geometry::decimate::decimate;
 
 // Largest number of triangles of a surface that is drawn.
 // heuristic: a page stays a few megabytes.
@@ -31,7 +31,7 @@ pub fn truth(run: &Run) -> Option<MeshBvh> {
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
 pub fn section(run: &Run) -> anyhow::Result<String> {
     let experiment = &run.experiment;
-    if experiment.scene.around.is_none() {
+    if experiment.scene.whole_object.is_none() {
         return Ok(String::new());
     }
     let truth = truth(run);
@@ -55,7 +55,7 @@ pub const FIGURE: ReportFigure = ReportFigure {
     },
     draw: |run| {
         let experiment = &run.experiment;
-        if experiment.scene.around.is_none() {
+        if experiment.scene.whole_object.is_none() {
             return Ok(None);
         }
         let (counts, truth) = (experiment.drawn_touch_counts(), truth(run));
@@ -115,7 +115,7 @@ pub fn frame(
     let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
     let Some(belief) = belief(experiment, touches)? else { return Ok(None) };
     let Some(surface) = belief.surface() else { return Ok(None) };
-    let mesh = surface.mesh(experiment.space.cells).map(|mesh| coarse(&mesh, most));
+    let mesh = surface.mesh(experiment.space.cells).map(|mesh| decimate(&mesh, most));
     let mesh = mesh.unwrap_or_default();
     let score = |shape: &ShapeMetrics| {
         let chamfer = shape.chamfer_m.map(|chamfer_m| digits(1e3 * chamfer_m));
@@ -147,8 +147,9 @@ pub fn belief(
     let Some(fit) = touches.last().and_then(|touch| touch.fit.as_ref()) else { return Ok(None) };
     let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
     let scene = &experiment.scene;
-    let ball = scene.around.as_ref().and_then(|around| around.ball());
-    let ball = ball.context("the scene has no ball of [around]; resolved.toml is incomplete")?;
+    let ball = scene.whole_object.as_ref().and_then(|around| around.ball());
+    let ball =
+        ball.context("the scene has no ball of [whole_object]; resolved.toml is incomplete")?;
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
     let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());

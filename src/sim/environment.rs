@@ -68,7 +68,7 @@ impl Environment {
     /// # Errors
     /// The errors of [`build`](Self::build).
     pub fn build_with_progress(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, InputError> {
-        if scene.body == SimulatorKind::Function {
+        if scene.simulator == SimulatorKind::Analytic {
             let function = scene.function.ok_or_else(|| missing_part("function"))?;
             return Self::with_shape(scene, ObjectShape::Function(function));
         }
@@ -77,7 +77,7 @@ impl Environment {
         let (mesh, report) = import_with(
             &object.mesh,
             object.unit.metres_per_unit() * object.scale,
-            object.outside_buffers,
+            object.allow_external_buffers,
         )?;
         tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
@@ -95,39 +95,43 @@ impl Environment {
             scene.effects = effects;
             notices.push(notice::DEFAULT_FINGER.into());
         }
+        if !scene.former_names.is_empty() {
+            notices.push(notice::former_names(&scene.former_names));
+        }
         if !scene.effects.legacy_keys.is_empty() {
             notices.push(notice::legacy_keys(&scene.effects.legacy_keys));
         }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
-        if scene.body.moves_finger() && scene.effects.skin.is_some() && !is_biotac {
+        if scene.simulator.moves_finger() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
-        let task =
-            if let (Some(around), ObjectShape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
-                let ball = bounding_ball(around, bvh.mesh())?;
-                whole_object_task(&scene, arm.as_ref(), ball, bvh.mesh())?
-            } else {
-                let zone = scene.zone.as_mut().ok_or_else(|| missing_part("zone"))?;
-                let extent = extent(zone, &shape);
-                let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
-                if let ObjectShape::Mesh { bvh, .. } = &shape {
-                    let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-                    let size = notice::size_mismatch(zone, unit, &extent);
-                    check_overlap(zone, depth_m, &extent, size.as_deref())?;
-                    check_front(zone, bvh, depth_m[0], -extent[1].y)?;
-                    notices.extend(size);
-                    if zone.datum_y_m.is_none() {
-                        zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
-                    }
+        let task = if let (Some(around), ObjectShape::Mesh { bvh, .. }) =
+            (&mut scene.whole_object, &shape)
+        {
+            let ball = bounding_ball(around, bvh.mesh())?;
+            whole_object_task(&scene, arm.as_ref(), ball, bvh.mesh())?
+        } else {
+            let zone = scene.zone.as_mut().ok_or_else(|| missing_part("zone"))?;
+            let extent = extent(zone, &shape);
+            let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
+            if let ObjectShape::Mesh { bvh, .. } = &shape {
+                let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
+                let size = notice::size_mismatch(zone, unit, &extent);
+                check_overlap(zone, depth_m, &extent, size.as_deref())?;
+                check_front(zone, bvh, depth_m[0], -extent[1].y)?;
+                notices.extend(size);
+                if zone.datum_y_m.is_none() {
+                    zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
                 }
-                zone.datum_y_m.get_or_insert(0.0);
-                Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
-            };
+            }
+            zone.datum_y_m.get_or_insert(0.0);
+            Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
+        };
         let arm_mjcf = match &scene.arm {
             Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,
         };
-        if scene.body == SimulatorKind::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
+        if scene.simulator == SimulatorKind::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
             return Err(missing_part("`mjcf` in its arm's model"));
         }
         let fingertip =
@@ -395,14 +399,14 @@ fn whole_object_task(
     let farthest_m = mesh.vertices().iter().map(away_m).fold(0.0, f64::max);
     if farthest_m > ball.radius_m {
         return Err(InputError::new(format!(
-            "around.radius_m is {} m, but the object reaches {farthest_m:.4} m from \
+            "whole_object.radius_m is {} m, but the object reaches {farthest_m:.4} m from \
              around.centre_m: choose a larger radius, or the finger collides with it on its way around",
             ball.radius_m
         )));
     }
     let around = ball.keep_out(finger, touch.standoff_m);
     let task = Task::new(ball, touch.clone(), finger).map_err(invalid)?;
-    let Some(arm) = arm.filter(|_| scene.body.moves_finger()) else { return Ok(task) };
+    let Some(arm) = arm.filter(|_| scene.simulator.moves_finger()) else { return Ok(task) };
     let robot =
         Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.skin.is_some() };
     let home_w: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();

@@ -23,7 +23,7 @@ const PLATE_M: [f64; 2] = [0.1, 0.02];
 /// # Errors
 /// If the scene's body touches no object.
 pub fn environment(scene: &Scene, body: &CalibrationBody) -> Result<Environment, InputError> {
-    if scene.body == SimulatorKind::Function {
+    if scene.simulator == SimulatorKind::Analytic {
         return Err(missing_part("object"));
     }
     // The frame's +y is the plate's normal; `half_m` is the half side of the zone explored.
@@ -43,7 +43,7 @@ pub fn environment(scene: &Scene, body: &CalibrationBody) -> Result<Environment,
     let zone = Zone { position_m, rotation_deg, ..Zone::new(sides_m, Some(sides_m)) };
     let object = ObjectSettings {
         mesh: NAME.into(),
-        outside_buffers: false,
+        allow_external_buffers: false,
         unit: Unit::M,
         scale: 1.0,
         position_m,
@@ -51,8 +51,13 @@ pub fn environment(scene: &Scene, body: &CalibrationBody) -> Result<Environment,
         truth: None,
     };
     let touch = design::touch_settings(&scene.touch);
-    let scene =
-        Scene { zone: Some(zone), around: None, object: Some(object), touch, ..scene.clone() };
+    let scene = Scene {
+        zone: Some(zone),
+        whole_object: None,
+        object: Some(object),
+        touch,
+        ..scene.clone()
+    };
     let bvh = MeshBvh::new(mesh.transformed(&x_wo));
     Environment::with_shape(scene, ObjectShape::Mesh { bvh, report: report.into() })
 }

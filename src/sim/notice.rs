@@ -12,6 +12,11 @@ use palpate_geometry::low_discrepancy::directions;
 pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger gets the default \
     [effects.skin], [effects.fluid] and [effects.electrodes]";
 
+/// Notice that a file uses names of version 0.1.
+pub(super) fn former_names(names: &[String]) -> String {
+    format!("rename these settings, which the next version will not read: {}", names.join(", "))
+}
+
 /// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
 pub(super) fn legacy_keys(keys: &[String]) -> String {
     format!(

@@ -33,7 +33,7 @@ pub fn reachable(
     heights_m: &[Option<f64>],
     tell: &dyn Fn(&str),
 ) -> Vec<bool> {
-    if environment.scene().body == SimulatorKind::Function {
+    if environment.scene().simulator == SimulatorKind::Analytic {
         return heights_m.iter().map(Option::is_some).collect();
     }
     let Some(fingers) = FingerGrid::new(environment) else { return vec![false; places.len()] };

@@ -26,8 +26,8 @@ use std::path::{Path, PathBuf};
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Simulator that carries out a touch.
-    pub body: SimulatorKind,
-    /// Analytic surface, if `body = "function"`.
+    pub simulator: SimulatorKind,
+    /// Analytic surface, if `simulator = "analytic"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub function: Option<AnalyticCurve>,
     /// Rectangle to explore on one side of an object.
@@ -35,11 +35,11 @@ pub struct Scene {
     pub zone: Option<Zone>,
     /// Ball to explore around a whole object; replaces the zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub around: Option<WholeObject>,
-    /// Object to touch, unless `body = "function"`.
+    pub whole_object: Option<WholeObject>,
+    /// Object to touch, unless `simulator = "analytic"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<ObjectSettings>,
-    /// Finger; not used by `body = "function"`.
+    /// Finger; not used by `simulator = "analytic"`.
     #[serde(default)]
     pub finger: Finger,
     /// Arm that carries the finger; default: a stage of three slides, with a wrist for a whole
@@ -55,7 +55,28 @@ pub struct Scene {
     /// Motion of the finger during a touch.
     #[serde(default, skip_serializing_if = "is_default")]
     pub touch: TouchSettings,
+    /// Former names of settings in the file that was read, each with the present one.
+    #[serde(skip)]
+    pub former_names: Vec<String>,
 }
+
+/// Keys of version 0.1, and their present names.
+const FORMER_KEYS: [[&str; 2]; 11] = [
+    ["body", "simulator"],
+    ["around", "whole_object"],
+    ["object.outside_buffers", "object.allow_external_buffers"],
+    ["effects.skin.along", "effects.skin.cells_along"],
+    ["effects.skin.around", "effects.skin.cells_around"],
+    ["effects.registration.finger_position_m", "effects.registration.true_tool_position_m"],
+    ["effects.registration.finger_rotation_deg", "effects.registration.true_tool_rotation_deg"],
+    ["effects.registration.finger_m", "effects.registration.finger_position_sd_m"],
+    ["effects.registration.finger_deg", "effects.registration.finger_attitude_sd_deg"],
+    ["effects.registration.object_m", "effects.registration.object_position_sd_m"],
+    ["effects.registration.object_deg", "effects.registration.object_attitude_sd_deg"],
+];
+
+/// Simulators of version 0.1, and their present names.
+const FORMER_SIMULATORS: [[&str; 2]; 2] = [["function", "analytic"], ["cast", "swept"]];
 
 // heuristic: contact is a force above this many standard deviations of its noise, because an
 // approach takes about a thousand readings.
@@ -66,9 +87,9 @@ const CONTACT_SIGMAS: f64 = 5.0;
 #[serde(rename_all = "snake_case")]
 pub enum SimulatorKind {
     /// Analytic surface, evaluated without a finger.
-    Function,
+    Analytic,
     /// Finger's rigid hull, swept along the approach to first contact on the exact mesh.
-    Cast,
+    Swept,
     /// Soft finger, moved exactly as commanded, in contact with the exact mesh.
     Kinematic,
     /// Arm and finger with masses, gravity, friction and velocity servos, in MuJoCo.
@@ -79,8 +100,8 @@ impl SimulatorKind {
     /// Returns the name used in a scene file.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Function => "function",
-            Self::Cast => "cast",
+            Self::Analytic => "function",
+            Self::Swept => "cast",
             Self::Kinematic => "kinematic",
             Self::Dynamic => "dynamic",
         }
@@ -133,7 +154,7 @@ pub struct ObjectSettings {
     pub mesh: PathBuf,
     /// Permission for a .gltf file to name buffers outside its own folder.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub outside_buffers: bool,
+    pub allow_external_buffers: bool,
     /// Unit of the mesh file.
     #[serde(default)]
     pub unit: Unit,
@@ -226,49 +247,51 @@ impl Validate for Scene {
         let given = |rules: &mut Rules, key: &str, given: bool, allowed: &str| {
             rules.require(key, "(given)", !given, || allowed.into());
         };
-        match &self.around {
+        match &self.whole_object {
             None => {
-                let allowed = "a table [zone] with x_m and z_m, or [around] for a whole object";
+                let allowed =
+                    "a table [zone] with x_m and z_m, or [whole_object] for a whole object";
                 lacks(rules, "zone", self.zone.is_none(), allowed);
                 self.zone.iter().for_each(|zone| rules.table("zone", zone));
             }
             Some(around) => {
-                let allowed = "no zone: [around] explores the object from all sides";
+                let allowed = "no zone: [whole_object] explores the object from all sides";
                 given(rules, "zone", self.zone.is_some(), allowed);
-                rules.table("around", around);
+                rules.table("whole_object", around);
             }
         }
         rules.table("finger", &self.finger);
-        let body = self.body.name();
-        if self.body == SimulatorKind::Function {
-            let allowed = "\"toy\", because body = \"function\"";
+        let body = self.simulator.name();
+        if self.simulator == SimulatorKind::Analytic {
+            let allowed = "\"toy\", because simulator = \"analytic\"";
             lacks(rules, "function", self.function.is_none(), allowed);
-            let allowed = "no object: body = \"function\" touches a curve";
+            let allowed = "no object: simulator = \"analytic\" touches a curve";
             given(rules, "object", self.object.is_some(), allowed);
-            let allowed = "no around: body = \"function\" touches a curve";
-            given(rules, "around", self.around.is_some(), allowed);
-            let allowed = "no arm: body = \"function\" needs none";
+            let allowed = "no whole_object: simulator = \"analytic\" touches a curve";
+            given(rules, "whole_object", self.whole_object.is_some(), allowed);
+            let allowed = "no arm: simulator = \"analytic\" needs none";
             given(rules, "arm", self.arm.is_some(), allowed);
             let is_deep = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
-            let allowed = "no z_m: the surface of body = \"function\" is a curve over x";
+            let allowed = "no z_m: the surface of simulator = \"analytic\" is a curve over x";
             given(rules, "zone.z_m", is_deep, allowed);
         } else {
-            let allowed = format!("no function: body = \"{body}\" touches an object");
+            let allowed = format!("no function: simulator = \"{body}\" touches an object");
             given(rules, "function", self.function.is_some(), &allowed);
-            let allowed = format!("a table with a mesh, because body = \"{body}\"");
+            let allowed = format!("a table with a mesh, because simulator = \"{body}\"");
             lacks(rules, "object", self.object.is_none(), &allowed);
         }
-        let turns =
-            self.around.is_none() || self.arm.is_some() || self.body != SimulatorKind::Dynamic;
-        rules.require("body", "\"dynamic\"", turns, || {
+        let turns = self.whole_object.is_none()
+            || self.arm.is_some()
+            || self.simulator != SimulatorKind::Dynamic;
+        rules.require("simulator", "\"dynamic\"", turns, || {
             "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must turn, and the \
-             stage of body = \"dynamic\" has no wrist"
+             stage of simulator = \"dynamic\" has no wrist"
                 .into()
         });
         rules.table("effects", &self.effects);
         rules.table("touch", &self.touch);
         rules.table("solver", &self.solver);
-        if self.body == SimulatorKind::Dynamic {
+        if self.simulator == SimulatorKind::Dynamic {
             let (period_s, step_s) = (self.period_s(), self.solver.step_s);
             let whole = self.solver.steps(period_s).is_some();
             rules.require("touch.period_s", period_s, whole, || {
@@ -288,18 +311,18 @@ impl Validate for Scene {
             let value = format!("\"{}\"", collision.name());
             let met = self.collides() || self.effects.collision.is_some();
             rules.require("solver.collision", value, met, || {
-                "no collision: only a finger without skin of body = \"dynamic\", or a scene with \
+                "no collision: only a finger without skin of simulator = \"dynamic\", or a scene with \
                  [effects.collision], collides in MuJoCo; any other meets the exact mesh"
                     .into()
             });
         }
         let is_rigid =
-            self.body == SimulatorKind::Kinematic && self.effective_effects().skin.is_none();
-        let allowed = "a table, because body = \"kinematic\" needs a soft skin (for a rigid finger \
-                       use body = \"cast\"; without any [effects] the skin is a BioTac's)";
+            self.simulator == SimulatorKind::Kinematic && self.effective_effects().skin.is_none();
+        let allowed = "a table, because simulator = \"kinematic\" needs a soft skin (for a rigid finger \
+                       use simulator = \"swept\"; without any [effects] the skin is a BioTac's)";
         lacks(rules, "effects.skin", is_rigid, allowed);
-        let bumps = self.body != SimulatorKind::Dynamic && self.effects.collision.is_some();
-        let allowed = "no collision: only body = \"dynamic\" computes collisions of links";
+        let bumps = self.simulator != SimulatorKind::Dynamic && self.effects.collision.is_some();
+        let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
         given(rules, "effects.collision", bumps, allowed);
         if let (Some(wrench), false) = (&self.effects.wrench, self.detects_by_frames()) {
             let least_n = CONTACT_SIGMAS * wrench.noise_max_n();
@@ -342,16 +365,16 @@ impl Scene {
     /// default of a simulated arm is the cycle of the PA-10's servo driver (`hydro`, Orca
     /// robotics); a body without inertia needs only one tick for each tactile frame.
     pub fn period_s(&self) -> f64 {
-        self.touch.period_s.unwrap_or(match self.body {
+        self.touch.period_s.unwrap_or(match self.simulator {
             SimulatorKind::Dynamic => 0.002,
-            SimulatorKind::Function | SimulatorKind::Cast | SimulatorKind::Kinematic => 0.01,
+            SimulatorKind::Analytic | SimulatorKind::Swept | SimulatorKind::Kinematic => 0.01,
         })
     }
 
     /// Returns the effects in use: those of the scene, or those of a BioTac (skin, fluid and
     /// electrodes with their defaults) if a `kinematic` scene names no effects.
     pub fn effective_effects(&self) -> Cow<'_, Effects> {
-        match self.body == SimulatorKind::Kinematic && self.effects == Effects::default() {
+        match self.simulator == SimulatorKind::Kinematic && self.effects == Effects::default() {
             true => Cow::Owned(Effects::biotac()),
             false => Cow::Borrowed(&self.effects),
         }
@@ -360,14 +383,14 @@ impl Scene {
     /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin model
     /// computes the contact force.
     pub fn collides(&self) -> bool {
-        self.body == SimulatorKind::Dynamic && self.effects.skin.is_none()
+        self.simulator == SimulatorKind::Dynamic && self.effects.skin.is_none()
     }
 
     /// Returns the fastest approach at which contact is detected before skin and fluid in front of
     /// the tip are fully compressed; `None` for a body that does not move through contact.
     pub fn approach_limit_m_s(&self) -> Option<f64> {
         let effects = self.effective_effects();
-        if self.body != SimulatorKind::Kinematic || effects.skin.is_none() {
+        if self.simulator != SimulatorKind::Kinematic || effects.skin.is_none() {
             return None;
         }
         let ahead_t = self.finger.direction_t();
@@ -399,7 +422,9 @@ impl Scene {
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
         let legacy_keys = Self::resolve(&mut loader, "")?;
+        let former_names = loader.take_former_names();
         let mut scene: Self = loader.finish()?;
+        scene.former_names = former_names;
         scene.effects.legacy_keys = legacy_keys;
         Ok(scene)
     }
@@ -411,6 +436,8 @@ impl Scene {
     /// # Errors
     /// If the sensor file cannot be read, or holds a value that is not allowed.
     pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
+        loader.read_former_keys(prefix, &FORMER_KEYS)?;
+        loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
         loader.resolve_path(&format!("{prefix}object.mesh"));
         loader.resolve_path_ending(&format!("{prefix}arm.model"), ".toml");
         sensor::load(loader, &format!("{prefix}effects"))

@@ -34,16 +34,16 @@ impl Simulator {
     pub fn new(environment: Arc<Environment>) -> Result<Self, InputError> {
         #[cfg(feature = "mujoco")]
         {
-            let moved = environment.scene().body == SimulatorKind::Dynamic;
+            let moved = environment.scene().simulator == SimulatorKind::Dynamic;
             let models =
                 if moved { Some(mujoco::CompiledModels::new(&environment)?) } else { None };
             Ok(Self { environment, models })
         }
         #[cfg(not(feature = "mujoco"))]
         match environment.scene().body {
-            SimulatorKind::Dynamic => {
-                Err(InputError::new("body = \"dynamic\" needs a build with the feature `mujoco`"))
-            }
+            SimulatorKind::Dynamic => Err(InputError::new(
+                "simulator = \"dynamic\" needs a build with the feature `mujoco`",
+            )),
             _ => Ok(Self { environment }),
         }
     }
@@ -77,7 +77,7 @@ impl Simulator {
     /// If a part of the zone is out of reach.
     pub fn check_reach(&self) -> Result<(), InputError> {
         let environment = &self.environment;
-        match (environment.scene().body, environment.robot()) {
+        match (environment.scene().simulator, environment.robot()) {
             (SimulatorKind::Kinematic | SimulatorKind::Dynamic, Some(robot)) => {
                 check_reach(&robot, environment.task())
             }
@@ -134,8 +134,8 @@ impl Simulator {
     /// # Errors
     /// If there is no memory for its state.
     pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
-        let body: Box<dyn Backend> = match self.environment.scene().body {
-            SimulatorKind::Function | SimulatorKind::Cast => return Ok(None),
+        let body: Box<dyn Backend> = match self.environment.scene().simulator {
+            SimulatorKind::Analytic | SimulatorKind::Swept => return Ok(None),
             SimulatorKind::Kinematic => Box::new(KinematicBackend::new(&self.environment)?),
             #[cfg(feature = "mujoco")]
             SimulatorKind::Dynamic => {

@@ -149,7 +149,7 @@ fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     };
     let travels = finished.iter().filter_map(|row| row.path_m(run.experiment.touches));
     let mut reliability = [[0; 2]; TENTHS];
-    let outlines = finished.iter().filter_map(|row| row.touches.last()?.outline.as_ref());
+    let outlines = finished.iter().filter_map(|row| row.touches.last()?.silhouette.as_ref());
     for counted in outlines.filter_map(|outline| outline.reliability) {
         for (sums, counts) in reliability.iter_mut().zip(counted) {
             sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
@@ -158,11 +158,11 @@ fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     ObjectResult {
         scores: logs.into_iter().filter_map(score).collect(),
         miss_share: share(|touch| touch.contact.is_none() && !touch.overload),
-        fallback_share: share(|touch| touch.stall.is_some()),
+        fallback_share: share(|touch| touch.fallback.is_some()),
         travel_m: some_mean(travels.collect()),
         coverage: at_end(|touch| touch.metrics.as_ref()?.coverage),
-        brier: at_end(|touch| Some(touch.outline.as_ref()?.brier)),
-        iou: at_end(|touch| Some(touch.outline.as_ref()?.iou)),
+        brier: at_end(|touch| Some(touch.silhouette.as_ref()?.brier)),
+        iou: at_end(|touch| Some(touch.silhouette.as_ref()?.iou)),
         reliability,
     }
 }

@@ -80,7 +80,8 @@ fn with_masses_the_error_in_contact_falls_with_the_step() {
 /// Settings for a rigid finger alone are removed for a soft one, where they would be invalid.
 #[test]
 fn a_rigid_scene_leaves_its_geometry_to_rigid_levels() {
-    let sets = ["body=\"dynamic\"", "effects={}", "solver={collision=\"sdf\", sdf={iterations=5}}"];
+    let sets =
+        ["simulator=\"dynamic\"", "effects={}", "solver={collision=\"sdf\", sdf={iterations=5}}"];
     let rigid = scene(&sets);
     for level in LEVELS {
         let changed = level.apply(&rigid);
@@ -172,7 +173,7 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
     // Coarser ticks and more frames lower the limit; a body that does not move has none.
     let coarser = scene(&["touch.period_s=0.02"]).approach_limit_m_s().unwrap();
     assert!(coarser < limit_m_s);
-    assert!(load(&["touch.approach_m_s=0.5", "body=\"cast\""]).is_ok());
+    assert!(load(&["touch.approach_m_s=0.5", "simulator=\"swept\""]).is_ok());
 }
 
 /// At the fastest allowed approach the finger comes to rest within its skin and fluid, and deeper

@@ -45,7 +45,7 @@ fn outwards() -> impl Iterator<Item = Vector3<f64>> {
 fn a_soft_finger_feels_a_sphere_from_all_sides_as_well_as_from_one() {
     let off_m = |p_w: &Point3<f64>| ((p_w - Point3::from(MIDDLE_W)).norm() - RADIUS_M).abs();
     let mut one = scene("container_around_finger.toml", &[]);
-    (one.around, one.zone) = (None, Some(Zone::new([-0.03, 0.03], Some([0.47, 0.53]))));
+    (one.whole_object, one.zone) = (None, Some(Zone::new([-0.03, 0.03], Some([0.47, 0.53]))));
     let one = with_sphere(one).unwrap();
     let mut probe = Simulator::new(Arc::clone(&one)).unwrap().probe(1).unwrap();
     let touches = one.task().zone().unwrap().grid(4).into_iter().map(|place| {
@@ -67,7 +67,7 @@ fn a_soft_finger_feels_a_sphere_from_all_sides_as_well_as_from_one() {
 #[test]
 fn the_finger_is_rolled_only_where_it_must_be_and_always_the_same() {
     let free = around("container_around.toml", &[]);
-    let low = around("container_around.toml", &["around.lowest_m=0.45"]);
+    let low = around("container_around.toml", &["whole_object.lowest_m=0.45"]);
     let mut rolled = 0;
     for i in 0..200 {
         let outward_w = direction(i, 200);
@@ -92,7 +92,7 @@ fn the_finger_is_rolled_only_where_it_must_be_and_always_the_same() {
 #[test]
 fn nothing_goes_below_what_the_object_stands_on() {
     for name in ["container_around.toml", "container_around_finger.toml"] {
-        let environment = around(name, &["around.lowest_m=0.45"]);
+        let environment = around(name, &["whole_object.lowest_m=0.45"]);
         let (task, finger) = (environment.task(), &environment.scene().finger);
         let below = Aim::against(MIDDLE_W.into(), &-Vector3::z());
         assert!(!task.is_reachable(&below) && !task.is_probably_reachable(&below));
@@ -119,7 +119,7 @@ fn nothing_goes_below_what_the_object_stands_on() {
 /// An arm reaches every target that it reports as reachable, in any order.
 #[test]
 fn an_arm_comes_to_all_that_it_reaches() {
-    let sets = ["body=\"kinematic\""];
+    let sets = ["simulator=\"kinematic\""];
     let environment =
         Arc::new(Environment::build(scene("container_around_pa10.toml", &sets)).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
@@ -142,7 +142,7 @@ fn an_arm_comes_to_all_that_it_reaches() {
 /// Arm of `scenes/container_around_pa10.toml` at rest at these joints, rad, without contact.
 fn standing_at(q: [f64; 7]) -> Box<dyn Backend> {
     let home = format!("arm.home_deg={:?}", q.map(f64::to_degrees));
-    let sets = ["body=\"kinematic\"", "object.position_m=[0, -3, 0.5]", &home];
+    let sets = ["simulator=\"kinematic\"", "object.position_m=[0, -3, 0.5]", &home];
     let far = Environment::build(scene("container_around_pa10.toml", &sets)).unwrap();
     Box::new(KinematicBackend::new(&Arc::new(far)).unwrap())
 }
@@ -162,7 +162,7 @@ const LEFT_AT: [([f64; 7], usize); 6] = [
 /// unchecked movement.
 #[test]
 fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move() {
-    let environment = environment("container_around_pa10.toml", &["body=\"kinematic\""]);
+    let environment = environment("container_around_pa10.toml", &["simulator=\"kinematic\""]);
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let task = environment.task();
     let mut arrived = Vec::new();
@@ -172,7 +172,7 @@ fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move()
         let mut servo = simulator.servo(standing_at(q), 1).unwrap();
         match servo.touch(&task.approach(&aim.into()).unwrap()) {
             Ok(Touch::Miss) => arrived.push(i),
-            Err(Fault::NoWay { time_s, .. }) => assert_eq!(time_s, 0.0),
+            Err(Fault::NoPath { time_s, .. }) => assert_eq!(time_s, 0.0),
             end => panic!("{i}: {end:?}"),
         }
     }
@@ -182,7 +182,7 @@ fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move()
 /// Only checked movements are made.
 #[test]
 fn an_arm_that_knows_no_way_does_not_move() {
-    let environment = environment("container_around_pa10.toml", &["body=\"kinematic\""]);
+    let environment = environment("container_around_pa10.toml", &["simulator=\"kinematic\""]);
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let task = environment.task();
     let ball = task.ball().unwrap();
@@ -194,7 +194,7 @@ fn an_arm_that_knows_no_way_does_not_move() {
     let approaches = aims.map(|aim| ball.approach(&aim, finger, touch.standoff_m, 0.0));
     for approach in approaches.filter(|approach| !reach.reaches(approach)) {
         let end = servo.touch(&approach);
-        assert!(matches!(end, Err(Fault::NoWay { .. })), "{end:?}");
+        assert!(matches!(end, Err(Fault::NoPath { .. })), "{end:?}");
         assert_eq!(servo.time_s(), before_s);
         refused += 1;
     }
@@ -205,9 +205,9 @@ fn an_arm_that_knows_no_way_does_not_move() {
 fn a_body_that_cannot_go_around_is_refused() {
     let path =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_around.toml");
-    let error = Scene::load(&path, &["body=dynamic".into()]).unwrap_err().to_string();
+    let error = Scene::load(&path, &["simulator=dynamic".into()]).unwrap_err().to_string();
     assert!(error.contains("[arm]"), "{error}");
-    let small = scene("container_around_finger.toml", &["around.radius_m=0.04"]);
+    let small = scene("container_around_finger.toml", &["whole_object.radius_m=0.04"]);
     let Err(small) = with_sphere(small) else { panic!("a ball smaller than the object") };
     assert!(small.to_string().contains("reaches 0.05"), "{small}");
     let near = scene("container_around_pa10.toml", &["object.position_m=[0, -0.5, 0.7]"]);

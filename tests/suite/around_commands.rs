@@ -15,7 +15,10 @@ use tempfile::TempDir;
 fn around() -> TempDir {
     let folder = folder();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    write("scene.toml", "body = \"cast\"\n\n[object]\nmesh = \"mesh.obj\"\n\n[around]\n");
+    write(
+        "scene.toml",
+        "simulator = \"swept\"\n\n[object]\nmesh = \"mesh.obj\"\n\n[whole_object]\n",
+    );
     write(
         "small.toml",
         "name = \"small\"\nscene = \"scene.toml\"\nplanners = [\"active\", \"random\"]\ntrials = 2\n\
@@ -73,7 +76,7 @@ fn planners_around_an_object_are_held_against_what_they_were() {
 fn what_goes_over_a_zone_refuses_a_whole_object() {
     let folder = around();
     for command in ["export", "accuracy"] {
-        fails(folder.path(), &[command, "scene.toml"], &["scene.toml: [around]", "[zone]"]);
+        fails(folder.path(), &[command, "scene.toml"], &["scene.toml: [whole_object]", "[zone]"]);
     }
     let shown = succeeds(folder.path(), &["show", "scene.toml"]);
     assert!(shown.contains("ball: 9") && shown.contains("% of the surface"), "{shown}");
@@ -99,7 +102,7 @@ fn a_known_body_takes_the_place_of_a_whole_object() {
 #[test]
 fn a_run_does_not_resume_on_another_mesh() {
     let folder = around();
-    let ball = ["scene.around.centre_m=[0.4,0.4,0.4]", "scene.around.radius_m=1.0"];
+    let ball = ["scene.whole_object.centre_m=[0.4,0.4,0.4]", "scene.whole_object.radius_m=1.0"];
     let run = ["run", "small.toml", "--no-report", "--set", ball[0], "--set", ball[1]];
     let run = |more: &[&'static str]| [&run[..], more].concat();
     succeeds(folder.path(), &run(&[]));

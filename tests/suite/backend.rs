@@ -2,8 +2,8 @@
 
 use crate::common::shipped;
 use palpate::backend::delay::DelayedBackend;
-use palpate::backend::interlock::{InterlockSettings, Interlocked, SafetyContext};
-use palpate::backend::live_view::Watched;
+use palpate::backend::interlock::{InterlockSettings, InterlockedBackend, SafetyContext};
+use palpate::backend::live_view::ViewedBackend;
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::robot::{Finger, Robot};
@@ -32,7 +32,7 @@ const WRAPS: [(&str, Wrap); 5] = [
     ("interlocked", |body, chain| Box::new(interlocked(body, chain))),
     ("recorded", |body, _| recorded(body)),
     ("delayed", |body, _| Box::new(DelayedBackend::new(body, 0.03))),
-    ("watched", |body, _| Box::new(Watched::new(body, 100.0).0)),
+    ("watched", |body, _| Box::new(ViewedBackend::new(body, 100.0).0)),
 ];
 
 fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
@@ -48,7 +48,7 @@ fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
     Box::new(RecordingBackend::new(body, recording))
 }
 
-fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> Interlocked {
+fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> InterlockedBackend {
     let robot = Robot { chain: chain.clone(), finger: Finger::default(), is_soft: true };
     let (touch_force_n, travel_m_s) = (15.0, 0.1);
     let site = SafetyContext {
@@ -59,7 +59,7 @@ fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> Interlocked {
         touch_force_n,
         travel_m_s,
     };
-    Interlocked::new(body, &site, &InterlockSettings::default()).unwrap()
+    InterlockedBackend::new(body, &site, &InterlockSettings::default()).unwrap()
 }
 
 /// Runs `check` on every body in every wrapper.
@@ -272,7 +272,7 @@ fn a_delayed_body_does_later_what_the_bare_one_does() {
 fn a_watched_body_is_the_same_body_at_the_pace_of_the_clock() {
     let simulator = Simulator::new(environment(&[EFFECTS_DRY])).unwrap();
     let mut bare = simulator.body().unwrap().unwrap();
-    let (mut watched, sight) = Watched::new(simulator.body().unwrap().unwrap(), 4.0);
+    let (mut watched, sight) = ViewedBackend::new(simulator.body().unwrap().unwrap(), 4.0);
     let begun = std::time::Instant::now();
     let readings = run(&mut watched, 3, 20);
     // On a busy machine it is only later.

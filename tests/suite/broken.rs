@@ -117,7 +117,7 @@ fn broken_scenes_are_refused_with_file_line_key_and_remedy() {
         ("\"cast\"", "\"cats\"", &["scene.toml:1", "body", "cats", "cast"]),
         ("\"cast\"", "3", &["scene.toml:1", "body"]),
         ("\"cast\"", "\"function\"", &["scene.toml", "function", "toy"]),
-        ("body = \"cast\"", "", &["scene.toml", "body"]),
+        ("simulator = \"swept\"", "", &["scene.toml", "body"]),
         ("[0.1, 0.4]\nz", "[0.4, 0.1]\nz", &["scene.toml:7", "zone.x_m", "smaller number first"]),
         ("[0.1, 0.4]\nz", "[0.1, 0.1]\nz", &["scene.toml:7", "zone.x_m"]),
         ("[0.1, 0.4]\nz", "[nan, 0.1]\nz", &["scene.toml:7", "zone.x_m[0]"]),

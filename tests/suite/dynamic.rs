@@ -15,7 +15,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 const ARM: &str = "arm={links=\"C\"}";
-const DYNAMIC: &str = "body=\"dynamic\"";
+const DYNAMIC: &str = "simulator=\"dynamic\"";
 const DRY: &str = "effects={skin={}}";
 const WET: &str = "effects={skin={}, fluid={}}";
 
@@ -78,7 +78,7 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
         ("bird_finger.toml", ARM, WET),
         ("container_finger.toml", DYNAMIC, WET),
     ] {
-        let [still, moved] = ["body=\"kinematic\"", DYNAMIC]
+        let [still, moved] = ["simulator=\"kinematic\"", DYNAMIC]
             .map(|body| Simulator::new(environment(name, &[arm, body, effects])).unwrap());
         let scene = still.environment().scene();
         for fractions in [[0.4, 0.4], [0.7, 0.6], [0.2, 0.7]] {
@@ -115,7 +115,7 @@ fn a_slow_touch_is_the_kinematic_one() {
     for carrier in [ARM, DYNAMIC] {
         let (mut apart, mut stronger): (f64, f64) = (0.0, 0.0);
         for target in [[0.0, 0.5], [0.03, 0.47], [-0.02, 0.53]] {
-            let [kinematic, dynamic] = ["body=\"kinematic\"", DYNAMIC].map(|body| {
+            let [kinematic, dynamic] = ["simulator=\"kinematic\"", DYNAMIC].map(|body| {
                 let sets: Vec<&str> = [carrier, DRY, body].into_iter().chain(slow).collect();
                 let (touch, readings) =
                     tapped(&environment("container_finger.toml", &sets), &target);
@@ -214,7 +214,7 @@ fn a_finger_without_skin_finds_the_surface() {
         let slow = "touch.approach_m_s=0.005";
         let environment = environment(name, &[ARM, DYNAMIC, "effects={}", slow]);
         let mut scene = environment.scene().clone();
-        scene.body = SimulatorKind::Cast;
+        scene.simulator = SimulatorKind::Swept;
         let cast = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let mut cast = cast.probe(1).unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
@@ -308,10 +308,10 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
         let ObjectShape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         (bvh.closest_point(&found.p_wc).distance_m, found)
     };
-    let none = "{finger_m=0, finger_deg=0, object_m=0, object_deg=0}";
+    let none = "{finger_position_sd_m=0, finger_attitude_sd_deg=0, object_position_sd_m=0, object_attitude_sd_deg=0}";
     let exact = touch(WET, 1);
     assert_eq!(exact, touch(&format!("effects={{skin={{}}, fluid={{}}, registration={none}}}"), 1));
-    for part in ["object_m=0.001", "finger_m=0.001"] {
+    for part in ["object_position_sd_m=0.001", "finger_position_sd_m=0.001"] {
         let zero = none.replace(&part.replace("0.001", "0"), part);
         let effects = format!("effects={{skin={{}}, fluid={{}}, registration={zero}}}");
         let found: Vec<f64> = (1..9).map(|seed| touch(&effects, seed).0).collect();
@@ -325,7 +325,7 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
 /// fluid.
 #[test]
 fn a_force_sensor_tells_contact_where_no_fluid_does() {
-    for body in ["body=\"kinematic\"", DYNAMIC] {
+    for body in ["simulator=\"kinematic\"", DYNAMIC] {
         let sets = [ARM, body, "effects={skin={}, wrench={}}", "touch.detection_n=0.4"];
         let environment = environment("container_finger.toml", &sets);
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();

@@ -56,7 +56,7 @@ fn every_effect_of_a_scene_has_its_switch() {
 fn effects_without_what_they_need_are_refused_and_dropped() {
     let accepted = |effects: &Effects| {
         let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
-        let with = Scene { effects: effects.clone(), ..scene(&["body=\"dynamic\""]) };
+        let with = Scene { effects: effects.clone(), ..scene(&["simulator=\"dynamic\""]) };
         std::fs::write(file.path(), toml::to_string(&with).unwrap()).unwrap();
         Scene::load(file.path(), &[])
     };

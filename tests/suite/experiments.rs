@@ -72,7 +72,7 @@ fn toy_constant_starts_stall_visibly_and_recover() {
     // standard deviations below is 1.6.
     assert!(starts.len() >= 2, "{} constant starts", starts.len());
     assert!(starts.iter().all(|row| row.touches.last().unwrap().metrics.unwrap().r >= FOUND));
-    let stalls = rows.iter().flat_map(|row| &row.touches).filter(|touch| touch.stall.is_some());
+    let stalls = rows.iter().flat_map(|row| &row.touches).filter(|touch| touch.fallback.is_some());
     assert!(stalls.count() > 0);
 }
 

@@ -164,16 +164,19 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
         &absolute,
     ] {
         fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", uri)).unwrap();
-        let says =
-            ["outside.bin lies outside", "object.outside_buffers = true", "--outside-buffers"];
+        let says = [
+            "outside.bin lies outside",
+            "object.allow_external_buffers = true",
+            "--outside-buffers",
+        ];
         fails(folder.path(), &show, &says);
         fails(folder.path(), &["export", "gltf.toml"], &says);
         let shown = succeeds(folder.path(), &[&show[..], &["--outside-buffers"]].concat());
         assert!(shown.contains(ONE), "{uri}: {shown}");
         // A single triangle in the plane z = 0 covers no part of the zone, but it was read.
-        let set = ["show", "gltf.toml", "--set", "object.outside_buffers=true"];
+        let set = ["show", "gltf.toml", "--set", "object.allow_external_buffers=true"];
         let output = palpate(folder.path(), &set);
-        assert!(!stderr(&output).contains("outside_buffers"), "{uri}: {}", stderr(&output));
+        assert!(!stderr(&output).contains("allow_external_buffers"), "{uri}: {}", stderr(&output));
     }
     fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", "../../../../../../etc/passwd"))
         .unwrap();

@@ -43,7 +43,7 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations, levels: [usize; 2]) 
     let Range { low, high, .. } = bounds.signal_sd;
     let (scale, noise_ratio) = match bounds.touch_noise {
         TouchNoise::Known(sd) => (SignalModel::KnownNoise(sd), (sd / high, sd / low).into()),
-        _ => (SignalModel::Best(bounds.signal_sd), bounds.noise_ratio),
+        _ => (SignalModel::Profiled(bounds.signal_sd), bounds.noise_ratio),
     };
     let mut best = f64::MIN;
     for index in 0..per_length.pow(bounds.length_scales.len() as u32) {
@@ -235,7 +235,7 @@ fn a_fit_in_six_dimensions_finds_what_draws_were_made_with() {
         }
         let bounds = search_box(MeanModel::Zero, vec![(0.05, 5.0).into(); 6]);
         let fit = bounds.fit(&KERNEL, &touches);
-        let scale = SignalModel::Best(bounds.signal_sd);
+        let scale = SignalModel::Profiled(bounds.signal_sd);
         let mut likelihood = Likelihood::new(&KERNEL, MeanModel::Zero, &touches);
         let made_with = likelihood.profile(&lengths, 1e-4, &scale, None).unwrap();
         assert!(fit.log_likelihood >= made_with.log_likelihood, "{draw}: {fit:?} {made_with:?}");

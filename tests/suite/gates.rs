@@ -1,10 +1,10 @@
 //! Tests of the checks before a body may be moved.
 
-use crate::common::fake::{World, body_of};
+use crate::common::fake::{FakeScene, body_of};
 #[cfg(feature = "mujoco")]
 use crate::common::program::{palpate, stderr};
 use crate::common::shipped;
-use palpate::backend::interlock::{GateSettings, check_start};
+use palpate::backend::interlock::{StartCheckSettings, check_start};
 use palpate::backend::{Fault, Reading};
 use palpate::robot::arm::ArmSettings;
 use palpate::sim::simulator::Simulator;
@@ -13,9 +13,9 @@ use std::{fs, path::Path};
 
 fn checked(breaks: fn(u64, &mut Reading)) -> Result<(), Fault> {
     let chain = ArmSettings::default().chain().unwrap();
-    let world = World { breaks: Some((0, breaks)), ..World::real() };
+    let world = FakeScene { breaks: Some((0, breaks)), ..FakeScene::real() };
     let (mut body, _) = body_of(&chain, world);
-    check_start(&mut body, &chain, &GateSettings::default(), 1)
+    check_start(&mut body, &chain, &StartCheckSettings::default(), 1)
 }
 
 #[test]
@@ -24,7 +24,7 @@ fn a_body_in_order_passes() {
     let environment = shipped::environment("container_finger.toml", &["effects.wrench={}"]);
     let mut body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
     let chain = environment.chain().unwrap();
-    assert_eq!(check_start(body.as_mut(), &chain, &GateSettings::default(), 1), Ok(()));
+    assert_eq!(check_start(body.as_mut(), &chain, &StartCheckSettings::default(), 1), Ok(()));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
         );
     }
     let told = run("around", &needed[1..]);
-    for key in ["scene.around.centre_m", "scene.around.radius_m"] {
+    for key in ["scene.whole_object.centre_m", "scene.whole_object.radius_m"] {
         assert!(told.contains(key), "{told}");
     }
     assert!(!Path::new(out).exists());

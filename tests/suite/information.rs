@@ -227,7 +227,7 @@ fn contacts_say_how_wide_the_band_is() {
         let sobol = planner::by_name("sobol").unwrap();
         let row = Simulation::new(experiment).unwrap().trial(sobol, 0);
         let last = row.touches.last().unwrap();
-        assert!(last.outline.as_ref().is_some_and(|outline| outline.reliability.is_some()));
+        assert!(last.silhouette.as_ref().is_some_and(|outline| outline.reliability.is_some()));
         last.metrics.unwrap()
     });
     assert!(left_out.coverage > likely.coverage, "{left_out:?} {likely:?}");

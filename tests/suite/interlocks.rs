@@ -1,9 +1,11 @@
 //! Tests of interlocks: each trips on its cause only, and stays tripped.
 
-use crate::common::fake::{Fake, World, body_of};
+use crate::common::fake::{Fake, FakeScene, body_of};
 use crate::common::shipped;
 use nalgebra::{Point3, Vector3};
-use palpate::backend::interlock::{INTERLOCKS, InterlockSettings, Interlocked, SafetyContext};
+use palpate::backend::interlock::{
+    INTERLOCKS, InterlockSettings, InterlockedBackend, SafetyContext,
+};
 use palpate::backend::{Backend, Command, Fault, Reading, Wrench};
 use palpate::explore::probe::interlocks::with_interlocks;
 use palpate::robot::arm::stage::stage;
@@ -26,10 +28,10 @@ fn arm() -> SafetyContext {
 fn interlocks(
     site: &SafetyContext,
     settings: &InterlockSettings,
-    world: World,
-) -> (Interlocked, Fake) {
+    world: FakeScene,
+) -> (InterlockedBackend, Fake) {
     let (body, fake) = body_of(&site.robot.chain, world);
-    let mut body = Interlocked::new(Box::new(body), site, settings).unwrap();
+    let mut body = InterlockedBackend::new(Box::new(body), site, settings).unwrap();
     body.reset(1).unwrap();
     (body, fake)
 }
@@ -72,7 +74,7 @@ fn electrode(reading: &mut Reading, i: usize, counts: f64) {
 fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() {
     for (named, breaks) in CAUSES {
         let site = arm();
-        let world = World { breaks: Some((100, breaks)), ..World::real() };
+        let world = FakeScene { breaks: Some((100, breaks)), ..FakeScene::real() };
         let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), world);
         for tick in 0..99 {
             body.step(&command(7, tick)).unwrap_or_else(|fault| panic!("{named}: {fault}"));
@@ -101,7 +103,7 @@ fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() 
 /// Distance that a stage's tip moves after its joints freeze, and the interlock that stops it.
 fn frozen(speed_m_s: f64, noise: f64) -> (f64, String) {
     let site = site(stage(Point3::origin(), Finger::default().r_at()));
-    let world = World { freezes: Some((400, noise)), ..World::real() };
+    let world = FakeScene { freezes: Some((400, noise)), ..FakeScene::real() };
     let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), world);
     let ahead = Command { qdot: vec![0.0, -speed_m_s, 0.0] };
     let fault = (0..40_000).find_map(|_| body.step(&ahead).err()).unwrap();
@@ -130,7 +132,7 @@ fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
 fn joints_that_lag_by_less_than_is_allowed_trip_nothing() {
     for lag in [5, 40] {
         let site = site(stage(Point3::origin(), Finger::default().r_at()));
-        let world = World { lag, ..World::real() };
+        let world = FakeScene { lag, ..FakeScene::real() };
         let (mut body, _) = interlocks(&site, &InterlockSettings::default(), world);
         for tick in 0..5000 {
             let speed_m_s = 0.1 * (f64::from(tick) * 0.004).sin();
@@ -148,12 +150,12 @@ fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {
     // No other interlock stops it.
     let settings = InterlockSettings {
         tip_margin_m: 0.05,
-        frozen_s: 100.0,
-        joint_silence_s: 10.0,
+        stuck_s: 100.0,
+        joint_timeout_s: 10.0,
         tracking_lag_s: 1.0,
         ..InterlockSettings::default()
     };
-    let world = World { freezes: Some((100, 0.0)), ..World::real() };
+    let world = FakeScene { freezes: Some((100, 0.0)), ..FakeScene::real() };
     let (mut body, fake) = interlocks(&site, &settings, world);
     let ahead = Command { qdot: vec![0.0, -0.1, 0.0] };
     let fault = (0..4000).find_map(|_| body.step(&ahead).err()).unwrap();
@@ -166,7 +168,7 @@ fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {
 fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
     let mut site = arm();
     site.tip_w = Some([Point3::new(3.0, 0.0, 0.0); 2]);
-    let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), World::real());
+    let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), FakeScene::real());
     let fault = body.step(&command(7, 100)).unwrap_err();
     let said = fault.to_string();
     for word in ["its tip at [", "workspace of the tip", "jog it close to its home", "S1 -1.571"] {
@@ -179,14 +181,14 @@ fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
 /// A single reading does not count as a force.
 #[test]
 fn a_single_spike_of_force_is_none() {
-    let world = World {
+    let world = FakeScene {
         breaks: Some((100, |tick, reading| {
             // Between two readings used for a rise.
             if tick % 50 == 2 {
                 force(reading, 100.0);
             }
         })),
-        ..World::real()
+        ..FakeScene::real()
     };
     let (mut body, _) = interlocks(&arm(), &InterlockSettings::default(), world);
     (0..300).for_each(|tick| assert!(body.step(&command(7, tick)).is_ok()));
@@ -196,7 +198,7 @@ fn a_single_spike_of_force_is_none() {
 /// and noise may repeat the earlier value.
 #[test]
 fn an_electrode_that_reads_the_same_before_and_after_a_pause_is_not_frozen() {
-    let world = World {
+    let world = FakeScene {
         breaks: Some((99, |tick, reading| {
             if tick <= 100 {
                 electrode(reading, 18, 2000.0);
@@ -205,7 +207,7 @@ fn an_electrode_that_reads_the_same_before_and_after_a_pause_is_not_frozen() {
                 reading.time_s += 0.7;
             }
         })),
-        ..World::real()
+        ..FakeScene::real()
     };
     let (mut body, _) = interlocks(&arm(), &InterlockSettings::default(), world);
     (0..300).for_each(|tick| body.step(&command(7, tick)).map(|_| ()).unwrap());
@@ -213,8 +215,10 @@ fn an_electrode_that_reads_the_same_before_and_after_a_pause_is_not_frozen() {
 
 #[test]
 fn a_simulated_body_is_cleared_by_its_reset() {
-    let world =
-        World { breaks: Some((10, |_, reading| force(reading, 24.0))), ..World::simulated() };
+    let world = FakeScene {
+        breaks: Some((10, |_, reading| force(reading, 24.0))),
+        ..FakeScene::simulated()
+    };
     let (mut body, fake) = interlocks(&arm(), &InterlockSettings::default(), world);
     assert!((0..50).any(|tick| body.step(&command(7, tick)).is_err()));
     fake.mend();
@@ -228,7 +232,7 @@ fn pressed(
     settings: &InterlockSettings,
 ) -> (Fault, Fake) {
     let site = site(stage(Point3::origin(), Finger::default().r_at()));
-    let world = World { wall: Some(Box::new(wall)), ..World::real() };
+    let world = FakeScene { wall: Some(Box::new(wall)), ..FakeScene::real() };
     let (mut body, fake) = interlocks(&site, settings, world);
     let ahead = Command { qdot: vec![0.0, -0.02, 0.0] };
     let fault = (0..2000).find_map(|_| body.step(&ahead).err()).unwrap();
@@ -279,7 +283,7 @@ fn going_back_ends_where_the_force_rises() {
 #[test]
 fn it_goes_back_from_nothing_but_force() {
     for (named, breaks) in CAUSES.into_iter().filter(|(named, _)| *named != "force") {
-        let world = World { breaks: Some((100, breaks)), ..World::real() };
+        let world = FakeScene { breaks: Some((100, breaks)), ..FakeScene::real() };
         let (mut body, fake) = interlocks(&arm(), &InterlockSettings::default(), world);
         let ahead = Command { qdot: vec![0.01; 7] };
         assert!((0..300).any(|_| body.step(&ahead).is_err()), "{named}");
@@ -291,8 +295,8 @@ fn it_goes_back_from_nothing_but_force() {
         reading.samples.clear();
         force(reading, (0.24 * (tick - 100) as f64).min(26.0));
     };
-    let world = World { breaks: Some((100, both)), ..World::real() };
-    let settings = InterlockSettings { frame_silence_s: 0.23, ..InterlockSettings::default() };
+    let world = FakeScene { breaks: Some((100, both)), ..FakeScene::real() };
+    let settings = InterlockSettings { frame_timeout_s: 0.23, ..InterlockSettings::default() };
     let (mut body, fake) = interlocks(&arm(), &settings, world);
     let ahead = Command { qdot: vec![0.05; 7] };
     let fault = (0..400).find_map(|_| body.step(&ahead).err()).unwrap();
@@ -302,7 +306,7 @@ fn it_goes_back_from_nothing_but_force() {
 
 #[test]
 fn a_body_that_faults_is_told_to_stand_still_at_once() {
-    let world = World { dies_at: Some(50), ..World::real() };
+    let world = FakeScene { dies_at: Some(50), ..FakeScene::real() };
     let (mut body, fake) = interlocks(&arm(), &InterlockSettings::default(), world);
     let fault = (0..100).find_map(|_| body.step(&Command { qdot: vec![0.05; 7] }).err()).unwrap();
     assert!(matches!(fault, Fault::Stopped { .. }));
@@ -349,7 +353,7 @@ fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
     let (robot, task) = (environment.robot().unwrap(), environment.task());
     let [_, far_m] = task.depth_m();
     for (way, named) in [([0.0, -0.05, 0.0], "depth"), ([0.05, 0.0, 0.0], "workspace")] {
-        let (body, fake) = body_of(&robot.chain, World::simulated());
+        let (body, fake) = body_of(&robot.chain, FakeScene::simulated());
         let settings = InterlockSettings::default();
         let mut body = with_interlocks(Box::new(body), &robot, task, None, &settings).unwrap();
         body.reset(1).unwrap();
@@ -383,7 +387,7 @@ proptest! {
             tip_speed_m_s: Some(2.0),
             ..InterlockSettings::default()
         };
-        let (mut body, fake) = interlocks(&site, &settings, World::simulated());
+        let (mut body, fake) = interlocks(&site, &settings, FakeScene::simulated());
         'run: for qdot in &wild {
             let wanted = |i: usize| 10.0 * gentle * qdot[i] * chain.joints[i].qdot_limit;
             let command = Command { qdot: (0..7).map(wanted).collect() };

@@ -168,7 +168,7 @@ fn the_loop_loses_nothing_at_250_hz() {
         }
     };
     let link = Link::open(open, period, take, || None).unwrap();
-    let topic = CommandTopic { age_s: 0.02, ..CommandTopic::default() };
+    let topic = CommandTopic { max_age_s: 0.02, ..CommandTopic::default() };
     let names =
         JointNames::new(["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from).into());
     let send = || link.send(names.command(pace::now_s(), &[0.0; 7], &topic));
@@ -264,8 +264,11 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     }
     drop(lab);
     // The wrong mapping gets no answer, and the message names the setting.
-    let other =
-        BackendSettings { service_mapping: MappingKind::Enhanced, patience_s: 2.0, ..on_change };
+    let other = BackendSettings {
+        service_mapping: MappingKind::Enhanced,
+        connect_timeout_s: 2.0,
+        ..on_change
+    };
     let lab = RosArm::connect_over(&other, &chain).unwrap();
     let fault = lab.call(&Service::Hold).unwrap_err().to_string();
     assert!(

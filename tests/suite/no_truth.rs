@@ -43,7 +43,7 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
     assert_eq!(verified.verification.len(), 16);
     let other = row(container(&WITH), "random", 1);
     let new = |row: &TrialRow| -> Vec<palpate::task::Target> {
-        let new = row.verification.iter().filter(|touch| touch.again.is_none());
+        let new = row.verification.iter().filter(|touch| touch.repeats.is_none());
         new.map(|touch| touch.target.clone()).collect()
     };
     assert_eq!(new(&verified), new(&other));
@@ -64,13 +64,13 @@ fn an_exact_probe_repeats_and_verifies() {
     let verified = row(container(&["verification_touches=200", "repeat_touches=6"]), "active", 0);
     let of = |id: &str| measure::by_id(id).unwrap().value(&verified, 10).unwrap();
     assert_eq!(of("repeatability_m"), 0.0);
-    assert_eq!(of("verification_missed"), 0.0);
+    assert_eq!(of("verification_miss_share"), 0.0);
     let ratio = of("verification_rmse_m") / of("rmse_m");
     assert!((0.4..2.5).contains(&ratio), "{ratio}");
-    let again: Vec<u32> = verified.verification.iter().filter_map(|touch| touch.again).collect();
+    let again: Vec<u32> = verified.verification.iter().filter_map(|touch| touch.repeats).collect();
     assert_eq!(again.len(), 6);
-    for touch in verified.verification.iter().filter(|touch| touch.again.is_some()) {
-        let first = &verified.touches[touch.again.unwrap() as usize - 1];
+    for touch in verified.verification.iter().filter(|touch| touch.repeats.is_some()) {
+        let first = &verified.touches[touch.repeats.unwrap() as usize - 1];
         assert_eq!((&touch.target, touch.contact), (&first.target, first.contact));
     }
 }
@@ -127,7 +127,7 @@ fn a_scan_is_a_truth() {
     }
     fs::write(&scan, text).unwrap();
     let zone = Zone { datum_y_m: Some(0.002), ..Zone::new([-0.05, 0.02], Some([-0.02, 0.02])) };
-    let truth = ScanTruth { scan: scan.clone(), neighbours: 4, within_m: None };
+    let truth = ScanTruth { scan: scan.clone(), contacts_min: 4, search_radius_m: None };
     let (truth, contacts, rmse_m) = truth.sample(&zone, 15).unwrap();
     let (mut known, mut unknown) = (0, 0);
     for (place, told_m) in truth.places.iter().zip(&truth.heights_m) {
@@ -143,9 +143,10 @@ fn a_scan_is_a_truth() {
     assert!(known > 50 && unknown > 50);
     assert_eq!(contacts, 441);
     assert!(rmse_m.unwrap() < 1e-9);
-    let gone = ScanTruth { scan: folder.path().join("none.csv"), neighbours: 4, within_m: None };
+    let gone =
+        ScanTruth { scan: folder.path().join("none.csv"), contacts_min: 4, search_radius_m: None };
     assert!(gone.sample(&zone, 5).unwrap_err().to_string().contains("none.csv"));
     fs::write(&scan, "x_m,y_m\n1,2\n").unwrap();
-    let bad = ScanTruth { scan, neighbours: 4, within_m: None };
+    let bad = ScanTruth { scan, contacts_min: 4, search_radius_m: None };
     assert!(bad.sample(&zone, 5).unwrap_err().to_string().contains("z_m"));
 }

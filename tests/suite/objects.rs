@@ -64,7 +64,7 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
         let rows = (0..trials).into_par_iter().map(|trial| simulation.trial(planner, trial));
         let logs = rows.map(|row| {
             let is_whole = row.failure.is_none();
-            assert!(is_whole && row.touches.iter().all(|it| it.stall.is_none()), "{name}");
+            assert!(is_whole && row.touches.iter().all(|it| it.fallback.is_none()), "{name}");
             (CHECK_MEASURES[0].value)(&row, simulation.experiment()).unwrap()
         });
         logs.sum::<f64>() / f64::from(trials)

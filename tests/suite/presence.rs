@@ -42,7 +42,7 @@ proptest! {
         for (x, z, meets) in &touches {
             touch(&mut belief, &zone, &[*x, *z], *meets);
         }
-        let silhouette = belief.presence().silhouette();
+        let silhouette = belief.surface_evidence().silhouette();
         let [here, hoped] = [silhouette.probability(&at), silhouette.optimistic_probability(&at)];
         let asked = silhouette.hit_probability(&at);
         prop_assert!(here >= 0.0 && here <= hoped && hoped <= asked + 1e-9 && asked <= 1.0);
@@ -59,10 +59,10 @@ proptest! {
 fn touches_speak_for_their_surroundings() {
     let zone = zone();
     let mut belief = HeightField::new(zone.clone(), GpSettings::default());
-    assert_eq!(belief.presence().silhouette().probability(&[0.05, 0.05]), 1.0);
+    assert_eq!(belief.surface_evidence().silhouette().probability(&[0.05, 0.05]), 1.0);
     touch(&mut belief, &zone, &[0.02, 0.05], true);
     touch(&mut belief, &zone, &[0.08, 0.05], false);
-    let silhouette = belief.presence().silhouette();
+    let silhouette = belief.surface_evidence().silhouette();
     let along: Vec<f64> =
         (0..6).map(|i| silhouette.probability(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
     assert!(along.is_sorted_by(|a, b| a >= b) && along[0] > 0.9 && along[5] < 0.5, "{along:?}");
@@ -77,7 +77,7 @@ fn touches_speak_for_their_surroundings() {
         belief.observe(&[0.05, 0.05], &Touch::Contact(contact));
         let p_wt = zone.point(&[0.05, 0.05], 0.0);
         belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
-        belief.presence().silhouette().probability(&[0.05 + radius_m, 0.05])
+        belief.surface_evidence().silhouette().probability(&[0.05 + radius_m, 0.05])
     };
     assert!(beyond(0.9) < 0.5 && beyond(0.1) > 0.6, "{} {}", beyond(0.9), beyond(0.1));
 }
@@ -107,7 +107,7 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
         belief.observe(target, &touch);
         belief.observe_swept(&SweptVolume { finger: finger.clone(), p_wt });
     }
-    let silhouette = belief.presence().silhouette();
+    let silhouette = belief.surface_evidence().silhouette();
     let truth = simulation.truth();
     let share = truth.surface_count() as f64 / truth.places.len() as f64;
     let mut sums = [0.0; 2];
@@ -129,7 +129,7 @@ fn a_silhouette_is_found() {
         let [own, share] = brier(&simulation, "sobol");
         (found, by_share) = (found + own, by_share + share);
         let row = simulation.trial(planner::by_name("silhouette").unwrap(), 1);
-        assert!(row.touches.iter().all(|touch| touch.stall.is_none()), "{scene}");
+        assert!(row.touches.iter().all(|touch| touch.fallback.is_none()), "{scene}");
     }
     assert!(found < 0.65 * by_share, "{found} {by_share}");
 }

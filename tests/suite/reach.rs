@@ -25,7 +25,7 @@ fn environment(profile: &[(f64, f64)], finger: &str) -> Environment {
     }
     fs::write(folder.path().join("profile.obj"), mesh).unwrap();
     let scene = format!(
-        "body = \"cast\"\n[object]\nmesh = \"profile.obj\"\n[finger]\n{finger}\n[zone]\n\
+        "simulator = \"swept\"\n[object]\nmesh = \"profile.obj\"\n[finger]\n{finger}\n[zone]\n\
          x_m = [-0.02, 0.02]\nz_m = [-0.02, 0.02]\n"
     );
     let path = folder.path().join("scene.toml");

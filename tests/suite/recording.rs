@@ -200,7 +200,7 @@ proptest! {
             1..12,
         ),
     ) {
-        let lost = Fault::Lost { time_s: 1.5 };
+        let lost = Fault::NoResponse { time_s: 1.5 };
         let results = ticks.iter().map(|(reading, _)| Ok(reading.clone()));
         let fake = Fake::new(3, results.chain([Err(lost.clone())]).collect());
         let paper = paper(usize::MAX);
@@ -223,7 +223,7 @@ proptest! {
         // Each reset restarts the replay.
         for _ in 0..2 {
             let other = player.reset(8).unwrap_err();
-            prop_assert_eq!(other, Fault::NeverReset { seed: 8 });
+            prop_assert_eq!(other, Fault::NoSuchReset { seed: 8 });
             player.reset(9).unwrap();
             for ((reading, _), command) in ticks.iter().zip(commands()) {
                 let played = player.step(&command).unwrap();
@@ -469,14 +469,14 @@ fn a_disk_that_is_full_is_a_fault() {
             recording.touched(&touch, [shape(), shape()])
         });
         let fault = ended.unwrap_err();
-        assert!(matches!(fault, Fault::Unrecorded { time_s: 2.5, .. }), "{fault}");
+        assert!(matches!(fault, Fault::RecordingFailed { time_s: 2.5, .. }), "{fault}");
         // The error persists.
         assert!(recorder.step(&Command { qdot: vec![0.0; 3] }).is_err());
         assert!(recording.end(2.5, &TrialEnd::default()).is_err());
     }
     assert!((1..=2).contains(&begun));
     let nowhere = Recording::create(Path::new("/nowhere/at/all.mcap"), &about);
-    assert!(matches!(nowhere.err(), Some(Fault::Unrecorded { time_s: 0.0, .. })));
+    assert!(matches!(nowhere.err(), Some(Fault::RecordingFailed { time_s: 0.0, .. })));
 }
 
 #[test]
@@ -528,8 +528,12 @@ fn replayed(path: &Path, sets: &[&str]) -> Result<replay::Replay, Fault> {
 
 #[test]
 fn a_recorded_trial_is_played_to_the_same_rows() {
-    let dynamic =
-        ["scene.body=\"dynamic\"", "scene.effects={skin={}}", "touches=2", "initial_touches=2"];
+    let dynamic = [
+        "scene.simulator=\"dynamic\"",
+        "scene.effects={skin={}}",
+        "touches=2",
+        "initial_touches=2",
+    ];
     let bodies: [&[&str]; 2] = [&["scene.effects.wrench={}", "scene.effects.thermal={}"], &dynamic];
     for sets in bodies.iter().take(if cfg!(feature = "mujoco") { 2 } else { 1 }) {
         let folder = TempDir::new().unwrap();
@@ -572,7 +576,7 @@ fn what_acts_otherwise_is_found_where_it_first_does() {
         "{more:?}"
     );
     let other = replayed(&path, &["seed=1"]).unwrap_err();
-    assert!(matches!(other, Fault::NeverReset { .. }), "{other}");
+    assert!(matches!(other, Fault::NoSuchReset { .. }), "{other}");
     // A cut recording is the same up to its end.
     let bytes = fs::read(&path).unwrap();
     for share in [0.3, 0.6, 0.9] {
@@ -587,7 +591,7 @@ fn the_program_records_and_replays() {
     let folder = TempDir::new().unwrap();
     let path = folder.path();
     fs::write(path.join("mesh.obj"), MESH).unwrap();
-    let scene = "body = \"kinematic\"\n[object]\nmesh = \"mesh.obj\"\nscale = 0.2\n\
+    let scene = "simulator = \"kinematic\"\n[object]\nmesh = \"mesh.obj\"\nscale = 0.2\n\
                  [zone]\nx_m = [0.02, 0.08]\nz_m = [0.02, 0.08]\n[effects.skin]\n";
     fs::write(path.join("scene.toml"), scene).unwrap();
     let experiment = "name = \"small\"\nscene = \"scene.toml\"\nplanners = [\"random\", \"active\"]\n\
@@ -613,7 +617,8 @@ fn the_program_records_and_replays() {
     assert!(words.contains("touch 1 differs at tick "), "{words}");
     fails(path, &["replay", "small.toml"], &["small.toml", "not a recording"]);
     fails(path, &["replay", "none.mcap"], &["none.mcap"]);
-    let cast = ["run", "small.toml", "--set", "scene.body=\"cast\"", "--record", "--out", "cast"];
+    let cast =
+        ["run", "small.toml", "--set", "scene.simulator=\"swept\"", "--record", "--out", "cast"];
     fails(path, &cast, &["--record", "\"cast\"", "nothing to record"]);
     assert!(!path.join("cast").exists());
     // A fresh start deletes the old recordings.

@@ -222,13 +222,13 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     let mut scene = Scene::load(
         "scenes/container_pa10.toml".as_ref(),
         &[
-            "body=\"kinematic\"".into(),
-            "effects.registration.finger_position_m=[0.0012, -0.0012, 0.001]".into(),
-            "effects.registration.finger_rotation_deg=[1.2, -1.2, 1.0]".into(),
-            "effects.registration.finger_m=0".into(),
-            "effects.registration.finger_deg=0".into(),
-            "effects.registration.object_m=0".into(),
-            "effects.registration.object_deg=0".into(),
+            "simulator=\"kinematic\"".into(),
+            "effects.registration.true_tool_position_m=[0.0012, -0.0012, 0.001]".into(),
+            "effects.registration.true_tool_rotation_deg=[1.2, -1.2, 1.0]".into(),
+            "effects.registration.finger_position_sd_m=0".into(),
+            "effects.registration.finger_attitude_sd_deg=0".into(),
+            "effects.registration.object_position_sd_m=0".into(),
+            "effects.registration.object_attitude_sd_deg=0".into(),
         ],
     )
     .unwrap();

@@ -20,7 +20,7 @@ fn plane(slope_deg: f64) -> String {
     corners.concat() + "f 1 2 3\nf 1 3 4\n"
 }
 
-const SCENE: &str = "body = \"kinematic\"
+const SCENE: &str = "simulator = \"kinematic\"
 [object]
 mesh = \"plane.obj\"
 [zone]
@@ -167,7 +167,7 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     assert!(folder.join("less/accuracy.png").is_file());
     // Existing files are replaced only if Palpate wrote them.
     fs::create_dir(folder.join("mine")).unwrap();
-    fs::write(folder.join("mine/cheapest.toml"), "body = \"cast\"\n").unwrap();
+    fs::write(folder.join("mine/cheapest.toml"), "simulator = \"swept\"\n").unwrap();
     let last = arguments.len() - 1;
     arguments[last] = "mine";
     fails(folder, &arguments, &["mine", "--force"]);

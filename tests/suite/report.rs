@@ -181,7 +181,7 @@ fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
     assert!(!paired.contains("time_s"), "{paired}");
     let files = drawn(&run);
     let page = text(&files, "report.html");
-    for words in ["minus random", "largest error, mm", "lateral travel, m", ">over 20<"] {
+    for words in ["minus random", "maximum error, mm", "lateral travel, m", ">over 20<"] {
         assert!(page.contains(words), "{words}");
     }
 }
@@ -192,8 +192,8 @@ fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
 fn claims_stand_beside_what_came_out() {
     let mut run = run(SURFACE);
     let claim = |touches, says: &str| Claim {
-        place: "Fig. 5".into(),
-        says: says.into(),
+        source: "Fig. 5".into(),
+        text: says.into(),
         touches,
         measures: vec!["rmse_m".into(), "length_scale_z_m".into()],
     };
@@ -243,14 +243,18 @@ fn a_measure_is_told_wherever_measures_are() {
     let mut run = run(SURFACE);
     for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
         touch.time_s = Some(1.0);
-        touch.outline =
-            Some(SilhouetteMetrics { brier: 0.1, iou: 0.8, wrong_share: 0.1, reliability: None });
+        touch.silhouette = Some(SilhouetteMetrics {
+            brier: 0.1,
+            iou: 0.8,
+            misclassified_share: 0.1,
+            reliability: None,
+        });
         touch.metrics.iter_mut().for_each(|metrics| metrics.unreachable_rmse_m = Some(0.1));
         touch.shape = Some(SHAPE);
     }
     run.experiment.report.claims = vec![Claim {
-        place: "here".into(),
-        says: "everything".into(),
+        source: "here".into(),
+        text: "everything".into(),
         touches: 10,
         measures: MEASURES.iter().map(|measure| measure.id.into()).collect(),
     }];
@@ -271,7 +275,7 @@ fn a_measure_is_told_wherever_measures_are() {
         assert_eq!(has("minus_random_low"), measure.is_error, "{measure:?}");
         // Measures without values in the rows are omitted.
         let is_told = run.rows.iter().any(|row| measure.value(row, 20).is_some());
-        let is_compared = is_told && measure.direction != Direction::Neither;
+        let is_compared = is_told && measure.direction != Direction::Undirected;
         assert_eq!(comparison.contains(&format!(",{},", measure.id)), is_compared, "{measure:?}");
         let is_drawn = !matches!(measure.scale, PanelAxis::Undrawn);
         let (title, unit) = (measure.title, measure.unit.symbol);

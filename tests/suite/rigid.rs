@@ -30,7 +30,7 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
     let mut scene = scene(
         "container_finger.toml",
         &[
-            "body=\"dynamic\"",
+            "simulator=\"dynamic\"",
             "effects={}",
             &zone,
             "finger={radius_m=0.007, length_m=0}",
@@ -143,7 +143,7 @@ fn a_distance_needs_an_inside() {
     let sheet = "v -.05 0 .4\nv .05 0 .4\nv 0 0 .6\nv 0 .01 .5\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
     std::fs::write(&path, sheet).unwrap();
     let object = format!("object={{mesh=\"{}\"}}", path.display());
-    let rigid = ["body=\"dynamic\"", "effects={}", &object];
+    let rigid = ["simulator=\"dynamic\"", "effects={}", &object];
     let refused = |collision: &str| {
         let sets: Vec<&str> = rigid.iter().copied().chain([collision]).collect();
         let environment = Environment::build(scene("container_finger.toml", &sets)).unwrap();
@@ -275,7 +275,8 @@ fn gains_in_the_mass_matrix_are_mujocos_servos_where_nothing_rubs() {
 #[test]
 fn every_integrator_presses_alike() -> Result<(), Fault> {
     let pressed = |integrator: Integrator| -> Result<f64, Fault> {
-        let mut scene = scene("container_finger.toml", &["body=\"dynamic\"", "effects={skin={}}"]);
+        let mut scene =
+            scene("container_finger.toml", &["simulator=\"dynamic\"", "effects={skin={}}"]);
         (scene.solver.integrator, scene.solver.step_s) = (integrator, 1e-3);
         let simulator = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let mut body = simulator.body()?.unwrap();
@@ -303,7 +304,7 @@ fn every_integrator_presses_alike() -> Result<(), Fault> {
 /// of its default tolerance.
 #[test]
 fn one_iteration_finds_the_force_of_contact() {
-    let scene = scene("bird_finger.toml", &["body=\"dynamic\"", "effects={}"]);
+    let scene = scene("bird_finger.toml", &["simulator=\"dynamic\"", "effects={}"]);
     let environment = Environment::build(scene).unwrap();
     let text = mjcf::scene(&environment, ModelPurpose::Dynamic { step_s: 2e-3 }).unwrap();
     let chain = environment.chain().unwrap();

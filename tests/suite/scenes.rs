@@ -148,8 +148,8 @@ fn solver_settings_that_mean_nothing_are_refused() {
     let (rigid, sdf) = ("effects={}", "solver.collision=\"sdf\"");
     for (sets, words) in [
         (&[sdf][..], ["solver.collision", "without skin"]),
-        (&["body=\"kinematic\"", sdf], ["solver.collision", "dynamic"]),
-        (&["body=\"cast\"", rigid, sdf], ["solver.collision", "dynamic"]),
+        (&["simulator=\"kinematic\"", sdf], ["solver.collision", "dynamic"]),
+        (&["simulator=\"swept\"", rigid, sdf], ["solver.collision", "dynamic"]),
         (&[rigid, "solver.collision=\"box\""], ["solver.collision", "height_field"]),
         (&[rigid, "solver.sdf={}"], ["solver.sdf", "collision = \"sdf\""]),
         (&[rigid, sdf, "solver.sdf.iterations=0"], ["solver.sdf.iterations", "1 to 1000"]),

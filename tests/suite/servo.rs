@@ -179,9 +179,9 @@ fn a_sensor_that_falls_silent_and_joints_that_do_not_move_are_faults_with_their_
             reading.samples.clear();
         }
     });
-    assert!(matches!(silent, Err(Fault::Lost { time_s }) if time_s > 0.0), "{silent:?}");
+    assert!(matches!(silent, Err(Fault::NoResponse { time_s }) if time_s > 0.0), "{silent:?}");
     let (stuck, _) = broken(&environment, |_, reading| reading.q[0] = 0.03);
-    assert!(matches!(stuck, Err(Fault::Late { .. })), "{stuck:?}");
+    assert!(matches!(stuck, Err(Fault::Timeout { .. })), "{stuck:?}");
     let (nan, _) = broken(&environment, |tick, reading| {
         if tick > 20 {
             reading.q[1] = f64::NAN;
@@ -211,7 +211,7 @@ fn a_pressure_that_is_not_a_number_is_silence_and_a_frozen_one_ends_inside() {
             reading.frames_mut().for_each(|frame| frame.pdc_counts = Some(f64::NAN));
         }
     });
-    assert!(matches!(nan, Err(Fault::Lost { .. })), "{nan:?}");
+    assert!(matches!(nan, Err(Fault::NoResponse { .. })), "{nan:?}");
     // Without a force sensor no other signal detects the object until it meets the tip's centre.
     let (frozen, _) = broken(&environment, |_, reading| {
         reading.frames_mut().for_each(|frame| frame.pdc_counts = Some(2000.0));

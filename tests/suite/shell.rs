@@ -27,7 +27,12 @@ pub const SILICONE: Material = Material { young_pa: 1.552e6, poisson: 0.3165, th
 
 pub fn shell(cells: [usize; 2], cavity_pa_m3: f64) -> Skin {
     let [along, around] = cells;
-    let effect = SkinEffect { model: SkinModel::Shell, along, around, ..SkinEffect::default() };
+    let effect = SkinEffect {
+        model: SkinModel::Shell,
+        cells_along: along,
+        cells_around: around,
+        ..SkinEffect::default()
+    };
     Skin::new(&Profile::biotac(&Finger::default()), &effect, cavity_pa_m3)
 }
 
@@ -248,8 +253,12 @@ fn nothing_makes_it_diverge() {
         square(0.1, 2),
     ]
     .map(|mesh| Object { bvh: MeshBvh::new(mesh) });
-    let default =
-        SkinEffect { model: SkinModel::Shell, along: 12, around: 8, ..SkinEffect::default() };
+    let default = SkinEffect {
+        model: SkinModel::Shell,
+        cells_along: 12,
+        cells_around: 8,
+        ..SkinEffect::default()
+    };
     let effects = [
         (default.clone(), CAVITY_PA_M3),
         (SkinEffect { modulus_pa: 1e3, ..default.clone() }, 1e20),
@@ -309,8 +318,8 @@ fn a_touch_of_a_scene_is_felt_with_it() {
 #[test]
 fn its_settings_are_checked() {
     for (set, said) in [
-        ("effects.skin.around=7", "an even number"),
-        ("effects.skin.along=2", "4 to 48"),
+        ("effects.skin.cells_around=7", "an even number"),
+        ("effects.skin.cells_along=2", "4 to 48"),
         ("effects.skin.poisson=0.5", "effects.skin.poisson"),
         ("effects.skin.model=\"plate\"", "effects.skin.model"),
     ] {

@@ -7,7 +7,7 @@ use crate::page::{CLOCK, DRIVER, browser_or_note, log};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::Point3;
-use palpate::geometry::decimate::coarse;
+use palpate::geometry::decimate::decimate;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
 use palpate::report::files::png;
@@ -80,7 +80,7 @@ fn the_page_holds_what_was_given() {
         let all = given.iter().flat_map(|it| &it.frames).flat_map(|it| &it.mesh.0);
         let contacts = given.iter().flat_map(|it| &it.touches).filter_map(|it| it.contact_w);
         // Only the displayed part of the ground truth counts.
-        let shown = coarse(&truth, 8000).0;
+        let shown = decimate(&truth, 8000).0;
         let points: Vec<Point3<f64>> = all.copied().chain(contacts).chain(shown).collect();
         let low = points.iter().fold(points[0], |low, p| low.inf(p));
         let high = points.iter().fold(points[0], |high, p| high.sup(p));

@@ -67,7 +67,7 @@ fn a_second_explorer_is_refused_and_the_first_is_stopped() {
 #[test]
 fn joints_of_other_names_are_named() {
     let rig = Rig::new(STAGE, BackendSettings::default(), &[]);
-    let mut settings = BackendSettings { patience_s: 0.3, ..BackendSettings::default() };
+    let mut settings = BackendSettings { connect_timeout_s: 0.3, ..BackendSettings::default() };
     settings.joints = ["A", "B", "C"].map(String::from).to_vec();
     let hub = rig.hub.clone();
     let connect = Box::new(move || Ok(Box::new(hub.end(Side::Explorer)) as _));
@@ -80,7 +80,7 @@ fn joints_of_other_names_are_named() {
 
 #[test]
 fn nobody_there_is_said_with_names_and_types() {
-    let settings = BackendSettings { patience_s: 0.1, ..BackendSettings::default() };
+    let settings = BackendSettings { connect_timeout_s: 0.1, ..BackendSettings::default() };
     let chain = palpate::robot::arm::ArmSettings::default().chain().unwrap();
     let connect = Box::new(|| Ok(Box::new(Hub::default().end(Side::Explorer)) as _));
     let error = RosArm::connect(&settings, &chain, connect).map(|_| ()).unwrap_err().to_string();

@@ -68,7 +68,9 @@ fn the_explorer_says_what_failed() {
                 // Silence and order are detected by age limits, which must be the default ones.
                 let is_aged = ["no_joints", "no_wrench", "no_tactile", "backward"];
                 let settings = match is_aged.contains(&names[0]) {
-                    true => BackendSettings { patience_s: 20.0, ..BackendSettings::default() },
+                    true => {
+                        BackendSettings { connect_timeout_s: 20.0, ..BackendSettings::default() }
+                    }
                     false => patient(),
                 };
                 let rig = Rig::new(STAGE, settings, &injected(names, 0.1));

@@ -247,7 +247,7 @@ fn what_cannot_be_asked_for_is_refused() {
     let refused = |settings: &str, scene: &str, words: &str| {
         let text = format!(
             "name = \"whole\"\ninitial_touches = 5\ntrials = 1\ntouches = 9\n{settings}\n[scene]\n\
-             body = \"cast\"\nobject = {{ mesh = \"none.obj\" }}\n{scene}\n"
+             simulator = \"swept\"\nobject = {{ mesh = \"none.obj\" }}\n{scene}\n"
         );
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("whole.toml");
@@ -259,9 +259,9 @@ fn what_cannot_be_asked_for_is_refused() {
     refused("planners = [\"active\", \"slope\"]", "around = {}", "planners[1]");
     refused("planners = [\"silhouette\"]", "around = {}", "a planner for whole objects");
     refused(active, "around = {}\nzone = { x_m = [0, 1] }", "scene.zone");
-    refused(active, "", "[around] for a whole object");
-    refused(active, "around = { radius_m = -1 }", "scene.around.radius_m");
-    refused(active, "around = { centre_m = [0, 0, 1e9] }", "scene.around.centre_m");
+    refused(active, "", "[whole_object] for a whole object");
+    refused(active, "around = { radius_m = -1 }", "scene.whole_object.radius_m");
+    refused(active, "around = { centre_m = [0, 0, 1e9] }", "scene.whole_object.centre_m");
     refused(
         &format!("{active}\ngp = {{ kernel = \"squared_exponential\" }}"),
         "around = {}",
@@ -296,14 +296,14 @@ fn one_table_says_how_a_belief_is_fitted() {
 /// A ball that does not contain the object is rejected by name before any touch.
 #[test]
 fn a_ball_beside_the_object_is_refused() {
-    let text = "body = \"cast\"\nobject = { mesh = \"none.obj\" }\n\
+    let text = "simulator = \"swept\"\nobject = { mesh = \"none.obj\" }\n\
                 around = { centre_m = [1, 0, 0], radius_m = 0.1 }";
     let scene: Scene = toml::from_str(text).unwrap();
     let mesh = mesh(sphere);
     let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();
     let shape = ObjectShape::Mesh { bvh: MeshBvh::new(mesh), report: report.into() };
     let error = Environment::with_shape(scene, shape).err().unwrap().to_string();
-    assert!(error.contains("around.centre_m"), "{error}");
+    assert!(error.contains("whole_object.centre_m"), "{error}");
 }
 
 /// With a kernel without derivatives normals are omitted, as over a zone, and a ball is found from
@@ -325,7 +325,7 @@ fn a_kernel_without_slopes_does_without_normals() {
 fn a_run_says_what_it_found() {
     let simulation = simulation(
         touching,
-        "planners = [\"active\", \"random\"]\ntouches = 32\nspace = { compared_every = 4 }",
+        "planners = [\"active\", \"random\"]\ntouches = 32\nspace = { evaluate_every = 4 }",
     );
     let planners = ["active", "random"].map(|name| planner::by_name(name).unwrap());
     let trials = (0..2).flat_map(|trial| planners.map(|planner| (trial, planner)));
@@ -354,13 +354,13 @@ fn a_run_says_what_it_found() {
 #[test]
 fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
     let settings = "planners = [\"active\"]\ntouches = 40\nverification_touches = 20\n\
-                    repeat_touches = 3\nspace = { compared_every = 40 }";
+                    repeat_touches = 3\nspace = { evaluate_every = 40 }";
     for name in ["active", "random"] {
         let simulation = simulation(sphere, settings);
         let row = trial(&simulation, name);
         assert_eq!(row.verification.len(), 23);
         let (again, new): (Vec<_>, Vec<_>) =
-            row.verification.iter().partition(|touch| touch.again.is_some());
+            row.verification.iter().partition(|touch| touch.repeats.is_some());
         for touch in &new {
             let (error_m, sd_m) = (touch.error_m.unwrap(), touch.sd_m.unwrap());
             // The sphere is some centimetres wide.

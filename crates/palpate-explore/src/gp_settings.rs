@@ -52,7 +52,7 @@ pub enum Kernels {
     /// A single kernel.
     One(String),
     /// The most likely of several kernels.
-    Likeliest(Vec<String>),
+    MostLikely(Vec<String>),
 }
 
 impl Kernels {
@@ -60,7 +60,7 @@ impl Kernels {
     pub fn names(&self) -> &[String] {
         match self {
             Self::One(name) => std::slice::from_ref(name),
-            Self::Likeliest(names) => names,
+            Self::MostLikely(names) => names,
         }
     }
 }

@@ -253,7 +253,7 @@ fn belief(radius_m: f64, labels: &[(Vector2<f64>, f64)]) -> Option<Posterior> {
         return None;
     }
     let noise: NoiseRatio = NOISE_VARIANCE.sqrt().into();
-    let scale = SignalModel::Best(Range::from((1e-2, 1e2)));
+    let scale = SignalModel::Profiled(Range::from((1e-2, 1e2)));
     let mut likelihood = Likelihood::new(&SquaredExponential, MeanModel::Zero, &evidence);
     let scored = LENGTHS.into_iter().filter_map(|radii| {
         let lengths = vec![radii * radius_m; 2];

@@ -17,7 +17,7 @@ const FINER: f64 = 0.9;
 /// No vertex moves by more than a cell's diagonal, 6 √(A / `most`). The two sides of a thin wall
 /// remain separate: vertices with opposite normals are not merged. A closed mesh remains closed;
 /// triangles may intersect.
-pub fn coarse(mesh: &Mesh, most: usize) -> Triangles {
+pub fn decimate(mesh: &Mesh, most: usize) -> Triangles {
     let (vertices, triangles) = (mesh.vertices(), mesh.triangles());
     if triangles.len() <= most {
         return (vertices.to_vec(), triangles.to_vec());
@@ -64,7 +64,7 @@ fn clustered(mesh: &Mesh, normals: &[Vector3<f64>], cell_m: f64) -> Triangles {
 
 #[cfg(test)]
 mod tests {
-    use super::coarse;
+    use super::decimate;
     use crate::bvh::MeshBvh;
     use crate::mesh::Mesh;
     use crate::solids::{box_mesh, sphere_mesh};
@@ -77,7 +77,7 @@ mod tests {
         let wall = points.iter().map(|p| Point3::new(p.x, 0.02 * p.y, p.z)).collect();
         for (points, factor) in [(points, 0.97), (wall, 0.9)] {
             let (fine, _) = Mesh::new(&points, &triangles).unwrap();
-            let (vertices, triangles) = coarse(&fine, 1000);
+            let (vertices, triangles) = decimate(&fine, 1000);
             assert!((700..=1000).contains(&triangles.len()), "{}", triangles.len());
             let limit_m = 6.0 * (fine.area_m2() / 1000.0).sqrt();
             let (coarse, report) = Mesh::new(&vertices, &triangles).unwrap();
@@ -97,6 +97,6 @@ mod tests {
     fn what_is_coarse_stays_as_it_is() {
         let (points, triangles) = box_mesh([0.0; 3], [0.1; 3]);
         let (mesh, _) = Mesh::new(&points, &triangles).unwrap();
-        assert_eq!(coarse(&mesh, 12), (mesh.vertices().to_vec(), mesh.triangles().to_vec()));
+        assert_eq!(decimate(&mesh, 12), (mesh.vertices().to_vec(), mesh.triangles().to_vec()));
     }
 }

@@ -7,7 +7,7 @@ use super::likelihood::{Likelihood, ProfiledLikelihood};
 use super::observations::Observations;
 use super::scan::{Grid, Scan};
 use super::search_box::{SearchBox, SignalModel, TouchNoise};
-use crate::math::bfgs::{BfgsOptions, Climb, climb};
+use crate::math::bfgs::{BfgsClimb, BfgsOptions, climb};
 use crate::math::optimize::{Bounds, Stop};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,7 @@ pub struct Fit {
     pub log_likelihood: f64,
     /// Largest residual standard deviation of a touch's height given the inducing touches, in the
     /// heights' unit, if the posterior is approximate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, alias = "left_sd", skip_serializing_if = "Option::is_none")]
     pub nystrom_residual_sd: Option<f64>,
     /// Number of factored covariance matrices, not counting those of the scan that grew by a row.
     pub factorisations: u32,
@@ -249,7 +249,7 @@ impl<'a> Search<'a> {
     ) -> Self {
         let scale = match sought.touch_noise {
             TouchNoise::Known(noise_sd) => SignalModel::KnownNoise(noise_sd),
-            TouchNoise::Fitted | TouchNoise::AtLeast(_) => SignalModel::Best(sought.signal_sd),
+            TouchNoise::Fitted | TouchNoise::AtLeast(_) => SignalModel::Profiled(sought.signal_sd),
         };
         let likelihood = Likelihood::new(kernel, sought.mean, observations);
         let bounds = Bounds { lower, upper };
@@ -266,7 +266,7 @@ impl<'a> Search<'a> {
         let Self { sought, likelihood, scale, bounds, best, .. } = self;
         let mut profile = None;
         let (mut here, mut highest) = (None, f64::NEG_INFINITY);
-        let is_worth = |climb: &Climb| {
+        let is_worth = |climb: &BfgsClimb| {
             let Some(best) = &best else { return true };
             let is_lower = climb.best().value < best.score;
             let apart = |((x, top), (lower, upper)): ((&f64, &f64), (&f64, &f64))| {
@@ -277,7 +277,7 @@ impl<'a> Search<'a> {
             let is_hopeless = climb.is_measured() && climb.upper_bound(HOPE) < best.score;
             !(is_lower && (is_hopeless || !is_apart))
         };
-        let start = Climb::new(*bounds, start, curvature, MANNER);
+        let start = BfgsClimb::new(*bounds, start, curvature, MANNER);
         let (top, curvature) = climb(start, is_worth, |x, gradient| {
             let value = score(sought, likelihood, scale, x, Some(gradient), &mut here);
             if value > highest {

@@ -38,7 +38,7 @@ pub struct InducingPosterior {
     pub posterior: Posterior,
     /// Largest residual standard deviation of another touch's height given the inducing ones, in
     /// the heights' unit.
-    pub left_sd: f64,
+    pub nystrom_residual_sd: f64,
 }
 
 impl Posterior {
@@ -67,7 +67,7 @@ impl Posterior {
         let kept = kept.with_heights(heights.collect());
         let left_sd = hyperparameters.signal_sd * left_variance.sqrt();
         let posterior = Self::factored(kernel, hyperparameters, kept, &dense);
-        Ok(InducingPosterior { posterior, left_sd })
+        Ok(InducingPosterior { posterior, nystrom_residual_sd: left_sd })
     }
 }
 

@@ -139,7 +139,7 @@ impl LogNormal {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SignalModel {
     /// Most probable s in a range, with the noise as a fraction of it.
-    Best(Range),
+    Profiled(Range),
     /// s follows from a known touch noise and its ratio.
     KnownNoise(f64),
 }
@@ -152,7 +152,7 @@ impl SignalModel {
     pub fn signal_sd(&self, fit: f64, count: usize, noise_ratio: f64) -> f64 {
         let range = match self {
             Self::KnownNoise(noise_sd) => return noise_sd / noise_ratio,
-            Self::Best(range) => range,
+            Self::Profiled(range) => range,
         };
         let n = count.max(1) as f64;
         let Some(prior) = range.prior else {
@@ -170,7 +170,7 @@ impl SignalModel {
     /// Returns the log prior density of s.
     pub fn log_prior(&self, signal_sd: f64) -> f64 {
         match self {
-            Self::Best(Range { prior: Some(prior), .. }) => prior.log_density(signal_sd.ln()),
+            Self::Profiled(Range { prior: Some(prior), .. }) => prior.log_density(signal_sd.ln()),
             _ => 0.0,
         }
     }
@@ -228,9 +228,9 @@ mod tests {
         for prior in [None, prior] {
             let range = Range { low: 1e-3, high: 1e3, prior };
             for (fit, count) in [(3.0, 7), (1e-9, 2), (40.0, 1)] {
-                let best = SignalModel::Best(range).signal_sd(fit, count, 0.1);
+                let best = SignalModel::Profiled(range).signal_sd(fit, count, 0.1);
                 let value = |s: f64| {
-                    let prior = SignalModel::Best(range).log_prior(s);
+                    let prior = SignalModel::Profiled(range).log_prior(s);
                     -0.5 * fit / (s * s) - count as f64 * s.ln() + prior
                 };
                 for factor in [0.5, 0.99, 1.01, 2.0] {

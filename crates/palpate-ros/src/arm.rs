@@ -3,7 +3,7 @@
 
 use super::link::Link;
 use super::net_ft::{NetFt, NetFtSettings, Record};
-use super::receiver::{LatestMessages, Mailbox, TopicState, refused};
+use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
 use super::settings::BackendSettings;
 use super::status::ArmStatus;
 use super::topics::{Service, Side, Topic};
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 pub struct RosArm {
     chain: Chain,
     link: Link,
-    mailbox: Arc<Mailbox>,
+    mailbox: Arc<TopicReceiver>,
     /// First fault; it is latched until the operator clears it.
     latched: Mutex<Option<LinkFault>>,
     /// Receiver of forces over UDP, while it exists.
@@ -59,7 +59,7 @@ impl RosArm {
         connect: Connect,
     ) -> Result<Arc<Self>, LinkFault> {
         let names = settings.joint_names(chain);
-        let mailbox = Arc::new(Mailbox::new(names, settings.clone()));
+        let mailbox = Arc::new(TopicReceiver::new(names, settings.clone()));
         let period = Duration::from_secs_f64(1.0 / settings.rate_hz);
         let (taker, idler) = (Arc::clone(&mailbox), Arc::clone(&mailbox));
         let take = move |delivery| taker.push(delivery);
@@ -92,7 +92,7 @@ impl RosArm {
     /// # Errors
     /// The first check that fails.
     pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
-        check_start(&mut self.backend(), &self.chain, &self.settings().gates, 0)
+        check_start(&mut self.backend(), &self.chain, &self.settings().start_checks, 0)
     }
 
     fn settings(&self) -> &BackendSettings {
@@ -105,7 +105,7 @@ impl RosArm {
     /// # Errors
     /// If there is no server or no answer within the timeout, or the answer is a refusal.
     pub fn call(&self, service: &Service) -> Result<(), LinkFault> {
-        self.call_within(service, self.settings().patience_s)
+        self.call_within(service, self.settings().connect_timeout_s)
     }
 
     fn call_within(&self, service: &Service, timeout_s: f64) -> Result<(), LinkFault> {
@@ -174,8 +174,9 @@ impl RosArm {
             if missing.is_empty() {
                 return Ok(());
             }
-            let BackendSettings { patience_s, topics, .. } = self.settings();
-            if begun.elapsed().as_secs_f64() > *patience_s {
+            let BackendSettings { connect_timeout_s: connect_timeout_s, topics, .. } =
+                self.settings();
+            if begun.elapsed().as_secs_f64() > *connect_timeout_s {
                 let name =
                     |topic: Topic| format!("{} ({})", topics.name(topic), topics.type_name(topic));
                 let names: Vec<String> = missing.iter().copied().map(name).collect();
@@ -183,7 +184,7 @@ impl RosArm {
                 let skipped: String =
                     skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
                 return Err(InputError::new(format!(
-                    "no message within {patience_s} s on {}; check that the arm's driver runs in the same \
+                    "no message within {connect_timeout_s} s on {}; check that the arm's driver runs in the same \
                      domain and that [backend.topics] has its names and types.{skipped}",
                     names.join(", ")
                 ))
@@ -229,7 +230,7 @@ impl RosArm {
                 continue;
             }
             let age_s = state.at.map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
-            if age_s > topics.age_s(topic) {
+            if age_s > topics.max_age_s(topic) {
                 return Err(silent(&topics.name(topic), age_s, state).into());
             }
         }
@@ -241,7 +242,7 @@ impl RosArm {
 }
 
 /// Writes the sensor's records into the mailbox; a record with an error status is refused.
-fn listen(settings: &NetFtSettings, mailbox: &Arc<Mailbox>) -> Result<NetFt, LinkFault> {
+fn listen(settings: &NetFtSettings, mailbox: &Arc<TopicReceiver>) -> Result<NetFt, LinkFault> {
     let (mailbox, address) = (Arc::clone(mailbox), settings.address.clone());
     let take = move |record: Record| {
         let mut heard = mailbox.latest();
@@ -397,7 +398,7 @@ impl Backend for RosBackend {
             let waited_s = begun.elapsed().as_secs_f64();
             heard.is_ready = is_ready && waited_s > HANDSHAKE_S;
             let is_done = heard.is_ready || is_final && waited_s > HANDSHAKE_S;
-            if is_done || waited_s > lab.settings().patience_s {
+            if is_done || waited_s > lab.settings().connect_timeout_s {
                 break;
             }
         }

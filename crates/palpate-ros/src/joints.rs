@@ -94,7 +94,7 @@ impl JointNames {
             joint_names: self.0.clone(),
             points: vec![JointTrajectoryPoint {
                 velocities: qdot.into(),
-                time_from_start: Duration::from_s(topic.age_s),
+                time_from_start: Duration::from_s(topic.max_age_s),
                 ..JointTrajectoryPoint::default()
             }],
         })

@@ -73,7 +73,7 @@ pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
 }
 
 /// The newest messages of an arm, shared between the link's thread and the control loop.
-pub struct Mailbox {
+pub struct TopicReceiver {
     /// Names of the arm's joints in its messages.
     pub names: JointNames,
     /// Table `[backend]` of the experiment.
@@ -81,7 +81,7 @@ pub struct Mailbox {
     heard: Mutex<LatestMessages>,
 }
 
-impl Mailbox {
+impl TopicReceiver {
     /// Creates a mailbox without messages.
     pub fn new(names: JointNames, settings: BackendSettings) -> Self {
         let heard = LatestMessages { since: Some(Instant::now()), ..LatestMessages::default() };
@@ -97,11 +97,11 @@ impl Mailbox {
     pub fn push(&self, delivery: Delivery) {
         match delivery {
             Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
-            Delivery::Garbled { topic, words } => {
+            Delivery::Malformed { topic, words } => {
                 let fault = refused(&self.settings.topics.name(topic), words);
                 self.latest().refused.get_or_insert(fault);
             }
-            Delivery::Answered { service, answer } => self.latest().answers.push((service, answer)),
+            Delivery::Response { service, answer } => self.latest().answers.push((service, answer)),
             Delivery::Call { .. } => (),
         }
     }
@@ -251,7 +251,7 @@ impl Mailbox {
         if self.settings.is_on_change(topic) {
             return Ok(true);
         }
-        let is_late = age_s > topics.age_s(topic);
+        let is_late = age_s > topics.max_age_s(topic);
         state.late_s = is_late.then_some(age_s);
         Ok(!is_late)
     }

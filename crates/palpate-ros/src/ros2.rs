@@ -231,7 +231,7 @@ impl Ros2 {
                     }
                     Ok(None) => break,
                     Err(error) => {
-                        take(Delivery::Garbled { topic, words: error.to_string() });
+                        take(Delivery::Malformed { topic, words: error.to_string() });
                         break;
                     }
                 }
@@ -338,7 +338,7 @@ impl Transport for Ros2 {
         for (service, open) in &self.clients {
             let Some((client, _)) = open else { continue };
             while let Ok(Some((_, answer))) = client.receive_response() {
-                take(Delivery::Answered { service: service.clone(), answer });
+                take(Delivery::Response { service: service.clone(), answer });
             }
         }
     }

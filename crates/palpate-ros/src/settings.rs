@@ -3,7 +3,7 @@
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
 use super::topics::{Topic, Topics};
-use palpate_explore::backend::interlock::{FORMER_KEYS, GateSettings, InterlockSettings};
+use palpate_explore::backend::interlock::{FORMER_KEYS, InterlockSettings, StartCheckSettings};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use schemars::JsonSchema;
@@ -74,7 +74,7 @@ pub struct BackendSettings {
     /// Control ticks per second, Hz.
     pub rate_hz: f64,
     /// Connection timeout, s.
-    pub patience_s: f64,
+    pub connect_timeout_s: f64,
     /// Whether messages without a stamp are accepted; their age counts from receipt.
     pub accept_unstamped: bool,
     /// Whether the status is published on change only (latched); the arm then counts as lost
@@ -88,7 +88,7 @@ pub struct BackendSettings {
     pub interlocks: InterlockSettings,
     /// Start checks of arm and sensors.
     #[serde(skip_serializing_if = "is_default")]
-    pub gates: GateSettings,
+    pub start_checks: StartCheckSettings,
     /// Topics of the arm.
     pub topics: Topics,
 }
@@ -112,11 +112,11 @@ impl Default for BackendSettings {
             joints: Vec::new(),
             finger: 0,
             rate_hz: 250.0,
-            patience_s: 5.0,
+            connect_timeout_s: 5.0,
             accept_unstamped: false,
             status_on_change: false,
             net_ft: None,
-            gates: GateSettings::default(),
+            start_checks: StartCheckSettings::default(),
             interlocks: InterlockSettings::default(),
             topics: Topics::default(),
         }
@@ -129,7 +129,7 @@ pub const CLOCK_AHEAD_S: f64 = 0.005;
 
 /// Keys of version 0.1 without an effect on a run.
 const UNUSED_KEYS: [&str; 6] = [
-    "gates.near",
+    "start_checks.near",
     "topics.joints.rate_hz",
     "topics.wrench.rate_hz",
     "topics.tactile.rate_hz",
@@ -137,13 +137,29 @@ const UNUSED_KEYS: [&str; 6] = [
     "topics.command.rate_hz",
 ];
 
-/// Removes from the experiment in `loader` the keys that version 0.1 read in `[backend]`, and wrote
+/// Keys of version 0.1 in `[backend]`, and their present names.
+const RENAMED_KEYS: [[&str; 2]; 11] = [
+    ["patience_s", "connect_timeout_s"],
+    ["gates", "start_checks"],
+    ["interlocks.joint_silence_s", "interlocks.joint_timeout_s"],
+    ["interlocks.wrench_silence_s", "interlocks.wrench_timeout_s"],
+    ["interlocks.frame_silence_s", "interlocks.frame_timeout_s"],
+    ["interlocks.frozen_s", "interlocks.stuck_s"],
+    ["topics.joints.age_s", "topics.joints.max_age_s"],
+    ["topics.wrench.age_s", "topics.wrench.max_age_s"],
+    ["topics.tactile.age_s", "topics.tactile.max_age_s"],
+    ["topics.status.age_s", "topics.status.max_age_s"],
+    ["topics.command.age_s", "topics.command.max_age_s"],
+];
+
+/// Renames or removes from the experiment in `loader` the keys that version 0.1 read in `[backend]`, and wrote
 /// with their defaults.
 ///
 /// # Errors
 /// If one has a value other than the present constant: a limit of an arm does not change without
 /// notice.
 pub fn take_former_keys(loader: &mut Loader) -> Result<(), ConfigError> {
+    loader.read_former_keys("backend.", &RENAMED_KEYS)?;
     UNUSED_KEYS.iter().for_each(|key| drop(loader.take(&format!("backend.{key}"))));
     let numbers = FORMER_KEYS.into_iter().chain([("clock_ahead_s", CLOCK_AHEAD_S)]);
     let numbers = numbers.map(|(key, number)| (key.to_owned(), Value::Float(number)));
@@ -201,7 +217,7 @@ impl Validate for BackendSettings {
             "an address, e.g. \"http://127.0.0.1:11311\"".into()
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
-        rules.number("patience_s", self.patience_s, 0.1..=600.0);
+        rules.number("connect_timeout_s", self.connect_timeout_s, 0.1..=600.0);
         for (i, name) in self.joints.iter().enumerate() {
             let is_new = !name.is_empty() && !self.joints[..i].contains(name);
             rules.require(&format!("joints[{i}]"), format!("\"{name}\""), is_new, || {
@@ -212,7 +228,7 @@ impl Validate for BackendSettings {
             rules.table("net_ft", net_ft);
         }
         rules.table("interlocks", &self.interlocks);
-        rules.table("gates", &self.gates);
+        rules.table("start_checks", &self.start_checks);
         rules.table("topics", &self.topics);
     }
 }

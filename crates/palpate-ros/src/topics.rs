@@ -99,13 +99,13 @@ macro_rules! topic_settings {
                 pub message: $message,
             )?
             /// Age limit of the last message, s; for a command, its validity.
-            pub age_s: f64,
+            pub max_age_s: f64,
         }
 
         impl Default for $name {
             fn default() -> Self {
-                let (name, age_s) = USUAL[$topic as usize];
-                Self { name: name.into(), $(message: $message::default(),)? age_s }
+                let (name, max_age_s) = USUAL[$topic as usize];
+                Self { name: name.into(), $(message: $message::default(),)? max_age_s }
             }
         }
     };
@@ -141,11 +141,11 @@ impl Topics {
     /// Returns the name, without its namespace, and the age limit of a topic.
     fn entry(&self, topic: Topic) -> (&str, f64) {
         match topic {
-            Topic::Joints => (&self.joints.name, self.joints.age_s),
-            Topic::Wrench => (&self.wrench.name, self.wrench.age_s),
-            Topic::Tactile => (&self.tactile.name, self.tactile.age_s),
-            Topic::Status => (&self.status.name, self.status.age_s),
-            Topic::Command => (&self.command.name, self.command.age_s),
+            Topic::Joints => (&self.joints.name, self.joints.max_age_s),
+            Topic::Wrench => (&self.wrench.name, self.wrench.max_age_s),
+            Topic::Tactile => (&self.tactile.name, self.tactile.max_age_s),
+            Topic::Status => (&self.status.name, self.status.max_age_s),
+            Topic::Command => (&self.command.name, self.command.max_age_s),
         }
     }
 
@@ -158,7 +158,7 @@ impl Topics {
     }
 
     /// Returns the age limit of the last message of a topic.
-    pub fn age_s(&self, topic: Topic) -> f64 {
+    pub fn max_age_s(&self, topic: Topic) -> f64 {
         self.entry(topic).1
     }
 
@@ -244,7 +244,7 @@ impl Validate for Topics {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
         let names = Topic::ALL.map(|topic| self.name(topic));
         for (i, topic) in Topic::ALL.into_iter().enumerate() {
-            let (name, age_s) = self.entry(topic);
+            let (name, max_age_s) = self.entry(topic);
             let is_name = !name.is_empty() && !name.ends_with('/') && name.chars().all(is_plain);
             let key = format!("{}.name", topic.key());
             rules.require(&key, format!("\"{name}\""), is_name, || {
@@ -256,7 +256,7 @@ impl Validate for Topics {
                 !names[..i].contains(&names[i]),
                 || "a unique name".into(),
             );
-            rules.number(&format!("{}.age_s", topic.key()), age_s, 1e-3..=10.0);
+            rules.number(&format!("{}.max_age_s", topic.key()), max_age_s, 1e-3..=10.0);
         }
     }
 }

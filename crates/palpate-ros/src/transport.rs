@@ -94,7 +94,7 @@ pub enum Delivery {
         received: Instant,
     },
     /// Data that cannot be read as its topic's type.
-    Garbled {
+    Malformed {
         /// Topic.
         topic: Topic,
         /// Description of the error.
@@ -108,7 +108,7 @@ pub enum Delivery {
         call: u64,
     },
     /// Answer to a call made by this side.
-    Answered {
+    Response {
         /// Service.
         service: Service,
         /// Answer.

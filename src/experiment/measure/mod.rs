@@ -8,7 +8,7 @@ pub mod metrics;
 pub mod shape;
 pub mod silhouette;
 
-use self::Direction::{Less, More, Neither};
+use self::Direction::{Maximise, Minimise, Undirected};
 use self::metrics::{Metrics, calibration, rmse};
 use self::shape::ShapeMetrics;
 use self::silhouette::SilhouetteMetrics;
@@ -21,77 +21,67 @@ pub static MEASURES: &[Measure] = &[
     CENTRED_R,
     RMSE,
     EDGE_RMSE,
-    measure(Less, "reachable_rmse_m", "RMSE where the finger reaches", MM)
+    measure(Minimise, "reachable_rmse_m", "RMSE, reachable", MM)
         .from(Source::Metrics(|it| it.reachable_rmse_m))
         .aggregated(Aggregate::Median)
         .drawn(PanelAxis::LogBeside(&UNREACHABLE_RMSE))
         .untabled()
         .error(),
     UNREACHABLE_RMSE,
-    measure(Less, "max_error_m", "largest error", MM)
+    measure(Minimise, "max_error_m", "maximum error", MM)
         .from(Source::Metrics(|it| Some(it.max_error_m)))
         .aggregated(Aggregate::Median),
     COVERAGE,
-    measure(Less, "coverage_off", "share in the 95 % band, away from 0.95", SHARE)
+    measure(Minimise, "coverage_error", "coverage error of the 95 % band", SHARE)
         .from(Source::Metrics(|it| Some((it.coverage? - CALIBRATED_COVERAGE).abs())))
         .untabled(),
-    measure(Less, "nlpd", "NLPD", PLAIN).from(Source::Metrics(|it| it.nlpd)),
-    measure(Less, "presence_brier", "Brier score of where there is a surface", SHARE)
+    measure(Minimise, "nlpd", "NLPD", PLAIN).from(Source::Metrics(|it| it.nlpd)),
+    measure(Minimise, "presence_brier", "Brier score of surface probability", SHARE)
         .from(Source::Outline(|it| Some(it.brier))),
-    measure(More, "silhouette_iou", "silhouette, intersection over union", SHARE)
+    measure(Maximise, "silhouette_iou", "silhouette IoU", SHARE)
         .from(Source::Outline(|it| Some(it.iou)))
         .drawn(PanelAxis::UpToOne),
-    measure(
-        Less,
-        "silhouette_wrong",
-        "share of the zone on the wrong side of the silhouette",
-        SHARE,
-    )
-    .from(Source::Outline(|it| Some(it.wrong_share)))
-    .untabled(),
+    measure(Minimise, "silhouette_misclassified", "misclassified share of the zone", SHARE)
+        .from(Source::Outline(|it| Some(it.misclassified_share)))
+        .untabled(),
     CHAMFER,
-    measure(Less, "chamfer_share", "Chamfer distance, of the diagonal", PERCENT)
+    measure(Minimise, "chamfer_share", "Chamfer distance, share of the diagonal", PERCENT)
         .from(Source::Shape(|it| it.chamfer_share)),
-    measure(Less, "reachable_chamfer_m", "distance of what the finger reaches", MM)
+    measure(Minimise, "reachable_chamfer_m", "distance, reachable surface", MM)
         .from(Source::Shape(|it| it.reachable_chamfer_m))
         .aggregated(Aggregate::Median)
         .untabled(),
-    measure(More, "f_1", "F-score at 1 % of the diagonal", SHARE)
+    measure(Maximise, "f_1", "F-score at 1 % of the diagonal", SHARE)
         .from(Source::Shape(|it| Some(it.f_1)))
         .drawn(PanelAxis::UpToOne),
-    measure(More, "f_3", "F-score at 3 % of the diagonal", SHARE)
+    measure(Maximise, "f_3", "F-score at 3 % of the diagonal", SHARE)
         .from(Source::Shape(|it| Some(it.f_3))),
-    measure(Neither, "volume_error", "believed volume, too much", PERCENT)
+    measure(Undirected, "volume_error", "volume error", PERCENT)
         .from(Source::Shape(|it| it.volume_error)),
-    measure(Neither, "area_error", "believed area, too much", PERCENT)
+    measure(Undirected, "area_error", "area error", PERCENT)
         .from(Source::Shape(|it| Some(it.area_error))),
-    measure(More, "iou", "insides, intersection over union", SHARE)
+    measure(Maximise, "iou", "volume IoU", SHARE)
         .from(Source::Shape(|it| it.iou))
         .drawn(PanelAxis::UpToOne),
-    measure(
-        Neither,
-        "shape_coverage",
-        "share of the surface within two standard deviations",
-        SHARE,
-    )
-    .from(Source::Shape(|it| it.coverage))
-    .drawn(PanelAxis::UpToOne),
-    measure(Less, "path_m", "lateral travel", METRES)
+    measure(Undirected, "shape_coverage", "coverage within two standard deviations", SHARE)
+        .from(Source::Shape(|it| it.coverage))
+        .drawn(PanelAxis::UpToOne),
+    measure(Minimise, "path_m", "lateral travel", METRES)
         .from(Source::Trial(TrialRow::path_m))
         .drawn(PanelAxis::Linear),
-    measure(Less, "time_s", "time of the body", SECONDS).from(Source::Touch(|it| it.time_s)),
+    measure(Minimise, "time_s", "robot time", SECONDS).from(Source::Touch(|it| it.time_s)),
     VERIFICATION_RMSE,
-    measure(Less, "verification_nlpd", "NLPD at verification touches", PLAIN)
+    measure(Minimise, "verification_nlpd", "NLPD at verification touches", PLAIN)
         .from(Source::Trial(|row, n| predicted(row, n)?.1)),
     VERIFICATION_COVERAGE,
-    measure(Less, "verification_missed", "verification touches without contact", SHARE)
+    measure(Minimise, "verification_miss_share", "missed verification touches", SHARE)
         .from(Source::Trial(missed)),
     REPEATABILITY,
-    measure(Neither, "length_scale_x_m", "length scale along x", MM)
+    measure(Undirected, "length_scale_x_m", "length scale along x", MM)
         .from(Source::Touch(|it| length_scale(it, 0)))
         .aggregated(Aggregate::Median)
         .untabled(),
-    measure(Neither, "length_scale_z_m", "length scale along z", MM)
+    measure(Undirected, "length_scale_z_m", "length scale along z", MM)
         .from(Source::Touch(|it| length_scale(it, 1)))
         .aggregated(Aggregate::Median)
         .untabled(),
@@ -101,42 +91,41 @@ pub static MEASURES: &[Measure] = &[
 const CALIBRATED_COVERAGE: f64 = 0.95;
 
 /// R of Eq. 5, Yi et al. 2016.
-pub const R: Measure = measure(More, "r", "R (Eq. 5)", CORRELATION)
+pub const R: Measure = measure(Maximise, "r", "R (Eq. 5)", CORRELATION)
     .from(Source::Metrics(|it| Some(it.r)))
     .drawn(PanelAxis::UpToOne);
 
 /// R after subtracting the means.
-pub const CENTRED_R: Measure = measure(More, "centred_r", "centred R", CORRELATION)
+pub const CENTRED_R: Measure = measure(Maximise, "centred_r", "centred R", CORRELATION)
     .from(Source::Metrics(|it| Some(it.centred_r)))
     .drawn(PanelAxis::UpToOne);
 
 /// Root mean square error.
-pub const RMSE: Measure = measure(Less, "rmse_m", "RMSE", MM)
+pub const RMSE: Measure = measure(Minimise, "rmse_m", "RMSE", MM)
     .from(Source::Metrics(|it| Some(it.rmse_m)))
     .aggregated(Aggregate::Both)
     .drawn(PanelAxis::Log)
     .error();
 
 /// Root mean square error in the outer tenth of the zone.
-pub const EDGE_RMSE: Measure = measure(Less, "edge_rmse_m", "RMSE in the outer tenth", MM)
+pub const EDGE_RMSE: Measure = measure(Minimise, "edge_rmse_m", "RMSE in the outer tenth", MM)
     .from(Source::Metrics(|it| it.edge_rmse_m))
     .aggregated(Aggregate::Median)
     .drawn(PanelAxis::Log)
     .error();
 
-const UNREACHABLE_RMSE: Measure =
-    measure(Less, "unreachable_rmse_m", "RMSE where it does not reach", MM)
-        .from(Source::Metrics(|it| it.unreachable_rmse_m))
-        .aggregated(Aggregate::Median)
-        .untabled();
+const UNREACHABLE_RMSE: Measure = measure(Minimise, "unreachable_rmse_m", "RMSE, unreachable", MM)
+    .from(Source::Metrics(|it| it.unreachable_rmse_m))
+    .aggregated(Aggregate::Median)
+    .untabled();
 
 /// Share of the truth inside the 95 % band.
-pub const COVERAGE: Measure = measure(Neither, "coverage", "share in the 95 % band", SHARE)
+pub const COVERAGE: Measure = measure(Undirected, "coverage", "coverage of the 95 % band", SHARE)
     .from(Source::Metrics(|it| it.coverage))
     .drawn(PanelAxis::UpToOne);
 
 /// Chamfer distance between the estimated and the true surface of a whole object.
-pub const CHAMFER: Measure = measure(Less, "chamfer_m", "Chamfer distance", MM)
+pub const CHAMFER: Measure = measure(Minimise, "chamfer_m", "Chamfer distance", MM)
     .from(Source::Shape(|it| it.chamfer_m))
     .aggregated(Aggregate::Both)
     .drawn(PanelAxis::Log)
@@ -145,22 +134,21 @@ pub const CHAMFER: Measure = measure(Less, "chamfer_m", "Chamfer distance", MM)
 /// Root mean square error at verification touches, which the belief predicted and was not fitted
 /// to.
 pub const VERIFICATION_RMSE: Measure =
-    measure(Less, "verification_rmse_m", "RMSE at verification touches", MM)
+    measure(Minimise, "verification_rmse_m", "RMSE at verification touches", MM)
         .from(Source::Trial(|row, n| rmse(verified(row, n)?.filter_map(|touch| touch.error_m))))
         .aggregated(Aggregate::Both);
 
 /// Share of verification touches inside the 95 % band.
 pub const VERIFICATION_COVERAGE: Measure =
-    measure(Neither, "verification_coverage", "verification touches in the 95 % band", SHARE)
+    measure(Undirected, "verification_coverage", "coverage of verification touches", SHARE)
         .from(Source::Trial(|row, n| predicted(row, n)?.0));
 
 /// Root mean square difference between a touch and the one it repeats.
-pub const REPEATABILITY: Measure =
-    measure(Less, "repeatability_m", "difference of repeated touches", MM)
-        .from(Source::Trial(|row, n| {
-            rmse(verification(row, n)?.iter().filter_map(|touch| touch.difference_m))
-        }))
-        .aggregated(Aggregate::Both);
+pub const REPEATABILITY: Measure = measure(Minimise, "repeatability_m", "repeatability, RMS", MM)
+    .from(Source::Trial(|row, n| {
+        rmse(verification(row, n)?.iter().filter_map(|touch| touch.difference_m))
+    }))
+    .aggregated(Aggregate::Both);
 
 fn length_scale(touch: &TouchRow, axis: usize) -> Option<f64> {
     touch.fit.as_ref()?.hyperparameters.length_scales.get(axis).copied()
@@ -173,7 +161,7 @@ fn verification(row: &TrialRow, touches: u32) -> Option<&[VerificationRow]> {
 
 /// Verification touches at new places.
 fn verified(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &VerificationRow>> {
-    Some(verification(row, touches)?.iter().filter(|touch| touch.again.is_none()))
+    Some(verification(row, touches)?.iter().filter(|touch| touch.repeats.is_none()))
 }
 
 /// Coverage and NLPD of the errors at verification touches.
@@ -262,11 +250,11 @@ pub struct MeasureUnit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Less is better.
-    Less,
+    Minimise,
     /// More is better.
-    More,
+    Maximise,
     /// No direction; planners are not compared in it.
-    Neither,
+    Undirected,
 }
 
 /// Statistics reported over many trials.
@@ -366,7 +354,7 @@ impl Measure {
     pub fn value_after_touch(&self, touch: &TouchRow) -> Option<f64> {
         match self.source {
             Source::Metrics(of) => of(touch.metrics.as_ref()?),
-            Source::Outline(of) => of(touch.outline.as_ref()?),
+            Source::Outline(of) => of(touch.silhouette.as_ref()?),
             Source::Shape(of) => of(touch.shape.as_ref()?),
             Source::Touch(of) => of(touch),
             Source::Trial(_) => None,

@@ -16,7 +16,8 @@ pub struct SilhouetteMetrics {
     /// Intersection over union of the estimated (probability > ½) and the true surface area.
     pub iou: f64,
     /// Share of the zone's test points that are classified wrongly at probability ½.
-    pub wrong_share: f64,
+    #[serde(alias = "wrong_share")]
+    pub misclassified_share: f64,
     /// Test points in each tenth of the probability, and those of them with a surface; written
     /// after the last touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,7 +56,7 @@ impl SilhouetteMetrics {
         Some(Self {
             brier: tidy(squares / count as f64),
             iou: tidy(both / f64::max(either, 1.0)),
-            wrong_share: tidy(wrong / count as f64),
+            misclassified_share: tidy(wrong / count as f64),
             reliability: Some(reliability),
         })
     }

@@ -25,7 +25,8 @@ pub struct PairedComparison<'a> {
 pub fn comparisons<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<PairedComparison<'a>> {
     let mut found = Vec::new();
     for (planner, baseline) in pairs(experiment) {
-        for measure in MEASURES.iter().filter(|measure| measure.direction != Direction::Neither) {
+        for measure in MEASURES.iter().filter(|measure| measure.direction != Direction::Undirected)
+        {
             let paired = paired(experiment, rows, [planner, baseline], experiment.touches, measure);
             found.extend(paired.map(|paired| PairedComparison {
                 planner,
@@ -62,7 +63,7 @@ pub fn paired(
     let pairs: Vec<(f64, f64)> =
         values(planner).filter_map(|(trial, value)| Some((value, *theirs.get(&trial)?))).collect();
     let mut paired = PairedDifference::new(&pairs, experiment.seed)?;
-    if measure.direction == Direction::More {
+    if measure.direction == Direction::Maximise {
         paired.won = 1.0 - paired.won;
     }
     Some(paired)

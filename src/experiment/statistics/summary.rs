@@ -61,9 +61,9 @@ pub struct EventCounts {
     /// Aborted touches: force limit exceeded, or contact not located.
     pub overloads: usize,
     /// Plans that fell back because the belief had no variance at the best place.
-    pub collapsed: usize,
+    pub no_variance: usize,
     /// Plans that fell back because they repeated a target.
-    pub repeated: usize,
+    pub duplicate_target: usize,
 }
 
 /// Curve of one planner, from its first fit to its last touch.
@@ -144,8 +144,8 @@ pub fn events(rows: &[TrialRow], planner: &str) -> EventCounts {
         events.failures += usize::from(row.failure.is_some());
         events.misses += count(|touch| touch.contact.is_none() && !touch.overload);
         events.overloads += count(|touch| touch.overload);
-        events.collapsed += count(|touch| touch.stall == Some(Fallback::Collapsed));
-        events.repeated += count(|touch| touch.stall == Some(Fallback::Repeated));
+        events.no_variance += count(|touch| touch.fallback == Some(Fallback::NoVariance));
+        events.duplicate_target += count(|touch| touch.fallback == Some(Fallback::DuplicateTarget));
     }
     events
 }

@@ -14,7 +14,7 @@ pub const RESOLVED: &str = "resolved.toml";
 pub fn resolved(experiment: &Experiment) -> String {
     let mut text = toml::to_string(experiment).unwrap_or_default();
     // Around an object, `[gp]` is the table of that belief.
-    if experiment.scene.around.is_some()
+    if experiment.scene.whole_object.is_some()
         && let (Ok(mut whole), Ok(Ok(belief))) = (
             text.parse::<DocumentMut>(),
             toml::to_string(&experiment.space).map(|text| text.parse::<DocumentMut>()),

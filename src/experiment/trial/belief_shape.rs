@@ -86,7 +86,7 @@ fn colours(sds: &[f64]) -> Vec<ColorRGBA> {
 
 fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut Marker) {
     let places = zone.grid(PER_SIDE);
-    let known = belief.presence().silhouette().is_likely(places.iter().map(Vec::as_slice));
+    let known = belief.surface_evidence().silhouette().is_likely(places.iter().map(Vec::as_slice));
     let predictions = posterior.predict(places.iter().map(Vec::as_slice));
     let sds: Vec<f64> =
         predictions.iter().map(|prediction| prediction.variance.max(0.0).sqrt()).collect();

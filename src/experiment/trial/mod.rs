@@ -109,11 +109,11 @@ fn run_touches(
             tip: swept.map(|swept| swept.p_wt.coords.into()),
             time_s: probe.time_s(),
             planned_sd_m: plan.sd_m,
-            stall: plan.fallback,
+            fallback: plan.fallback,
             fit: None,
             jitter: 0.0,
             metrics: None,
-            outline: None,
+            silhouette: None,
             shape: None,
         };
         let fitted = match count >= experiment.initial_touches {
@@ -146,8 +146,8 @@ fn evaluate(
                 row.metrics = field.surface().and_then(|it| truth.truth.compare(it));
             }
             // Only the last row contains the reliability.
-            row.outline = SilhouetteMetrics::of(field.presence(), &truth.truth);
-            if let Some(outline) = row.outline.as_mut().filter(|_| count < experiment.touches) {
+            row.silhouette = SilhouetteMetrics::of(field.surface_evidence(), &truth.truth);
+            if let Some(outline) = row.silhouette.as_mut().filter(|_| count < experiment.touches) {
                 outline.reliability = None;
             }
         }

@@ -121,7 +121,8 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::TouchMessage<'_>, F
         (None, false) => "miss",
     };
     let json = serde_json::to_string(row);
-    let json = json.map_err(|error| Fault::Unrecorded { time_s, message: error.to_string() })?;
+    let json =
+        json.map_err(|error| Fault::RecordingFailed { time_s, message: error.to_string() })?;
     Ok(recording::TouchMessage {
         touch,
         time_s,

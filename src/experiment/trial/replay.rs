@@ -111,7 +111,7 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
     let is_interrupted = recorded.ending.as_ref().is_some_and(|ending| ending.is_interrupted);
     let difference = match (differs, probe.fault) {
         (Some(difference), _) => Some(difference),
-        (_, Some(Fault::Differs { tick, time_s, joint, recorded: then, now })) => {
+        (_, Some(Fault::ReplayMismatch { tick, time_s, joint, recorded: then, now })) => {
             let number = |value: f64| Some(value).filter(|value| value.is_finite());
             Some(Difference::Command {
                 touch: touches + 1,

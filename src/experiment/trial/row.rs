@@ -53,7 +53,7 @@ pub struct TouchRow {
     /// for contacts if used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<[f64; 3]>,
-    /// Time of the body at the touch's end, s since its start; omitted without motion.
+    /// Simulator or robot time at the touch's end, s since its start; omitted without motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
     /// Posterior standard deviation at the target when planned, conditioned on unreached targets;
@@ -61,8 +61,8 @@ pub struct TouchRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub planned_sd_m: Option<f64>,
     /// Reason why the planner used its fallback.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stall: Option<Fallback>,
+    #[serde(default, alias = "stall", skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<Fallback>,
     /// Fit after this touch; none before the last initial touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<Fit>,
@@ -73,8 +73,8 @@ pub struct TouchRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metrics: Option<Metrics>,
     /// Errors of the estimated silhouette; omitted where the object fills its zone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outline: Option<SilhouetteMetrics>,
+    #[serde(default, alias = "outline", skip_serializing_if = "Option::is_none")]
+    pub silhouette: Option<SilhouetteMetrics>,
     /// Errors of the estimated closed surface; omitted for a zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<ShapeMetrics>,
@@ -86,8 +86,8 @@ pub struct VerificationRow {
     /// Target of the touch, as in the trial's touches.
     pub target: Target,
     /// Number of the repeated touch, from 1; none for a touch at a new place.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub again: Option<u32>,
+    #[serde(default, alias = "again", skip_serializing_if = "Option::is_none")]
+    pub repeats: Option<u32>,
     /// Predicted height at the target; around an object, predicted distance of contact before the
     /// aimed point, 0 without a prediction.
     pub predicted_m: f64,

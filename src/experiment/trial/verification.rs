@@ -52,7 +52,7 @@ pub(super) fn verify(
         let before = error.zip(first.and_then(|first| signed_distance(belief, &first)));
         rows.push(VerificationRow {
             target,
-            again: again.map(|at| at as u32 + 1),
+            repeats: again.map(|at| at as u32 + 1),
             predicted_m,
             predicted_sd_m,
             contact: p_wc.map(|p_wc| p_wc.coords.into()),

@@ -46,7 +46,7 @@ use crate::experiment::measure::metrics::{Metrics, calibration, rmse};
 use crate::sim::Environment;
 use crate::sim::reach;
 use palpate_explore::task::Zone;
-use palpate_geometry::decimate::coarse;
+use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::Posterior;
 use std::sync::Arc;
@@ -96,7 +96,7 @@ impl Truth {
     pub fn whole_object(mesh: Option<&Mesh>) -> Self {
         let kept = mesh.map(|mesh| match mesh.triangles().len() > TRIANGLES {
             true => {
-                let (vertices, triangles) = coarse(mesh, TRIANGLES);
+                let (vertices, triangles) = decimate(mesh, TRIANGLES);
                 Mesh::new(&vertices, &triangles).map_or_else(|_| mesh.clone(), |(mesh, _)| mesh)
             }
             false => mesh.clone(),

@@ -20,11 +20,11 @@ pub struct ScanTruth {
     pub scan: PathBuf,
     /// Minimum number of contacts within `within_m` of a test point that has a height.
     #[serde(default = "neighbours")]
-    pub neighbours: usize,
+    pub contacts_min: usize,
     /// Search radius around a test point, in the zone's plane (default: three times the median
     /// nearest-neighbour distance).
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub within_m: Option<f64>,
+    pub search_radius_m: Option<f64>,
 }
 
 /// Default number of neighbours.
@@ -41,9 +41,9 @@ impl Validate for ScanTruth {
     fn check(&self, rules: &mut Rules) {
         let named = !self.scan.as_os_str().is_empty();
         rules.require("scan", "\"\"", named, || "the name of a cloud.csv or cloud.ply".into());
-        let enough = (3..=1000).contains(&self.neighbours);
-        rules.require("neighbours", self.neighbours, enough, || "3 to 1000".into());
-        rules.optional_number("within_m", self.within_m, 1e-6..=1.0);
+        let enough = (3..=1000).contains(&self.contacts_min);
+        rules.require("neighbours", self.contacts_min, enough, || "3 to 1000".into());
+        rules.optional_number("within_m", self.search_radius_m, 1e-6..=1.0);
     }
 }
 
@@ -65,10 +65,11 @@ impl ScanTruth {
     ) -> Result<(Truth, usize, Option<f64>), InputError> {
         let contact = |p_w: &Point3<f64>| (flat(&zone.place(p_w)), zone.height_m(p_w));
         let contacts: Vec<([f64; 2], f64)> = read_cloud(&self.scan)?.iter().map(contact).collect();
-        let within_m = self.within_m.unwrap_or_else(|| RADIUS_SPACINGS * spacing_m(&contacts));
+        let within_m =
+            self.search_radius_m.unwrap_or_else(|| RADIUS_SPACINGS * spacing_m(&contacts));
         let places = zone.grid(per_side);
         let height = |place: [f64; 2], without| {
-            height_m(&contacts, place, (within_m, self.neighbours), without)
+            height_m(&contacts, place, (within_m, self.contacts_min), without)
         };
         let heights_m: Vec<Option<f64>> =
             places.iter().map(|place| height(flat(place), None)).collect();

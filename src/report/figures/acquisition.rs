@@ -55,7 +55,7 @@ fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f6
 
 /// Returns the place of the largest deviation: that of the plan, or else of `read`.
 fn maximum<'a>(replay: &'a Replay, read: &'a [MapValue]) -> Option<&'a [f64]> {
-    let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.stall.is_none());
+    let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.fallback.is_none());
     let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let planned = next.and_then(|next| next.target.place());
     planned.or_else(|| largest().map(|(place, ..)| place.as_slice()))

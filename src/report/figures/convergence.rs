@@ -45,7 +45,7 @@ type Curve = (&'static str, Vec<CurvePoint>);
 type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    if !run.truth.is_known() && run.experiment.scene.around.is_none() {
+    if !run.truth.is_known() && run.experiment.scene.whole_object.is_none() {
         return Ok(None);
     }
     let planners = &run.experiment.planners;

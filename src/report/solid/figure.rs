@@ -9,7 +9,7 @@ use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, MISS, touch_entries};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
-use palpate_geometry::decimate::coarse;
+use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 
 const PANEL: (f64, f64) = (236.0, 258.0);
@@ -34,7 +34,7 @@ pub fn figure(
     truth: Option<&Mesh>,
     counts: &[u32],
 ) -> Option<String> {
-    let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
+    let truth = truth.map(|mesh| decimate(mesh, TRUTH_TRIANGLES));
     let frames = sequences.iter().flat_map(|sequence| &sequence.frames);
     let drawn: Vec<&SurfaceFrame> =
         frames.filter(|frame| counts.contains(&frame.touches)).collect();

@@ -7,7 +7,7 @@ use crate::report::legend::{FigureLayout, Swatch};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
-use palpate_geometry::decimate::coarse;
+use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::solids::Triangles;
 
@@ -31,7 +31,7 @@ pub fn picture(
     spots: &[(Point3<f64>, bool)],
     sides: &[(Point3<f64>, bool)],
 ) -> String {
-    let drawn = coarse(mesh, TRUTH_TRIANGLES);
+    let drawn = decimate(mesh, TRUTH_TRIANGLES);
     let is_reached = triangles_reached(&drawn, spots);
     let marks = sides.iter().map(|(p_w, _)| p_w.coords);
     let points: Vec<Vector3<f64>> = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).collect();

@@ -11,7 +11,7 @@ use anyhow::ensure;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Point3, Vector3};
-use palpate_geometry::decimate::coarse;
+use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::solids::Triangles;
@@ -45,7 +45,7 @@ pub fn section(
     let shown: Vec<&PlannerSurfaces> =
         sequences.iter().filter(|sequence| !sequence.frames.is_empty()).collect();
     let Some(first) = shown.first() else { return Ok(String::new()) };
-    let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
+    let truth = truth.map(|mesh| decimate(mesh, TRUTH_TRIANGLES));
     let Some(data) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
     let initial = first.touches.iter().filter(|touch| touch.is_initial).count();
     let green = match truth {

@@ -48,7 +48,7 @@ pub fn comparisons(run: &Run, found: &[PairedComparison]) -> Vec<Table> {
 /// Returns the note that explains the cells of [`comparisons`].
 pub fn comparisons_note(run: &Run) -> String {
     let more: Vec<&str> = measures_with_columns(&run.rows)
-        .filter(|measure| measure.direction == Direction::More)
+        .filter(|measure| measure.direction == Direction::Maximise)
         .map(|measure| measure.title)
         .collect();
     format!(
@@ -152,7 +152,7 @@ fn effort(equal: &EqualError, most: u32) -> Cell {
         shown(&equal.ratio, &ratio),
         shown(&equal.path_ratio, &ratio),
     );
-    Cell::from(words).with_verdict(equal.ratio.interval, 1.0, Direction::Less)
+    Cell::from(words).with_verdict(equal.ratio.interval, 1.0, Direction::Minimise)
 }
 
 fn touches(count: f64, most: u32) -> String {

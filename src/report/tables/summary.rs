@@ -106,8 +106,8 @@ pub fn claims(run: &Run) -> Table {
             let once = |words: &str| Cell::from(if i == 0 { words } else { "" });
             let kind = if measure.aggregate.has_median() { "median" } else { "mean" };
             let start = [
-                once(&claim.place),
-                once(&claim.says),
+                once(&claim.source),
+                once(&claim.text),
                 format!("{} touches", claim.touches).into(),
                 format!("{kind} {}", titled(measure)).into(),
             ];
@@ -141,10 +141,10 @@ fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
         (events.misses, "touches without contact"),
         (events.overloads, "touches aborted: force limit, or no contact location"),
         (
-            events.collapsed,
+            events.no_variance,
             "random targets instead of planned ones: no variance left at the best one",
         ),
-        (events.repeated, "random targets instead of planned ones: repeated target"),
+        (events.duplicate_target, "random targets instead of planned ones: repeated target"),
     ];
     let told: Vec<String> = counts
         .iter()

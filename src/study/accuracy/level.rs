@@ -67,7 +67,7 @@ const fn shell(cells: [usize; 2], period_s: f64) -> FidelityLevel {
 /// their distances from it show whether they converge. They start with ticks shorter than a tactile
 /// frame, because longer ticks see every frame at the instant of sampling.
 pub const LEVELS: &[FidelityLevel] = &[
-    FidelityLevel::new(SimulatorKind::Cast, SensorModel::Rigid, 0, 0.01),
+    FidelityLevel::new(SimulatorKind::Swept, SensorModel::Rigid, 0, 0.01),
     rigid(Collision::Hull),
     rigid(Collision::HeightField),
     rigid(Collision::Sdf),
@@ -138,7 +138,7 @@ impl FidelityLevel {
     /// Returns `scene` with this level's changes; other settings are kept.
     pub fn apply(&self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
-        scene.body = self.body;
+        scene.simulator = self.body;
         scene.touch.period_s = Some(self.period_s);
         let solver = &mut scene.solver;
         if self.body == SimulatorKind::Dynamic {
@@ -160,7 +160,7 @@ impl FidelityLevel {
         match (&mut effects.skin, self.shell) {
             (Some(skin), Some(cells)) => {
                 skin.model = SkinModel::Shell;
-                [skin.along, skin.around] = cells;
+                [skin.cells_along, skin.cells_around] = cells;
             }
             (Some(skin), None) => {
                 skin.model = SkinModel::Columns;
@@ -177,7 +177,7 @@ impl FidelityLevel {
     /// Name in tables.
     pub fn name(&self) -> String {
         let mut words = vec![self.body.name().to_string()];
-        if self.body != SimulatorKind::Cast {
+        if self.body != SimulatorKind::Swept {
             words.push(self.senses.name().into());
             words.extend(self.collision.map(|collision| collision.name().into()));
             words.extend((self.samples > 0).then(|| self.samples.to_string()));

@@ -17,8 +17,10 @@ pub fn switches() -> Vec<EffectSwitch<Scene>> {
     #[cfg(feature = "mujoco")]
     all.push(EffectSwitch::new(
         "masses",
-        |scene: &Scene| scene.body == SimulatorKind::Dynamic,
-        |scene, on| scene.body = if on { SimulatorKind::Dynamic } else { SimulatorKind::Kinematic },
+        |scene: &Scene| scene.simulator == SimulatorKind::Dynamic,
+        |scene, on| {
+            scene.simulator = if on { SimulatorKind::Dynamic } else { SimulatorKind::Kinematic }
+        },
     ));
     all
 }
@@ -28,15 +30,15 @@ pub fn switches() -> Vec<EffectSwitch<Scene>> {
 pub fn toggle(scene: &Scene, switch: &EffectSwitch<Scene>) -> Scene {
     let mut scene = scene.clone();
     let (was_soft, was_on) = (scene.effects.skin.is_some(), switch.is_on(&scene));
-    let had_masses = scene.body == SimulatorKind::Dynamic;
+    let had_masses = scene.simulator == SimulatorKind::Dynamic;
     switch.set(&mut scene, !was_on);
     scene.effects.remove_orphans();
     // A finger without its skin is a rigid hull; body `cast` is the simplest simulation of its
     // touches.
     if was_soft && scene.effects.skin.is_none() {
-        scene.body = SimulatorKind::Cast;
+        scene.simulator = SimulatorKind::Swept;
     }
-    let Scene { body, effects, solver, .. } = &mut scene;
+    let Scene { simulator: body, effects, solver, .. } = &mut scene;
     if had_masses && *body != SimulatorKind::Dynamic {
         effects.collision = None;
         (solver.collision, solver.sdf) = (None, None);

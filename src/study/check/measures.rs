@@ -62,7 +62,7 @@ pub static CHECK_MEASURES: &[CheckMeasure] = &[
         share(row, of, |touch| touch.contact.is_none())
     }),
     CheckMeasure::share("stalled", "share of fallback plans", |row, of| {
-        share(row, of, |touch| touch.stall.is_some())
+        share(row, of, |touch| touch.fallback.is_some())
     }),
 ];
 

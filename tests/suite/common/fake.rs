@@ -11,7 +11,7 @@ pub type Break = fn(u64, &mut Reading);
 
 /// Behaviour of a fake body.
 #[derive(Default)]
-pub struct World {
+pub struct FakeScene {
     pub real_time: bool,
     /// First tick of a fault, and the fault.
     pub breaks: Option<(u64, Break)>,
@@ -25,7 +25,7 @@ pub struct World {
     pub dies_at: Option<u64>,
 }
 
-impl World {
+impl FakeScene {
     pub fn real() -> Self {
         Self { real_time: true, ..Self::default() }
     }
@@ -69,14 +69,14 @@ impl Fake {
 pub struct FakeBody {
     chain: Chain,
     capabilities: Capabilities,
-    world: World,
+    world: FakeScene,
     log: Fake,
     tick: u64,
     reading: Reading,
 }
 
 /// Creates a body with ticks of 2 ms.
-pub fn body_of(chain: &Chain, world: World) -> (FakeBody, Fake) {
+pub fn body_of(chain: &Chain, world: FakeScene) -> (FakeBody, Fake) {
     let log = Fake::default();
     let mut capabilities = Capabilities::simulated(chain, 0.002);
     capabilities.real_time = world.real_time;

@@ -114,7 +114,7 @@ impl Transport for Memory {
         call: u64,
         answer: TriggerResponse,
     ) -> Result<(), InputError> {
-        let delivery = Delivery::Answered { service: service.clone(), answer };
+        let delivery = Delivery::Response { service: service.clone(), answer };
         self.to(|end| end.id == call, &delivery);
         Ok(())
     }

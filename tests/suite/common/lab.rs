@@ -148,13 +148,13 @@ impl TwinProcess {
     }
 
     /// Waits for an event and returns its time, as [`last`](Self::last) does.
-    pub fn wait_for(&self, is_it: impl Fn(&Value) -> bool, patience_s: f64) -> f64 {
+    pub fn wait_for(&self, is_it: impl Fn(&Value) -> bool, connect_timeout_s: f64) -> f64 {
         let begun = Instant::now();
         loop {
             if let Some(at_s) = self.last(&is_it) {
                 return at_s;
             }
-            assert!(begun.elapsed().as_secs_f64() < patience_s, "{:?}", self.events);
+            assert!(begun.elapsed().as_secs_f64() < connect_timeout_s, "{:?}", self.events);
             sleep(Duration::from_millis(5));
         }
     }

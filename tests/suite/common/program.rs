@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 pub const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-pub const SCENE: &str = "body = \"cast\"
+pub const SCENE: &str = "simulator = \"swept\"
 
 [object]
 mesh = \"mesh.obj\"

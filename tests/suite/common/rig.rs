@@ -12,7 +12,7 @@ use palpate::robot::arm::Chain;
 use palpate::ros::arm::RosArm;
 use palpate::ros::message::TriggerResponse;
 use palpate::ros::server::failure::by_name;
-use palpate::ros::server::serve::{Event, Injection, Twin};
+use palpate::ros::server::serve::{Event, Injection, SimulatedRobotServer};
 use palpate::ros::settings::BackendSettings;
 use palpate::ros::topics::{Service, Side, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
@@ -181,9 +181,15 @@ impl Rig {
         let settings_of_arm = settings.clone();
         let thread = std::thread::spawn(move || {
             let connect = Box::new(move || Ok(Box::new(end.end(Side::Arm)) as _));
-            let mut twin =
-                Twin::new(Box::new(body), &chain, &settings_of_arm, connect, injections, 0)
-                    .unwrap();
+            let mut twin = SimulatedRobotServer::new(
+                Box::new(body),
+                &chain,
+                &settings_of_arm,
+                connect,
+                injections,
+                0,
+            )
+            .unwrap();
             twin.run(&stopped, &mut |at_s, event| told.lock().unwrap().push((at_s, event)))
                 .unwrap();
         });
@@ -280,10 +286,10 @@ impl Drop for Rig {
 
 /// Settings for busy machines: age limits are not under test.
 pub fn patient() -> BackendSettings {
-    let mut settings = BackendSettings { patience_s: 20.0, ..BackendSettings::default() };
+    let mut settings = BackendSettings { connect_timeout_s: 20.0, ..BackendSettings::default() };
     let topics = &mut settings.topics;
-    (topics.joints.age_s, topics.wrench.age_s, topics.tactile.age_s) = (0.4, 0.4, 0.4);
-    (topics.status.age_s, topics.command.age_s) = (1.0, 0.3);
-    settings.interlocks.wrench_silence_s = 0.5;
+    (topics.joints.max_age_s, topics.wrench.max_age_s, topics.tactile.max_age_s) = (0.4, 0.4, 0.4);
+    (topics.status.max_age_s, topics.command.max_age_s) = (1.0, 0.3);
+    settings.interlocks.wrench_timeout_s = 0.5;
     settings
 }

@@ -19,7 +19,7 @@ initial_touches = 3
 touches = 12
 grid = 41
 [scene]
-body = "function"
+simulator = "analytic"
 function = "toy"
 zone = { x_m = [-2.0, 2.0] }
 "#;
@@ -33,7 +33,7 @@ touches = 20
 grid = 21
 report = { touch_counts = [5, 12, 20] }
 [scene]
-body = "cast"
+simulator = "swept"
 zone = { x_m = [-0.05, 0.05], z_m = [-0.07, 0.07], datum_y_m = -0.6 }
 object = { mesh = "none.obj" }
 "#;
@@ -111,7 +111,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
     };
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
-        outline: None,
+        silhouette: None,
         shape: None,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
         tip: height_m(&target).is_none().then(|| tip_behind(zone, &target)),
@@ -120,7 +120,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         normal: None,
         time_s: None,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
-        stall: None,
+        fallback: None,
         fit: is_fitted.then_some(fit),
         jitter: 0.0,
         metrics: is_fitted.then_some(metrics),

@@ -98,7 +98,7 @@ pub const APPROACH_M_S: f64 = 0.015;
 /// A soft finger on a stage with masses.
 pub fn with_masses(step_s: f64) -> Scene {
     let mut scene = wall::scene(0.002);
-    scene.body = SimulatorKind::Dynamic;
+    scene.simulator = SimulatorKind::Dynamic;
     scene.solver.step_s = step_s;
     scene.touch.approach_m_s = APPROACH_M_S;
     scene

@@ -175,7 +175,7 @@ fn release(depth_mm: f64, period_s: f64) -> Outcome {
 fn held(count: f64, period_s: f64) -> Outcome {
     let mut effects = shell();
     if let Some(skin) = &mut effects.skin {
-        (skin.along, skin.around) = (12, 8);
+        (skin.cells_along, skin.cells_around) = (12, 8);
     }
     with_finger(&effects, |setup| {
         let (mut state, motion) = (setup.untouched(), setup.at(1e-3, 0.0));

@@ -144,7 +144,7 @@ impl WallPress {
         see: &mut dyn FnMut(&Reading),
     ) -> Result<(), Fault> {
         let until_s = self.way_m / APPROACH_M_S + pressed_s;
-        let chain = self.environment.chain().ok_or(Fault::Lost { time_s: 0.0 })?;
+        let chain = self.environment.chain().ok_or(Fault::NoResponse { time_s: 0.0 })?;
         let period_s = body.capabilities().period_s;
         let unusable = |_| Fault::Refused { values: Vec::new() };
         let mut control = Controller::new(chain, period_s).map_err(unusable)?;
@@ -296,7 +296,7 @@ fn long(ticks: f64) -> Outcome {
         return Outcome::Wrong("nothing to press".into());
     };
     let run = || -> Result<Outcome, Fault> {
-        let lost = Fault::Lost { time_s: 0.0 };
+        let lost = Fault::NoResponse { time_s: 0.0 };
         let models =
             CompiledModels::with_step(&press.environment, 0.002).map_err(|_| lost.clone())?;
         let mut body = DynamicBackend::new(&press.environment, &models)?;

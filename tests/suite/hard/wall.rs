@@ -131,9 +131,9 @@ pub fn scene(period_s: f64) -> Scene {
     let mut effects = Effects { skin: Some(Default::default()), ..Effects::default() };
     effects.fluid = Some(Default::default());
     Scene {
-        body: SimulatorKind::Kinematic,
+        simulator: SimulatorKind::Kinematic,
         function: None,
-        around: None,
+        whole_object: None,
         zone: Some(Zone::new([-0.05, 0.05], Some([-0.05, 0.05]))),
         object: None,
         finger: Finger::default(),
@@ -141,6 +141,7 @@ pub fn scene(period_s: f64) -> Scene {
         effects,
         touch: TouchSettings { period_s: Some(period_s), ..TouchSettings::default() },
         solver: Default::default(),
+        former_names: Vec::new(),
     }
 }
 

@@ -59,7 +59,7 @@ pub enum Fault {
     /// A movement within reach exceeded its timeout: an obstacle blocks it, or the joints do not
     /// follow.
     #[error("at {time_s:.3} s the movement to {goal} timed out; joints at {q:.3?}")]
-    Late {
+    Timeout {
         /// Target of the movement.
         goal: &'static str,
         /// Time since reset, s.
@@ -72,7 +72,7 @@ pub enum Fault {
         "at {time_s:.3} s no collision-free path from joints {q:.3?} to the approach or home; \
          jog the arm to arm.home_deg, or skip this approach"
     )]
-    NoWay {
+    NoPath {
         /// Time since reset, s.
         time_s: f64,
         /// Joint positions, rad or m.
@@ -80,7 +80,7 @@ pub enum Fault {
     },
     /// A recording cannot be written; motion stops, since it would not be recorded.
     #[error("cannot write the recording at {time_s:.3} s: {message}")]
-    Unrecorded {
+    RecordingFailed {
         /// Time since reset, s.
         time_s: f64,
         /// Message of the operating system.
@@ -91,7 +91,7 @@ pub enum Fault {
         "tick {tick} after {time_s:.3} s: the command of joint {} is {now:?}, in the recording {recorded:?}",
         joint + 1
     )]
-    Differs {
+    ReplayMismatch {
         /// Ticks since the reset.
         tick: u64,
         /// Time of the reading that the command was computed from.
@@ -111,7 +111,7 @@ pub enum Fault {
     },
     /// A replayed recording has no reset with this seed.
     #[error("the recording has no reset with seed {seed}")]
-    NeverReset {
+    NoSuchReset {
         /// The seed.
         seed: u64,
     },
@@ -131,7 +131,7 @@ pub enum Fault {
     },
     /// The backend stopped responding.
     #[error("no answer since {time_s:.3} s")]
-    Lost {
+    NoResponse {
         /// Time of its last response.
         time_s: f64,
     },

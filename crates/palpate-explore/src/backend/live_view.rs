@@ -52,7 +52,7 @@ impl LiveView {
 
 /// A backend that publishes every reading and runs at no more than `speed` times real time. Its
 /// readings, including their time, are those of the wrapped backend, whatever the clock says.
-pub struct Watched {
+pub struct ViewedBackend {
     inner: Box<dyn Backend>,
     sight: LiveView,
     /// Simulated seconds per second of the clock.
@@ -61,7 +61,7 @@ pub struct Watched {
     since: Option<(Instant, f64)>,
 }
 
-impl Watched {
+impl ViewedBackend {
     /// Wraps `inner` so that `speed` of its seconds pass per second of the clock.
     pub fn new(inner: Box<dyn Backend>, speed: f64) -> (Self, LiveView) {
         let sight = LiveView::default();
@@ -69,7 +69,7 @@ impl Watched {
     }
 }
 
-impl Backend for Watched {
+impl Backend for ViewedBackend {
     fn capabilities(&self) -> &Capabilities {
         self.inner.capabilities()
     }

@@ -166,7 +166,7 @@ impl HeightField {
         let (mut posterior, left_sd) = match self.inducing() {
             None => (Posterior::new(kernel, hyperparameters, self.contacts.clone())?, None),
             Some(most) => {
-                let InducingPosterior { posterior, left_sd } =
+                let InducingPosterior { posterior, nystrom_residual_sd: left_sd } =
                     Posterior::with_inducing_points(most, kernel, hyperparameters, &self.contacts)?;
                 (posterior, Some(left_sd))
             }
@@ -265,7 +265,7 @@ impl HeightField {
     }
 
     /// Evidence of the touches for the presence of a surface.
-    pub fn presence(&self) -> &SurfaceEvidence {
+    pub fn surface_evidence(&self) -> &SurfaceEvidence {
         &self.presence
     }
 

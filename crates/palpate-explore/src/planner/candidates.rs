@@ -88,7 +88,10 @@ impl<'a> Candidates<'a> {
             let aim = free_aim(self.belief, &mut field, place)?;
             Some(Plan { sd_m: Some(candidate.offset_m), ..Plan::at(aim) })
         });
-        free.unwrap_or_else(|| Plan { fallback: Some(Fallback::Blocked), ..Plan::at(*anywhere) })
+        free.unwrap_or_else(|| Plan {
+            fallback: Some(Fallback::Unreachable),
+            ..Plan::at(*anywhere)
+        })
     }
 }
 

@@ -58,11 +58,14 @@ impl Plan {
 #[serde(rename_all = "snake_case")]
 pub enum Fallback {
     /// The variance at the best place is below rounding error.
-    Collapsed,
+    #[serde(alias = "collapsed")]
+    NoVariance,
     /// The target would repeat an earlier one.
-    Repeated,
+    #[serde(alias = "repeated")]
+    DuplicateTarget,
     /// No approach to any candidate on a whole object is free.
-    Blocked,
+    #[serde(alias = "blocked")]
+    Unreachable,
 }
 
 /// Error of a planner that returned no target.

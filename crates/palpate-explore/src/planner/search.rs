@@ -9,7 +9,7 @@ use super::settings::PlanningSettings;
 use super::sobol;
 use crate::belief::HeightField;
 use crate::task::Zone;
-use palpate_gp::math::bfgs::{BfgsOptions, Climb};
+use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::Bounds;
 use palpate_gp::posterior::Scratch;
@@ -109,10 +109,10 @@ impl Search {
             first_step: FIRST_STEP,
             gain: 0.0,
             relative_gain: RELATIVE_GAIN,
-            budget: self.settings.lbfgs_evaluations,
+            budget: self.settings.bfgs_evaluations,
         };
-        let start = |start: Vec<f64>| Climb::new(bounds, &start, None, manner);
-        let mut climbs: Vec<Climb> = hills(zone, seen).into_iter().map(start).collect();
+        let start = |start: Vec<f64>| BfgsClimb::new(bounds, &start, None, manner);
+        let mut climbs: Vec<BfgsClimb> = hills(zone, seen).into_iter().map(start).collect();
         loop {
             let asked: Vec<Vec<f64>> =
                 climbs.iter().filter_map(|climb| climb.requested().map(<[f64]>::to_vec)).collect();
@@ -221,9 +221,9 @@ fn fallback_reason(belief: &HeightField, place: &[f64]) -> Option<Fallback> {
     let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
     let same = |target: &Vec<f64>| belief.zone().distance(target, place) < SAME_TARGET;
     if variance(belief, place) <= lost_sd * lost_sd {
-        Some(Fallback::Collapsed)
+        Some(Fallback::NoVariance)
     } else if belief.targets().iter().any(same) {
-        Some(Fallback::Repeated)
+        Some(Fallback::DuplicateTarget)
     } else {
         None
     }

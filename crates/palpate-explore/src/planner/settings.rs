@@ -11,7 +11,7 @@ pub struct PlanningSettings {
     /// DIRECT evaluations of the acquisition function per plan.
     pub direct_evaluations: u32,
     /// BFGS evaluations per climb that refines a plan.
-    pub lbfgs_evaluations: u32,
+    pub bfgs_evaluations: u32,
     /// Settings of `integrated_variance`.
     pub integrated_variance: IntegratedVarianceSettings,
     /// Settings of `silhouette`.
@@ -32,7 +32,7 @@ impl Default for PlanningSettings {
     fn default() -> Self {
         Self {
             direct_evaluations: 500,
-            lbfgs_evaluations: 50,
+            bfgs_evaluations: 50,
             integrated_variance: Default::default(),
             silhouette: Default::default(),
             oracle: Default::default(),
@@ -70,14 +70,14 @@ pub struct SilhouetteSettings {
     /// Travel distance along the zone that costs as much time as one touch; values are then per
     /// unit time.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub touch_way_m: Option<f64>,
+    pub travel_cost_m: Option<f64>,
 }
 
 impl Default for SilhouetteSettings {
     /// Returns the defaults of `silhouette`. Heuristic: twice as many candidates bring no gain on
     /// the suite.
     fn default() -> Self {
-        Self { places: 256, candidates: 500, touch_way_m: None }
+        Self { places: 256, candidates: 500, travel_cost_m: None }
     }
 }
 
@@ -136,28 +136,32 @@ impl Default for TravelSettings {
 #[serde(default, deny_unknown_fields)]
 pub struct UcbSettings {
     /// Number κ of standard deviations added to the mean.
-    pub sds: f64,
+    pub kappa: f64,
 }
 
 impl Default for UcbSettings {
     /// Returns the defaults of `ucb`. Heuristic: about the upper end of the 95 % band.
     fn default() -> Self {
-        Self { sds: 2.0 }
+        Self { kappa: 2.0 }
     }
 }
 
 impl Validate for PlanningSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("direct_evaluations", self.direct_evaluations.into(), 1.0..=1e6);
-        rules.number("lbfgs_evaluations", self.lbfgs_evaluations.into(), 1.0..=1e6);
+        rules.number("bfgs_evaluations", self.bfgs_evaluations.into(), 1.0..=1e6);
         let places = self.integrated_variance.places;
         rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
         rules.number("silhouette.places", self.silhouette.places.into(), 1.0..=65536.0);
         rules.number("silhouette.candidates", self.silhouette.candidates.into(), 1.0..=65536.0);
-        rules.optional_number("silhouette.touch_way_m", self.silhouette.touch_way_m, 1e-6..=1e6);
+        rules.optional_number(
+            "silhouette.travel_cost_m",
+            self.silhouette.travel_cost_m,
+            1e-6..=1e6,
+        );
         rules.number("oracle.candidates", self.oracle.candidates.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);
-        rules.number("ucb.sds", self.ucb.sds, 0.0..=1e3);
+        rules.number("ucb.kappa", self.ucb.kappa, 0.0..=1e3);
     }
 }

@@ -5,7 +5,7 @@
 //! suite's tuning objects the error is 0.904 of that of a Sobol sequence; with the probability
 //! itself and without optimism it is 0.937.
 //!
-//! With `planning.silhouette.touch_way_m`, the reduction is divided by time: a touch takes as long
+//! With `planning.silhouette.travel_cost_m`, the reduction is divided by time: a touch takes as long
 //! as travelling this distance, and the travel to it is added.
 //!
 //! A few touches determine the length scales poorly, so the variance is that of a committee of
@@ -41,7 +41,7 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
     };
     let count = search.settings.silhouette.places;
     let places = sobol::places(belief.zone(), count, seed);
-    let silhouette = belief.presence().silhouette();
+    let silhouette = belief.surface_evidence().silhouette();
     let weigh = |place: &Vec<f64>| silhouette.optimistic_probability(place).sqrt();
     let weights: Vec<f64> = places.iter().map(weigh).collect();
     let committee: Vec<Posterior> =
@@ -65,10 +65,10 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
     let candidates = search.spread_places(belief.zone(), search.settings.silhouette.candidates);
     // Time in units of a touch that begins where the last one ended.
     let time = |place: &[f64]| {
-        let way = search.settings.silhouette.touch_way_m.zip(belief.targets().last());
+        let way = search.settings.silhouette.travel_cost_m.zip(belief.targets().last());
         let travel_m =
             |here: &[f64]| here.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-        1.0 + way.map_or(0.0, |(touch_way_m, here)| travel_m(here) / touch_way_m)
+        1.0 + way.map_or(0.0, |(travel_cost_m, here)| travel_m(here) / travel_cost_m)
     };
     let valued = candidates.into_iter().map(|place| (value(&place) / time(&place), place));
     match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {

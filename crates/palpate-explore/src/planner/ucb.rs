@@ -15,7 +15,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
             else {
                 return search.anywhere(belief.zone());
             };
-            let sds = search.settings.ucb.sds;
+            let sds = search.settings.ucb.kappa;
             let score = search.with_gradients(belief.zone(), |places| {
                 let means = surface.means(places.iter().map(Vec::as_slice));
                 let variances = known.variances(places, &mut []);

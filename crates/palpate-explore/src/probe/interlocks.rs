@@ -1,7 +1,7 @@
 //! Construction of the interlocks of a backend from the robot and the task.
 
 use super::servo::{BEYOND_M, standoff, turning_point};
-use crate::backend::interlock::{InterlockSettings, Interlocked, SafetyContext};
+use crate::backend::interlock::{InterlockSettings, InterlockedBackend, SafetyContext};
 use crate::backend::{Backend, Fault};
 use crate::robot::Robot;
 use crate::task::{Region, Task};
@@ -19,7 +19,7 @@ pub fn with_interlocks(
     task: &Task,
     object: Option<OrientedBox>,
     settings: &InterlockSettings,
-) -> Result<Interlocked, Fault> {
+) -> Result<InterlockedBackend, Fault> {
     let touch = task.touch();
     let home: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let (mut low, mut high) = (home, home);
@@ -54,5 +54,5 @@ pub fn with_interlocks(
         touch_force_n: touch.force_limit_n,
         travel_m_s: touch.travel_m_s.max(touch.approach_m_s),
     };
-    Interlocked::new(body, &site, settings)
+    InterlockedBackend::new(body, &site, settings)
 }

@@ -59,7 +59,7 @@ impl Approach {
     }
 }
 
-/// Table `[around]`: the ball to explore around a whole object, instead of a zone.
+/// Table `[whole_object]`: the ball to explore around a whole object, instead of a zone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WholeObject {

@@ -66,7 +66,7 @@ impl ImplicitSurface {
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
         self.asked.push(*aim);
-        self.evidence.observe(approach, touch, swept, self.settings.free_places);
+        self.evidence.observe(approach, touch, swept, self.settings.free_space_samples);
     }
 
     /// Fits length scale and noises by maximum likelihood and conditions on all touches.
@@ -102,7 +102,7 @@ impl ImplicitSurface {
         fit: Fit,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
         let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), observations)?;
-        posterior.inflate(self.settings.widening);
+        posterior.inflate(self.settings.sd_inflation);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
         let met = (self.contacts(), offset_m);
         let surface = Surface::new(&self.scope, prior, posterior, met);
@@ -146,7 +146,7 @@ impl ImplicitSurface {
         begin.truncate(ranges.len());
         // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
-        let signal_sd = SignalModel::Best(Range::from((
+        let signal_sd = SignalModel::Profiled(Range::from((
             SIGNAL_RANGE[0] * radius_m,
             SIGNAL_RANGE[1] * radius_m,
         )));

@@ -23,9 +23,9 @@ pub struct SpatialGpSettings {
     /// `matern_52`.
     pub normals: bool,
     /// Free-space samples per swept path; twice as many for a miss.
-    pub free_places: u32,
+    pub free_space_samples: u32,
     /// Factor applied to the standard deviations.
-    pub widening: f64,
+    pub sd_inflation: f64,
     /// Standard deviation of a common offset of all contacts, m; default 0.0003 for a soft finger,
     /// else 0.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -34,7 +34,7 @@ pub struct SpatialGpSettings {
     pub cells: u32,
     /// Interval, in touches, between evaluations against the ground truth; the last touch is always
     /// evaluated.
-    pub compared_every: u32,
+    pub evaluate_every: u32,
 }
 
 /// Prior mean of the field, relative to the contacts.
@@ -64,11 +64,11 @@ impl Default for SpatialGpSettings {
             noise: [1e-3, 0.1],
             slope_noise: [0.01, 1.0],
             normals: true,
-            free_places: 3,
-            widening: 1.6,
+            free_space_samples: 3,
+            sd_inflation: 1.6,
             offset_m: None,
             cells: 64,
-            compared_every: 5,
+            evaluate_every: 5,
         }
     }
 }
@@ -79,10 +79,10 @@ impl Validate for SpatialGpSettings {
         rules.interval("length_scale", self.length_scale, 1e-2..=100.0);
         rules.interval("noise", self.noise, 1e-6..=10.0);
         rules.interval("slope_noise", self.slope_noise, 1e-6..=100.0);
-        rules.number("free_places", self.free_places.into(), 0.0..=16.0);
-        rules.number("widening", self.widening, 0.1..=10.0);
+        rules.number("free_space_samples", self.free_space_samples.into(), 0.0..=16.0);
+        rules.number("sd_inflation", self.sd_inflation, 0.1..=10.0);
         rules.optional_number("offset_m", self.offset_m, 0.0..=0.1);
-        rules.number("compared_every", self.compared_every.into(), 1.0..=1e6);
+        rules.number("evaluate_every", self.evaluate_every.into(), 1.0..=1e6);
         rules.number("cells", self.cells.into(), 8.0..=256.0);
     }
 }

@@ -239,10 +239,10 @@ fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, InputError> {
     // The actual location: `..` and links may lead anywhere.
     let real = path.canonicalize().map_err(unreadable)?;
     let folder = folder(source.path).map_err(unreadable)?;
-    if !source.outside_buffers && !real.starts_with(folder) {
+    if !source.allow_external_buffers && !real.starts_with(folder) {
         return Err(InputError::new(format!(
             "{} lies outside the mesh's folder; to allow it, set \
-             object.outside_buffers = true in the scene, or use --outside-buffers",
+             object.allow_external_buffers = true in the scene, or use --outside-buffers",
             real.display()
         )));
     }

@@ -44,23 +44,23 @@ pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), I
 }
 
 /// Runs [`import`], with buffers of a glTF document outside its folder allowed if
-/// `outside_buffers`.
+/// `allow_external_buffers`.
 ///
 /// # Errors
 /// The errors of [`import`].
 pub fn import_with(
     path: &Path,
     metres_per_unit: f64,
-    outside_buffers: bool,
+    allow_external_buffers: bool,
 ) -> Result<(Mesh, MeshReport), InputError> {
-    read_and_repair(path, metres_per_unit, outside_buffers)
+    read_and_repair(path, metres_per_unit, allow_external_buffers)
         .map_err(|fault| fault.at(path.display()))
 }
 
 fn read_and_repair(
     path: &Path,
     metres_per_unit: f64,
-    outside_buffers: bool,
+    allow_external_buffers: bool,
 ) -> Result<(Mesh, MeshReport), InputError> {
     if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
         return Err(InputError::new(format!(
@@ -77,7 +77,7 @@ fn read_and_repair(
         return Err(InputError::new(format!("is a \".{extension}\" file; supported: {supported}")));
     };
     let bytes = files::bytes(path, BYTES_MAX).map_err(unreadable)?;
-    let mut raw = read(&Source { path, bytes: &bytes, outside_buffers })?;
+    let mut raw = read(&Source { path, bytes: &bytes, allow_external_buffers })?;
     raw.scale(metres_per_unit);
     let (mesh, report) = repair(raw)?;
     let sha256 = mesh.sha256();

@@ -9,7 +9,7 @@ pub(super) struct Source<'a> {
     pub bytes: &'a [u8],
     /// Whether the buffers of a glTF document may lie outside its folder; if not, a mesh of unknown
     /// origin cannot open other files.
-    pub outside_buffers: bool,
+    pub allow_external_buffers: bool,
 }
 
 /// Largest size of a mesh file, and of all buffers it refers to; a heuristic: the largest number of

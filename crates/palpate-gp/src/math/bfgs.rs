@@ -34,7 +34,7 @@ const DAMPING: f64 = 0.2;
 
 /// A BFGS climb.
 #[derive(Clone, Debug)]
-pub struct Climb<'a> {
+pub struct BfgsClimb<'a> {
     bounds: Bounds<'a>,
     manner: BfgsOptions,
     /// Highest place so far.
@@ -55,7 +55,7 @@ pub struct Climb<'a> {
     is_done: bool,
 }
 
-impl<'a> Climb<'a> {
+impl<'a> BfgsClimb<'a> {
     /// Starts at `start`, with the final curvature of an earlier climb in the same box, if there
     /// was one.
     pub fn new(
@@ -313,8 +313,8 @@ impl<'a> Climb<'a> {
 /// Runs a single climb while `is_worth` is true; `objective` writes its gradient into its second
 /// argument.
 pub fn climb(
-    mut climb: Climb,
-    mut is_worth: impl FnMut(&Climb) -> bool,
+    mut climb: BfgsClimb,
+    mut is_worth: impl FnMut(&BfgsClimb) -> bool,
     mut objective: impl FnMut(&[f64], &mut [f64]) -> f64,
 ) -> (Optimum, Vec<f64>) {
     let mut gradient = vec![0.0; climb.here.len()];

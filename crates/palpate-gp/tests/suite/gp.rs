@@ -270,8 +270,8 @@ proptest! {
         let touches = all(&touches);
         let prior = Some(LogNormal { median: 1.0, spread: 1.5 });
         let scale = [
-            SignalModel::Best((1e-3, 1e3).into()),
-            SignalModel::Best(Range { low: 1e-3, high: 1e3, prior }),
+            SignalModel::Profiled((1e-3, 1e3).into()),
+            SignalModel::Profiled(Range { low: 1e-3, high: 1e3, prior }),
             SignalModel::KnownNoise(0.05),
         ][choice];
         let mean = [MeanModel::Zero, MeanModel::Constant, MeanModel::Data][choice];

@@ -56,7 +56,7 @@ fn places(observations: &Observations) -> Vec<[f64; 2]> {
 fn it_is_the_posterior_of_its_equations() {
     for kernel in KERNELS {
         let (touches, at) = (touches(120), hyperparameters(0.25));
-        let InducingPosterior { posterior, left_sd } =
+        let InducingPosterior { posterior, nystrom_residual_sd: left_sd } =
             Posterior::with_inducing_points(30, kernel, at.clone(), &touches).unwrap();
         let kept = places(posterior.observations());
         assert!(kept.len() <= 30 && kept.len() > 20);
@@ -95,7 +95,10 @@ fn through_all_of_them_it_is_exact() {
         let (touches, at) = (touches(60), hyperparameters(0.08));
         let exact = Posterior::new(kernel, at.clone(), touches.clone()).unwrap();
         let induced = Posterior::with_inducing_points(60, kernel, at, &touches).unwrap();
-        assert_eq!((induced.posterior.observations().len(), induced.left_sd < 1e-6), (60, true));
+        assert_eq!(
+            (induced.posterior.observations().len(), induced.nystrom_residual_sd < 1e-6),
+            (60, true)
+        );
         for place in queries() {
             let [ours, theirs] = [&induced.posterior, &exact]
                 .map(|posterior| posterior.predict([place.as_slice()])[0]);
@@ -116,7 +119,7 @@ fn it_says_how_near_it_is() {
         let exact = exact.predict(queries().iter().map(|place| place.as_slice()));
         let mut last = f64::INFINITY;
         for most in [40, 80, 160, 320, 640] {
-            let InducingPosterior { posterior, left_sd } =
+            let InducingPosterior { posterior, nystrom_residual_sd: left_sd } =
                 Posterior::with_inducing_points(most, kernel, at.clone(), &touches).unwrap();
             // No inducing points are added once the residual is negligible.
             assert!(left_sd <= last.max(0.02 * at.noise_sd), "{left_sd} {last}");
@@ -148,7 +151,7 @@ fn touches_at_one_place_are_kept_once() {
         touches.push_height(&[x], x + if i < 150 { 0.1 } else { -0.1 });
     }
     let at = Hyperparameters { length_scales: vec![1.0], mean: 0.0, ..hyperparameters(1.0) };
-    let InducingPosterior { posterior, left_sd } =
+    let InducingPosterior { posterior, nystrom_residual_sd: left_sd } =
         Posterior::with_inducing_points(50, &SquaredExponential, at.clone(), &touches).unwrap();
     let exact = Posterior::new(&SquaredExponential, at, touches).unwrap();
     assert_eq!((posterior.observations().len(), left_sd < 1e-6), (5, true));

@@ -1,6 +1,6 @@
 //! Tests of the optimisers: DIRECT evaluates the places of NLopt's; climbs converge in few steps.
 
-use palpate_gp::math::bfgs::{BfgsOptions, Climb, climb};
+use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions, climb};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::{Bounds, Stop};
 
@@ -82,7 +82,7 @@ fn a_climb_reaches_the_end_of_rosenbrocks_valley() {
         gradient[1] = -200.0 * (b - a * a);
         -((1.0 - a).powi(2) + 100.0 * (b - a * a).powi(2))
     };
-    let start = Climb::new(BOX, &[-1.2, 1.0], None, MANNER);
+    let start = BfgsClimb::new(BOX, &[-1.2, 1.0], None, MANNER);
     let (top, _) = climb(start, |_| true, rosenbrock);
     assert!(top.value > -1e-8 && top.stop == Stop::Converged, "{top:?}");
     assert!(top.evaluations < 100, "{top:?}");
@@ -97,17 +97,18 @@ fn a_climb_of_a_parabola_is_short_and_stays_in_the_box() {
         gradient[1] = -2.0 * (x[1] - 1.0) - 3.0 * (x[0] - 0.4);
         -40.0 * (x[0] - 0.4).powi(2) - (x[1] - 1.0).powi(2) - 3.0 * (x[0] - 0.4) * (x[1] - 1.0)
     };
-    let (top, curvature) = climb(Climb::new(BOX, &[-1.0, -1.5], None, MANNER), |_| true, parabola);
+    let (top, curvature) =
+        climb(BfgsClimb::new(BOX, &[-1.0, -1.5], None, MANNER), |_| true, parabola);
     assert!((top.x[0] - 0.4).abs() < 1e-4 && (top.x[1] - 1.0).abs() < 1e-3, "{top:?}");
     assert!(top.evaluations < 20, "{top:?}");
-    let known = Climb::new(BOX, &[0.38, 0.97], Some(&curvature), MANNER);
+    let known = BfgsClimb::new(BOX, &[0.38, 0.97], Some(&curvature), MANNER);
     let (top, _) = climb(known, |_| true, parabola);
     assert!(top.evaluations <= 4 && top.value > -1e-8, "{top:?}");
     let slope = |x: &[f64], gradient: &mut [f64]| {
         gradient.fill(1.0);
         x[0] + x[1]
     };
-    let (top, _) = climb(Climb::new(BOX, &[0.0, 0.0], None, MANNER), |_| true, slope);
+    let (top, _) = climb(BfgsClimb::new(BOX, &[0.0, 0.0], None, MANNER), |_| true, slope);
     assert_eq!((top.x, top.stop), (vec![2.0, 2.0], Stop::Converged));
 }
 
@@ -120,10 +121,10 @@ fn hope_holds_the_top_near_it_and_a_climb_without_a_value_ends() {
         gradient[1] = -2.0 * (x[1] + 0.3) * value;
         value
     };
-    let start = Climb::new(BOX, &[0.3, 0.0], None, MANNER);
+    let start = BfgsClimb::new(BOX, &[0.3, 0.0], None, MANNER);
     let (top, _) = climb(start, |climb| climb.upper_bound(4.0) > 1.0 - 1e-6, hill);
     assert!(top.stop == Stop::Converged && (top.value - 1.0).abs() < 1e-6, "{top:?}");
-    let nowhere = Climb::new(BOX, &[0.0, 0.0], None, MANNER);
+    let nowhere = BfgsClimb::new(BOX, &[0.0, 0.0], None, MANNER);
     let (top, _) = climb(nowhere, |_| true, |_, _| f64::NAN);
     assert_eq!((top.stop, top.evaluations), (Stop::Failed, 1));
 }

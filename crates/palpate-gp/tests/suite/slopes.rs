@@ -226,7 +226,7 @@ proptest! {
         let observations = all(&touches);
         let mean = [MeanModel::Zero, MeanModel::Constant, MeanModel::Data][choice];
         let scale =
-            [SignalModel::Best((1e-3, 1e3).into()), SignalModel::KnownNoise(0.05), SignalModel::KnownNoise(0.2)][choice];
+            [SignalModel::Profiled((1e-3, 1e3).into()), SignalModel::KnownNoise(0.05), SignalModel::KnownNoise(0.2)][choice];
         let mut likelihood = Likelihood::new(kernel(choice % 2), mean, &observations);
         let NoiseRatio { height, slope } = at.noise_ratio();
         let logs = [at.length_scales[0], at.length_scales[1], height, slope].map(f64::ln);

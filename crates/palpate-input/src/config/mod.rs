@@ -38,8 +38,10 @@ pub struct Loader {
     sources: Vec<Source>,
     /// Keys set on the command line, with their text as typed.
     sets: Vec<(String, String)>,
-    /// Pair of table names: the table that is given, and the table as which it is read.
-    read_as: Option<[&'static str; 2]>,
+    /// Keys as given, and as read.
+    read_as: Vec<[String; 2]>,
+    /// Former names that were read, each with the present one.
+    former_names: Vec<String>,
 }
 
 impl Loader {
@@ -59,25 +61,85 @@ impl Loader {
     pub fn from_text(path: &Path, text: String) -> Result<Self, ConfigError> {
         let (table, document) = parse(path, text)?;
         let source = Source { path: path.into(), prefix: String::new(), document };
-        Ok(Self { table, sources: vec![source], sets: Vec::new(), read_as: None })
+        Ok(Self {
+            table,
+            sources: vec![source],
+            sets: Vec::new(),
+            read_as: Vec::new(),
+            former_names: Vec::new(),
+        })
     }
 
-    /// Reads the table `key` as if it were under `other`, unless that exists; messages name `key`.
-    pub fn read_as(&mut self, key: &'static str, other: &'static str) {
-        if let (false, Some(table)) = (self.table.contains_key(other), self.table.remove(key)) {
-            self.table.insert(other.into(), table);
-            self.read_as = Some([key, other]);
+    /// Reads the dotted key `given` as `present`, if it has a value; messages name it as given.
+    ///
+    /// # Errors
+    /// If both have a value.
+    pub fn read_as(&mut self, given: &str, present: &str) -> Result<(), ConfigError> {
+        if !self.has_value(given) {
+            return Ok(());
         }
+        if self.has_value(present) {
+            let message = format!("also given by its present name `{present}`; keep one");
+            return Err(ConfigError::invalid(self.origin(given), given.into(), None, message));
+        }
+        let (tables, last) = present.rsplit_once('.').unwrap_or(("", present));
+        if let Some(value) = self.take(given)
+            && let Some(table) = self.table_mut(tables)
+        {
+            table.insert(last.into(), value);
+            self.read_as.push([given.into(), present.into()]);
+        }
+        Ok(())
+    }
+
+    /// Reads keys of an earlier version, pairs of a former and the present name under `prefix`.
+    ///
+    /// # Errors
+    /// If a key is given by both names.
+    pub fn read_former_keys(
+        &mut self,
+        prefix: &str,
+        keys: &[[&str; 2]],
+    ) -> Result<(), ConfigError> {
+        for names in keys {
+            let [former, present] = names.map(|name| format!("{prefix}{name}"));
+            if self.has_value(&former) {
+                self.read_as(&former, &present)?;
+                self.former_names.push(format!("`{former}` is now `{present}`"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads values of an earlier version, pairs of a former and the present name, of the key
+    /// `key`.
+    pub fn read_former_values(&mut self, key: &str, values: &[[&str; 2]]) {
+        let value = self.value(key).and_then(Value::as_str);
+        let names = values.iter().find(|[former, _]| value == Some(former));
+        if let (Some([former, present]), Some((tables, last))) =
+            (names, key.rsplit_once('.').or(Some(("", key))))
+            && let Some(table) = self.table_mut(tables)
+        {
+            table.insert(last.into(), Value::String((*present).into()));
+            self.former_names.push(format!("\"{former}\" is now \"{present}\""));
+        }
+    }
+
+    /// Takes the list of former names that were read, each with the present one.
+    pub fn take_former_names(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.former_names)
     }
 
     /// Returns the key under which `key` was given.
     fn given(&self, key: &str) -> String {
-        match self.read_as.and_then(|[given, other]| Some((given, key.strip_prefix(other)?))) {
-            Some((given, rest)) if rest.is_empty() || rest.starts_with(['.', '[']) => {
-                format!("{given}{rest}")
+        self.read_as.iter().rev().fold(key.to_owned(), |key, [given, present]| {
+            match key.strip_prefix(present.as_str()) {
+                Some(rest) if rest.is_empty() || rest.starts_with(['.', '[']) => {
+                    format!("{given}{rest}")
+                }
+                _ => key,
             }
-            _ => key.into(),
-        }
+        })
     }
 
     /// Whether there is a value under the dotted key.
@@ -102,7 +164,7 @@ impl Loader {
 
     /// Returns the error that `key` may not have this value.
     pub fn not_allowed(&self, key: &str, value: &str, allowed: &str) -> ConfigError {
-        ConfigError::not_allowed(self.origin(key), key.into(), value.into(), allowed.into())
+        ConfigError::not_allowed(self.origin(key), self.given(key), value.into(), allowed.into())
     }
 
     /// Returns the error that the file is `found`, and not of the requested kind.
@@ -286,6 +348,7 @@ impl Loader {
     }
 
     fn origin(&self, key: &str) -> Origin {
+        let key = &*self.given(key);
         let under = |set: &str| {
             key.strip_prefix(set)
                 .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))

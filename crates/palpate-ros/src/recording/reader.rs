@@ -108,7 +108,7 @@ impl Backend for ReplayBackend {
         self.entries = Entries::new(Arc::clone(&self.recorded.bytes));
         let mut ticks = std::iter::from_fn(|| next_tick(&mut self.entries));
         let reset = ticks.find(|tick| tick.is_reset() && tick.seed == seed);
-        let reset = reset.ok_or(Fault::NeverReset { seed })?;
+        let reset = reset.ok_or(Fault::NoSuchReset { seed })?;
         reset.write_to(&mut self.reading);
         Ok(&self.reading)
     }
@@ -117,12 +117,8 @@ impl Backend for ReplayBackend {
         let time_s = self.reading.time_s;
         let tick = next_tick(&mut self.entries).filter(|tick| !tick.is_reset());
         let tick = tick.ok_or(Fault::RecordingEnds { time_s })?;
-        compare(&tick.command, &command.qdot).map_err(|(joint, recorded, now)| Fault::Differs {
-            tick: tick.tick,
-            time_s,
-            joint,
-            recorded,
-            now,
+        compare(&tick.command, &command.qdot).map_err(|(joint, recorded, now)| {
+            Fault::ReplayMismatch { tick: tick.tick, time_s, joint, recorded, now }
         })?;
         if !tick.fault.is_empty() {
             return Err(InputError::new(tick.fault).into());

@@ -183,7 +183,7 @@ fn metadata(name: &str, metadata: BTreeMap<String, String>) -> Metadata {
 }
 
 fn unrecorded(time_s: f64, message: &dyn std::fmt::Display) -> Fault {
-    Fault::Unrecorded { time_s, message: message.to_string() }
+    Fault::RecordingFailed { time_s, message: message.to_string() }
 }
 
 /// A backend that records the ticks of another. A tick that cannot be recorded is a fault, even if

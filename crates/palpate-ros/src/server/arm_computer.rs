@@ -21,7 +21,7 @@ const ROUNDING: f64 = 1e-6;
 const TOGETHER_S: f64 = 0.5;
 
 /// State between network and servos. Times are seconds of a monotonic clock.
-pub struct ArmPc {
+pub struct SimulatedArmComputer {
     names: JointNames,
     /// Speed limit of each joint, rad/s or m/s.
     qdot_limits: Vec<f64>,
@@ -41,7 +41,7 @@ pub struct ArmPc {
     refusal: String,
 }
 
-impl ArmPc {
+impl SimulatedArmComputer {
     /// Creates an arm at rest with closed brakes. Commands are valid for `valid_s`; one beyond
     /// `qdot_limits`, the speed limits of the joints, is refused and stops the arm.
     pub fn new(names: JointNames, qdot_limits: Vec<f64>, valid_s: f64) -> Self {

@@ -24,11 +24,11 @@ pub struct Failure {
 #[derive(Clone, Copy)]
 pub enum FailureEffect {
     /// Drops one packet in five.
-    Lose,
+    Drop,
     /// Stops sending on a topic.
-    Cease(Topic),
+    Mute(Topic),
     /// Repeats the first message of a topic with new stamps.
-    Freeze(Topic),
+    Repeat(Topic),
     /// Changes packets.
     Change(fn(&mut Packet, &mut FailureState)),
     /// Writes the flag of this name in a status, or all flags, as one of these texts: off, on.
@@ -79,19 +79,19 @@ const fn failure(name: &'static str, about: &'static str, act: FailureEffect) ->
 
 /// All failures; add one line per failure.
 pub static FAILURES: &[Failure] = &[
-    failure("loss", "one packet in five is lost", FailureEffect::Lose),
+    failure("loss", "one packet in five is lost", FailureEffect::Drop),
     failure("latency", "packets are sent 20 ms late", FailureEffect::Delay(0.02)),
     failure("noise", "the force has noise of 0.3 N", FailureEffect::Change(add_noise)),
-    failure("frozen", "the same tactile frame is repeated", FailureEffect::Freeze(Topic::Tactile)),
+    failure("frozen", "the same tactile frame is repeated", FailureEffect::Repeat(Topic::Tactile)),
     failure(
         "frozen_joints",
         "the same joint positions and velocities are repeated, with new stamps",
-        FailureEffect::Freeze(Topic::Joints),
+        FailureEffect::Repeat(Topic::Joints),
     ),
     failure(
         "frozen_wrench",
         "the same force and torque are repeated, with new stamps",
-        FailureEffect::Freeze(Topic::Wrench),
+        FailureEffect::Repeat(Topic::Wrench),
     ),
     failure(
         "force_spike",
@@ -117,9 +117,9 @@ pub static FAILURES: &[Failure] = &[
         "stamps run backwards by 0.1 ms per message",
         FailureEffect::Change(turn_back),
     ),
-    failure("no_joints", "joint states stop arriving", FailureEffect::Cease(Topic::Joints)),
-    failure("no_wrench", "forces stop arriving", FailureEffect::Cease(Topic::Wrench)),
-    failure("no_tactile", "tactile frames stop arriving", FailureEffect::Cease(Topic::Tactile)),
+    failure("no_joints", "joint states stop arriving", FailureEffect::Mute(Topic::Joints)),
+    failure("no_wrench", "forces stop arriving", FailureEffect::Mute(Topic::Wrench)),
+    failure("no_tactile", "tactile frames stop arriving", FailureEffect::Mute(Topic::Tactile)),
     failure("estop", "the emergency stop is pressed", FailureEffect::Estop),
     failure("deadman", "the dead-man switch is released", FailureEffect::Deadman),
     failure(
@@ -280,9 +280,9 @@ impl FailingSender {
         let mut delay_s = 0.0;
         for (failure, _) in FAILURES.iter().zip(&self.is_on).filter(|(_, is_on)| **is_on) {
             match failure.act {
-                FailureEffect::Lose if self.memory.rng.random::<f64>() <= LOST => return,
-                FailureEffect::Cease(topic) if packet.topic() == topic => return,
-                FailureEffect::Freeze(topic) if packet.topic() == topic => {
+                FailureEffect::Drop if self.memory.rng.random::<f64>() <= LOST => return,
+                FailureEffect::Mute(topic) if packet.topic() == topic => return,
+                FailureEffect::Repeat(topic) if packet.topic() == topic => {
                     freeze(&mut packet, &mut self.memory);
                 }
                 FailureEffect::Change(change) => change(&mut packet, &mut self.memory),

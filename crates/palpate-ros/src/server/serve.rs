@@ -1,7 +1,7 @@
 //! Loop of a twin: receives commands, runs one tick of the simulated robot, sends readings, in real
 //! time.
 
-use super::arm_computer::ArmPc;
+use super::arm_computer::SimulatedArmComputer;
 use super::failure::{FAILURES, FailingSender, FailureEffect, by_name};
 use crate::joints::JointNames;
 use crate::link::Link;
@@ -72,11 +72,11 @@ pub fn services() -> Vec<Service> {
 }
 
 /// Simulated arm behind topics.
-pub struct Twin {
+pub struct SimulatedRobotServer {
     body: Box<dyn Backend>,
     settings: BackendSettings,
     names: JointNames,
-    pc: ArmPc,
+    pc: SimulatedArmComputer,
     /// Deliveries, queued for the loop.
     inbox: Receiver<Delivery>,
     link: Link,
@@ -97,7 +97,7 @@ pub struct Twin {
     events: Vec<(f64, Event)>,
 }
 
-impl Twin {
+impl SimulatedRobotServer {
     /// Serves `body`, which moves `chain`, behind the topics of `settings`.
     ///
     /// # Errors
@@ -117,7 +117,8 @@ impl Twin {
         let take = move |delivery| drop(sink.send(delivery));
         let link = Link::open(connect, Duration::from_millis(20), take, || None)?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
-        let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
+        let pc =
+            SimulatedArmComputer::new(names.clone(), limits, settings.topics.command.max_age_s);
         Ok(Self {
             period_s: body.capabilities().period_s,
             events: Vec::new(),
@@ -206,7 +207,7 @@ impl Twin {
                         self.pc.receive(&packet, sender, at_s.min(now_s), pace::now_s());
                     }
                 }
-                Delivery::Garbled { words, .. } => {
+                Delivery::Malformed { words, .. } => {
                     self.pc.alarm(&format!("command refused: {words}"), now_s);
                 }
                 Delivery::Call { service, call } => {
@@ -214,7 +215,7 @@ impl Twin {
                     self.tell(Event::Called(service.clone()));
                     self.link.answer(service, call, answer);
                 }
-                Delivery::Answered { .. } => (),
+                Delivery::Response { .. } => (),
             }
         }
     }

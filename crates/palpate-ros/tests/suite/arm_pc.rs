@@ -2,7 +2,7 @@
 
 use palpate_ros::joints::JointNames;
 use palpate_ros::message::{JointTrajectory, JointTrajectoryPoint};
-use palpate_ros::server::arm_computer::ArmPc;
+use palpate_ros::server::arm_computer::SimulatedArmComputer;
 use palpate_ros::topics::CommandTopic;
 use palpate_ros::transport::Packet;
 use proptest::prelude::*;
@@ -15,18 +15,18 @@ fn names() -> JointNames {
 }
 
 fn topic() -> CommandTopic {
-    CommandTopic { age_s: VALID_S, ..CommandTopic::default() }
+    CommandTopic { max_age_s: VALID_S, ..CommandTopic::default() }
 }
 
 /// A limit above all of these commands.
 const LIMIT: f64 = 2.0;
 
-fn arm_pc() -> ArmPc {
-    ArmPc::new(names(), vec![LIMIT; 3], VALID_S)
+fn arm_pc() -> SimulatedArmComputer {
+    SimulatedArmComputer::new(names(), vec![LIMIT; 3], VALID_S)
 }
 
 /// Returns an arm computer that was commanded to rest and then to move, 4 ms apart, until 0.1 s.
-fn moving() -> ArmPc {
+fn moving() -> SimulatedArmComputer {
     let mut pc = arm_pc();
     pc.receive(&names().command(0.0, &[0.0; 3], &topic()), 1, 0.0, 0.0);
     for i in 1..=25 {
@@ -39,7 +39,7 @@ fn moving() -> ArmPc {
 }
 
 /// Returns the largest commanded speed at each of the ticks from 0.1 s on.
-fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
+fn speeds(pc: &mut SimulatedArmComputer, ticks: u32) -> Vec<f64> {
     let at = |tick| 0.1 + f64::from(tick) * PERIOD_S;
     let fastest = |qdot: &[f64]| qdot.iter().fold(0.0, |most: f64, qdot| most.max(qdot.abs()));
     (1..=ticks).map(|tick| fastest(pc.advance(at(tick)))).collect()

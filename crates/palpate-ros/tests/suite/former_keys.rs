@@ -59,7 +59,7 @@ rate_hz = 250.0
 fn a_file_of_version_0_1_is_read() {
     let backend = read(OLD).unwrap().backend;
     assert_eq!(backend.kind, BackendKind::Ros2);
-    assert_eq!(backend.gates.drift_n, 0.25);
+    assert_eq!(backend.start_checks.drift_n, 0.25);
 }
 
 /// A limit of an arm does not change without notice.

@@ -19,44 +19,44 @@ pub struct RegistrationEffect {
     /// True position of the finger on its mount, as in `arm.tool_position_m`; default: the arm's
     /// setting.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub finger_position_m: Option<[f64; 3]>,
+    pub true_tool_position_m: Option<[f64; 3]>,
     /// True attitude of the finger, as in `arm.tool_rotation_deg`; default: the arm's setting.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub finger_rotation_deg: Option<[f64; 3]>,
+    pub true_tool_rotation_deg: Option<[f64; 3]>,
     /// Standard deviation of the fingertip's position on its mount, along each axis.
-    pub finger_m: f64,
+    pub finger_position_sd_m: f64,
     /// Standard deviation of the fingertip's attitude, about each axis.
-    pub finger_deg: f64,
+    pub finger_attitude_sd_deg: f64,
     /// Standard deviation of the object's position, along each axis.
-    pub object_m: f64,
+    pub object_position_sd_m: f64,
     /// Standard deviation of the object's attitude, about each axis through its mesh's origin.
-    pub object_deg: f64,
+    pub object_attitude_sd_deg: f64,
 }
 
 impl Default for RegistrationEffect {
     // heuristic: a finger measured with a calliper, an object placed against a mark.
     fn default() -> Self {
         Self {
-            finger_position_m: None,
-            finger_rotation_deg: None,
-            finger_m: 0.2e-3,
-            finger_deg: 0.5,
-            object_m: 0.5e-3,
-            object_deg: 0.5,
+            true_tool_position_m: None,
+            true_tool_rotation_deg: None,
+            finger_position_sd_m: 0.2e-3,
+            finger_attitude_sd_deg: 0.5,
+            object_position_sd_m: 0.5e-3,
+            object_attitude_sd_deg: 0.5,
         }
     }
 }
 
 impl Validate for RegistrationEffect {
     fn check(&self, rules: &mut Rules) {
-        (self.finger_position_m.iter())
-            .for_each(|values| rules.numbers("finger_position_m", values, -0.1..=0.1));
-        (self.finger_rotation_deg.iter())
-            .for_each(|values| rules.numbers("finger_rotation_deg", values, -45.0..=45.0));
-        rules.number("finger_m", self.finger_m, 0.0..=0.1);
-        rules.number("finger_deg", self.finger_deg, 0.0..=45.0);
-        rules.number("object_m", self.object_m, 0.0..=0.1);
-        rules.number("object_deg", self.object_deg, 0.0..=45.0);
+        (self.true_tool_position_m.iter())
+            .for_each(|values| rules.numbers("true_tool_position_m", values, -0.1..=0.1));
+        (self.true_tool_rotation_deg.iter())
+            .for_each(|values| rules.numbers("true_tool_rotation_deg", values, -45.0..=45.0));
+        rules.number("finger_position_sd_m", self.finger_position_sd_m, 0.0..=0.1);
+        rules.number("finger_attitude_sd_deg", self.finger_attitude_sd_deg, 0.0..=45.0);
+        rules.number("object_position_sd_m", self.object_position_sd_m, 0.0..=0.1);
+        rules.number("object_attitude_sd_deg", self.object_attitude_sd_deg, 0.0..=45.0);
     }
 }
 
@@ -64,12 +64,12 @@ impl RegistrationEffect {
     /// Returns the true pose of the finger's `T` in the `T` of the kinematics, which the arm's
     /// settings move by `correction` from the end of the mount, before random errors.
     pub fn nominal_error(&self, correction: Option<Isometry3<f64>>) -> Option<Isometry3<f64>> {
-        if self.finger_position_m.is_none() && self.finger_rotation_deg.is_none() {
+        if self.true_tool_position_m.is_none() && self.true_tool_rotation_deg.is_none() {
             return None;
         }
         let really = pose(
-            self.finger_position_m.unwrap_or_default(),
-            self.finger_rotation_deg.unwrap_or_default(),
+            self.true_tool_position_m.unwrap_or_default(),
+            self.true_tool_rotation_deg.unwrap_or_default(),
         );
         Some(correction.map_or(really, |correction| correction.inverse() * really))
     }
@@ -110,8 +110,8 @@ impl Registration {
             Isometry3::from_parts(place, turn)
         };
         Self {
-            finger: drawn(effect.finger_m, effect.finger_deg),
-            object: drawn(effect.object_m, effect.object_deg),
+            finger: drawn(effect.finger_position_sd_m, effect.finger_attitude_sd_deg),
+            object: drawn(effect.object_position_sd_m, effect.object_attitude_sd_deg),
         }
     }
 }

@@ -44,9 +44,9 @@ effect! {
         /// Number of skin points; for a shell, of those on the back.
         samples: usize = 500,
         /// Shell cells along the finger, half over the cylinder and half over the tip's arc.
-        along: usize = 24,
+        cells_along: usize = 24,
         /// Shell cells around the finger, from nail to nail; even.
-        around: usize = 16,
+        cells_around: usize = 16,
     }
     constants {
         /// Modulus of the skin, in Pa; for columns only in compression between object and fluid.
@@ -66,9 +66,11 @@ fn check_resolution(skin: &SkinEffect, rules: &mut Rules) {
     rules.require("samples", skin.samples, (10..=100_000).contains(&skin.samples), || {
         "10 to 100000".into()
     });
-    rules.require("along", skin.along, (4..=48).contains(&skin.along), || "4 to 48".into());
-    let even = skin.around.is_multiple_of(2) && (4..=32).contains(&skin.around);
-    rules.require("around", skin.around, even, || "an even number, 4 to 32".into());
+    rules.require("cells_along", skin.cells_along, (4..=48).contains(&skin.cells_along), || {
+        "4 to 48".into()
+    });
+    let even = skin.cells_around.is_multiple_of(2) && (4..=32).contains(&skin.cells_around);
+    rules.require("cells_around", skin.cells_around, even, || "an even number, 4 to 32".into());
 }
 
 impl Effect for SkinEffect {
@@ -121,7 +123,7 @@ impl Skin {
     /// finger.
     pub fn new(profile: &Profile, effect: &SkinEffect, cavity_pa_m3: f64) -> Self {
         let mut samples = spread(profile, effect.samples);
-        let cells = [effect.along, effect.around];
+        let cells = [effect.cells_along, effect.cells_around];
         let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells));
         if let Some(lattice) = &lattice {
             samples.retain(|sample| !sample.layers.has_fluid);

@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Inverse of the sheet's stiffness at rest for the nodes that can move; constant.
 #[derive(Clone, Debug)]
-pub struct Softness {
+pub struct Compliance {
     /// Factors of symmetric and antisymmetric motions.
     halves: [Factor; 2],
     /// Number of symmetric unknowns, which precede the antisymmetric ones.
@@ -29,7 +29,7 @@ struct Part {
     share: f32,
 }
 
-impl Softness {
+impl Compliance {
     /// Computes the compliance of `sheet`. Node k has the index `place[k]` among those that can
     /// move; index i has its mirror image across y = 0 at index `mirror[i]`.
     pub fn new(sheet: &Sheet, place: &[Option<usize>], mirror: &[usize]) -> Self {

@@ -4,7 +4,7 @@
 //! smallest. This module has that energy; `settle` minimises it. `Membrane::balance` minimises it
 //! with the rays by which the skin meets an object.
 
-use super::compliance::Softness;
+use super::compliance::Compliance;
 use super::elastic_sheet::{Material, Sheet, SheetState};
 use super::springs::UnilateralSprings;
 use crate::sim::finger::foundation::{Balance, Column, ColumnResponse, SkinContact};
@@ -34,7 +34,7 @@ pub struct Membrane {
     /// Nodes that can move, and the index of each node among them.
     pub(super) free: Vec<usize>,
     pub(super) place: Vec<Option<usize>>,
-    pub(super) softness: Softness,
+    pub(super) softness: Compliance,
     /// Stiffness of each node, in N/m: the skin through its thickness, and the core.
     pub(super) skin_n_m: Vec<f64>,
     pub(super) core_n_m: Vec<f64>,
@@ -96,7 +96,7 @@ impl Membrane {
         let area_m2 = |node: &Node| node.area_m2.norm();
         let skin_pa_m = material.young_pa / material.thickness_m;
         Self {
-            softness: Softness::new(&sheet, &place, &mirror),
+            softness: Compliance::new(&sheet, &place, &mirror),
             skin_n_m: nodes.iter().map(|node| skin_pa_m * area_m2(node)).collect(),
             core_n_m: nodes.iter().map(|node| core_pa_m * area_m2(node)).collect(),
             sheet,

@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 /// a command trips an interlock: the robot is braked within its joints' accelerations and does not
 /// move again. A reset clears the fault of a simulated robot; for a real one, only
 /// [`Interlocked::clear_fault`] does.
-pub struct Interlocked {
+pub struct InterlockedBackend {
     inner: Box<dyn Backend>,
     interlocks: Vec<Box<dyn Interlock>>,
     site: SafetyContext,
@@ -34,7 +34,7 @@ pub struct Interlocked {
     is_cleared: bool,
 }
 
-impl Interlocked {
+impl InterlockedBackend {
     /// Wraps `inner`, which moves the joints of the robot in `site`.
     ///
     /// # Errors
@@ -236,7 +236,7 @@ const HELD_TICKS: f64 = 8.0;
 /// Ticks in addition to twice those of a retraction at full speed, to start and to stop.
 const RETRACT_TIMEOUT_TICKS: usize = 100;
 
-impl Backend for Interlocked {
+impl Backend for InterlockedBackend {
     fn capabilities(&self) -> &Capabilities {
         self.inner.capabilities()
     }

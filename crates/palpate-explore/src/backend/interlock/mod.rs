@@ -17,9 +17,9 @@ mod tracking;
 mod workspace;
 
 pub use interlock::{Interlock, InterlockEntry, RobotState, SafetyContext};
-pub use interlocked::Interlocked;
+pub use interlocked::InterlockedBackend;
 pub use settings::{InterlockSettings, defaults};
-pub use start_checks::{GateSettings, check_start};
+pub use start_checks::{StartCheckSettings, check_start};
 
 /// All interlocks in the order in which they act: those that limit a command come before those that
 /// check the result.
@@ -30,9 +30,9 @@ pub const INTERLOCKS: &[InterlockEntry] = &[
     workspace::DEPTH,
     collision::CLEARANCE,
     force::FORCE,
-    sensors::SILENCE,
+    sensors::SENSOR_TIMEOUT,
     sensors::ELECTRODE,
-    tracking::STANDSTILL,
+    tracking::STUCK_JOINT,
     tracking::VELOCITY,
     tracking::POSITION,
 ];
@@ -44,6 +44,6 @@ pub const FORMER_KEYS: [(&str, f64); 7] = [
     ("interlocks.follow_s", tracking::VELOCITY_S),
     ("interlocks.retract_m_s", force::RETRACT_M_S),
     ("interlocks.retract_rise_n", force::RETRACT_RISE_N),
-    ("gates.hold_s", start_checks::HOLD_S),
-    ("gates.still", start_checks::START_TOLERANCE),
+    ("start_checks.hold_s", start_checks::HOLD_S),
+    ("start_checks.still", start_checks::START_TOLERANCE),
 ];

@@ -6,11 +6,11 @@ use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
 
 /// Interlock that stops a robot when joint states, force/torque or tactile data time out.
-pub const SILENCE: InterlockEntry = InterlockEntry {
+pub const SENSOR_TIMEOUT: InterlockEntry = InterlockEntry {
     name: "silence",
     make: |_, settings, capabilities| {
         let limits_s =
-            [settings.joint_silence_s, settings.wrench_silence_s, settings.frame_silence_s];
+            [settings.joint_timeout_s, settings.wrench_timeout_s, settings.frame_timeout_s];
         let repeats = capabilities.real_time;
         Some(Box::new(SensorTimeout {
             limits_s,
@@ -28,8 +28,8 @@ pub const SILENCE: InterlockEntry = InterlockEntry {
 pub const ELECTRODE: InterlockEntry = InterlockEntry {
     name: "electrode",
     make: |_, settings, capabilities| {
-        let frozen_s = settings.frozen_s;
-        let electrodes = Electrodes { frozen_s, still: NOTHING, ends: [0; ELECTRODES] };
+        let stuck_s = settings.stuck_s;
+        let electrodes = Electrodes { stuck_s, still: NOTHING, ends: [0; ELECTRODES] };
         capabilities.real_time.then(|| Box::new(electrodes) as _)
     },
 };
@@ -92,7 +92,7 @@ struct Still {
 }
 
 struct Electrodes {
-    frozen_s: f64,
+    stuck_s: f64,
     still: [Still; ELECTRODES],
     /// Consecutive frames at an end of the range.
     ends: [u32; ELECTRODES],
@@ -107,15 +107,15 @@ impl Interlock for Electrodes {
                     *still = Still { count, since_s: now.time_s, frames: 0 };
                 }
                 still.frames += 1;
-                let frozen_s = now.time_s - still.since_s;
-                let is_frozen = frozen_s > self.frozen_s && still.frames >= STILL_FRAMES;
+                let stuck_s = now.time_s - still.since_s;
+                let is_frozen = stuck_s > self.stuck_s && still.frames >= STILL_FRAMES;
                 let is_end = count <= 0.0 || count >= FULL_SCALE_COUNTS;
                 self.ends[i] = if is_end { self.ends[i] + 1 } else { 0 };
                 if self.ends[i] >= FRAMES || is_frozen {
                     let end = if count <= 0.0 { 0.0 } else { FULL_SCALE_COUNTS };
                     let (interlock, measures, unit) = match self.ends[i] >= FRAMES {
                         true => ("value", [count, end], "counts"),
-                        false => ("standstill", [frozen_s, self.frozen_s], "s"),
+                        false => ("standstill", [stuck_s, self.stuck_s], "s"),
                     };
                     return Trip::check(false, interlock, &format!("E{}", i + 1), measures, unit);
                 }

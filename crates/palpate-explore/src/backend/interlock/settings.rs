@@ -36,15 +36,15 @@ pub struct InterlockSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
     /// Timeout of joint states, s.
-    pub joint_silence_s: f64,
+    pub joint_timeout_s: f64,
     /// Timeout of the force/torque sensor, s.
-    pub wrench_silence_s: f64,
+    pub wrench_timeout_s: f64,
     /// Timeout of tactile frames, s.
-    pub frame_silence_s: f64,
+    pub frame_timeout_s: f64,
     /// Time after which a constant electrode or position of a commanded joint stops a real robot,
     /// s.
     // heuristic: seven tactile frames.
-    pub frozen_s: f64,
+    pub stuck_s: f64,
     /// Largest velocity tracking error over 0.2 s, as a fraction of the joint's velocity limit.
     #[serde(alias = "follow_share")]
     pub tracking_error_ratio: f64,
@@ -81,10 +81,10 @@ impl Default for InterlockSettings {
             reaction_s: defaults::REACTION_S,
             force_limit_n: None,
             torque_limit_nm: None,
-            joint_silence_s: 0.04,
-            wrench_silence_s: 0.07,
-            frame_silence_s: 0.2,
-            frozen_s: 0.07,
+            joint_timeout_s: 0.04,
+            wrench_timeout_s: 0.07,
+            frame_timeout_s: 0.2,
+            stuck_s: 0.07,
             tracking_error_ratio: 0.3,
             tracking_lag_s: 0.1,
             retract_m: 0.01,
@@ -118,10 +118,10 @@ impl Validate for InterlockSettings {
             ("reaction_s", Some(self.reaction_s), 0.0..=1.0),
             ("force_limit_n", self.force_limit_n, 0.1..=1e5),
             ("torque_limit_nm", self.torque_limit_nm, 1e-3..=1e4),
-            ("joint_silence_s", Some(self.joint_silence_s), 1e-3..=10.0),
-            ("wrench_silence_s", Some(self.wrench_silence_s), 1e-3..=10.0),
-            ("frame_silence_s", Some(self.frame_silence_s), 1e-2..=10.0),
-            ("frozen_s", Some(self.frozen_s), 0.05..=100.0),
+            ("joint_timeout_s", Some(self.joint_timeout_s), 1e-3..=10.0),
+            ("wrench_timeout_s", Some(self.wrench_timeout_s), 1e-3..=10.0),
+            ("frame_timeout_s", Some(self.frame_timeout_s), 1e-2..=10.0),
+            ("stuck_s", Some(self.stuck_s), 0.05..=100.0),
             ("tracking_error_ratio", Some(self.tracking_error_ratio), 0.01..=10.0),
             ("tracking_lag_s", Some(self.tracking_lag_s), 0.0..=1.0),
             ("retract_m", Some(self.retract_m), 0.0..=0.1),

@@ -13,20 +13,20 @@ use serde::{Deserialize, Serialize};
 /// Settings of the start checks; values without a source are heuristics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct GateSettings {
+pub struct StartCheckSettings {
     /// Largest drift of the force at rest, N, between the means of the first and last quarter.
     pub drift_n: f64,
     /// Largest standard deviation of an electrode, counts; real ones have 3 to 11.
     pub noise_counts: f64,
 }
 
-impl Default for GateSettings {
+impl Default for StartCheckSettings {
     fn default() -> Self {
         Self { drift_n: 0.5, noise_counts: 30.0 }
     }
 }
 
-impl Validate for GateSettings {
+impl Validate for StartCheckSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("drift_n", self.drift_n, 1e-3..=100.0);
         rules.number("noise_counts", self.noise_counts, 0.1..=4095.0);
@@ -48,7 +48,7 @@ pub const START_TOLERANCE: f64 = 2e-3;
 pub fn check_start(
     body: &mut dyn Backend,
     chain: &Chain,
-    settings: &GateSettings,
+    settings: &StartCheckSettings,
     seed: u64,
 ) -> Result<(), Fault> {
     body.capabilities().fit(chain)?;

@@ -10,12 +10,12 @@ use std::collections::VecDeque;
 /// Interlock that stops a real robot if a joint position reading stays constant while the joint is
 /// commanded to move: the driver repeats old data, and all limits would be checked at a wrong
 /// position.
-pub const STANDSTILL: InterlockEntry = InterlockEntry {
+pub const STUCK_JOINT: InterlockEntry = InterlockEntry {
     name: "joint standstill",
     make: |_, settings, capabilities| {
         let standstill = Standstill {
-            frozen_s: settings.frozen_s.max(settings.tracking_lag_s),
-            blind_s: BLIND_SHARE * settings.joint_silence_s,
+            stuck_s: settings.stuck_s.max(settings.tracking_lag_s),
+            blind_s: BLIND_SHARE * settings.joint_timeout_s,
             since_s: [None; MAX_JOINTS],
         };
         capabilities.real_time.then(|| Box::new(standstill) as _)
@@ -60,7 +60,7 @@ const BLIND_M: f64 = 5e-3;
 const BLIND_SHARE: f64 = 1.5;
 
 struct Standstill {
-    frozen_s: f64,
+    stuck_s: f64,
     blind_s: f64,
     /// Time since which each joint has been commanded without a change of its position.
     since_s: [Option<f64>; MAX_JOINTS],
@@ -75,9 +75,9 @@ impl Interlock for Standstill {
                 continue;
             }
             let found = now.time_s - *self.since_s[i].get_or_insert(now.time_s - now.period_s);
-            let limit = if unseen_m > BLIND_M { self.blind_s } else { self.frozen_s };
+            let limit = if unseen_m > BLIND_M { self.blind_s } else { self.stuck_s };
             let moves = unseen_m <= SEEN_M || found <= limit;
-            Trip::check(moves, STANDSTILL.name, &joint.name, [found, limit], "s")?;
+            Trip::check(moves, STUCK_JOINT.name, &joint.name, [found, limit], "s")?;
         }
         Ok(())
     }

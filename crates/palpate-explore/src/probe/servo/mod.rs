@@ -118,7 +118,7 @@ impl Servo {
         self.monitor.push(reading);
         match self.monitor.last_sample_s() {
             Some(heard_s) if self.time_s - heard_s > SILENCE_S => {
-                Err(Fault::Lost { time_s: heard_s })
+                Err(Fault::NoResponse { time_s: heard_s })
             }
             _ => Ok(()),
         }
@@ -152,7 +152,7 @@ impl Servo {
             let goal = path.advance(period_s);
             self.tick(&goal)?;
             let time_s = self.time_s;
-            let deadline_s = *deadline_s.get_or_insert(time_s + path.pace.patience_s());
+            let deadline_s = *deadline_s.get_or_insert(time_s + path.pace.connect_timeout_s());
             if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
                 return Ok(Some(end));
             }
@@ -235,14 +235,14 @@ impl Servo {
             let qdot = qdot.map_err(|cause| Fault::no_command(self.time_s, cause))?;
             self.carry_out(&qdot)?;
             let (time_s, q) = (self.time_s, &self.q);
-            let deadline_s = *deadline_s.get_or_insert(time_s + line.pace.patience_s());
+            let deadline_s = *deadline_s.get_or_insert(time_s + line.pace.connect_timeout_s());
             let home = self.robot.chain.start();
             let is_home = q.iter().zip(home).all(|(q, home)| (q - home).abs() < HOME_RAD);
             if line.pace.is_done() && is_home {
                 return Ok(());
             }
             if time_s > deadline_s {
-                return Err(Fault::Late { goal: "home", time_s, q: q.clone() });
+                return Err(Fault::Timeout { goal: "home", time_s, q: q.clone() });
             }
         }
     }
@@ -269,7 +269,7 @@ impl Servo {
     }
 
     fn no_way(&self) -> Fault {
-        Fault::NoWay { time_s: self.time_s, q: self.q.clone() }
+        Fault::NoPath { time_s: self.time_s, q: self.q.clone() }
     }
 
     /// Returns the fault of a movement to `to` that exceeded its timeout.
@@ -279,7 +279,7 @@ impl Servo {
             Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
                 Fault::OutOfReach { goal: phase, time_s, distance_m, angle_rad }
             }
-            _ => Fault::Late { goal: phase, time_s, q: self.q.clone() },
+            _ => Fault::Timeout { goal: phase, time_s, q: self.q.clone() },
         }
     }
 

@@ -109,7 +109,7 @@ impl VelocityProfile {
     }
 
     /// Timeout of the movement, s; a heuristic: four times its planned duration.
-    pub(super) fn patience_s(&self) -> f64 {
+    pub(super) fn connect_timeout_s(&self) -> f64 {
         let least_s = self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2;
         4.0 * least_s + 2.0
     }
