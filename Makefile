@@ -56,7 +56,7 @@ test: setup
 test-faults: setup
 	cargo test --locked -p palpate --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults
 
-# Regression test of planners against experiments/baselines; palpate check --bless REASON accepts a change.
+# Regression test of planners against experiments/baselines; palpate check --accept REASON accepts a change.
 CHECKED := toy container bird
 
 check-planners: setup

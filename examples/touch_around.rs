@@ -1,5 +1,5 @@
-//! Touches of the object of an `[whole_object]` scene from directions spread evenly over the sphere, at
-//! its middle and beside it; prints their outcomes and their distance from the mesh.
+//! Touches of the object of an `[whole_object]` scene from directions spread evenly over the
+//! sphere, at its middle and beside it; prints their outcomes and their distance from the mesh.
 //!
 //!     cargo run --release --example touch_around -- scenes/container_around_finger.toml 60
 

@@ -23,7 +23,7 @@
 //! | `palpate-ros` | [`ros`] | an arm behind topics, its simulated twin, recordings |
 //! | `palpate-gp` | [`gp`], [`math`] | Gaussian-process regression |
 //! | `palpate-geometry` | [`geometry`] | meshes, and where rays and fingers meet them |
-//! | `palpate-input` | [`config`], [`error`], [`files`], [`words`] | settings, errors, files |
+//! | `palpate-input` | [`config`], [`error`], [`files`], [`mod@format`] | settings, errors, files |
 //!
 //! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. A
 //! [`Servo`](explore::probe::servo::Servo) is made of a task, a robot and any

@@ -116,7 +116,8 @@ impl Scene {
     }
 
     /// Creates a scene from a mesh in the world frame, touched along -y: vertices (n, 3), metres;
-    /// triangles (m, 3), vertex indices; the zone, metres; the simulator; other arguments as in `load`.
+    /// triangles (m, 3), vertex indices; the zone, metres; the simulator; other arguments as in
+    /// `load`.
     #[staticmethod]
     #[pyo3(signature = (vertices_m, triangles, *, x_m, z_m, simulator = "swept", seed = 0, **settings))]
     fn from_mesh<'py>(

@@ -78,7 +78,7 @@ pub(super) struct Args {
     /// Held-out targets or trials that test the cheapest scene [default: 200 targets for effects,
     /// else as many as are compared].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
-    fresh: Option<u16>,
+    held_out: Option<u16>,
     /// Start from the scene with every effect that its body supports.
     #[arg(long)]
     full: bool,
@@ -185,7 +185,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
             Criterion::Touches(tolerance) => (compared.cheapest(&tolerance, origin), None),
             Criterion::Verdict(_) => (None, None),
         };
-        let fresh = args.fresh.or(fresh.filter(|_| !is_verdict));
+        let fresh = args.held_out.or(fresh.filter(|_| !is_verdict));
         let confirm = |selected| compared.confirm(selected, origin, fresh);
         cheapest = selected.map(confirm).transpose()?;
     }

@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[command(after_help = "\
 Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl
-  palpate check toy --baseline experiments/baselines/toy.jsonl --bless 'length scales are fitted in logarithms'
+  palpate check toy --baseline experiments/baselines/toy.jsonl --accept 'length scales are fitted in logarithms'
   palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
 
 Runs the first four trials of every planner. If their rows equal the baseline's byte for byte, the planner is identical \
@@ -33,7 +33,7 @@ Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 error.
 pub(super) struct Args {
     /// An experiment (.toml), or the name of one in experiments/.
     experiment: PathBuf,
-    /// Baseline file, written by --bless.
+    /// Baseline file, written by --accept.
     #[arg(long, value_name = "FILE")]
     baseline: PathBuf,
     /// Maximum number of trials per planner.
@@ -43,8 +43,8 @@ pub(super) struct Args {
     #[arg(long, default_value_t = 0.05, value_name = "SHARE", value_parser = tolerance)]
     tolerance: f64,
     /// Write the current results to the baseline, with this reason.
-    #[arg(long, value_name = "WHY")]
-    bless: Option<String>,
+    #[arg(long, value_name = "REASON")]
+    accept: Option<String>,
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -77,7 +77,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     for path in [&args.junit, &args.markdown, &args.svg].into_iter().flatten() {
         args.force.check_file(path)?;
     }
-    let old = match &args.bless {
+    let old = match &args.accept {
         Some(_) if !args.baseline.exists() => None,
         _ => {
             let old = StoredBaseline::read(&args.baseline)?;
@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     }
     let stop = stop_on_interrupt("trials")?;
     let rules = CheckOptions { tolerance: args.tolerance, ..CheckOptions::default() };
-    if let Some(why) = &args.bless {
+    if let Some(why) = &args.accept {
         return accept_baseline(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;

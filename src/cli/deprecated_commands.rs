@@ -1,4 +1,4 @@
-//! Deprecated command names, accepted for one version.
+//! Deprecated names of commands and options, accepted for one version.
 
 use anyhow::{bail, ensure};
 use std::ffi::OsString;
@@ -43,6 +43,15 @@ pub(super) fn translate(
             ("register", "register MESH --cloud CLOUD")
         }
         "suite" => ("run", "run SWEEP"),
+        "twin" => ("serve", "serve EXPERIMENT"),
+        "check" if has(&rest, "--bless") => {
+            rename(&mut rest, "--bless", "--accept");
+            ("check", "check --accept REASON")
+        }
+        "accuracy" if has(&rest, "--fresh") => {
+            rename(&mut rest, "--fresh", "--held-out");
+            ("accuracy", "accuracy --held-out N")
+        }
         "fidelity" => {
             rename(&mut rest, "--from", "--against");
             if !has(&rest, "--against") {

@@ -55,7 +55,7 @@ Examples:
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
   palpate show scenes/bird_pa10.toml --watch    a trial in a window
-  palpate twin experiments/container_pa10.toml   a simulated robot in place of the real one, over ROS 2
+  palpate serve experiments/container_pa10.toml   a simulated robot in place of the real one, over ROS 2
   palpate export runs/bird --planner active --out bird.ply
   palpate export scenes/bird.toml           touch the whole zone, write a point cloud
   palpate run experiments/suite/six.toml    compare planners on several objects
@@ -84,7 +84,7 @@ enum Command {
     /// Measure the error and time of simulation levels and effects of a scene.
     Accuracy(accuracy::Args),
     /// Serve a simulated robot over ROS topics in real time.
-    Twin(serve::Args),
+    Serve(serve::Args),
     /// Register the finger, a ball, a plate or an object by touch.
     Register(register::Args),
     /// Replay a recorded trial and compare commands and results.
@@ -103,7 +103,7 @@ enum Command {
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "report", "show", "export"]),
     ("Evaluate", &["compare", "check", "accuracy"]),
-    ("Robot", &["twin", "register", "replay", "calibrate"]),
+    ("Robot", &["serve", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
 
@@ -172,7 +172,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Compare(args) => compare::run(&args),
         Command::Check(args) => check::run(&args, talk),
         Command::Accuracy(args) => accuracy::run(&args, talk),
-        Command::Twin(args) => serve::run(&args, talk),
+        Command::Serve(args) => serve::run(&args, talk),
         Command::Register(args) => register::run(&args, talk),
         Command::Replay(args) => replay::run(&args, talk),
         Command::Calibrate(args) => calibrate::run(&args),

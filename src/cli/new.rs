@@ -41,7 +41,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t)]
     finger: FingerKind,
     /// Let a glTF mesh read buffers outside its own folder.
-    #[arg(long)]
+    #[arg(long, alias = "outside-buffers")]
     allow_external_buffers: bool,
     /// Folder for both files.
     #[arg(long, value_name = "FOLDER", default_value = ".")]

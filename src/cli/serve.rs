@@ -1,4 +1,4 @@
-//! Command `palpate twin`.
+//! Command `palpate serve`.
 
 use super::find::{EXPERIMENTS, SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;
@@ -20,10 +20,10 @@ use std::sync::Arc;
 
 const HELP: &str = "\
 Examples:
-  palpate twin real_arm
-  palpate twin scenes/container_pa10.toml --domain 7 --seed 3
-  palpate twin scenes/bird_pa10.toml --inject force_spike@12 --inject estop@20+2
-  palpate twin scenes/container_pa10.toml --ball 0.02 --at 0.003,-0.652,0.501
+  palpate serve real_arm
+  palpate serve scenes/container_pa10.toml --domain 7 --seed 3
+  palpate serve scenes/bird_pa10.toml --inject force_spike@12 --inject estop@20+2
+  palpate serve scenes/container_pa10.toml --ball 0.02 --at 0.003,-0.652,0.501
 
 In another terminal: palpate run real_arm
 

@@ -48,8 +48,9 @@ pub(super) struct Args {
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<Unit>,
-    /// Let a .gltf mesh read buffers outside its folder; in a scene use object.allow_external_buffers.
-    #[arg(long)]
+    /// Let a .gltf mesh read buffers outside its folder; in a scene use
+    /// object.allow_external_buffers.
+    #[arg(long, alias = "outside-buffers")]
     allow_external_buffers: bool,
     /// Change one setting of a scene or experiment; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -91,7 +92,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         ("--json", args.json, is_folder, "a run's folder"),
         ("--set", !args.set.is_empty(), is_toml, "a scene or an experiment (.toml)"),
         (
-            "--outside-buffers",
+            "--allow-external-buffers",
             args.allow_external_buffers,
             is_mesh,
             "a mesh; in a scene use object.allow_external_buffers",

@@ -1,8 +1,8 @@
 //! Experiments: planners × trials on one scene.
 //!
-//! Only the [`Experiment::row_settings`] decides what a row contains. Other settings may change on a
-//! finished run: new trials and planners are added to the existing rows. Rows of trials or planners
-//! that are no longer listed are kept but not shown.
+//! Only the [`Experiment::row_settings`] decides what a row contains. Other settings may change on
+//! a finished run: new trials and planners are added to the existing rows. Rows of trials or
+//! planners that are no longer listed are kept but not shown.
 
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::report_settings::{ReportSettings, TOUCHES_MAX};

@@ -15,7 +15,7 @@
 //! let active = planner::by_name("active").expect("it is there");
 //! let row = simulation.trial(active, 0);
 //! assert_eq!((row.touches.len(), row.failure.clone()), (8, None));
-//! let rmse = measure::RMSE.of(&row, 8).expect("it was measured");
+//! let rmse = measure::RMSE.value(&row, 8).expect("it was measured");
 //! assert!(rmse > 0.0 && rmse < 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -102,8 +102,8 @@ impl Simulation {
         Ok(Self { scan_notice: scanned, ..Self::made(experiment, truth)? })
     }
 
-    /// Builds the simulation as [`in_environment`](Self::in_environment) does, with a ground truth sampled before.
-    /// Without a known truth only truth-free measures are computed.
+    /// Builds the simulation as [`in_environment`](Self::in_environment) does, with a ground truth
+    /// sampled before. Without a known truth only truth-free measures are computed.
     ///
     /// # Errors
     /// If the scene cannot be simulated.

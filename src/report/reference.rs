@@ -138,19 +138,23 @@ fn plain(text: &str) -> String {
 
 /// Returns the table of measures as Markdown, with their columns in `summary.csv`.
 pub fn measures() -> String {
-    let heads = ["measure", "what", "in files", "better", "columns of `summary.csv`"];
+    let heads = ["measure", "meaning", "unit", "better", "summary"];
     let mut table = Table::new(heads.map(Column::new));
     for measure in MEASURES {
         let better = match measure.direction {
-            Direction::Minimise => "less",
-            Direction::Maximise => "more",
-            Direction::Undirected => "neither",
+            Direction::Minimise => "low",
+            Direction::Maximise => "high",
+            Direction::Undirected => "",
         };
-        let columns: Vec<String> =
-            measure.columns().iter().map(|name| format!("`{name}`")).collect();
+        let aggregate = measure.aggregate;
+        let summary = match (aggregate.has_mean(), aggregate.has_median()) {
+            (true, true) => "mean, median",
+            (true, false) => "mean",
+            (false, _) => "median",
+        };
         let unit = measure.unit.suffix.trim_start_matches('_');
         let id = format!("`{}`", measure.id);
-        let cells = [id, plain(measure.title), unit.into(), better.into(), columns.join(", ")];
+        let cells = [id, plain(measure.title), unit.into(), better.into(), summary.into()];
         table.rows.push(cells.map(Cell::from).into());
     }
     table.markdown()

@@ -225,9 +225,9 @@ pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     Some(estimate(&counts(&logs), (seed, "suite"), of))
 }
 
-/// Share of the gap from [`BASELINE_PLANNER`] to the [`ORACLE`] that a planner closes, in log error averaged
-/// over objects: (floor − contender) / (floor − ceiling). Trials of the same number are drawn
-/// together because they share initial touches. `None` if one of the three lacks an object of
+/// Share of the gap from [`BASELINE_PLANNER`] to the [`ORACLE`] that a planner closes, in log error
+/// averaged over objects: (floor − contender) / (floor − ceiling). Trials of the same number are
+/// drawn together because they share initial touches. `None` if one of the three lacks an object of
 /// `objects` or has another number of trials, or if the gap is zero.
 pub fn gap_closed(
     compared: &SuiteComparison,

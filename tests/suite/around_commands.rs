@@ -22,7 +22,7 @@ fn around() -> TempDir {
     write(
         "small.toml",
         "name = \"small\"\nscene = \"scene.toml\"\nplanners = [\"active\", \"random\"]\ntrials = 2\n\
-         initial_touches = 4\ntouches = 8\n\n[gp]\ncells = 16\ncompared_every = 4\n\n\
+         initial_touches = 4\ntouches = 8\n\n[gp]\ncells = 16\nevaluate_every = 4\n\n\
          [report]\ntouch_counts = [8]\n",
     );
     folder
@@ -62,7 +62,7 @@ fn a_whole_belief_is_exported_and_read_back() {
 fn planners_around_an_object_are_held_against_what_they_were() {
     let folder = around();
     let check = ["check", "small.toml", "--baseline", "it.jsonl", "--max-trials", "2"];
-    succeeds(folder.path(), &[&check[..], &["--bless", "so it is"]].concat());
+    succeeds(folder.path(), &[&check[..], &["--accept", "so it is"]].concat());
     let same = succeeds(folder.path(), &check);
     assert!(same.trim_end().ends_with("identical"), "{same}");
     // Touches are equal, but their evaluation differs.

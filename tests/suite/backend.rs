@@ -68,7 +68,7 @@ fn each(check: impl Fn(&str, &mut dyn Backend, &Chain)) {
         for arm in [None, Some("arm={links=\"C\"}")] {
             for effects in [Some(EVERYTHING), (kind == "dynamic").then_some("effects={}")] {
                 let Some(effects) = effects else { continue };
-                let body = format!("body=\"{kind}\"");
+                let body = format!("simulator=\"{kind}\"");
                 let sets: Vec<&str> = [&*body, effects].into_iter().chain(arm).collect();
                 let simulator = Simulator::new(environment(&sets)).unwrap();
                 let chain = simulator.environment().chain().unwrap();

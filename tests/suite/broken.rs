@@ -77,7 +77,7 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
         ("scene.toml", "mesh.obj", &["mesh.obj", "not valid TOML"]),
         ("scene.toml", ".", &["small.toml:2", "readable file"]),
         ("scene = \"scene.toml\"", "scene = 3", &["small.toml:2", "scene"]),
-        ("scene = \"scene.toml\"", "scene = {}", &["small.toml", "body"]),
+        ("scene = \"scene.toml\"", "scene = {}", &["small.toml", "scene.simulator"]),
         ("scene = \"scene.toml\"", "", &["small.toml", "scene"]),
         ("[1e-4, 1e-2]", "[1e-2, 1e-4]", &["small.toml:10", "noise", "smaller number first"]),
         ("[1e-4, 1e-2]", "[nan, 1e-2]", &["small.toml:10", "gp.noise[0]", "NaN"]),
@@ -114,10 +114,10 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
 #[test]
 fn broken_scenes_are_refused_with_file_line_key_and_remedy() {
     let cases: &[(&str, &str, &[&str])] = &[
-        ("\"cast\"", "\"cats\"", &["scene.toml:1", "body", "cats", "cast"]),
-        ("\"cast\"", "3", &["scene.toml:1", "body"]),
-        ("\"cast\"", "\"function\"", &["scene.toml", "function", "toy"]),
-        ("simulator = \"swept\"", "", &["scene.toml", "body"]),
+        ("\"swept\"", "\"cats\"", &["scene.toml:1", "simulator", "cats", "swept"]),
+        ("\"swept\"", "3", &["scene.toml:1", "simulator"]),
+        ("\"swept\"", "\"analytic\"", &["scene.toml", "function", "toy"]),
+        ("simulator = \"swept\"", "", &["scene.toml", "simulator"]),
         ("[0.1, 0.4]\nz", "[0.4, 0.1]\nz", &["scene.toml:7", "zone.x_m", "smaller number first"]),
         ("[0.1, 0.4]\nz", "[0.1, 0.1]\nz", &["scene.toml:7", "zone.x_m"]),
         ("[0.1, 0.4]\nz", "[nan, 0.1]\nz", &["scene.toml:7", "zone.x_m[0]"]),

@@ -145,7 +145,7 @@ fn a_check_says_by_its_exit_code() {
     };
     let (code, said) = check(&[]);
     assert!(code == Some(2) && said.contains("toy.jsonl"), "{said}");
-    let (code, said) = check(&["--bless", "the first"]);
+    let (code, said) = check(&["--accept", "the first"]);
     assert!(code == Some(0) && said.contains("8 trials"), "{said}");
     let reports = ["xml", "md", "svg"].map(|it| folder.path().join(format!("check.{it}")));
     let [junit, markdown, svg] = reports.each_ref().map(|path| path.to_str().unwrap());

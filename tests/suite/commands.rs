@@ -60,7 +60,7 @@ fn commands_answer_to_their_old_names() {
     fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);
     // The help lists each command once, in its group.
     let help = succeeds(folder.path(), &["--help"]);
-    for (group, name) in [("Explore:", "  export "), ("Robot:", "  twin "), ("More:", "  list ")] {
+    for (group, name) in [("Explore:", "  export "), ("Robot:", "  serve "), ("More:", "  list ")] {
         assert!(help.find(group) < help.find(name), "{help}");
         assert_eq!(help.matches(&format!("\n{name}")).count(), 1, "{help}");
     }

@@ -59,6 +59,7 @@ mod own_planners;
 mod page;
 mod presence;
 mod probes;
+mod prose;
 mod reach;
 mod recording;
 mod reference;

@@ -47,22 +47,22 @@ fn values_of_a_wrong_type_are_told_what_is_allowed() {
         ("planners=active", &["`planners`", "allowed is a list"]),
         (
             "scene.simulator=3",
-            &["`scene.simulator` = 3", "allowed is function, cast, kinematic, dynamic"],
+            &["`scene.simulator` = 3", "allowed is analytic, swept, kinematic, dynamic"],
         ),
         (
             "scene.simulator={}",
-            &["`scene.simulator`", "allowed is function, cast, kinematic, dynamic"],
+            &["`scene.simulator`", "allowed is analytic, swept, kinematic, dynamic"],
         ),
         (
             "scene.simulator=[1]",
-            &["`scene.simulator`", "allowed is function, cast, kinematic, dynamic"],
+            &["`scene.simulator`", "allowed is analytic, swept, kinematic, dynamic"],
         ),
         (
             "scene.simulator={a=1,b=2}",
-            &["`scene.simulator`", "allowed is function, cast, kinematic"],
+            &["`scene.simulator`", "allowed is analytic, swept, kinematic"],
         ),
         ("scene.simulator={cast=1}", &["scene.simulator"]),
-        ("scene.simulator=cats", &["`scene.simulator` = \"cats\"", "allowed is function, cast"]),
+        ("scene.simulator=cats", &["`scene.simulator` = \"cats\"", "allowed is analytic, swept"]),
         ("scene.object.unit={}", &["`scene.object.unit`", "allowed is m, cm, mm, um, in"]),
         ("scene.zone=3", &["`scene.zone` = 3", "allowed is a table"]),
         ("scene.object.mesh=3", &["`scene.object.mesh` = 3", "allowed is text in quotes"]),

@@ -1,5 +1,5 @@
-//! Tests of wording: every message of the program is listed in `tests/messages.txt`, and messages, doc
-//! comments and guides avoid openers without a verb and words of people.
+//! Tests of wording: every message of the program is listed in `tests/messages.txt`, and messages,
+//! doc comments and guides avoid openers without a verb and words of people.
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::BTreeMap;
@@ -148,7 +148,10 @@ fn messages_are_listed() {
     }
     let kept = fs::read_to_string(&path).unwrap_or_default();
     for (ours, kept) in list.lines().zip(kept.lines().chain(std::iter::repeat(""))) {
-        assert_eq!(ours, kept, "tests/messages.txt differs: run `make messages` and read the change");
+        assert_eq!(
+            ours, kept,
+            "tests/messages.txt differs: run `make messages` and read the change"
+        );
     }
     assert_eq!(list.len(), kept.len());
 }
@@ -168,13 +171,16 @@ fn doc_comments_begin_with_a_subject_or_a_verb() {
 fn prose_names_things_instead_of_people() {
     let mut texts: Vec<(String, String)> = Vec::new();
     for (name, source) in sources() {
-        let lines = source.docs.into_iter().chain(source.literals.into_iter().filter(|t| is_message(t)));
+        let lines =
+            source.docs.into_iter().chain(source.literals.into_iter().filter(|t| is_message(t)));
         texts.extend(lines.map(|line| (name.clone(), line)));
     }
     for page in files(&root().join("docs"), "md").into_iter().chain([root().join("README.md")]) {
         let text = fs::read_to_string(&page).unwrap();
         texts.extend(text.lines().map(|line| (page.display().to_string(), line.to_owned())));
     }
+    // Stored recordings contain this text byte for byte.
+    texts.retain(|(_, text)| !text.starts_with("# Of each frame"));
     let wrong: Vec<_> = texts
         .iter()
         .filter_map(|(name, text)| Some(format!("{name}: \"{}\" in {text}", avoided(text)?)))
@@ -202,9 +208,9 @@ fn first_pages_have_short_sentences() {
         let page = fs::read_to_string(root().join(name)).unwrap();
         for paragraph in prose(&page).split("\n\n") {
             let items = paragraph.split("\n- ").flat_map(|item| item.split(['.', '?', '!', ':']));
-            for sentence in items.filter(|text| text.split_whitespace().count() > SENTENCE_MAX) {
-                panic!("{name}: more than {SENTENCE_MAX} words: {sentence}");
-            }
+            let count = |text: &str| text.split_whitespace().count();
+            let longest = items.max_by_key(|text| count(text)).unwrap_or_default();
+            assert!(count(longest) <= SENTENCE_MAX, "{name}: a long sentence: {longest}");
         }
     }
 }

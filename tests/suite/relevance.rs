@@ -111,7 +111,7 @@ fn what_a_scene_is_refused_without_is_needed() {
 fn the_full_scene_is_one_that_is_accepted() {
     let folder = folder(0.0, "");
     for body in ["kinematic", "dynamic"] {
-        let set = format!("body=\"{body}\"");
+        let set = format!("simulator=\"{body}\"");
         let scene = Scene::load(&folder.path().join("scene.toml"), &[set]).unwrap();
         let whole = with_all_effects(&scene);
         let text = toml::to_string(&whole).unwrap();
@@ -132,7 +132,7 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     let mut arguments = vec!["--quiet", "accuracy", "scene.toml", "--tolerance", "0.05mm"];
     arguments.extend([
         "--touches=80",
-        "--fresh=20",
+        "--held-out=20",
         "--pairs=2",
         "--against=scene",
         "--out",
@@ -201,7 +201,7 @@ fn a_verdict_calls_for_what_changes_it() {
     arguments.extend([
         "--trial-touches=9",
         "--touches=10",
-        "--fresh=4",
+        "--held-out=4",
         "--out=less",
         "--tolerance",
     ]);

@@ -126,7 +126,7 @@ fn every_constant_stands_in_the_file() {
         keys.sort();
         keys
     };
-    assert_eq!(keys("skin"), ["along", "around", "model", "samples"]);
+    assert_eq!(keys("skin"), ["cells_along", "cells_around", "model", "samples"]);
     assert_eq!(keys("fluid"), ["vibration"]);
     assert!(written["fluid"]["vibration"].as_table().unwrap().is_empty());
     assert_eq!(keys("timing"), ["control_delay_s"]);

@@ -256,21 +256,21 @@ fn what_cannot_be_asked_for_is_refused() {
         assert!(error.contains(words), "{error}");
     };
     let active = "planners = [\"active\"]";
-    refused("planners = [\"active\", \"slope\"]", "around = {}", "planners[1]");
-    refused("planners = [\"silhouette\"]", "around = {}", "a planner for whole objects");
-    refused(active, "around = {}\nzone = { x_m = [0, 1] }", "scene.zone");
+    refused("planners = [\"active\", \"slope\"]", "whole_object = {}", "planners[1]");
+    refused("planners = [\"silhouette\"]", "whole_object = {}", "a planner for whole objects");
+    refused(active, "whole_object = {}\nzone = { x_m = [0, 1] }", "scene.zone");
     refused(active, "", "[whole_object] for a whole object");
-    refused(active, "around = { radius_m = -1 }", "scene.whole_object.radius_m");
-    refused(active, "around = { centre_m = [0, 0, 1e9] }", "scene.whole_object.centre_m");
+    refused(active, "whole_object = { radius_m = -1 }", "scene.whole_object.radius_m");
+    refused(active, "whole_object = { centre_m = [0, 0, 1e9] }", "scene.whole_object.centre_m");
     refused(
         &format!("{active}\ngp = {{ kernel = \"squared_exponential\" }}"),
-        "around = {}",
+        "whole_object = {}",
         "gp.kernel",
     );
-    refused(&format!("{active}\ngp = {{ cells = 4 }}"), "around = {}", "gp.cells");
-    refused(&format!("{active}\ngp = {{ mean = \"zero\" }}"), "around = {}", "gp.mean");
+    refused(&format!("{active}\ngp = {{ cells = 4 }}"), "whole_object = {}", "gp.cells");
+    refused(&format!("{active}\ngp = {{ mean = \"zero\" }}"), "whole_object = {}", "gp.mean");
     // As in version 0.1.
-    refused(&format!("{active}\nspace = {{ cells = 4 }}"), "around = {}", "space.cells");
+    refused(&format!("{active}\nspace = {{ cells = 4 }}"), "whole_object = {}", "space.cells");
 }
 
 /// One table `[gp]` configures the belief in either region; it is written and read back unchanged,

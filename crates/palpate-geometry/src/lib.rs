@@ -33,7 +33,7 @@
 //! // The nearest point of it.
 //! let nearest = mesh.closest_point(&Point3::new(0.15, 0.0, 0.0));
 //! assert!((nearest.point - Point3::new(0.1, 0.0, 0.0)).norm() < 1e-12);
-//! # Ok::<(), palpate_input::error::Invalid>(())
+//! # Ok::<(), palpate_input::error::InputError>(())
 //! ```
 
 mod bounds;

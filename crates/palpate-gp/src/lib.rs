@@ -11,20 +11,20 @@
 //! ```
 //! use palpate_gp::kernel::SquaredExponential;
 //! use palpate_gp::posterior::Scratch;
-//! use palpate_gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
+//! use palpate_gp::{MeanModel, Observations, Posterior, SearchBox, TouchNoise};
 //!
 //! // Heights of a wave 20 mm high, observed every 0.5 m over 4 m; all in metres.
 //! let wave = |x_m: f64| 0.02 * (2.0 * x_m).sin();
 //! let mut observations = Observations::new(1);
 //! for i in 0..9 {
 //!     let x_m = 0.5 * f64::from(i);
-//!     observations.push(&[x_m], wave(x_m));
+//!     observations.push_height(&[x_m], wave(x_m));
 //! }
 //!
 //! // The most likely hyperparameters within these ranges: the length from 5 cm to 4 m, the noise
 //! // from a ten-thousandth to a hundredth of the signal, the signal from 0.1 mm to 1 m.
 //! let search_box = SearchBox {
-//!     mean: Mean::Zero,
+//!     mean: MeanModel::Zero,
 //!     length_scales: vec![(0.05, 4.0).into()],
 //!     noise_ratio: (1e-4, 1e-2).into(),
 //!     signal_sd: (1e-4, 1.0).into(),

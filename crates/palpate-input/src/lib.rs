@@ -5,10 +5,10 @@
 //! | [`files`] | reads and replaces files named by users |
 //! | [`config`] | settings from a TOML file and `key=value` overrides |
 //! | [`error`] | error of invalid input: place, value, allowed values |
-//! | [`words`] | formatting of values and parser messages for users |
+//! | [`mod@format`] | formatting of values and parser messages for users |
 //!
 //! ```
-//! use palpate_input::config::{Checked, Loader, Rules};
+//! use palpate_input::config::{Loader, Rules, Validate};
 //! use serde::Deserialize;
 //!
 //! #[derive(Deserialize)]
@@ -16,13 +16,13 @@
 //!     force_n: f64,
 //! }
 //!
-//! impl Checked for Touch {
+//! impl Validate for Touch {
 //!     fn check(&self, rules: &mut Rules) {
 //!         rules.number("force_n", self.force_n, 0.1..=5.0);
 //!     }
 //! }
 //!
-//! let mut loader = Loader::of("touch.toml".as_ref(), "force_n = 1.0".into())?;
+//! let mut loader = Loader::from_text("touch.toml".as_ref(), "force_n = 1.0".into())?;
 //! loader.set("force_n=50")?;
 //! let error = loader.finish::<Touch>().err().expect("it is too large");
 //! assert!(error.to_string().starts_with("--set force_n=50: `force_n` = 50"));

@@ -174,8 +174,7 @@ impl RosArm {
             if missing.is_empty() {
                 return Ok(());
             }
-            let BackendSettings { connect_timeout_s: connect_timeout_s, topics, .. } =
-                self.settings();
+            let BackendSettings { connect_timeout_s, topics, .. } = self.settings();
             if begun.elapsed().as_secs_f64() > *connect_timeout_s {
                 let name =
                     |topic: Topic| format!("{} ({})", topics.name(topic), topics.type_name(topic));

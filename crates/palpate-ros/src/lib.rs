@@ -5,7 +5,7 @@
 //! | [`arm`] | the arm: a [`Backend`](palpate_explore::backend::Backend) over topics |
 //! | [`topics`], [`message`] | the topics and services of an arm, and their messages |
 //! | [`transport`] | sends and receives packets; [`connect`] creates one from settings |
-//! | [`twin`] | a simulated robot behind the same topics, in real time |
+//! | [`server`] | a simulated robot behind the same topics, in real time |
 //! | [`recording`] | every tick of a trial as an MCAP file, and a backend that replays it |
 //!
 //! Joints are matched by name, so that a driver's messages may have them in any order:
@@ -19,7 +19,7 @@
 //! let (mut q, mut qdot) = (Vec::new(), Vec::new());
 //! arm.read(&message, &mut q, &mut qdot)?;
 //! assert_eq!(q, [0.1, 0.2]);
-//! # Ok::<(), palpate_input::error::Invalid>(())
+//! # Ok::<(), palpate_input::error::InputError>(())
 //! ```
 
 pub mod arm;

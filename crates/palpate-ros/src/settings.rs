@@ -152,8 +152,8 @@ const RENAMED_KEYS: [[&str; 2]; 11] = [
     ["topics.command.age_s", "topics.command.max_age_s"],
 ];
 
-/// Renames or removes from the experiment in `loader` the keys that version 0.1 read in `[backend]`, and wrote
-/// with their defaults.
+/// Renames or removes from the experiment in `loader` the keys that version 0.1 read in
+/// `[backend]`, and wrote with their defaults.
 ///
 /// # Errors
 /// If one has a value other than the present constant: a limit of an arm does not change without

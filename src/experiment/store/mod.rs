@@ -5,9 +5,9 @@
 //! (ground truth on the test grid; `surface.obj` for a whole object) and `trials.jsonl` (a row per
 //! finished trial). All other files are generated from these.
 //!
-//! A folder contains the rows of one [identity](Experiment::row_settings). It can be opened with more
-//! trials, other planners or another report: `resolved.toml` is updated, and missing trials are
-//! run. Rows that are no longer listed stay in `trials.jsonl`, so a change loses no trial.
+//! A folder contains the rows of one [identity](Experiment::row_settings). It can be opened with
+//! more trials, other planners or another report: `resolved.toml` is updated, and missing trials
+//! are run. Rows that are no longer listed stay in `trials.jsonl`, so a change loses no trial.
 //!
 //! `resolved.toml` marks a run's folder: it is written first and never removed. A folder with it
 //! and without a row, or with only the partial files of a crash, is started again.

@@ -57,7 +57,7 @@ pub struct TrialLine {
     /// Reason of a failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Values of its measures, by [`CheckMeasure::id`](super::judged::CheckMeasure::id).
+    /// Values of its measures, by [`CheckMeasure::id`](super::measures::CheckMeasure::id).
     pub values: BTreeMap<String, f64>,
 }
 
@@ -144,7 +144,7 @@ impl StoredBaseline {
         };
         let mut lines = text.lines().enumerate();
         let empty = || {
-            InputError::new("the file is empty; write a baseline with --bless REASON")
+            InputError::new("the file is empty; write a baseline with --accept REASON")
                 .at(path.display())
         };
         let (_, first) = lines.next().ok_or_else(empty)?;
@@ -182,7 +182,7 @@ impl StoredBaseline {
                 let problem = format!(
                     "`{field}` is {found} in the baseline and {wanted} in the experiment, so trials do not pair"
                 );
-                let mend = "write a new baseline with --bless REASON";
+                let mend = "write a new baseline with --accept REASON";
                 return Err(InputError::new(problem).at(path.display()).remedy(mend));
             }
         }

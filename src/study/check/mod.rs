@@ -2,7 +2,7 @@
 //!
 //! Rows are compared first; identical bytes mean no change. Otherwise new and old trials with the
 //! same seeds are paired, and trials are added in batches until an anytime-valid interval
-//! ([`sequence`]) decides. [`judged`] lists the measures.
+//! ([`sequence`]) decides. [`measures`] lists the measures.
 
 pub mod baseline;
 pub mod measures;

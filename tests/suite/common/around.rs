@@ -26,8 +26,8 @@ pub fn mesh(field: Field) -> Mesh {
 /// An experiment on a solid in place of the scene's object; the settings are TOML.
 pub fn simulation(field: Field, settings: &str) -> Simulation {
     let text = format!(
-        "name = \"whole\"\ninitial_touches = 5\ntrials = 1\n{settings}\n[scene]\nbody = \"cast\"\n\
-         object = {{ mesh = \"none.obj\" }}\naround = {{}}\nfinger = {{ pitch_deg = 0 }}\n"
+        "name = \"whole\"\ninitial_touches = 5\ntrials = 1\n{settings}\n[scene]\nsimulator = \"swept\"\n\
+         object = {{ mesh = \"none.obj\" }}\nwhole_object = {{}}\nfinger = {{ pitch_deg = 0 }}\n"
     );
     let experiment: Experiment = toml::from_str(&text).unwrap();
     let vertices_of = mesh(field);

@@ -127,7 +127,7 @@ impl TwinProcess {
     /// Starts the robot of a scene or experiment; it is discovered when this returns.
     pub fn new(network: &Network, path: &str, more: &[&str]) -> Self {
         let mut child =
-            network.palpate(&["twin", path]).args(more).stdout(Stdio::piped()).spawn().unwrap();
+            network.palpate(&["serve", path]).args(more).stdout(Stdio::piped()).spawn().unwrap();
         let events: Arc<Mutex<Vec<Value>>> = Arc::default();
         let (lines, told) = (BufReader::new(child.stdout.take().unwrap()), Arc::clone(&events));
         let reader = std::thread::spawn(move || {

@@ -16,7 +16,7 @@ Written by `make hard-cases`, which runs every case of `tests/suite/hard` at eve
 every control period or time step. [physics.md](physics.md#where-the-simulation-breaks) says what helps. `make test` runs
 each case at the hardest severity that must hold.
 
-The column *outcomes* lists the severities from the easiest to the hardest. Behind each stands one letter for each period or step:
+The column *outcomes* lists the severities that did not hold everywhere. Behind each stands one letter for each period or step:
 
 | letter | outcome |
 |---|---|
@@ -47,7 +47,7 @@ pub fn write() -> Vec<String> {
     let mut ran = verdicts().into_iter();
     for (title, cases) in GROUPS {
         tables += &format!("\n## {title}\n\n");
-        tables += "| case | severity | outcomes | must hold to | holds to | beyond |\n|---|---|---|---|---|---|\n";
+        tables += "|case|severity|tested|must hold to|holds to|outcomes|beyond|\n|---|---|---|---|---|---|---|\n";
         for case in *cases {
             let verdicts: Vec<Verdict> = ran.by_ref().take(runs(case).count()).collect();
             tables += &line(case, &verdicts);
@@ -110,6 +110,7 @@ fn line(case: &Case, verdicts: &[Verdict]) -> String {
     let is_held = |rank: &usize| at(*rank).all(|verdict| verdict.outcome == Outcome::Stable);
     let held = ranks.clone().take_while(is_held).count();
     let outcomes: Vec<String> = ranks
+        .filter(|rank| !is_held(rank))
         .map(|rank| {
             let letters: String = at(rank).map(|verdict| LETTERS[self::rank(verdict)]).collect();
             format!("{} `{letters}`", short(case.severities[rank]))
@@ -127,13 +128,15 @@ fn line(case: &Case, verdicts: &[Verdict]) -> String {
         beyond += &format!(" ({})", case.known);
     }
     format!(
-        "| **{}**: {} | {} | {} | {} | {} | {} |\n",
+        "|**{}**: {}|{}|{} to {}|{}|{}|{}|{}|\n",
         case.name,
         case.why,
         case.severity,
-        outcomes.join(", "),
+        short(case.severities[0]),
+        short(case.severities[case.severities.len() - 1]),
         to(case.holds),
         to(held),
+        outcomes.join(", "),
         beyond.replace('|', "\\|").replace('\n', " ")
     )
 }
@@ -169,7 +172,9 @@ fn margins() -> String {
 
 /// Returns the start of a message, because some contain a whole state.
 fn cut(words: &str) -> String {
-    const MOST: usize = 100;
+    const MOST: usize = 60;
+    // A fault's state follows "with".
+    let words = words.split(" with ").next().unwrap_or(words);
     match words.chars().count() > MOST {
         true => words.chars().take(MOST).chain(['…']).collect(),
         false => words.into(),

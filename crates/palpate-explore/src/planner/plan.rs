@@ -109,8 +109,8 @@ pub struct PlannerEntry {
     pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
 }
 
-/// Factory of the planners of one name: a built-in [`PlannerEntry`], or one that a program adds to its
-/// simulation.
+/// Factory of the planners of one name: a built-in [`PlannerEntry`], or one that a program adds to
+/// its simulation.
 pub trait PlannerFactory: Send + Sync {
     /// Name in an experiment's list; a name other than a built-in one's is an
     /// [external](super::is_external) planner's.

@@ -5,8 +5,8 @@
 //! suite's tuning objects the error is 0.904 of that of a Sobol sequence; with the probability
 //! itself and without optimism it is 0.937.
 //!
-//! With `planning.silhouette.travel_cost_m`, the reduction is divided by time: a touch takes as long
-//! as travelling this distance, and the travel to it is added.
+//! With `planning.silhouette.travel_cost_m`, the reduction is divided by time: a touch takes as
+//! long as travelling this distance, and the travel to it is added.
 //!
 //! A few touches determine the length scales poorly, so the variance is that of a committee of
 //! beliefs whose length scales differ from the fitted ones.

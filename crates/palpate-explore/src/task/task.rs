@@ -157,9 +157,9 @@ impl Task {
         self.contains(&Target::Aim(*aim))
     }
 
-    /// Approximates [`is_reachable`](Self::is_reachable) for this direction and the ball's centre: computed
-    /// once per cell of directions, for use in searches. Always true without a limit of reach and a
-    /// lowest z.
+    /// Approximates [`is_reachable`](Self::is_reachable) for this direction and the ball's centre:
+    /// computed once per cell of directions, for use in searches. Always true without a limit of
+    /// reach and a lowest z.
     pub fn is_probably_reachable(&self, aim: &Aim) -> bool {
         let Some(ball) = self.ball() else { return false };
         if self.reach.is_none() && ball.lowest_m.is_none() {

@@ -242,7 +242,7 @@ fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, InputError> {
     if !source.allow_external_buffers && !real.starts_with(folder) {
         return Err(InputError::new(format!(
             "{} lies outside the mesh's folder; to allow it, set \
-             object.allow_external_buffers = true in the scene, or use --outside-buffers",
+             object.allow_external_buffers = true in the scene, or use --allow-external-buffers",
             real.display()
         )));
     }

@@ -73,12 +73,12 @@ impl Loader {
     /// Reads the dotted key `given` as `present`, if it has a value; messages name it as given.
     ///
     /// # Errors
-    /// If both have a value.
+    /// If both have a value, and `given` is not from `--set`, which replaces it.
     pub fn read_as(&mut self, given: &str, present: &str) -> Result<(), ConfigError> {
         if !self.has_value(given) {
             return Ok(());
         }
-        if self.has_value(present) {
+        if self.has_value(present) && !matches!(self.origin(given), Origin::Set(_)) {
             let message = format!("also given by its present name `{present}`; keep one");
             return Err(ConfigError::invalid(self.origin(given), given.into(), None, message));
         }

@@ -60,7 +60,7 @@ impl Recording {
     /// Creates the file `path`, replacing an existing one.
     ///
     /// # Errors
-    /// [`Fault::Unrecorded`] if it cannot be written.
+    /// [`Fault::RecordingFailed`] if it cannot be written.
     pub fn create(path: &Path, about: &RecordingMetadata) -> Result<Self, Fault> {
         let file = files::create(path)
             .map_err(|error| unrecorded(0.0, &format!("{}: {error}", path.display())))?;
@@ -70,7 +70,7 @@ impl Recording {
     /// Creates a recording that is written to `out`, with log times from `clock`.
     ///
     /// # Errors
-    /// [`Fault::Unrecorded`] if it cannot be written.
+    /// [`Fault::RecordingFailed`] if it cannot be written.
     pub fn new(
         out: Box<dyn Write + Send>,
         about: &RecordingMetadata,
@@ -84,7 +84,7 @@ impl Recording {
     /// recording so far is passed to the operating system.
     ///
     /// # Errors
-    /// [`Fault::Unrecorded`] if it cannot be written.
+    /// [`Fault::RecordingFailed`] if it cannot be written.
     pub fn touched(
         &self,
         touch: &TouchMessage,
@@ -106,7 +106,7 @@ impl Recording {
     /// Ends the file with the reason why the trial ended before its last touch, if so.
     ///
     /// # Errors
-    /// [`Fault::Unrecorded`] if it cannot be written.
+    /// [`Fault::RecordingFailed`] if it cannot be written.
     pub fn end(&self, time_s: f64, ending: &TrialEnd) -> Result<(), Fault> {
         let mut sheet = self.sheet();
         let metadata = metadata(ENDING, ending.texts());

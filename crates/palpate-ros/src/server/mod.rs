@@ -1,7 +1,7 @@
 //! Simulated arm behind ROS topics, in real time, for tests of an explorer before it commands the
 //! real arm.
 //!
-//! [`arm_pc`] is the layer between network and servos, [`failure`] the injected failures,
+//! [`arm_computer`] is the layer between network and servos, [`failure`] the injected failures,
 //! [`serve`](mod@serve) the loop.
 
 pub mod arm_computer;

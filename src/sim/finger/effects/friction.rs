@@ -1,8 +1,9 @@
 //! Coulomb friction with stick and slip: one elastic bristle between finger and object.
 //!
 //! The skin is the compliant part: the bristle's stretch is the displacement of the skin over the
-//! core by the object, which the electrodes sense ([`ShearCoupling`](super::electrodes::ShearCoupling)). During
-//! slip, the object's texture makes the fluid vibrate.
+//! core by the object, which the electrodes sense
+//! ([`ShearCoupling`](super::electrodes::ShearCoupling)). During slip, the object's texture makes
+//! the fluid vibrate.
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};

@@ -187,8 +187,8 @@ impl Skin {
 
     /// Computes the static equilibrium of the skin in pose `x_wt` against the object.
     ///
-    /// The force is minus the gradient of [`ContactLoad::energy_j`] over the pose: each column presses
-    /// along the object's normal n with its stress times section / cos(ray, n).
+    /// The force is minus the gradient of [`ContactLoad::energy_j`] over the pose: each column
+    /// presses along the object's normal n with its stress times section / cos(ray, n).
     ///
     /// # Errors
     /// If the pose is not finite, or the finger's axis is inside the object.

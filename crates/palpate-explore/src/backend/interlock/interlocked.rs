@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 /// joint, and passes a command within all of them unchanged. A limit that cannot be kept by scaling
 /// a command trips an interlock: the robot is braked within its joints' accelerations and does not
 /// move again. A reset clears the fault of a simulated robot; for a real one, only
-/// [`Interlocked::clear_fault`] does.
+/// [`InterlockedBackend::clear_fault`] does.
 pub struct InterlockedBackend {
     inner: Box<dyn Backend>,
     interlocks: Vec<Box<dyn Interlock>>,

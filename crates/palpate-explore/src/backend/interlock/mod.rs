@@ -1,7 +1,7 @@
 //! Interlocks: conditions that stop the robot independently of the commands.
 //!
-//! An [`Interlock`] is an [`InterlockEntry`] of [`INTERLOCKS`]; [`Interlocked`] is a backend that wraps
-//! another and evaluates all of them in every tick. Before the robot moves, [`check_start`]
+//! An [`Interlock`] is an [`InterlockEntry`] of [`INTERLOCKS`]; [`InterlockedBackend`] is a backend that
+//! wraps another and evaluates all of them in every tick. Before the robot moves, [`check_start`]
 //! commands it to rest and checks its sensors.
 
 mod collision;

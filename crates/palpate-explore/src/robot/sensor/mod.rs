@@ -70,7 +70,7 @@ pub trait Sensor: Send {
         None
     }
 
-    /// Locates the contact with `finger` from the samples collected since [`clear_samples`](Self::clear_samples).
-    /// Returns `None` if they do not determine it.
+    /// Locates the contact with `finger` from the samples collected since
+    /// [`clear_samples`](Self::clear_samples). Returns `None` if they do not determine it.
     fn locate(&self, finger: &Finger) -> Option<SensedContact>;
 }
