@@ -92,7 +92,7 @@ impl FingerKind {
     fn kit(self) -> FingerTemplate {
         match self {
             Self::Rigid => FingerTemplate {
-                body: "cast",
+                body: "swept",
                 scene: String::new(),
                 gp: NORMALS_SETTING,
                 takes: "half a minute",

@@ -167,11 +167,11 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
         let says = [
             "outside.bin lies outside",
             "object.allow_external_buffers = true",
-            "--outside-buffers",
+            "--allow-external-buffers",
         ];
         fails(folder.path(), &show, &says);
         fails(folder.path(), &["export", "gltf.toml"], &says);
-        let shown = succeeds(folder.path(), &[&show[..], &["--outside-buffers"]].concat());
+        let shown = succeeds(folder.path(), &[&show[..], &["--allow-external-buffers"]].concat());
         assert!(shown.contains(ONE), "{uri}: {shown}");
         // A single triangle in the plane z = 0 covers no part of the zone, but it was read.
         let set = ["show", "gltf.toml", "--set", "object.allow_external_buffers=true"];
@@ -181,7 +181,7 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
     fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", "../../../../../../etc/passwd"))
         .unwrap();
     fails(folder.path(), &show, &["/etc/passwd lies outside the mesh's folder"]);
-    fails(folder.path(), &["show", "scene.toml", "--outside-buffers"], &["applies only to a mesh"]);
+    fails(folder.path(), &["show", "scene.toml", "--allow-external-buffers"], &["applies only to a mesh"]);
 }
 
 /// A symbolic link in a run's folder cannot change a file outside.

@@ -297,7 +297,7 @@ fn one_table_says_how_a_belief_is_fitted() {
 #[test]
 fn a_ball_beside_the_object_is_refused() {
     let text = "simulator = \"swept\"\nobject = { mesh = \"none.obj\" }\n\
-                around = { centre_m = [1, 0, 0], radius_m = 0.1 }";
+                whole_object = { centre_m = [1, 0, 0], radius_m = 0.1 }";
     let scene: Scene = toml::from_str(text).unwrap();
     let mesh = mesh(sphere);
     let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();

@@ -21,7 +21,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "wrist singularity",
-        "two axes of the wrist fall into one on the way",
+        "two wrist axes align on the path",
         "W1 away from it deg",
         (&[60.0, 20.0, 5.0, 1.0, 0.0], 5),
         |away_deg, period_s| {
@@ -33,7 +33,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "joint limit",
-        "the object stands where a joint ends",
+        "the object lies at a joint limit",
         "to the side m",
         (&[0.0, 0.2, 0.4, 0.6, 0.8], 5),
         |x_m, period_s| reach(scene(period_s), [x_m, -0.6, 0.5], ArmSettings::default()),
@@ -41,7 +41,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "close to the base",
-        "the elbow folds until it ends, and at last home is inside the object",
+        "the elbow reaches its limit, and finally home is inside the object",
         "distance m",
         (&[0.65, 0.6, 0.5, 0.4, 0.3, 0.2], 2),
         |distance_m, period_s| {
@@ -51,7 +51,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "high and low",
-        "shoulder and wrist share what is left",
+        "shoulder and wrist share the remaining reach",
         "height m",
         (&[0.5, 0.3, 0.8, 0.1, 1.1], 5),
         |z_m, period_s| reach(scene(period_s), [0.0, -0.6, z_m], ArmSettings::default()),

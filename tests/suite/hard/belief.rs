@@ -40,7 +40,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "little noise",
-        "nothing lifts the smallest eigenvalue",
+        "the smallest eigenvalue is near zero",
         "noise ratio",
         (&[1e-2, 1e-4, 1e-7, 1e-10, 0.0], 5),
         |noise, _| given(&smooth(200), 1.0, noise),
@@ -54,14 +54,14 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "constant heights",
-        "a plate has no scale of its own",
+        "a plate has no length scale",
         "height m",
         (&[1.0, 0.0, 1e-9, 1e6], 4),
         |y, _| fitted(&smooth(12).into_iter().map(|(x, _)| (x, y)).collect::<Vec<_>>(), 0.01),
     ),
     case(
         "one outlier",
-        "a single touch that is far out",
+        "one height far outside the others",
         "times the range",
         (&[1.0, 10.0, 1e3, 1e6], 4),
         |times, _| {
@@ -74,7 +74,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "heights with an offset",
-        "what varies is a millionth of what is there",
+        "the relief is a millionth of the offset",
         "offset m",
         (&[0.0, 1.0, 1e3, 1e6, 1e9], 5),
         |offset, _| {
@@ -85,7 +85,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "places with an offset",
-        "differences of places lose digits",
+        "differences of coordinates lose digits",
         "offset m",
         (&[0.0, 1e2, 1e4, 1e6], 4),
         |offset, _| {
@@ -95,7 +95,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "heights in other units",
-        "thresholds in metres",
+        "absolute thresholds fail",
         "times",
         (&[1.0, 1e-3, 1e-9, 1e3, 1e9], 5),
         |unit, _| {
@@ -104,14 +104,14 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "few touches",
-        "fewer than there are parameters",
+        "fewer touches than parameters",
         "touches",
         (&[5.0, 3.0, 2.0, 1.0], 4),
         |count, _| fitted(&smooth(count as u32), 0.05),
     ),
     case(
-        "touch that is no number",
-        "one NaN is in every weight",
+        "touch is NaN",
+        "one NaN spreads to every weight",
         "which",
         (&[0.0, 5.0, 11.0], 0),
         |which, _| {

@@ -12,7 +12,7 @@ use palpate::sim::scene::SimulatorKind;
 pub const CASES: &[Case] = &[
     case(
         "soft finger into a wall",
-        "servos need a while to stop an arm that has met something",
+        "servos need time to stop the arm after contact",
         "m/s",
         (&[0.005, 0.015, 0.02, 0.05, 0.1, 0.3, 1.0], 2),
         |approach_m_s, step_s| approach(approach_m_s, on_arm(step_s)),
@@ -20,7 +20,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "rigid finger into a wall",
-        "without a skin nothing yields but the solver's contact",
+        "without a skin, only the solver's contact is compliant",
         "m/s",
         (&[0.005, 0.015, 0.02, 0.05, 0.1, 0.3, 1.0], 1),
         |approach_m_s, step_s| {
@@ -32,7 +32,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "light tool",
-        "an arm of 27 kg and a finger of grams in one mass matrix",
+        "an arm of 27 kg and a finger of grams share one mass matrix",
         "kg",
         (&[0.15, 0.027, 0.0027, 2.7e-4, 2.7e-5], 3),
         tool,
@@ -40,7 +40,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "heavy tool",
-        "motors near their limits, and at last beyond what the arm can carry",
+        "motors saturate, and finally the load exceeds the arm's capacity",
         "kg",
         (&[0.15, 1.0, 3.0, 10.0, 30.0], 4),
         tool,
@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "joint limit, with masses",
-        "the object stands where a joint ends",
+        "the object lies at a joint limit",
         "to the side m",
         (&[0.0, 0.2, 0.4, 0.6, 0.8], 5),
         |x_m, step_s| reach(with_masses(step_s), [x_m, -0.6, 0.5], ArmSettings::default()),
@@ -56,7 +56,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "wrist singularity, with masses",
-        "two axes of the wrist fall into one on the way",
+        "two wrist axes align on the path",
         "W1 away from it deg",
         (&[60.0, 20.0, 5.0, 1.0, 0.0], 5),
         |away_deg, step_s| {
@@ -68,7 +68,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "graze along an edge, with masses",
-        "a push from the side moves an arm that yields",
+        "a lateral force moves a compliant arm",
         "overlap mm",
         (&[3.0, 1.0, 0.3, 0.1, 0.01, 1e-6], 6),
         |overlap_mm, step_s| graze(overlap_mm, with_masses(step_s)),
@@ -76,7 +76,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "slot narrower than the finger, with masses",
-        "two edges hold what one would let in",
+        "two edges stop a finger that one edge would not",
         "width mm",
         (&[14.0, 10.0, 6.0, 3.0, 1.0, 0.1], 6),
         |width_mm, step_s| slot(width_mm, with_masses(step_s)),
@@ -84,7 +84,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "two contacts at once, with masses",
-        "two pushes whose torques turn the finger",
+        "two forces turn the finger",
         "one lower by mm",
         (&[1.0, 0.3, 0.1, 0.01, 0.0], 5),
         |lower_mm, step_s| twins(lower_mm, with_masses(step_s)),

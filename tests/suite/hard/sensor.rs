@@ -10,29 +10,29 @@ use crate::common::fault_injector::{Failure, FaultInjector};
 const FROM: (&[f64], usize) = (&[1e6, 120.0, 60.0, 20.0, 3.0, 0.0], 1);
 
 pub const CASES: &[Case] = &[
-    case("pressure is no number", "NaN compares as no contact", "from tick", FROM, |from, p| {
+    case("pressure is NaN", "NaN compares as no contact", "from tick", FROM, |from, p| {
         broken(Failure::NanPressure, from, p)
     }),
-    case("joint is no number", "NaN goes into every command", "from tick", FROM, |from, p| {
+    case("joint is NaN", "NaN goes into every command", "from tick", FROM, |from, p| {
         broken(Failure::NanJoint, from, p)
     }),
-    case("frozen sensor", "it says untouched for ever", "from tick", FROM, |from, p| {
+    case("frozen sensor", "it never reports contact", "from tick", FROM, |from, p| {
         broken(Failure::Frozen, from, p)
     }),
-    case("saturated sensor", "it says contact everywhere", "from tick", FROM, |from, p| {
+    case("saturated sensor", "it always reports contact", "from tick", FROM, |from, p| {
         broken(Failure::Saturated, from, p)
     })
     .known("a sensor that saturates at once looks like contact: only another sensor can tell"),
     case(
         "lost frames",
-        "contact is told late or never",
+        "contact is reported late or never",
         "share",
         (&[0.0, 0.1, 0.3, 0.6, 0.9, 1.0], 3),
         |share, p| broken(Failure::Lost(share), 0.0, p),
     ),
     case(
         "delayed frames",
-        "the finger goes on meanwhile",
+        "the finger moves on during the delay",
         "ticks",
         (&[0.0, 2.0, 5.0, 10.0, 20.0], 3),
         |ticks, p| broken(Failure::Late(ticks as usize), 0.0, p),
@@ -47,7 +47,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "weak joints",
-        "the body does not follow its commands",
+        "joints do not reach commanded velocities",
         "share followed",
         (&[1.0, 0.9, 0.5, 0.1, 0.0], 2),
         |share, p| broken(Failure::Weak(share), 0.0, p),

@@ -12,7 +12,7 @@ use palpate::sim::Scene;
 pub const CASES: &[Case] = &[
     case(
         "graze along an edge",
-        "the finger's flank meets less and less of the object",
+        "the overlap of finger and object tends to zero",
         "overlap mm",
         (&[3.0, 1.0, 0.3, 0.1, 0.01, 1e-6], 6),
         |overlap_mm, period_s| graze(overlap_mm, scene(period_s)),
@@ -20,14 +20,14 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "slot narrower than the finger",
-        "two edges hold what one would let in",
+        "two edges stop a finger that one edge would not",
         "width mm",
         (&[14.0, 10.0, 6.0, 3.0, 1.0, 0.1], 6),
         |width_mm, period_s| slot(width_mm, scene(period_s)),
     ),
     case(
         "two contacts at once",
-        "the centre of pressure of two places is on neither",
+        "the centre of pressure lies between two contacts, on neither",
         "one lower by mm",
         (&[1.0, 0.3, 0.1, 0.01, 0.0], 5),
         |lower_mm, period_s| twins(lower_mm, scene(period_s)),
@@ -49,28 +49,28 @@ pub const CASES: &[Case] = &[
     .known("a needle thinner than the skin's points are apart passes between them: use more"),
     case(
         "open border",
-        "half of the finger is over the edge of a sheet that has no other side",
+        "half of the finger is beyond the edge of an open sheet",
         "inside the edge mm",
         (&[5.0, 2.0, 0.5, 0.0, -1.0, -3.0], 6),
         border,
     ),
     case(
         "inverted patch",
-        "triangles whose winding says the outside is inside",
+        "triangles with the wrong winding swap inside and outside",
         "share inverted",
         (&[0.0, 0.1, 0.5, 1.0], 4),
         inverted,
     ),
     case(
         "small and large objects",
-        "searches and tolerances in metres",
+        "absolute search radii and tolerances fail",
         "radius m",
         (&[0.05, 0.01, 0.002, 0.0005, 1.0, 10.0], 6),
         sizes,
     ),
     case(
         "far from the origin",
-        "metres eat the digits of micrometres",
+        "large coordinates lose the digits of micrometres",
         "distance m",
         (&[0.0, 1.0, 10.0, 100.0, 990.0], 5),
         far,
@@ -87,7 +87,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "thin plate",
-        "rays that start behind it never meet it",
+        "rays that start behind it miss it",
         "thickness mm",
         (&[5.0, 1.0, 0.1, 1e-2, 1e-4], 5),
         |mm, period_s| {
@@ -97,7 +97,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "double sheet",
-        "a surface twice: which is the first?",
+        "two coincident surfaces make the first contact ambiguous",
         "apart mm",
         (&[1.0, 0.1, 1e-3, 1e-6], 4),
         |mm, period_s| {
@@ -108,7 +108,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "saw teeth",
-        "normals that point everywhere under one finger",
+        "contact normals vary strongly under one finger",
         "depth mm",
         (&[0.01, 0.1, 0.5, 1.0, 3.0], 5),
         |mm, period_s| {
@@ -118,7 +118,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "steep flank",
-        "the finger slides past what it should meet",
+        "the finger slides along the surface before contact",
         "slope deg",
         (&[30.0, 60.0, 75.0, 85.0, 89.0], 5),
         |deg, period_s| {

@@ -28,7 +28,7 @@ const APART: f64 = 0.02;
 pub const CASES: &[Case] = &[
     case(
         "shell, deep press",
-        "a thin shell buckles, and in the end meets the core",
+        "a thin shell buckles and finally touches the core",
         "depth mm",
         (&[0.5, 1.0, 2.0, 3.0, 4.0, 6.0], 4),
         deep,
@@ -36,7 +36,7 @@ pub const CASES: &[Case] = &[
     .known("beyond 3 mm the skin snaps over the core's rim, and force falls by 4 %"),
     case(
         "shell, press and release",
-        "what is found step by step depends on the steps",
+        "the equilibrium may depend on the path of steps",
         "depth mm",
         (&[0.5, 1.0, 1.5, 2.0], 4),
         release,
@@ -44,14 +44,14 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "shell, long hold",
-        "corrections that never end may add up to a drift",
+        "unconverged corrections may accumulate to a drift",
         "ticks",
         (&[1e3, 1e4, 1e5, 1e6], 2),
         held,
     ),
     case(
         "shell, edge",
-        "one row of nodes carries all",
+        "one row of nodes carries the load",
         "width mm",
         (&[3.0, 1.0, 0.3, 0.1, 0.01, 0.001], 6),
         |width_mm, _| {
@@ -62,14 +62,14 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "shell, needle",
-        "one node carries all",
+        "one node carries the load",
         "half angle deg",
         (&[45.0, 20.0, 5.0, 1.0, 0.1], 5),
         |half_angle_deg, _| pushed_into(needle(half_angle_deg)),
     ),
     case(
         "shell, two edges",
-        "what lies between them is pressed out",
+        "the skin between them is squeezed out",
         "apart mm",
         (&[14.0, 10.0, 6.0, 3.0, 1.0, 0.1], 6),
         |apart_mm, _| {
@@ -80,7 +80,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "shell, any pose",
-        "poses no touch would have",
+        "poses outside every planned touch",
         "poses",
         (&[100.0, 1000.0], 1),
         |count, _| poses(count, &shell()),
@@ -94,7 +94,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "shell, softer",
-        "the fluid and the core carry all",
+        "the fluid and the core carry the load",
         "times softer",
         (&[1.0, 10.0, 100.0], 3),
         |times, _| laws_of(1.0 / times, 1.0, &shell()),
@@ -115,7 +115,7 @@ pub const CASES: &[Case] = &[
     .known(STIFF_FLUID),
     case(
         "shell, size of the finger",
-        "constants in metres show when lengths scale",
+        "absolute tolerances fail when lengths scale",
         "times larger",
         (&[1.0, 0.3, 0.1, 10.0, 100.0], 4),
         |times, _| laws_of(1.0, times, &shell()),

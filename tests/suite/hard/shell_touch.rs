@@ -10,7 +10,7 @@ use palpate::sim::finger::effects::skin::SkinModel;
 pub const CASES: &[Case] = &[
     case(
         "shell into a wall, with masses",
-        "servos need a while to stop an arm that has met something",
+        "servos need time to stop the arm after contact",
         "m/s",
         (&[0.005, 0.015, 0.02, 0.05, 0.1, 0.3, 1.0], 2),
         |approach_m_s, step_s| {
@@ -22,7 +22,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "shell grazes along an edge, with masses",
-        "a push from the side moves an arm that yields",
+        "a lateral force moves a compliant arm",
         "overlap mm",
         (&[3.0, 1.0, 0.3, 0.1, 0.01, 1e-6], 6),
         |overlap_mm, step_s| graze(overlap_mm, shell(with_masses(step_s))),
@@ -30,7 +30,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "shell in a slot, with masses",
-        "two edges hold what one would let in",
+        "two edges stop a finger that one edge would not",
         "width mm",
         (&[14.0, 10.0, 6.0, 3.0, 1.0, 0.1], 6),
         |width_mm, step_s| slot(width_mm, shell(with_masses(step_s))),
@@ -38,7 +38,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "shell between two contacts, with masses",
-        "two pushes whose torques turn the finger",
+        "two forces turn the finger",
         "one lower by mm",
         (&[1.0, 0.3, 0.1, 0.01, 0.0], 5),
         |lower_mm, step_s| twins(lower_mm, shell(with_masses(step_s))),

@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub const CASES: &[Case] = &[
     case(
         "stiff skin on a stage, at rest",
-        "an explicit force blows up in steps longer than twice the square root of mass over stiffness",
+        "an explicit force diverges in steps above 2·sqrt(mass/stiffness)",
         "times stiffer",
         STIFF,
         |times, step_s| at_rest(times, step_s, false),
@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "stiff skin on an arm, at rest",
-        "the same with a mass that depends on the posture",
+        "the same, with a mass that depends on the posture",
         "times stiffer",
         STIFF,
         |times, step_s| at_rest(times, step_s, true),
@@ -35,7 +35,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "stiff skin on a stage, at its peak",
-        "how far the finger goes on is decided by servos and skin together",
+        "servos and skin together decide the overshoot",
         "times stiffer",
         (STIFF.0, 3),
         |times, step_s| at_peak(times, step_s, false),
@@ -44,7 +44,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "stiff skin on an arm, at its peak",
-        "the same with servos whose time constants are those of the step, and joints that rub",
+        "the same, with servo time constants near the step and joint friction",
         "times stiffer",
         STIFF,
         |times, step_s| at_peak(times, step_s, true),
@@ -53,7 +53,7 @@ pub const CASES: &[Case] = &[
     .stepped(),
     case(
         "long rest on a wall",
-        "a servo without position creeps, and errors of a million ticks add up",
+        "a velocity servo creeps, and errors of a million ticks accumulate",
         "ticks",
         (&[1e3, 1e4, 1e5, 1e6], 3),
         |ticks, _| long(ticks),

@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub const CASES: &[Case] = &[
     case(
         "fast approach to a wall",
-        "the finger goes on while frames agree that there is contact",
+        "the finger moves on during the frames that confirm contact",
         "m/s",
         (&[0.005, 0.02, 0.04, 0.06, 0.1, 0.2, 0.5, 1.0], 3),
         |approach_m_s, period_s| {
@@ -39,7 +39,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "soft skin",
-        "pressure rises too late to tell of contact",
+        "pressure rises too late for detection",
         "times softer",
         (&[1.0, 3.0, 10.0, 100.0, 1000.0], 3),
         |times, period_s| on_wall(skin(period_s, 1.0 / times)),
@@ -73,7 +73,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "noisy pressure",
-        "noise passes for contact in the air",
+        "noise triggers detection without contact",
         "times the noise",
         (&[1.0, 3.0, 10.0, 30.0, 100.0], 2),
         |times, period_s| {
@@ -111,7 +111,7 @@ pub const CASES: &[Case] = &[
     .timed(),
     case(
         "target off the object",
-        "there is nothing to meet",
+        "there is no surface",
         "beside it mm",
         (&[7.5, 20.0, 100.0], 3),
         |mm, period_s| {
