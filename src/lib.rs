@@ -12,7 +12,7 @@
 //! | [`report`] | tables, figures and the page, drawn from rows and studies |
 //! | [`study`] | accuracy, regression checks of planners, comparisons of runs |
 //! | [`experiment`] | experiment, trial, runner, store, measures, statistics, ground truth |
-//! | [`sim`] | scene, object, effects, physics of the finger, simulated bodies |
+//! | [`sim`] | scene, object, effects, physics of the finger, simulated robots |
 //!
 //! A program for a robot needs none of it. It uses the packages below, which do not depend on this
 //! one, so that the explorer cannot see the ground truth:

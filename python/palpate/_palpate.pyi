@@ -186,7 +186,7 @@ class Touch:
         """Height of the contact above the datum, metres; None without contact, and around an object."""
     @property
     def time_s(self) -> float | None:
-        """Time of the body since its start, seconds; None without motion."""
+        """Simulator or robot time since its start, seconds; None without motion."""
 
 @final
 class Scene:
@@ -255,7 +255,7 @@ class Scene:
 
         Raises:
             ValueError: if the target is outside the zone or the ball, or unreachable.
-            SimulationError: if the body has a fault.
+            SimulationError: if the robot has a fault.
         """
     def true_height(self, points: npt.ArrayLike) -> _Array:
         """True height above the datum, metres, at places (..., d); NaN outside the object."""
@@ -267,7 +267,7 @@ class Exploration:
     """Interactive exploration of a scene, touch by touch.
 
     Each touch updates a belief, which is fitted and can be compared with the ground truth. Touches use the scene's
-    body, which continues from its current state.
+    robot, which continues from its current state.
     """
 
     def __new__(cls, scene: Scene) -> Exploration: ...

@@ -214,7 +214,7 @@ impl Episode {
     /// Creates an exploration that has not started.
     ///
     /// # Errors
-    /// If the body cannot be moved to its start.
+    /// If the robot cannot be moved to its start.
     pub(crate) fn new(world: &Arc<ExplorationScene>, how: EpisodeOptions) -> Result<Self, Fault> {
         Ok(Self {
             how,

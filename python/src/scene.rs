@@ -56,7 +56,7 @@ impl Scene {
     /// Makes a touch at a target; also returns the approach and the swept volume.
     ///
     /// # Errors
-    /// `ValueError` for an invalid target, `SimulationError` for a fault of the body.
+    /// `ValueError` for an invalid target, `SimulationError` for a fault of the backend.
     pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, TouchData)> {
         let task = self.environment().task();
         let known = task::Target::from_numbers(&target).filter(|at| task.contains(at));
@@ -235,7 +235,7 @@ pub(crate) struct Touch {
     outcome: &'static str,
     contact: Option<probe::Contact>,
     place: Option<(Vec<f64>, f64)>,
-    /// Time of the body since its start, seconds; None without motion.
+    /// Simulator or robot time since its start, seconds; None without motion.
     #[pyo3(get)]
     time_s: Option<f64>,
 }

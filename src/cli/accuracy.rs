@@ -79,7 +79,7 @@ pub(super) struct Args {
     /// else as many as are compared].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     held_out: Option<u16>,
-    /// Start from the scene with every effect that its body supports.
+    /// Start from the scene with every effect that its simulator supports.
     #[arg(long)]
     full: bool,
     /// Folder for the results [default: runs/accuracy-SCENE].

@@ -27,7 +27,7 @@ pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,
     truth: Arc<GroundTruth>,
-    /// Connected arm that replaces the simulated body.
+    /// Connected arm that replaces the simulated robot.
     arm: Option<Arc<RosArm>>,
     /// Notice about a scanned ground truth.
     scan_notice: Option<String>,
@@ -155,7 +155,7 @@ impl Simulation {
         self.simulator.environment()
     }
 
-    /// Factory of the trials' bodies.
+    /// Factory of the trials' backends.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
@@ -184,7 +184,7 @@ impl Simulation {
         self.environment().task()
     }
 
-    /// Seed of all random numbers of a trial's body.
+    /// Seed of all random numbers of a trial's backend.
     pub fn body_seed(&self, trial: u32) -> u64 {
         seed::stream(self.experiment.seed, trial.into(), "body").random()
     }
@@ -207,11 +207,11 @@ impl Simulation {
         Ok(self.arm.clone())
     }
 
-    /// Returns the backend of a trial: the connected arm or the simulated body; `None` if touches
+    /// Returns the backend of a trial: the connected arm or the simulated robot; `None` if touches
     /// are computed without motion.
     ///
     /// # Errors
-    /// If no arm is connected, or memory for the body's state is missing.
+    /// If no arm is connected, or memory for the simulator's state is missing.
     pub fn backend(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         match &self.arm {
             Some(lab) => Ok(Some(Box::new(lab.backend()))),
@@ -223,7 +223,7 @@ impl Simulation {
     /// Returns the servo that moves `body` through touches, within the experiment's interlocks.
     ///
     /// # Errors
-    /// If the body cannot be moved to its start.
+    /// If the robot cannot be moved to its start.
     pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
         self.simulator.servo_within(body, seed, &self.experiment.backend.interlocks)
     }
@@ -231,7 +231,7 @@ impl Simulation {
     /// Returns the probe that makes a trial's touches.
     ///
     /// # Errors
-    /// If the body cannot be moved to its start, or no arm is connected.
+    /// If the robot cannot be moved to its start, or no arm is connected.
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
         let seed = self.body_seed(trial);
         match self.backend()? {

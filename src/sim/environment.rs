@@ -400,7 +400,7 @@ fn whole_object_task(
     if farthest_m > ball.radius_m {
         return Err(InputError::new(format!(
             "whole_object.radius_m is {} m, but the object reaches {farthest_m:.4} m from \
-             around.centre_m: choose a larger radius, or the finger collides with it on its way around",
+             whole_object.centre_m: choose a larger radius, or the finger collides with it on its way around",
             ball.radius_m
         )));
     }

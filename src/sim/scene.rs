@@ -46,10 +46,10 @@ pub struct Scene {
     /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmSettings>,
-    /// Optional physics of a body with a soft finger, one table per effect.
+    /// Optional physics of a soft finger, one table per effect.
     #[serde(default, skip_serializing_if = "is_default")]
     pub effects: Effects,
-    /// Solver settings of a `dynamic` body.
+    /// Solver settings of the `dynamic` simulator.
     #[serde(default, skip_serializing_if = "is_default")]
     pub solver: SolverSettings,
     /// Motion of the finger during a touch.
@@ -100,8 +100,8 @@ impl SimulatorKind {
     /// Returns the name used in a scene file.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Analytic => "function",
-            Self::Swept => "cast",
+            Self::Analytic => "analytic",
+            Self::Swept => "swept",
             Self::Kinematic => "kinematic",
             Self::Dynamic => "dynamic",
         }
@@ -284,7 +284,7 @@ impl Validate for Scene {
             || self.arm.is_some()
             || self.simulator != SimulatorKind::Dynamic;
         rules.require("simulator", "\"dynamic\"", turns, || {
-            "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must turn, and the \
+            "\"swept\" or \"kinematic\", or an [arm]: around an object the finger must turn, and the \
              stage of simulator = \"dynamic\" has no wrist"
                 .into()
         });
@@ -361,9 +361,9 @@ impl Scene {
         Self { effects: Effects::all(), ..self }
     }
 
-    /// Returns the duration of one control tick: `touch.period_s`, or the default of the body. The
-    /// default of a simulated arm is the cycle of the PA-10's servo driver (`hydro`, Orca
-    /// robotics); a body without inertia needs only one tick for each tactile frame.
+    /// Returns the duration of one control tick: `touch.period_s`, or the default of the simulator.
+    /// The default of a simulated arm is the cycle of the PA-10's servo driver (`hydro`, Orca
+    /// robotics); a simulation without inertia needs only one tick for each tactile frame.
     pub fn period_s(&self) -> f64 {
         self.touch.period_s.unwrap_or(match self.simulator {
             SimulatorKind::Dynamic => 0.002,
@@ -387,7 +387,7 @@ impl Scene {
     }
 
     /// Returns the fastest approach at which contact is detected before skin and fluid in front of
-    /// the tip are fully compressed; `None` for a body that does not move through contact.
+    /// the tip are fully compressed; `None` for a simulator that does not move through contact.
     pub fn approach_limit_m_s(&self) -> Option<f64> {
         let effects = self.effective_effects();
         if self.simulator != SimulatorKind::Kinematic || effects.skin.is_none() {

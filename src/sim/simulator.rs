@@ -27,7 +27,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Compiles the models that the scene's body needs.
+    /// Compiles the models that the scene's simulator needs.
     ///
     /// # Errors
     /// If the scene cannot be simulated.
@@ -85,10 +85,11 @@ impl Simulator {
         }
     }
 
-    /// Returns the probe of the scene's body; `seed` decides all the randomness of its sensors.
+    /// Returns the probe of the scene's simulator; `seed` decides all the randomness of its
+    /// sensors.
     ///
     /// # Errors
-    /// If the body cannot be brought to its start.
+    /// If the robot cannot be brought to its start.
     pub fn probe(&self, seed: u64) -> Result<Box<dyn Probe>, Fault> {
         Ok(match self.body()? {
             Some(body) => Box::new(self.servo(body, seed)?),
@@ -101,7 +102,7 @@ impl Simulator {
     /// them collide.
     ///
     /// # Errors
-    /// If the body cannot be brought to its start.
+    /// If the robot cannot be brought to its start.
     pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
         self.servo_within(body, seed, &InterlockSettings::default())
     }

@@ -1,4 +1,4 @@
-//! Time integration of a body with masses.
+//! Time integration of a simulation with masses.
 
 use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;

@@ -181,7 +181,11 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
     fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", "../../../../../../etc/passwd"))
         .unwrap();
     fails(folder.path(), &show, &["/etc/passwd lies outside the mesh's folder"]);
-    fails(folder.path(), &["show", "scene.toml", "--allow-external-buffers"], &["applies only to a mesh"]);
+    fails(
+        folder.path(),
+        &["show", "scene.toml", "--allow-external-buffers"],
+        &["applies only to a mesh"],
+    );
 }
 
 /// A symbolic link in a run's folder cannot change a file outside.

@@ -34,9 +34,11 @@ mod finger_signals;
 mod fit;
 mod folders;
 mod formats;
+mod former_names;
 mod fuzz;
 mod gates;
 mod geometry;
+mod guides;
 mod hard;
 mod information;
 #[cfg(feature = "mujoco")]

@@ -57,7 +57,7 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
     }
 }
 
-/// The exact cast is perfectly repeatable, and the error at verification touches is similar to the
+/// The exact sweep is perfectly repeatable, and the error at verification touches is similar to the
 /// error on the test grid.
 #[test]
 fn an_exact_probe_repeats_and_verifies() {

@@ -77,8 +77,9 @@ impl Texts {
                 TokenTree::Group(group) => self.collect(group.stream()),
                 TokenTree::Literal(literal) => {
                     let text = literal.to_string();
-                    if let Some(text) = text.trim_matches(['r', '#']).strip_prefix('"') {
-                        self.literals.push(joined(text.trim_end_matches(['"', '#'])));
+                    let text = text.trim_start_matches('r').trim_matches('#');
+                    if let Some(text) = text.strip_prefix('"').and_then(|it| it.strip_suffix('"')) {
+                        self.literals.push(joined(text));
                     }
                 }
                 _ => {}

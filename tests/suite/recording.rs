@@ -619,7 +619,7 @@ fn the_program_records_and_replays() {
     fails(path, &["replay", "none.mcap"], &["none.mcap"]);
     let cast =
         ["run", "small.toml", "--set", "scene.simulator=\"swept\"", "--record", "--out", "cast"];
-    fails(path, &cast, &["--record", "\"cast\"", "nothing to record"]);
+    fails(path, &cast, &["--record", "\"swept\"", "nothing to record"]);
     assert!(!path.join("cast").exists());
     // A fresh start deletes the old recordings.
     succeeds(path, &["run", "small.toml", "--out", "run", "--no-report", "--fresh"]);

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | [`task`] | the region, targets in it, and the approach to each |
 //! | [`robot`] | the arm from a model file, the finger, its sensors |
-//! | [`backend`] | the trait of a body, faults, interlocks |
+//! | [`backend`] | the trait `Backend`, faults, interlocks |
 //! | [`belief`], [`whole_object`], [`surface_evidence`] | beliefs of a height field and of a whole object |
 //! | [`planner`] | planners, one list for both |
 //! | [`probe`], [`control`] | a touch, and the motion of the arm |

@@ -141,7 +141,7 @@ pub struct ResumedProbe<'a> {
     probe: &'a mut dyn Probe,
     /// The last touch, if it was made before, and the far end of its approach.
     last: Option<(TouchRow, Point3<f64>)>,
-    /// Time of the body at the interruption.
+    /// Simulator or robot time at the interruption.
     begun_s: f64,
     /// Fault that ended the last touch.
     pub fault: Option<Fault>,

@@ -237,7 +237,7 @@ impl AccuracyComparison {
     }
 
     /// Orders of convergence of the levels of `scene`: in the time step, in the number of skin
-    /// points, and in the step of a body with masses.
+    /// points, and in the step of a simulation with masses.
     ///
     /// # Errors
     /// If a scene cannot be built or simulated.

@@ -24,7 +24,7 @@ pub enum SensorModel {
 /// A fidelity level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FidelityLevel {
-    /// Simulated body.
+    /// Simulator.
     pub body: SimulatorKind,
     /// Simulated part of the finger.
     pub senses: SensorModel,
@@ -32,9 +32,9 @@ pub struct FidelityLevel {
     pub samples: usize,
     /// Cells along and around a thin-shell skin.
     pub shell: Option<[usize; 2]>,
-    /// Duration of a control tick, and of a step of a body with masses.
+    /// Duration of a control tick, and of a step of a simulation with masses.
     pub period_s: f64,
-    /// Integrator of a body with masses.
+    /// Integrator of a simulation with masses.
     pub integrator: Integrator,
     /// Collision geometry of a rigid finger with masses.
     pub collision: Option<Collision>,
@@ -111,7 +111,7 @@ pub fn converging() -> impl Iterator<Item = FidelityLevel> {
 }
 
 impl FidelityLevel {
-    /// Creates a level with the settings that every body has.
+    /// Creates a level with the settings that every simulator has.
     pub const fn new(
         body: SimulatorKind,
         senses: SensorModel,

@@ -33,8 +33,8 @@ pub fn toggle(scene: &Scene, switch: &EffectSwitch<Scene>) -> Scene {
     let had_masses = scene.simulator == SimulatorKind::Dynamic;
     switch.set(&mut scene, !was_on);
     scene.effects.remove_orphans();
-    // A finger without its skin is a rigid hull; body `cast` is the simplest simulation of its
-    // touches.
+    // A finger without its skin is a rigid hull; simulator `swept` is the simplest simulation of
+    // its touches.
     if was_soft && scene.effects.skin.is_none() {
         scene.simulator = SimulatorKind::Swept;
     }
@@ -46,7 +46,7 @@ pub fn toggle(scene: &Scene, switch: &EffectSwitch<Scene>) -> Scene {
     scene
 }
 
-/// Returns `scene` with every effect that its body supports.
+/// Returns `scene` with every effect that its simulator supports.
 pub fn with_all_effects(scene: &Scene) -> Scene {
     let effects = || Effects::switches().into_iter().map(for_scene);
     effects().fold(scene.clone(), |scene, switch| {

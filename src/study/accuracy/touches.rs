@@ -56,7 +56,7 @@ impl TargetTrials {
     /// Touches the targets in a [`noise_free`] scene; returns one result per trial.
     ///
     /// # Errors
-    /// If the body cannot be simulated or moved to its start.
+    /// If the robot cannot be simulated or moved to its start.
     pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<TouchResults>> {
         let simulator = Simulator::new(Arc::clone(environment))?;
         let trials = self.targets.par_iter().enumerate();
@@ -83,7 +83,7 @@ pub struct TouchResults {
     pub contacts: Vec<Option<Contact>>,
     /// Load on the finger when each contact was read.
     pub loads: Vec<Option<ReferenceLoad>>,
-    /// Simulated time of each touch of a moving body.
+    /// Simulated time of each touch of a moving finger.
     pub simulated_s: Vec<f64>,
     /// Touches that ended in a fault.
     pub faults: usize,
@@ -92,7 +92,7 @@ pub struct TouchResults {
 /// Touches every target with the simulator of a [`noise_free`] scene.
 ///
 /// # Errors
-/// If the body cannot be moved to its start.
+/// If the robot cannot be moved to its start.
 pub fn touch_all(
     simulator: &Simulator,
     targets: &[Target],
@@ -197,7 +197,7 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
 /// machine affects all scenes alike.
 ///
 /// # Errors
-/// If a scene cannot be built or its body cannot be moved to its start.
+/// If a scene cannot be built or its robot cannot be moved to its start.
 pub fn wall_times_s<const N: usize>(
     scenes: [&Scene; N],
     targets: &[Target],

@@ -83,7 +83,7 @@ impl Variant {
     }
 
     /// Returns the reference (the unchanged `scene`), then the scene with each effect switched
-    /// alone: effects that it has, and others that its body supports.
+    /// alone: effects that it has, and others that its simulator supports.
     pub fn effects(scene: &Scene) -> Vec<(Self, Scene)> {
         let mut variants = vec![(Self::named(UNCHANGED.into()), scene.clone())];
         for switch in switches() {

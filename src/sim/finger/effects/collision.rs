@@ -5,9 +5,9 @@ use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[collision]`: in a `dynamic` body, MuJoCo lets the links of the arm, the adapter and the
-/// finger collide with each other and with a table. All but a soft finger also collide with the
-/// object, with the geometry of `solver.collision`. Without this table they pass through each
+/// Table `[collision]`: in the `dynamic` simulator, MuJoCo lets the links of the arm, the adapter
+/// and the finger collide with each other and with a table. All but a soft finger also collide with
+/// the object, with the geometry of `solver.collision`. Without this table they pass through each
 /// other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]

@@ -6,7 +6,7 @@ use palpate_explore::backend::delay::DELAY_MAX_S;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_input::config::Rules;
 
-// heuristic: a command delay longer than a control tick of any body.
+// heuristic: a command delay longer than a control tick of any simulator.
 const LONG_DELAY_S: f64 = 0.02;
 
 effect! {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 effect! {
     /// Table `[wrench]`: a force/torque sensor at the mount, with its own frame: z along the
-    /// finger, distal. Without it a body has no such sensor.
+    /// finger, distal. Without it there is no such sensor.
     WrenchEffect in "wrench"
     constants {
         /// Noise (standard deviation) of each force reading along x, y, z.

@@ -1,8 +1,8 @@
 //! Interlocks: conditions that stop the robot independently of the commands.
 //!
-//! An [`Interlock`] is an [`InterlockEntry`] of [`INTERLOCKS`]; [`InterlockedBackend`] is a backend that
-//! wraps another and evaluates all of them in every tick. Before the robot moves, [`check_start`]
-//! commands it to rest and checks its sensors.
+//! An [`Interlock`] is an [`InterlockEntry`] of [`INTERLOCKS`]; [`InterlockedBackend`] is a backend
+//! that wraps another and evaluates all of them in every tick. Before the robot moves,
+//! [`check_start`] commands it to rest and checks its sensors.
 
 mod collision;
 mod force;

@@ -60,7 +60,7 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), InputError> {
             ))
             .remedy(
                 "move it closer (object.position_m), move arm.base_position_m, or decrease \
-                 around.radius_m or around.lowest_m",
+                 whole_object.radius_m or whole_object.lowest_m",
             )),
         };
     };
