@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
 
@@ -145,6 +145,10 @@ fuzz: setup
 # Generates docs/reference.md from the code; a test checks that it is up to date.
 reference: setup
 	PALPATE_WRITE_REFERENCE=1 cargo test --locked -p palpate --test suite reference::
+
+# Lists every message of the program in tests/messages.txt.
+messages: setup
+	PALPATE_WRITE_MESSAGES=1 cargo test --locked -p palpate --test suite prose::
 
 lint: setup
 	cargo fmt --all --check

@@ -41,18 +41,15 @@ const ELSEWHERE_PARTS: [(&str, &str); 4] = [
 /// Stand-in for `palpate` that reduces the work of a command.
 const REDUCED: &str = r#"#!/bin/bash
 set -e
+first=() last=()
 case "$1" in
-run) case "$*" in
-    *real_arm*|*--plan*) more=() ;;
-    *) more=(--set trials=4 --set touches=21 --set grid=9 --no-report) ;;
-    esac ;;
-check) more=(--max-trials 4) ;;
-accuracy) more=(--touches 4 --pairs 1 --held-out 4) ;;
-export) case "$*" in *--grid*|*runs/*) more=() ;; *) more=(--grid 9x9) ;; esac ;;
-*) more=() ;;
+run) first=(--set touches=21) last=(--set trials=4 --set grid=9 --no-report)
+    case "$*" in *--plan*) set -- run bird --plan 2 --threads 2; last=(--set trials=4) ;; esac ;;
+check) last=(--max-trials 4) ;;
+accuracy) last=(--touches 4 --pairs 1 --held-out 4) ;;
+export) case "$*" in *--grid*|*runs/*) ;; *) last=(--grid 9x9) ;; esac ;;
 esac
-[ "$1 $2 $3" = "run bird --plan" ] && set -- "$1" "$2" "$3" 2 --set touches=21 --threads 2
-exec "$PROGRAM" --quiet "$@" "${more[@]}"
+exec "$PROGRAM" --quiet "$1" "${first[@]}" "${@:2}" "${last[@]}"
 "#;
 
 /// Runs that the commands of a page read.

@@ -11,7 +11,8 @@
 //! | [`task`] | the region, targets in it, and the approach to each |
 //! | [`robot`] | the arm from a model file, the finger, its sensors |
 //! | [`backend`] | the trait `Backend`, faults, interlocks |
-//! | [`belief`], [`whole_object`], [`surface_evidence`] | beliefs of a height field and of a whole object |
+//! | [`belief`], [`whole_object`] | beliefs of a height field and of a whole object |
+//! | [`surface_evidence`] | probability of a surface from contacts and misses |
 //! | [`planner`] | planners, one list for both |
 //! | [`probe`], [`control`] | a touch, and the motion of the arm |
 //! | [`registration`] | the pose of finger and object, found by touch |

@@ -128,14 +128,13 @@ fn all_outcomes_are_explained() {
 #[test]
 fn the_page_lists_every_case() {
     let text = std::fs::read_to_string(page::path()).unwrap();
-    let listed = text.lines().filter(|line| line.starts_with("| **")).count();
+    let listed = text.lines().filter(|line| line.starts_with("|**")).count();
     assert_eq!(listed, cases().count(), "run `make hard-cases`");
     for case in cases() {
-        let start = format!("| **{}**: {} |", case.name, case.why);
+        let start = format!("|**{}**: {}|", case.name, case.why);
         let line = text.lines().find(|line| line.starts_with(&start));
         let line = line.unwrap_or_else(|| panic!("{}: run `make hard-cases`", case.name));
-        for severity in case.severities {
-            assert!(line.contains(&page::short(*severity)), "{}: {severity}", case.name);
-        }
+        let [first, last] = [0, case.severities.len() - 1].map(|i| page::short(case.severities[i]));
+        assert!(line.contains(&format!("|{first} to {last}|")), "{}", case.name);
     }
 }
