@@ -40,7 +40,7 @@ impl Simulator {
             Ok(Self { environment, models })
         }
         #[cfg(not(feature = "mujoco"))]
-        match environment.scene().body {
+        match environment.scene().simulator {
             SimulatorKind::Dynamic => Err(InputError::new(
                 "simulator = \"dynamic\" needs a build with the feature `mujoco`",
             )),

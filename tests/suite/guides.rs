@@ -11,7 +11,7 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// Starts of command lines that run elsewhere, and where.
-const ELSEWHERE: [(&str, &str); 16] = [
+const ELSEWHERE: [(&str, &str); 17] = [
     ("git clone", "continuous integration, in a clean checkout"),
     ("make ", "targets of the Makefile, tested below"),
     ("cargo ", "continuous integration; examples in `make test`"),
@@ -25,6 +25,7 @@ const ELSEWHERE: [(&str, &str); 16] = [
     ("PALPATE=palpate experiments/slurm", "tests/clusters/test.sh"),
     ("parallel ", "tests/clusters/test.sh"),
     ("export ROS_LOCALHOST_ONLY", "tests/ros2/namespace.sh"),
+    ("palpate accuracy", "accuracy:: and relevance::, on small scenes"),
     ("palpate serve", "lab::the_loop, over ROS 2"),
     ("palpate run real_arm", "lab::the_loop, over ROS 2"),
     ("palpate register real_arm", "needs a robot, or the simulated one in real time"),
@@ -44,9 +45,9 @@ set -e
 first=() last=()
 case "$1" in
 run) first=(--set touches=21) last=(--set trials=4 --set grid=9 --no-report)
+    case "$*" in *suite*) last=(--set trials=1 --set grid=9 --no-report) ;; esac
     case "$*" in *--plan*) set -- run bird --plan 2 --threads 2; last=(--set trials=4) ;; esac ;;
 check) last=(--max-trials 4) ;;
-accuracy) last=(--touches 4 --pairs 1 --held-out 4) ;;
 export) case "$*" in *--grid*|*runs/*) ;; *) last=(--grid 9x9) ;; esac ;;
 esac
 exec "$PROGRAM" --quiet "$1" "${first[@]}" "${@:2}" "${last[@]}"
