@@ -92,7 +92,7 @@ fn approach(
 }
 
 /// Formats median and maximum.
-fn told(mut forces_n: Vec<f64>) -> String {
+fn values(mut forces_n: Vec<f64>) -> String {
     forces_n.sort_by(f64::total_cmp);
     let word =
         |force_n: f64| if force_n.is_finite() { format!("{force_n:.3}") } else { "never".into() };
@@ -126,7 +126,7 @@ impl Sensor {
                     .map(|seed| approach(&self.tip(seed), bvh, &towards_t, (speed_m_s, seed)))
                     .collect();
                 std::array::from_fn::<_, 4, _>(|k| {
-                    told(all.iter().map(|told_n| told_n[k]).collect())
+                    values(all.iter().map(|told_n| told_n[k]).collect())
                 })
             });
             let [slow, fast] = [slow, fast].map(|cells| cells.join(" | "));

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from . import _palpate
-from ._home import found
+from ._home import find_file
 from ._palpate import Zone
-from ._planners import LIMIT_S, Factory, Workers, by_name, name_of
+from ._planners import LIMIT_S, Factory, ThreadPlannerFactory, by_name, name_of
 from ._progress import Progress
 from ._run import Run
 from ._settings import assignments
@@ -38,7 +38,7 @@ class Experiment:
         Raises:
             ConfigError: if a setting is invalid; with file, line, key, value and allowed values.
         """
-        return cls(found(path, "experiments"), settings)
+        return cls(find_file(path, "experiments"), settings)
 
     @property
     def name(self) -> str:
@@ -144,11 +144,11 @@ class Experiment:
             settings["trials"] = trials
         core = _palpate.Experiment.load(os.fspath(self._path), assignments(settings))
         if isolate:
-            from ._isolated import Isolated
+            from ._isolated import ProcessPlannerFactory
 
-            workers: dict[str, Any] = {name: Isolated(it, limit_s) for name, it in own.items()}
+            workers: dict[str, Any] = {name: ProcessPlannerFactory(it, limit_s) for name, it in own.items()}
         else:
-            workers = {name: Workers(it, limit_s) for name, it in own.items()}
+            workers = {name: ThreadPlannerFactory(it, limit_s) for name, it in own.items()}
 
         def stop() -> None:
             for started in workers.values():

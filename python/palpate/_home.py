@@ -12,7 +12,7 @@ from .errors import ConfigError
 HOME = Path(__file__).parent / "home"
 
 
-def found(name: str | os.PathLike[str], folder: str) -> Path:
+def find_file(name: str | os.PathLike[str], folder: str) -> Path:
     """Returns the file for `name`: a path, or the name of a file in `folder`, here or in the package.
 
     Raises:

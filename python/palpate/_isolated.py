@@ -13,7 +13,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ._planners import Factory, make, source_of, target_of, told
+from ._planners import Factory, make, source_of, target_of, format_exception
 from .errors import PlannerError
 
 #: Minimum time limit for a process to start and create a planner, seconds.
@@ -21,7 +21,7 @@ from .errors import PlannerError
 START_S = 60.0
 
 
-class Isolated:
+class ProcessPlannerFactory:
     """Planners of one name in a run, each in a process that a finished trial may have used."""
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
@@ -29,24 +29,24 @@ class Isolated:
         self.source = source_of(factory)
         self.limit_s = limit_s
         self._lock = threading.Lock()
-        self._idle: list[Child] = []
-        self._all: list[Child] = []
+        self._idle: list[PlannerProcess] = []
+        self._all: list[PlannerProcess] = []
         self.is_stopped = False
 
-    def __call__(self, zone: Any, seed: int) -> Session:
-        return Session(self, zone, seed)
+    def __call__(self, zone: Any, seed: int) -> ProcessPlanner:
+        return ProcessPlanner(self, zone, seed)
 
-    def take(self) -> Child:
+    def take(self) -> PlannerProcess:
         """Returns an idle process."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
-        child = Child()
+        child = PlannerProcess()
         with self._lock:
             self._all.append(child)
         return child
 
-    def give_back(self, child: Child) -> None:
+    def give_back(self, child: PlannerProcess) -> None:
         """Returns the process of a finished trial to the pool."""
         with self._lock:
             self._idle.append(child)
@@ -63,13 +63,13 @@ class Isolated:
             child.kill()
 
 
-class Session:
+class ProcessPlanner:
     """Planner of one trial."""
 
-    def __init__(self, home: Isolated, zone: Any, seed: int) -> None:
+    def __init__(self, home: ProcessPlannerFactory, zone: Any, seed: int) -> None:
         self._home = home
         self._begin: tuple[Any, int] | None = (zone, seed)
-        self._child: Child | None = None
+        self._child: PlannerProcess | None = None
 
     def plan(self, belief: Any) -> list[float]:
         """Returns the next target.
@@ -105,7 +105,7 @@ class Session:
             child.kill()
             if self._home.is_stopped:
                 raise PlannerError("the run was stopped") from None
-            if isinstance(error, _Late):
+            if isinstance(error, _Timeout):
                 raise PlannerError(f"the planner did not return within {limit_s:g} s") from None
             if died is not None:
                 raise PlannerError(died) from None
@@ -115,7 +115,7 @@ class Session:
         return reply
 
 
-class Child:
+class PlannerProcess:
     """A process with a pipe to it."""
 
     def __init__(self) -> None:
@@ -129,7 +129,7 @@ class Child:
         """Sends a request and returns the reply; meanwhile answers queries of the belief.
 
         Raises:
-            _Late: if there is no reply in time.
+            _Timeout: if there is no reply in time.
             EOFError, OSError: if the process has ended.
         """
         due_s = None if limit_s is None else time.monotonic() + limit_s
@@ -137,7 +137,7 @@ class Child:
         while True:
             left_s = None if due_s is None else max(0.0, due_s - time.monotonic())
             if not self._pipe.poll(left_s):
-                raise _Late
+                raise _Timeout
             kind, *rest = self._pipe.recv()
             if kind != "belief":
                 return kind, rest[0]
@@ -156,7 +156,7 @@ class Child:
         return f"the planner's process ended with exit code {code}"
 
 
-class _Late(Exception):
+class _Timeout(Exception):
     """No reply in time."""
 
 
@@ -218,4 +218,4 @@ def _serve(pipe: Connection[Any, Any]) -> None:
                 target = target_of(planner.plan(belief))
                 pipe.send(("target", target))
         except Exception as error:
-            pipe.send(("failed", str(error) if isinstance(error, PlannerError) else told(error)))
+            pipe.send(("failed", str(error) if isinstance(error, PlannerError) else format_exception(error)))

@@ -12,8 +12,8 @@ __version__: str
 __all__ = [
     "Ball",
     "Belief",
-    "Desk",
-    "Envs",
+    "PlannerChannel",
+    "ParallelExplorations",
     "Experiment",
     "Exploration",
     "Fitted",
@@ -317,14 +317,14 @@ class Fitted:
     def log_likelihood(self) -> float: ...
 
 @final
-class Desk:
-    def __new__(cls, limit_s: float) -> Desk: ...
+class PlannerChannel:
+    def __new__(cls, limit_s: float) -> PlannerChannel: ...
     def next(self) -> Belief | None: ...
     def answer(self, target: Sequence[float]) -> None: ...
     def fail(self, reason: str) -> None: ...
 
 @final
-class Envs:
+class ParallelExplorations:
     def __new__(
         cls,
         scenes: Sequence[tuple[str, Sequence[str]]],
@@ -334,7 +334,7 @@ class Envs:
         grid: int,
         reward: str,
         threads: int,
-    ) -> Envs: ...
+    ) -> ParallelExplorations: ...
     @property
     def sizes(self) -> tuple[int, int, int]: ...
     @property
@@ -367,7 +367,7 @@ class Experiment:
         self,
         own: Sequence[tuple[str, Callable[[Zone | None, int], Any]]],
         how: tuple[str | None, bool, int],
-        told: tuple[Callable[[int, int], None], Callable[[], None]],
+        callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
     ) -> Run: ...
 
 @final

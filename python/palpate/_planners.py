@@ -163,7 +163,7 @@ def target_of(planned: Any) -> list[float]:
     return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
 
 
-def told(error: BaseException) -> str:
+def format_exception(error: BaseException) -> str:
     """Returns an exception with its traceback, without the lines of this package."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if os.path.dirname(frame.filename) != os.path.dirname(__file__)]
@@ -173,19 +173,19 @@ def told(error: BaseException) -> str:
     return f"{head}\n" + "".join(traceback.format_list(own)).rstrip()
 
 
-class Workers:
+class ThreadPlannerFactory:
     """Planners of one name in a run, started by the extension."""
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
         self.source = source_of(factory)
         self._factory = factory
         self._limit_s = limit_s
-        self._live: set[Worker] = set()
+        self._live: set[ThreadPlanner] = set()
 
-    def __call__(self, zone: Any, seed: int) -> Worker | Trusted:
+    def __call__(self, zone: Any, seed: int) -> ThreadPlanner | InlinePlanner:
         if self._limit_s is None:
-            return Trusted(self._factory, zone, seed)
-        worker = Worker(self, self._factory, zone, seed, self._limit_s)
+            return InlinePlanner(self._factory, zone, seed)
+        worker = ThreadPlanner(self, self._factory, zone, seed, self._limit_s)
         self._live.add(worker)
         return worker
 
@@ -194,12 +194,12 @@ class Workers:
         for worker in list(self._live):
             worker.interrupt()
 
-    def forget(self, worker: Worker) -> None:
+    def forget(self, worker: ThreadPlanner) -> None:
         """Removes a finished worker."""
         self._live.discard(worker)
 
 
-class Trusted:
+class InlinePlanner:
     """Planner of one trial that is called on the trial's thread without a time limit."""
 
     def __init__(self, factory: Factory, zone: Any, seed: int) -> None:
@@ -215,18 +215,18 @@ class Trusted:
         except PlannerError:
             raise
         except BaseException as error:  # includes sys.exit in a planner
-            raise PlannerError(told(error)) from None
+            raise PlannerError(format_exception(error)) from None
 
     def close(self) -> None:
         """Ends the trial."""
 
 
-class Worker:
+class ThreadPlanner:
     """Planner of one trial on its own thread; the extension communicates with it through a desk."""
 
-    def __init__(self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float) -> None:
+    def __init__(self, home: ThreadPlannerFactory, factory: Factory, zone: Any, seed: int, limit_s: float) -> None:
         self._home = home
-        self.desk = _palpate.Desk(limit_s)
+        self.desk = _palpate.PlannerChannel(limit_s)
         arguments = (factory, zone, seed, self.desk)
         self._thread = threading.Thread(target=_serve, args=arguments, daemon=True)
         self._thread.start()
@@ -246,7 +246,7 @@ class Worker:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, ctypes.py_object(SystemExit))
 
 
-def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.Desk) -> None:
+def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.PlannerChannel) -> None:
     try:
         belief = desk.next()
         planner: Any = make(factory, zone, seed) if belief is not None else None
@@ -256,4 +256,4 @@ def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.Desk) -> None:
             del belief
             belief = desk.next()
     except BaseException as error:  # includes sys.exit in a planner
-        desk.fail(str(error) if isinstance(error, PlannerError) else told(error))
+        desk.fail(str(error) if isinstance(error, PlannerError) else format_exception(error))

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _palpate
-from ._home import found
+from ._home import find_file
 from ._settings import assignments, toml
 
 __all__ = ["read_mesh", "write_mesh"]
@@ -20,7 +20,7 @@ __all__ = ["read_mesh", "write_mesh"]
 
 def load(path: str | os.PathLike[str], seed: int, /, **settings: Any) -> _palpate.Scene:
     """Implements `Scene.load`."""
-    return _palpate.Scene._load(os.fspath(found(path, "scenes")), assignments(settings), seed)
+    return _palpate.Scene._load(os.fspath(find_file(path, "scenes")), assignments(settings), seed)
 
 
 def of_mesh(*arguments: Any, **settings: Any) -> _palpate.Scene:

@@ -18,8 +18,8 @@ __all__ = [
     "HEIGHT",
     "INITIAL",
     "INK",
-    "LATER",
     "PAPER",
+    "PLANNED",
     "TRUTH",
     "map_of",
     "planner",
@@ -39,7 +39,8 @@ TRUTH = "#009e73"
 #: Initial touches, the same for every planner.
 INITIAL = "#0046c8"
 #: Touches of a planner.
-LATER = "#d00000"
+PLANNED = "#d00000"
+LATER = PLANNED  # Former name.
 #: Opacity of a band.
 BAND_OPACITY = 0.22
 

@@ -54,7 +54,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from . import _palpate
-from ._home import HOME, found
+from ._home import HOME, find_file
 from ._settings import assignments
 
 __all__ = ["TouchEnv", "TouchVectorEnv"]
@@ -82,12 +82,12 @@ class _Explorations:
         if scene in ("suite", "suite/around"):
             files = sorted((HOME / "scenes" / str(scene)).glob("*.toml"))
         elif isinstance(scene, (str, os.PathLike)):
-            files = [found(scene, "scenes")]
+            files = [find_file(scene, "scenes")]
         else:
-            files = [found(one, "scenes") for one in scene]
+            files = [find_file(one, "scenes") for one in scene]
         sets = assignments(settings)
         scenes = [(os.fspath(file), sets) for file in files]
-        self.core = _palpate.Envs(scenes, count, touches, initial_touches, grid, reward, threads)
+        self.core = _palpate.ParallelExplorations(scenes, count, touches, initial_touches, grid, reward, threads)
         action, row, axes = self.core.sizes
         self.action = spaces.Box(-1.0, 1.0, (action,), np.float32)
         seen: dict[str, spaces.Space[Any]] = {
@@ -100,10 +100,10 @@ class _Explorations:
         self.observation = spaces.Dict(seen)
         self.measures = self.core.measures if grid or reward != "none" else []
 
-    def seen(self, told: dict[str, Any]) -> _Observation:
+    def observations(self, step: dict[str, Any]) -> _Observation:
         """Returns the observations of all environments."""
         shapes = {name: space.shape or () for name, space in self.observation.spaces.items()}
-        return {name: told[name].reshape(-1, *shape) for name, shape in shapes.items()}
+        return {name: step[name].reshape(-1, *shape) for name, shape in shapes.items()}
 
 
 class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
@@ -142,24 +142,24 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
     ) -> tuple[_Observation, dict[str, Any]]:
         """Starts an episode with its initial touches."""
         super().reset(seed=seed)
-        told = self._all.core.reset([int(self.np_random.integers(2**63))])
-        return self._seen(told), self._info(told)
+        step = self._all.core.reset([int(self.np_random.integers(2**63))])
+        return self._observation(step), self._info(step)
 
     def step(
         self, action: npt.NDArray[np.float32]
     ) -> tuple[_Observation, float, bool, bool, dict[str, Any]]:
         """Makes a touch; an episode terminates with its last touch."""
-        told = self._all.core.step(np.asarray(action, dtype=np.float32)[None])
-        return self._seen(told), float(told["reward"][0]), bool(told["over"][0]), False, self._info(told)
+        step = self._all.core.step(np.asarray(action, dtype=np.float32)[None])
+        return self._observation(step), float(step["reward"][0]), bool(step["over"][0]), False, self._info(step)
 
-    def _seen(self, told: dict[str, Any]) -> _Observation:
-        seen = {name: values[0] for name, values in self._all.seen(told).items()}
+    def _observation(self, step: dict[str, Any]) -> _Observation:
+        seen = {name: values[0] for name, values in self._all.observations(step).items()}
         seen["count"] = np.int64(seen["count"])
         return seen
 
-    def _info(self, told: dict[str, Any]) -> dict[str, Any]:
-        info: dict[str, Any] = {name: float(told[name][0]) for name in self._all.measures}
-        info["failure"] = told["failure"][0]
+    def _info(self, step: dict[str, Any]) -> dict[str, Any]:
+        info: dict[str, Any] = {name: float(step[name][0]) for name in self._all.measures}
+        info["failure"] = step["failure"][0]
         return info
 
 
@@ -209,22 +209,22 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[np.float32], npt.NDArra
         else:
             super().reset(seed=seed)
             seeds = [int(one) for one in self.np_random.integers(2**63, size=self.num_envs)]
-        told = self._all.core.reset(seeds)
-        return self._all.seen(told), self._info(told)
+        step = self._all.core.reset(seeds)
+        return self._all.observations(step), self._info(step)
 
     def step(
         self, actions: npt.NDArray[np.float32]
     ) -> tuple[_Observation, npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], dict[str, Any]]:
         """Makes a touch in each environment; actions have shape (num_envs, d)."""
-        told = self._all.core.step(np.ascontiguousarray(actions, dtype=np.float32))
+        step = self._all.core.step(np.ascontiguousarray(actions, dtype=np.float32))
         never = np.zeros(self.num_envs, dtype=bool)
-        return self._all.seen(told), told["reward"], told["over"], never, self._info(told)
+        return self._all.observations(step), step["reward"], step["over"], never, self._info(step)
 
-    def _info(self, told: dict[str, Any]) -> dict[str, Any]:
-        failed = [failure is not None for failure in told["failure"]]
-        info: dict[str, Any] = {name: told[name] for name in self._all.measures}
+    def _info(self, step: dict[str, Any]) -> dict[str, Any]:
+        failed = [failure is not None for failure in step["failure"]]
+        info: dict[str, Any] = {name: step[name] for name in self._all.measures}
         if any(failed):
-            info["failure"] = np.array(told["failure"], dtype=object)
+            info["failure"] = np.array(step["failure"], dtype=object)
             info["_failure"] = np.array(failed)
         return info
 

@@ -49,7 +49,7 @@ impl Belief {
         }
     }
 
-    fn told<'py>(
+    fn values<'py>(
         &self,
         points: &Bound<'py, PyAny>,
         (belief, posterior): (&HeightField, Option<&Posterior>),
@@ -96,13 +96,13 @@ impl Belief {
         let means = |posterior: &Posterior, places: &[Vec<f64>]| {
             posterior.means(places.iter().map(Vec::as_slice))
         };
-        self.told(points, (belief, belief.surface()), means)
+        self.values(points, (belief, belief.surface()), means)
     }
 
     /// Variance of the height without touch noise, square metres.
     fn variance<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("variance")?;
-        self.told(points, (belief, belief.surface()), variances)
+        self.values(points, (belief, belief.surface()), variances)
     }
 
     /// Gradient of `variance`, shape (..., d), metres.
@@ -122,7 +122,7 @@ impl Belief {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("explorable_variance")?;
-        self.told(points, (belief, belief.planning_posterior()), variances)
+        self.values(points, (belief, belief.planning_posterior()), variances)
     }
 
     /// Gradient of `explorable_variance`, shape (..., d), metres.
@@ -178,12 +178,12 @@ impl Belief {
     fn hyperparameters<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(posterior) = self.0.posterior() else { return Ok(None) };
         let found = posterior.hyperparameters();
-        let told = PyDict::new(py);
-        told.set_item("signal_sd_m", found.signal_sd)?;
-        told.set_item("length_scales_m", found.length_scales.clone())?;
-        told.set_item("noise_sd_m", found.noise_sd)?;
-        told.set_item("mean_m", found.mean)?;
-        Ok(Some(told))
+        let result = PyDict::new(py);
+        result.set_item("signal_sd_m", found.signal_sd)?;
+        result.set_item("length_scales_m", found.length_scales.clone())?;
+        result.set_item("noise_sd_m", found.noise_sd)?;
+        result.set_item("mean_m", found.mean)?;
+        Ok(Some(result))
     }
 
     /// Ball that contains the object (whole objects only).

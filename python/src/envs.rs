@@ -94,7 +94,7 @@ impl ParallelExplorations {
             let seeded: Vec<_> = each.iter_mut().zip(seeds).collect();
             self.pool.install(|| seeded.into_par_iter().for_each(begin));
         });
-        self.told(py)
+        self.observations(py)
     }
 
     /// Makes a touch in each exploration: actions have shape (count, d) and are fractions from -1
@@ -117,7 +117,7 @@ impl ParallelExplorations {
             };
             self.pool.install(|| each.par_iter_mut().zip(&actions).for_each(go));
         });
-        self.told(py)
+        self.observations(py)
     }
 }
 
@@ -134,30 +134,30 @@ impl ParallelExplorations {
     }
 
     /// Returns the observations, with reward and measures of the last touch.
-    fn told<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn observations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
         let count = each.len();
-        let told = PyDict::new(py);
+        let step = PyDict::new(py);
         let width = self.worlds[0].row();
         let touches: Vec<f32> =
             each.iter().flat_map(|env| env.observations.iter().copied()).collect();
         let touches = touches.into_pyarray(py).reshape([count, self.how.touches, width])?;
-        told.set_item("touches", touches)?;
+        step.set_item("touches", touches)?;
         let column = |of: fn(&Episode) -> f64| PyArray1::from_iter(py, each.iter().map(of));
-        told.set_item("count", PyArray1::from_iter(py, each.iter().map(|env| env.count as i64)))?;
+        step.set_item("count", PyArray1::from_iter(py, each.iter().map(|env| env.count as i64)))?;
         if self.how.believes {
             let believed: Vec<f32> =
                 each.iter().flat_map(|env| env.believed.iter().copied()).collect();
             let places = believed.len() / (2 * count.max(1));
-            told.set_item("belief", believed.into_pyarray(py).reshape([count, 2, places])?)?;
+            step.set_item("belief", believed.into_pyarray(py).reshape([count, 2, places])?)?;
         }
-        told.set_item("reward", column(|env| env.reward))?;
-        told.set_item("over", PyArray1::from_iter(py, each.iter().map(|env| env.is_over)))?;
+        step.set_item("reward", column(|env| env.reward))?;
+        step.set_item("over", PyArray1::from_iter(py, each.iter().map(|env| env.is_over)))?;
         for (i, name) in self.worlds[0].measured().iter().enumerate() {
-            told.set_item(*name, PyArray1::from_iter(py, each.iter().map(|env| env.measures[i])))?;
+            step.set_item(*name, PyArray1::from_iter(py, each.iter().map(|env| env.measures[i])))?;
         }
         let failures: Vec<Option<&str>> = each.iter().map(|env| env.failure.as_deref()).collect();
-        told.set_item("failure", failures)?;
-        Ok(told)
+        step.set_item("failure", failures)?;
+        Ok(step)
     }
 }

@@ -84,10 +84,10 @@ impl Experiment {
         py: Python<'_>,
         own: Vec<(String, Py<PyAny>)>,
         how: (Option<PathBuf>, bool, usize),
-        told: (Py<PyAny>, Py<PyAny>),
+        callbacks: (Py<PyAny>, Py<PyAny>),
     ) -> PyResult<Run> {
         let (out, fresh, threads) = how;
-        let (look, stop) = told;
+        let (look, stop) = callbacks;
         let makers = own
             .into_iter()
             .map(|(name, start)| -> PyResult<Box<dyn PlannerFactory>> {
@@ -104,15 +104,15 @@ impl Experiment {
             ));
         }
         let simulation = simulation.with_planners(makers);
-        let told = RunCallbacks {
+        let callbacks = RunCallbacks {
             look,
             stop,
             done: AtomicUsize::new(0),
             is_stopped: AtomicBool::new(false),
         };
         let run = match &out {
-            Some(folder) => told.kept(py, &simulation, (folder, fresh), threads),
-            None => told.in_memory(py, &simulation, threads),
+            Some(folder) => callbacks.kept(py, &simulation, (folder, fresh), threads),
+            None => callbacks.in_memory(py, &simulation, threads),
         };
         // Releases the Python planners before the interpreter continues.
         drop(simulation);

@@ -120,7 +120,7 @@ impl ExplorationScene {
     }
 
     /// Row of a touch: its target, contact and 1, or zeros without contact.
-    fn told(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
+    fn touch_row(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
         let mut row = match (self.task().region(), target) {
             (Region::Zone(zone), Target::Place(place)) => self.zone_row(zone, place, met),
             (Region::Ball(ball), Target::Aim(aim)) => {
@@ -196,7 +196,7 @@ pub(crate) struct Episode {
     score: f64,
     /// Number of touches made.
     pub(crate) count: usize,
-    /// Rows of the touches, from `ExplorationScene::told`.
+    /// Rows of the touches, from `ExplorationScene::touch_row`.
     pub(crate) observations: Vec<f32>,
     /// Means, then standard deviations on the grid, in the unit of heights.
     pub(crate) believed: Vec<f32>,
@@ -292,9 +292,9 @@ impl Episode {
                 Touch::Miss | Touch::Overload => None,
             };
         }
-        let told = self.world.told(target, met.as_ref());
-        let row = self.observations[self.count * told.len()..].iter_mut();
-        row.zip(told).for_each(|(to, from)| *to = from as f32);
+        let numbers = self.world.touch_row(target, met.as_ref());
+        let row = self.observations[self.count * numbers.len()..].iter_mut();
+        row.zip(numbers).for_each(|(to, from)| *to = from as f32);
         self.count += 1;
         Ok(())
     }
@@ -325,20 +325,20 @@ impl Episode {
             }
             None => {}
         }
-        let told = believed(known, &world.grid);
+        let values = believed(known, &world.grid);
         self.score = match self.how.reward {
             Reward::Error => self.measures[0].ln(),
             Reward::Information => {
                 let least = f64::MIN_POSITIVE;
-                let logs = told.iter().map(|(_, variance)| 0.5 * variance.max(least).ln());
-                logs.sum::<f64>() / told.len().max(1) as f64
+                let logs = values.iter().map(|(_, variance)| 0.5 * variance.max(least).ln());
+                logs.sum::<f64>() / values.len().max(1) as f64
             }
             Reward::None => 0.0,
         };
-        let (means, sds) = self.believed.split_at_mut(told.len());
-        for ((mean, sd), told) in means.iter_mut().zip(sds).zip(told) {
-            *mean = (told.0 / unit_m) as f32;
-            *sd = (told.1.max(0.0).sqrt() / unit_m) as f32;
+        let (means, sds) = self.believed.split_at_mut(values.len());
+        for ((mean, sd), values) in means.iter_mut().zip(sds).zip(values) {
+            *mean = (values.0 / unit_m) as f32;
+            *sd = (values.1.max(0.0).sqrt() / unit_m) as f32;
         }
         Ok(())
     }
@@ -348,9 +348,9 @@ impl Episode {
 fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
     match known {
         Known::HeightField(belief) => {
-            let told = belief.surface().map(|it| it.predict(grid.iter().map(Vec::as_slice)));
-            let told = told.into_iter().flatten();
-            told.map(|told| (told.mean, told.variance)).collect()
+            let values = belief.surface().map(|it| it.predict(grid.iter().map(Vec::as_slice)));
+            let values = values.into_iter().flatten();
+            values.map(|values| (values.mean, values.variance)).collect()
         }
         Known::ImplicitSurface(belief) => {
             let Some(surface) = belief.surface() else { return Vec::new() };

@@ -37,11 +37,11 @@ impl Exploration {
 
     /// Makes a touch at a target and fits the belief.
     fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
-        let (touch, told) = self.scene.get().touched(py, target.clone())?;
+        let (touch, values) = self.scene.get().touched(py, target.clone())?;
         let fitted = py.detach(|| {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(target) = Target::from_numbers(&target) {
-                known.observe(&target, &told.approach, (&told.touch, told.swept.as_ref()));
+                known.observe(&target, &values.approach, (&values.touch, values.swept.as_ref()));
             }
             known.refit().map(|_| ())
         });
@@ -67,11 +67,11 @@ impl Exploration {
             Some(BeliefErrors::Around(metrics)) => serde_json::to_value(metrics),
             None => return Ok(None),
         };
-        let told = PyDict::new(py);
+        let values = PyDict::new(py);
         for (name, value) in json.map_err(errors::other)?.as_object().into_iter().flatten() {
-            told.set_item(name, value.as_f64())?;
+            values.set_item(name, value.as_f64())?;
         }
-        Ok(Some(told))
+        Ok(Some(values))
     }
 
     fn __repr__(&self) -> String {

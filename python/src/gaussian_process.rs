@@ -101,8 +101,8 @@ impl Fitted {
         places: PyReadonlyArray2<'_, f64>,
     ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
         let places = each(&places);
-        let told = py.detach(|| self.posterior.predict(places.iter().map(Vec::as_slice)));
-        let (means, variances) = told.iter().map(|told| (told.mean, told.variance)).unzip();
+        let values = py.detach(|| self.posterior.predict(places.iter().map(Vec::as_slice)));
+        let (means, variances) = values.iter().map(|values| (values.mean, values.variance)).unzip();
         (PyArray1::from_vec(py, means), PyArray1::from_vec(py, variances))
     }
 

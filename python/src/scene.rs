@@ -85,8 +85,8 @@ impl Scene {
         let place = (task.zone())
             .zip(contact.as_ref())
             .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
-        let told = TouchData { approach, touch, swept };
-        Ok((Touch { target, outcome, contact, place, time_s }, told))
+        let values = TouchData { approach, touch, swept };
+        Ok((Touch { target, outcome, contact, place, time_s }, values))
     }
 }
 

@@ -16,8 +16,8 @@ def program():
 
     def run(*arguments, cwd=None):
         words = [str(command), "--quiet", *map(str, arguments)]
-        told = subprocess.run(words, cwd=cwd or os.path.dirname(__file__), capture_output=True, text=True)
-        assert told.returncode == 0, told.stderr
-        return told.stdout
+        result = subprocess.run(words, cwd=cwd or os.path.dirname(__file__), capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+        return result.stdout
 
     return run

@@ -128,8 +128,8 @@ def test_an_own_planner_goes_around_an_object(mug, run, isolate):
     ],
 )
 def test_a_planner_that_fails_is_a_row_with_the_reason(mug, planner, words):
-    told = mug.run([planner], trials=1).trials()
-    assert words in told["failure"][0]
+    result = mug.run([planner], trials=1).trials()
+    assert words in result["failure"][0]
 
 
 def test_an_exploration_is_touched_and_believes():

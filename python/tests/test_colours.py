@@ -10,7 +10,7 @@ from palpate import colours
 REPORT = (Path(__file__).parents[2] / "src" / "report" / "style.rs").read_text()
 
 
-@pytest.mark.parametrize("name", ["INK", "FAINT_INK", "GRID", "PAPER", "TRUTH", "INITIAL", "LATER"])
+@pytest.mark.parametrize("name", ["INK", "FAINT_INK", "GRID", "PAPER", "TRUTH", "INITIAL", "PLANNED"])
 def test_a_colour_is_the_report_s(name):
     assert f'pub const {name}: &str = "{getattr(colours, name)}";' in REPORT
 

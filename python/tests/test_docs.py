@@ -17,6 +17,6 @@ def test_the_first_example_prints_a_table(page, tmp_path):
     program = tmp_path / "first.py"
     program.write_text(code)
     command = [sys.executable, program]
-    told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert told.returncode == 0, told.stderr
-    assert "__main__:Widest" in told.stdout and "active" in told.stdout
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "__main__:Widest" in result.stdout and "active" in result.stdout

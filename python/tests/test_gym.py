@@ -47,18 +47,18 @@ def test_the_vector_environment_keeps_to_the_rules():
 
 
 def test_it_is_the_same_for_any_number_of_threads_and_alone():
-    told = []
+    result = []
     for threads in (1, 2):
         envs = palpate.gym.TouchVectorEnv(3, "bird", touches=9, threads=threads)
         envs.reset(seed=[5, 6, 7])
-        told.append(envs.step(np.full((3, 2), 0.25, dtype=np.float32)))
-    assert all((told[0][0][name] == told[1][0][name]).all() for name in told[0][0])
-    assert (told[0][1] == told[1][1]).all()
+        result.append(envs.step(np.full((3, 2), 0.25, dtype=np.float32)))
+    assert all((result[0][0][name] == result[1][0][name]).all() for name in result[0][0])
+    assert (result[0][1] == result[1][1]).all()
     env = palpate.gym.TouchEnv("bird", touches=9)
     env.reset(seed=6)
     seen, reward, *_ = env.step(np.full(2, 0.25, dtype=np.float32))
-    assert reward == told[0][1][1]
-    assert (seen["belief"] == told[0][0]["belief"][1]).all()
+    assert reward == result[0][1][1]
+    assert (seen["belief"] == result[0][0]["belief"][1]).all()
 
 
 @pytest.mark.parametrize("reward", ["error", "information"])

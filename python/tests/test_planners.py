@@ -19,9 +19,9 @@ from scipy import optimize
 def failures(planner, **settings):
     toy = palpate.Experiment.load("toy", touches=6)
     run = toy.run([planner, "random"], trials=2, **settings)
-    told = run.trials()
-    assert told[told["planner"] == "random"]["failure"].isna().all()
-    return list(told[told["planner"] != "random"]["failure"])
+    format_exception = run.trials()
+    assert format_exception[format_exception["planner"] == "random"]["failure"].isna().all()
+    return list(format_exception[format_exception["planner"] != "random"]["failure"])
 
 
 @pytest.mark.parametrize("isolate", [False, True])
@@ -54,8 +54,8 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     ],
 )
 def test_a_planner_that_fails_is_a_row_with_the_reason(planner, words, how):
-    told = failures(planner, **how)
-    assert len(told) == 2 and all(words in reason for reason in told)
+    format_exception = failures(planner, **how)
+    assert len(format_exception) == 2 and all(words in reason for reason in format_exception)
 
 
 def test_the_row_keeps_the_touches_before_and_the_place_in_the_code():
@@ -68,8 +68,8 @@ def test_the_row_keeps_the_touches_before_and_the_place_in_the_code():
 @pytest.mark.parametrize("planner", [own.Sleeps, own.Spins])
 @pytest.mark.parametrize("isolate", [False, True])
 def test_a_planner_that_does_not_return_is_a_row(planner, isolate):
-    told = failures(planner, isolate=isolate, limit_s=0.2)
-    assert all("within 0.2 s" in reason for reason in told)
+    format_exception = failures(planner, isolate=isolate, limit_s=0.2)
+    assert all("within 0.2 s" in reason for reason in format_exception)
 
 
 def test_a_planner_that_leaves_is_a_row():
@@ -103,10 +103,10 @@ def test_what_is_no_planner_is_refused():
 def test_the_program_runs_planners_of_python(tmp_path, program):
     here = os.path.dirname(__file__)
     sets = ["--set", "trials=2", "--set", "touches=8", "--set", 'planners=["random"]']
-    told = program(
+    format_exception = program(
         "run", "toy", "--planner", "own:Middle", *sets, "--out", tmp_path / "run", "--json", cwd=here
     )
-    assert "own:Middle" in told
+    assert "own:Middle" in format_exception
     run = palpate.Run.open(tmp_path / "run")
     experiment = palpate.Experiment.load("toy", touches=8)
     assert run.rows() == experiment.run(["random", "own:Middle"], trials=2).rows()

@@ -27,21 +27,21 @@ def test_an_experiment_says_what_it_is():
 
 
 def test_a_wrong_setting_is_an_error_with_its_parts(tmp_path):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as result:
         palpate.Experiment.load("toy", trials=0)
-    assert (told.value.key, told.value.value) == ("trials", "0")
-    assert told.value.allowed
+    assert (result.value.key, result.value.value) == ("trials", "0")
+    assert result.value.allowed
     file = tmp_path / "wrong.toml"
     file.write_text('name = "wrong"\nscene = "none.toml"\ntrails = 3\n')
-    with pytest.raises(ValueError) as told:
+    with pytest.raises(ValueError) as result:
         palpate.Experiment.load(file)
-    assert isinstance(told.value, ConfigError) and told.value.file is not None
-    with pytest.raises(ConfigError) as told:
+    assert isinstance(result.value, ConfigError) and result.value.file is not None
+    with pytest.raises(ConfigError) as result:
         palpate.Experiment.load("nowhere")
-    assert told.value.file == "nowhere"
-    with pytest.raises(ConfigError) as told:
+    assert result.value.file == "nowhere"
+    with pytest.raises(ConfigError) as result:
         palpate.Experiment.load("toy").run(["activ"])
-    assert "active" in told.value.allowed
+    assert "active" in result.value.allowed
 
 
 def test_rows_are_the_programs_to_the_byte(tmp_path, program):
@@ -63,9 +63,9 @@ def test_frames_hold_every_touch_and_measure(toy):
     last = touches[touches["touch"] == 12]
     assert (last["rmse_m"] > 0).all()
     summary = toy.summary()
-    told = summary.query("planner == 'active' and touches == 12")["rmse_mean_m"].item()
+    result = summary.query("planner == 'active' and touches == 12")["rmse_mean_m"].item()
     mean = last[last["planner"] == "active"]["rmse_m"].mean()
-    assert told == pytest.approx(mean, rel=1e-12)
+    assert result == pytest.approx(mean, rel=1e-12)
     assert toy.trials()["failure"].isna().all()
     assert "active" in str(toy)
 
@@ -97,9 +97,9 @@ def test_a_run_goes_on_in_its_folder(tmp_path):
     run = experiment.run(["random", "sobol"], trials=3, out=tmp_path / "run")
     assert len(run.trials()) == 6
     assert run.rows() == experiment.run(["random", "sobol"], trials=3).rows()
-    with pytest.raises(RunFolderError) as told:
+    with pytest.raises(RunFolderError) as result:
         palpate.Experiment.load("toy", touches=9).run(["random"], trials=2, out=tmp_path / "run")
-    assert told.value.path == str(tmp_path / "run")
+    assert result.value.path == str(tmp_path / "run")
     with pytest.raises(OSError):
         palpate.Run.open(tmp_path)
 
@@ -136,8 +136,8 @@ def test_the_interpreter_is_free_while_trials_run():
 def test_the_package_is_light_to_import(tmp_path):
     code = "import sys, palpate; print([m for m in ('pandas', 'mujoco', 'scipy') if m in sys.modules])"
     command = [sys.executable, "-c", code]
-    told = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path)
-    assert told.stdout.strip() == "[]"
+    result = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path)
+    assert result.stdout.strip() == "[]"
 
 
 def test_a_frame_is_a_frame(toy):

@@ -22,19 +22,19 @@ def toy():
     [(palpate.Experiment.load, "toi", "toy"), (palpate.Scene.load, "brid", "bird")],
 )
 def test_a_name_that_is_not_there(load, name, meant):
-    with pytest.raises(ConfigError, match=f"did you mean '{meant}'") as told:
+    with pytest.raises(ConfigError, match=f"did you mean '{meant}'") as result:
         load(name)
-    assert told.value.file == name
-    assert meant in told.value.allowed and "container" in told.value.allowed
+    assert result.value.file == name
+    assert meant in result.value.allowed and "container" in result.value.allowed
 
 
 def test_a_setting_that_is_wrong():
     with pytest.raises(ConfigError, match="did you mean `touches`"):
         palpate.Experiment.load("toy", touchs=3)
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as result:
         palpate.Experiment.load("toy", touches="many")
-    assert (told.value.key, told.value.value) == ("touches", '"many"')
-    assert told.value.allowed == "a whole number from 0 to 4294967295"
+    assert (result.value.key, result.value.value) == ("touches", '"many"')
+    assert result.value.allowed == "a whole number from 0 to 4294967295"
 
 
 @pytest.mark.parametrize(

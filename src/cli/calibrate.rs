@@ -131,7 +131,7 @@ fn shear_table(found: &ShearComparison, stiffness_n_m: f64) -> String {
         [format!("  E{}", i + 1), a, b, c, d]
     }));
     let table = aligned(&rows);
-    let told = [("lateral", lateral), ("axial", axial)].map(|(name, of)| {
+    let values = [("lateral", lateral), ("axial", axial)].map(|(name, of)| {
         let [least, most] = of.ratios();
         format!(
             "  {name}: correlation {:.2}; ratios of the eight largest slopes {least:.2} to {most:.2}; \
@@ -140,7 +140,7 @@ fn shear_table(found: &ShearComparison, stiffness_n_m: f64) -> String {
             stiffness_n_m / of.scale()
         )
     });
-    format!("sensor {sensor}, skin stiffness {stiffness_n_m} N/m\n{table}{}\n", told.join("\n"))
+    format!("sensor {sensor}, skin stiffness {stiffness_n_m} N/m\n{table}{}\n", values.join("\n"))
 }
 
 fn held_out_text(held: &HeldOutResult) -> String {

@@ -40,7 +40,7 @@ pub fn html(
         let drawings = drawings.iter().filter(|(it, _)| (it.name == CURVES) == is_curve);
         drawings.map(|(it, svg)| figure(run, it, svg)).collect()
     };
-    let claims = tables("", &[summary::claims(run)], "told", summary::CLAIMS_NOTE);
+    let claims = tables("", &[summary::claims(run)], "claims", summary::CLAIMS_NOTE);
     let summary = tables("", &[summary::table(run)], "counted", &summary::note(run));
     let equal = tables("", &equal, "named", &comparison::equal_errors_note(run));
     let against = tables("", &against, "named", &comparison::comparisons_note(run));

@@ -326,8 +326,8 @@ impl Validate for Scene {
         given(rules, "effects.collision", bumps, allowed);
         if let (Some(wrench), false) = (&self.effects.wrench, self.detects_by_frames()) {
             let least_n = CONTACT_SIGMAS * wrench.noise_max_n();
-            let told = self.touch.detection_n >= least_n;
-            rules.require("touch.detection_n", self.touch.detection_n, told, || {
+            let values = self.touch.detection_n >= least_n;
+            rules.require("touch.detection_n", self.touch.detection_n, values, || {
                 format!(
                     "at least {least_n} N, {CONTACT_SIGMAS} standard deviations of effects.wrench, \
                      because contact is detected from the force alone"

@@ -36,16 +36,16 @@ fn a_whole_belief_is_exported_and_read_back() {
     for (name, grid) in [("it.ply", "16"), ("it.obj", "16"), ("fine.ply", "48")] {
         let export =
             ["export", "runs/small", "--planner", "active", "--trial", "1", "--touches", "7"];
-        let told =
+        let values =
             succeeds(folder.path(), &[&export[..], &["--grid", grid, "--out", name]].concat());
-        assert!(told.contains("sigma up to"), "{told}");
+        assert!(values.contains("sigma up to"), "{values}");
         let (mesh, _) = import(&folder.path().join(name), 1.0).unwrap();
         let (low, high) = mesh.bounds();
         assert!((high - low).max() > 0.2 && (high - low).max() < 2.0, "{name}: {low} {high}");
         counts.push(mesh.triangles().len());
         let words =
             format!("{} vertices, {} triangles", mesh.vertices().len(), mesh.triangles().len());
-        assert!(told.contains(&words), "{words} in {told}");
+        assert!(values.contains(&words), "{words} in {values}");
     }
     assert!(counts[0] == counts[1] && counts[2] > 4 * counts[0], "{counts:?}");
     let text = fs::read_to_string(folder.path().join("it.ply")).unwrap();
@@ -67,9 +67,9 @@ fn planners_around_an_object_are_held_against_what_they_were() {
     assert!(same.trim_end().ends_with("identical"), "{same}");
     // Touches are equal, but their evaluation differs.
     let other = palpate(folder.path(), &[&check[..], &["--set", "gp.cells=24"]].concat());
-    let told = String::from_utf8_lossy(&other.stdout).into_owned();
-    assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{told} {}", stderr(&other));
-    assert!(told.contains("error after the last touch") && !told.contains("RMSE"), "{told}");
+    let values = String::from_utf8_lossy(&other.stdout).into_owned();
+    assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{values} {}", stderr(&other));
+    assert!(values.contains("error after the last touch") && !values.contains("RMSE"), "{values}");
 }
 
 #[test]

@@ -98,17 +98,17 @@ fn a_constant_that_recordings_do_not_determine_is_refused() {
 #[test]
 fn what_no_sensor_can_say_is_refused_by_name() {
     assert_eq!(recordings().check(), Ok(()));
-    let told = |change: fn(&mut PlateRecording)| {
+    let values = |change: fn(&mut PlateRecording)| {
         let mut all = recordings();
         change(&mut all.sensors[1]);
         all.check().unwrap_err().to_string()
     };
-    let counts = told(|of| of.near_normal_loads[2].mean_counts[4] = 5000.0);
+    let counts = values(|of| of.near_normal_loads[2].mean_counts[4] = 5000.0);
     assert!(counts.contains("sensors[1].near_normal_loads[2].mean_counts[4] = 5000"), "{counts}");
     assert!(counts.contains("less than 4095"), "{counts}");
-    assert!(told(|of| of.no_contact_median_counts[0] = f64::NAN).contains("NaN"));
-    assert!(told(|of| of.near_normal_loads[0].mean_normal_force_n = 0.0).contains("more than 0"));
-    assert!(told(|of| of.near_normal_loads.clear()).contains("near_normal_loads is empty"));
+    assert!(values(|of| of.no_contact_median_counts[0] = f64::NAN).contains("NaN"));
+    assert!(values(|of| of.near_normal_loads[0].mean_normal_force_n = 0.0).contains("more than 0"));
+    assert!(values(|of| of.near_normal_loads.clear()).contains("near_normal_loads is empty"));
     let empty = Recordings { note: String::new(), sensors: Vec::new() };
     let error = empty.check().unwrap_err().to_string();
     assert_eq!(error, "sensors is empty: allowed is at least one entry");

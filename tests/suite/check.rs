@@ -158,8 +158,8 @@ fn a_check_says_by_its_exit_code() {
     let (code, said) = check(&["--set", "gp.noise_sd_m=0.3", "--junit", junit]);
     assert!([Some(1), Some(3)].contains(&code), "{code:?} {said}");
     assert!(said.contains("settings or the object's file"), "{said}");
-    let told = fs::read_to_string(junit).unwrap();
-    assert!(told.contains("<failure") || told.contains("<error"), "{told}");
+    let results = fs::read_to_string(junit).unwrap();
+    assert!(results.contains("<failure") || results.contains("<error"), "{results}");
     let (code, said) = check(&["--set", "seed=5"]);
     assert!(code == Some(2) && said.contains("`seed` is 2016 in the baseline and 5"), "{said}");
     let text = fs::read_to_string(&file).unwrap();
@@ -265,19 +265,19 @@ fn a_loss_of_five_percent_is_flagged_and_other_random_numbers_are_not() {
     assert!(changes.iter().any(|(_, new)| wanted(new.name)), "{change:?}");
     for (old, new) in changes.into_iter().filter(|(_, new)| wanted(new.name)) {
         let old = planner::by_name(old).unwrap();
-        let told: Vec<_> = (0..checks)
+        let results: Vec<_> = (0..checks)
             .into_par_iter()
             .map(|seed| {
-                let told = one_check(&name, seed, old, new);
-                println!("{name}, {}, seed {seed}: {told:?}", new.name);
-                told
+                let results = one_check(&name, seed, old, new);
+                println!("{name}, {}, seed {seed}: {results:?}", new.name);
+                results
             })
             .collect();
-        let flagged = told.iter().filter(|(verdict, ..)| *verdict >= Verdict::Worse).count();
-        let ok = told.iter().filter(|(verdict, ..)| *verdict < Verdict::Undecided).count();
+        let flagged = results.iter().filter(|(verdict, ..)| *verdict >= Verdict::Worse).count();
+        let ok = results.iter().filter(|(verdict, ..)| *verdict < Verdict::Undecided).count();
         let trials =
-            told.iter().map(|(_, trials, _)| *trials).sum::<usize>() as f64 / checks as f64;
-        let loss = told.iter().map(|(.., mean)| mean).sum::<f64>() / checks as f64;
+            results.iter().map(|(_, trials, _)| *trials).sum::<usize>() as f64 / checks as f64;
+        let loss = results.iter().map(|(.., mean)| mean).sum::<f64>() / checks as f64;
         println!(
             "{name}, {} against {}: {:+.1} %, flagged {flagged} of {checks}, passed {ok}, {trials:.1} trials each",
             new.name,

@@ -79,9 +79,9 @@ fn shells_are_told_how_to_complete() {
 fn a_summary_is_told_to_programs() {
     let folder = folder();
     let text = succeeds(folder.path(), &["run", "small.toml", "--no-report", "--json"]);
-    let told: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert_eq!((&told["name"], &told["trials"]), (&"small".into(), &1.into()));
-    let line = &told["summary"][0];
+    let values: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&values["name"], &values["trials"]), (&"small".into(), &1.into()));
+    let line = &values["summary"][0];
     assert_eq!((&line["planner"], &line["touches"]), (&"random".into(), &3.into()));
     let csv = fs::read_to_string(folder.path().join("runs/small/summary.csv")).unwrap();
     let columns = csv.lines().next().unwrap().split(',').skip(3);
@@ -90,7 +90,7 @@ fn a_summary_is_told_to_programs() {
         assert_eq!(line["measures"][column].as_f64(), cell.parse().ok(), "{column}");
     }
     let shown = succeeds(folder.path(), &["show", "runs/small", "--json"]);
-    assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), told);
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), values);
 }
 
 /// Progress appears only for slow work, and not with --quiet.

@@ -294,9 +294,9 @@ fn of_several_kernels_the_likeliest_is_taken() {
         let at = |choice: &KernelSelection| {
             Posterior::new(choice.kernel(), fit.hyperparameters.clone(), touches.clone())
         };
-        let [mean, told] = [&choice, &again]
+        let [mean, values] = [&choice, &again]
             .map(|choice| at(choice).unwrap().mean(&[0.2], &mut Scratch::default()));
-        assert_eq!(mean, told);
+        assert_eq!(mean, values);
         chosen.push(fit.kernel.unwrap());
     }
     assert_eq!(chosen, ["squared_exponential", "matern_32"]);

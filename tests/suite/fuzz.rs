@@ -300,7 +300,7 @@ fn damage(files: &[(PathBuf, Vec<u8>)], file: usize, edits: &[Edit]) {
 }
 
 /// Generates all outputs of a run.
-fn told(path: &Path, draw: bool) -> Result<(), String> {
+fn results(path: &Path, draw: bool) -> Result<(), String> {
     let run = Run::read(path).map_err(|error| error.to_string())?;
     let analysis = Analysis::new(&run);
     drop((tables::summary::text(&run), analysis));
@@ -324,7 +324,7 @@ fn run_folders() {
         drawn.set(drawn.get() + 1);
         // Drawing takes a hundred times as long as reading.
         let (path, draw) = (path.clone(), drawn.get() % 10 == 0);
-        survived(move || told(&path, draw))
+        survived(move || results(&path, draw))
     });
 }
 

@@ -95,17 +95,20 @@ fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
     };
     for missing in 0..needed.len() {
         let sets: Vec<_> = (0..needed.len()).filter(|&i| i != missing).map(|i| needed[i]).collect();
-        let told = run("container_pa10", &sets);
+        let values = run("container_pa10", &sets);
         let (key, _) = needed[missing].split_once('=').unwrap();
-        assert!(told.contains("moves a real robot, which needs") && told.contains(key), "{told}");
         assert!(
-            told.contains(&format!("{key} = [")) || told.contains(&format!("{key} = 0")),
-            "{told}"
+            values.contains("moves a real robot, which needs") && values.contains(key),
+            "{values}"
+        );
+        assert!(
+            values.contains(&format!("{key} = [")) || values.contains(&format!("{key} = 0")),
+            "{values}"
         );
     }
-    let told = run("around", &needed[1..]);
+    let values = run("around", &needed[1..]);
     for key in ["scene.whole_object.centre_m", "scene.whole_object.radius_m"] {
-        assert!(told.contains(key), "{told}");
+        assert!(values.contains(key), "{values}");
     }
     assert!(!Path::new(out).exists());
 }
@@ -134,7 +137,7 @@ fn a_folder_that_may_not_be_used_is_refused_before_the_arm_is_looked_for() {
     fs::create_dir(&out).unwrap();
     let trials = fs::File::create(out.join("trials.jsonl")).unwrap();
     trials.lock().unwrap();
-    let told = run();
-    assert!(told.contains("another run is writing this folder"), "{told}");
+    let values = run();
+    assert!(values.contains("another run is writing this folder"), "{values}");
     drop(trials);
 }

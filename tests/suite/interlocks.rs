@@ -89,10 +89,10 @@ fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() 
         assert!(tick <= 205, "{named}: {tick}");
         let commands = fake.commands();
         assert!(commands.last().unwrap().iter().all(|qdot| *qdot == 0.0), "{named}");
-        let told = commands.len();
+        let values = commands.len();
         assert_eq!(body.step(&command(7, 0)).unwrap_err(), fault);
         assert_eq!(body.reset(2).unwrap_err(), fault);
-        assert_eq!(fake.commands().len(), told, "{named}: it moved after it was stopped");
+        assert_eq!(fake.commands().len(), values, "{named}: it moved after it was stopped");
         body.clear_fault();
         fake.mend();
         body.reset(2).unwrap();

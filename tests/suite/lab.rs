@@ -134,13 +134,13 @@ fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
         let network = Network::new(number);
         let twin = TwinProcess::new(&network, path.to_str().unwrap(), &[]);
         let output = network.peer("touch", &[peer]).output().unwrap();
-        let told = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(output.status.success(), "{told}{}", String::from_utf8_lossy(&output.stderr));
-        let felt_m = serde_json::from_str::<Value>(&told).unwrap()["felt_y_m"].as_f64().unwrap();
+        let values = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{values}{}", String::from_utf8_lossy(&output.stderr));
+        let felt_m = serde_json::from_str::<Value>(&values).unwrap()["felt_y_m"].as_f64().unwrap();
         // The container's front is at most 60 mm before its axis at y = -0.65 m; the tip's centre
         // is 7 mm before that.
         assert!((-0.65..-0.58).contains(&felt_m), "{felt_m}");
-        println!("{peer}: {}", told.trim());
+        println!("{peer}: {}", values.trim());
         twin.end();
     }
 }
@@ -235,11 +235,11 @@ fn a_run_that_was_halted_goes_on() {
     // Both parts of the recording can be replayed, on any machine.
     let whole = out.join("recordings/random-0000.mcap");
     let replay = network.palpate(&["replay", whole.to_str().unwrap()]).output().unwrap();
-    let told = String::from_utf8_lossy(&replay.stdout).into_owned();
-    assert!(replay.status.success(), "{told}{}", String::from_utf8_lossy(&replay.stderr));
+    let values = String::from_utf8_lossy(&replay.stdout).into_owned();
+    assert!(replay.status.success(), "{values}{}", String::from_utf8_lossy(&replay.stderr));
     assert!(
-        told.contains("random-0000-part-2.mcap") && told.contains("6 touches identical"),
-        "{told}"
+        values.contains("random-0000-part-2.mcap") && values.contains("6 touches identical"),
+        "{values}"
     );
     twin.end();
 }
@@ -276,11 +276,11 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
         "{fault}"
     );
     drop(lab);
-    let told = String::from_utf8(arm.wait_with_output().unwrap().stdout).unwrap();
-    let called: Value = serde_json::from_str(&told).unwrap();
+    let values = String::from_utf8(arm.wait_with_output().unwrap().stdout).unwrap();
+    let called: Value = serde_json::from_str(&values).unwrap();
     for service in Service::COMMON {
         let name = Value::from(service.name("/pa10"));
-        assert!(called["called"].as_array().unwrap().contains(&name), "{name}: {told}");
+        assert!(called["called"].as_array().unwrap().contains(&name), "{name}: {values}");
     }
 }
 

@@ -59,7 +59,7 @@ impl FaultScenario {
     }
 }
 
-fn told(what: &str, seen_s: Option<f64>, rest_s: Option<f64>, said: &str) {
+fn values(what: &str, seen_s: Option<f64>, rest_s: Option<f64>, said: &str) {
     let ms = |time_s: Option<f64>| {
         time_s.map_or("–".into(), |time_s| format!("{:.0} ms", 1e3 * time_s))
     };
@@ -98,7 +98,7 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
         let goes_back = name == "force_spike";
         let seen_s = Some(halted_s - at_s).filter(|_| !goes_back);
         let rest_s = Some(scene.rest_s(at_s)).filter(|_| !goes_back);
-        told(name, seen_s, rest_s, &said);
+        values(name, seen_s, rest_s, &said);
         other.extend((!said.contains(words)).then_some((name, said)));
     }
     assert!(other.is_empty(), "{other:?}");
@@ -129,7 +129,7 @@ fn the_death_of_either_side_stops_the_other() {
         let at_s = pace::now_s();
         sleep(Duration::from_secs(1));
         let seen_s = scene.twin.alarmed_s(at_s) - at_s;
-        told(&format!("SIG{name} of the explorer"), Some(seen_s), Some(scene.rest_s(at_s)), "");
+        values(&format!("SIG{name} of the explorer"), Some(seen_s), Some(scene.rest_s(at_s)), "");
         if name == "STOP" {
             // Queued commands move nothing, and the explorer gets an error.
             let count = scene.twin.events.lock().unwrap().len();
@@ -149,14 +149,14 @@ fn the_death_of_either_side_stops_the_other() {
         signal(&scene.twin.child, name);
         let at_s = pace::now_s();
         let (said, halted_s) = scene.halted();
-        told(&format!("SIG{name} of the arm's side"), Some(halted_s - at_s), None, &said);
+        values(&format!("SIG{name} of the arm's side"), Some(halted_s - at_s), None, &said);
         assert!(said.contains("no new message on"), "{said}");
         if name == "STOP" {
             // It resumes with an outdated command.
             signal(&scene.twin.child, "CONT");
             let at_s = pace::now_s();
             sleep(Duration::from_secs(1));
-            told("and after SIGCONT", None, Some(scene.rest_s(at_s)), "");
+            values("and after SIGCONT", None, Some(scene.rest_s(at_s)), "");
         }
     }
 }
@@ -180,8 +180,8 @@ fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
     assert!(ip("link set lo up") && (!has_dummy || ip("link set dds0 up")));
     assert!(ip(&format!("route replace 224.0.0.0/4 dev {device}")));
     let (said, halted_s) = scene.halted();
-    told("network gone: the arm's side", Some(seen_s), Some(rest_s), "");
-    told("network gone: the explorer", Some(halted_s - at_s), None, &said);
+    values("network gone: the arm's side", Some(seen_s), Some(rest_s), "");
+    values("network gone: the explorer", Some(halted_s - at_s), None, &said);
     let events = scene.twin.events.lock().unwrap();
     assert!(events[count..].iter().all(|line| line["event"] != "moving"), "{events:?}");
     drop(events);
@@ -210,7 +210,7 @@ fn a_second_publisher_of_commands_stops_the_arm() {
     // Over ROS 1 the arm's side cannot distinguish publishers; the explorer queries the master.
     let is_told_by_arm = said.contains("alarm");
     let at_s = if is_told_by_arm { scene.twin.alarmed_s(before_s) } else { before_s };
-    told("two publishers", Some(halted_s - at_s), Some(scene.rest_s(at_s)), &said);
+    values("two publishers", Some(halted_s - at_s), Some(scene.rest_s(at_s)), &said);
     assert!(said.contains("two publishers") || said.contains("2 publishers"), "{said}");
 }
 

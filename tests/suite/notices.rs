@@ -187,8 +187,11 @@ fn a_soft_finger_of_another_size_is_told_what_it_costs() {
         let set = format!("finger.radius_m={radius_m}");
         palpate(folder.path(), &["show", "scene.toml", "--set", &set])
     };
-    let told = stderr(&show("0.01"));
-    assert!(told.contains("finger.radius_m = 0.01") && told.contains("0.79 at 0.010"), "{told}");
-    let told = stderr(&show("0.007"));
-    assert!(!told.contains("finger.radius_m"), "{told}");
+    let values = stderr(&show("0.01"));
+    assert!(
+        values.contains("finger.radius_m = 0.01") && values.contains("0.79 at 0.010"),
+        "{values}"
+    );
+    let values = stderr(&show("0.007"));
+    assert!(!values.contains("finger.radius_m"), "{values}");
 }

@@ -130,9 +130,9 @@ fn the_command_line_adds_planners() {
             .unwrap()
     };
     for (planner, words) in [("mine:Random", "Python"), ("activ", "active"), ("a b:c", "active")] {
-        let told = run(planner);
-        assert_eq!(told.status.code(), Some(2), "{planner}");
-        let error = String::from_utf8_lossy(&told.stderr).into_owned();
+        let values = run(planner);
+        assert_eq!(values.status.code(), Some(2), "{planner}");
+        let error = String::from_utf8_lossy(&values.stderr).into_owned();
         assert!(error.contains(planner) && error.contains(words), "{error}");
     }
     assert!(run("active").status.success());

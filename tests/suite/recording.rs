@@ -342,13 +342,13 @@ fn a_recording_without_slips_is_read_as_ever() {
     assert!(shorter != bytes);
     let [now, before] = [bytes, shorter].map(|bytes| RecordedTrial::from_bytes(bytes).unwrap());
     assert_eq!((now.tick_count, &now.touches), (before.tick_count, &before.touches));
-    let mut told = 0;
+    let mut values = 0;
     for (now, before) in now.ticks().zip(before.ticks()) {
-        told += now.slips.len();
+        values += now.slips.len();
         assert!(before.slips.is_empty());
         assert_eq!(TickMessage { slips: Default::default(), ..now }, before);
     }
-    assert!(told > 10, "{told}");
+    assert!(values > 10, "{values}");
 }
 
 #[test]
@@ -397,8 +397,8 @@ fn what_others_read_is_what_was_read() {
                 let frames: Vec<&Frame> = readings.iter().flat_map(Reading::frames).collect();
                 let frame = frames[number];
                 let [first, .., last] = frame.electrode_counts.unwrap();
-                let told = hand.bt_data[0].electrode_data;
-                assert_eq!((first, last), (f64::from(told[0]), f64::from(told[18])));
+                let values = hand.bt_data[0].electrode_data;
+                assert_eq!((first, last), (f64::from(values[0]), f64::from(values[18])));
                 assert_eq!(f64::from(hand.bt_data[0].pdc_data), frame.pdc_counts.unwrap());
             }
             "/palpate/tick" => {

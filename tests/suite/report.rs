@@ -200,8 +200,8 @@ fn claims_stand_beside_what_came_out() {
     run.experiment.report.claims = vec![claim(10, "it is <accurate>"), claim(99, "it is nowhere")];
     let files = drawn(&run);
     let page = text(&files, "report.html");
-    let told = "<td>10 touches</td><td>median RMSE, mm</td><td>2.000</td>";
-    assert!(page.contains(&format!("it is &lt;accurate&gt;</td>{told}")));
+    let found = "<td>10 touches</td><td>median RMSE, mm</td><td>2.000</td>";
+    assert!(page.contains(&format!("it is &lt;accurate&gt;</td>{found}")));
     assert!(page.contains("<td>median length scale along z, mm</td><td>42.000</td>"));
     assert!(!page.contains("it is nowhere"));
 }
@@ -225,14 +225,14 @@ fn a_zone_has_no_measures_of_whole_objects() {
     let run = run(SURFACE);
     let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::new(&run));
     report::write_tables(&run, &analysis, folder.path()).unwrap();
-    let mut told = text(&drawn(&run), "report.html").to_owned();
+    let mut found = text(&drawn(&run), "report.html").to_owned();
     for name in ["summary.csv", "comparison.csv", "equal_error.csv"] {
-        told += &fs::read_to_string(folder.path().join(name)).unwrap();
+        found += &fs::read_to_string(folder.path().join(name)).unwrap();
     }
     for measure in MEASURES.iter().filter(|measure| measure.is_for_whole_objects()) {
-        assert!(!told.contains(measure.title), "{measure:?}");
+        assert!(!found.contains(measure.title), "{measure:?}");
         for name in measure.columns().into_iter().chain([measure.id.into()]) {
-            assert!(!told.contains(&format!(",{name},")), "{name}");
+            assert!(!found.contains(&format!(",{name},")), "{name}");
         }
     }
 }

@@ -50,8 +50,8 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
                 fs::read_to_string(at(shard).join("trials.jsonl")).unwrap().lines().count() < 4
             );
         }
-        let (code, told) = run(&at(shard), &["--shard", &format!("{shard}/3")]);
-        assert_eq!(code, Some(0), "{told}");
+        let (code, values) = run(&at(shard), &["--shard", &format!("{shard}/3")]);
+        assert_eq!(code, Some(0), "{values}");
     }
     let merge = |out: &str, parts: &[&str]| {
         let parts: Vec<String> = parts.iter().map(|part| text(part)).collect();
@@ -60,24 +60,24 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
         arguments.extend(parts.iter().map(String::as_str));
         said(&arguments)
     };
-    let (code, told) = merge("merged", &["2", "3", "1"]);
-    assert!(code == Some(0) && told.contains("14 trials"), "{told}");
+    let (code, values) = merge("merged", &["2", "3", "1"]);
+    assert!(code == Some(0) && values.contains("14 trials"), "{values}");
     let rows = |name: &str| fs::read(at(name).join("trials.jsonl")).unwrap();
     assert_eq!(rows("merged"), rows("whole"));
     assert_eq!(said(&["report", &text("merged")]).0, Some(0));
 
-    let (code, told) = merge("missing", &["1", "3"]);
-    assert!(code == Some(2) && told.contains("4 of 14 trials are missing"), "{told}");
-    let (code, told) = merge("twice", &["1", "2", "3", "whole"]);
-    assert!(code == Some(2) && told.contains("is in both"), "{told}");
+    let (code, values) = merge("missing", &["1", "3"]);
+    assert!(code == Some(2) && values.contains("4 of 14 trials are missing"), "{values}");
+    let (code, values) = merge("twice", &["1", "2", "3", "whole"]);
+    assert!(code == Some(2) && values.contains("is in both"), "{values}");
     run(&at("foreign"), &["--shard", "1/3", "--set", "gp.noise_sd_m=0.01"]);
-    let (code, told) = merge("of-two", &["2", "foreign"]);
-    assert!(code == Some(2) && told.contains("not the experiment of"), "{told}");
-    let (code, told) = merge("merged", &["1", "2", "3"]);
-    assert!(code == Some(2) && told.contains("already has rows"), "{told}");
+    let (code, values) = merge("of-two", &["2", "foreign"]);
+    assert!(code == Some(2) && values.contains("not the experiment of"), "{values}");
+    let (code, values) = merge("merged", &["1", "2", "3"]);
+    assert!(code == Some(2) && values.contains("already has rows"), "{values}");
     assert!(["missing", "twice", "of-two"].iter().all(|name| !at(name).exists()));
-    let (code, told) = run(&at("no"), &["--shard", "4/3"]);
-    assert!(code == Some(2) && told.contains("from 1 to N"), "{told}");
+    let (code, values) = run(&at("no"), &["--shard", "4/3"]);
+    assert!(code == Some(2) && values.contains("from 1 to N"), "{values}");
 }
 
 /// Only the trial and the position of each row are kept in memory.

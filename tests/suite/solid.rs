@@ -89,20 +89,20 @@ fn the_page_holds_what_was_given() {
     let sds_mm = numbers(&data["deviation_range"]);
     let errors_mm = numbers(&data["error_range"]);
     for (planner, sequence) in given.iter().enumerate() {
-        let told = &data["planners"][planner];
-        assert_eq!(told["name"], sequence.planner.as_str());
-        for (touch, told) in sequence.touches.iter().zip(told["touches"].as_array().unwrap()) {
-            let aim_mm = nalgebra::Vector3::from_vec(numbers(&told["aim"]));
+        let values = &data["planners"][planner];
+        assert_eq!(values["name"], sequence.planner.as_str());
+        for (touch, values) in sequence.touches.iter().zip(values["touches"].as_array().unwrap()) {
+            let aim_mm = nalgebra::Vector3::from_vec(numbers(&values["aim"]));
             assert!((1e3 * (touch.aim_w - middle) - aim_mm).amax() < 1e-4);
-            assert_eq!(told["contact"].is_null(), touch.contact_w.is_none());
-            assert_eq!(told["is_initial"], touch.is_initial);
+            assert_eq!(values["contact"].is_null(), touch.contact_w.is_none());
+            assert_eq!(values["is_initial"], touch.is_initial);
         }
         for (index, frame) in sequence.frames.iter().enumerate() {
-            let told = &told["frames"][index];
-            assert_eq!(told["touches"], frame.touches);
-            assert_eq!(told["score"], frame.score.as_str());
-            let (positions, corners) = (shares(&told["positions"]), corners(&told["corners"]));
-            let (sds, errors) = (shares(&told["deviation"]), shares(&told["error"]));
+            let values = &values["frames"][index];
+            assert_eq!(values["touches"], frame.touches);
+            assert_eq!(values["score"], frame.score.as_str());
+            let (positions, corners) = (shares(&values["positions"]), corners(&values["corners"]));
+            let (sds, errors) = (shares(&values["deviation"]), shares(&values["error"]));
             let given: Vec<usize> =
                 frame.mesh.1.as_flattened().iter().map(|&vertex| vertex as usize).collect();
             assert_eq!(corners.len(), given.len());
@@ -126,8 +126,8 @@ fn the_page_holds_what_was_given() {
     }
     // The truth is shown with fewer triangles, on the same surface within a cell.
     let positions = shares(&data["truth"]["positions"]);
-    let (told, given) = (corners(&data["truth"]["corners"]).len(), 3 * truth.triangles().len());
-    assert!(told <= 3 * 8000 && 3 * 8000 < given, "{told} of {given}");
+    let (values, given) = (corners(&data["truth"]["corners"]).len(), 3 * truth.triangles().len());
+    assert!(values <= 3 * 8000 && 3 * 8000 < given, "{values} of {given}");
     for offset in positions.as_chunks::<3>().0 {
         let p = middle + nalgebra::Vector3::from(offset.map(|share| side_m * (share - 0.5)));
         assert!(ring_m(&p).abs() < 1e-3, "{p}");
@@ -151,9 +151,9 @@ fn a_corner_may_lie_far_back() {
         ..PlannerSurfaces::default()
     };
     let data = data(&section(&[fan], None, 0).unwrap());
-    let told = corners(&data["planners"][0]["frames"][0]["corners"]);
+    let values = corners(&data["planners"][0]["frames"][0]["corners"]);
     let given: Vec<usize> = triangles.as_flattened().iter().map(|&i| i as usize).collect();
-    assert_eq!(told, given);
+    assert_eq!(values, given);
     assert!(data["error_range"].is_null() && data["truth"].is_null());
 }
 
@@ -335,8 +335,8 @@ setTimeout(() => {
   log.textContent += [document.querySelector("#explorer .notices").textContent, seen(".notices"), seen("canvas"), seen("output")].join(" | ");
 }, 100);
 "##;
-    let told: Vec<[String; 4]> =
+    let values: Vec<[String; 4]> =
         log(&browser, &page(folder.path(), script), &["--disable-3d-apis"]);
-    assert!(told[0][0].contains("needs WebGL"), "{told:?}");
-    assert_eq!(told[0][1..], ["true", "false", "false"], "{told:?}");
+    assert!(values[0][0].contains("needs WebGL"), "{values:?}");
+    assert_eq!(values[0][1..], ["true", "false", "false"], "{values:?}");
 }

@@ -209,8 +209,8 @@ impl Silhouette {
 impl SilhouetteModel {
     fn over(&self, places: &[Vector2<f64>]) -> Vec<f64> {
         let believed = self.belief.predict(places.iter().map(|place| place.as_slice()));
-        let told = places.iter().zip(believed);
-        told.map(|(place, at)| self.above(DIVIDE, place, PRIOR + at.mean, at.variance)).collect()
+        let results = places.iter().zip(believed);
+        results.map(|(place, at)| self.above(DIVIDE, place, PRIOR + at.mean, at.variance)).collect()
     }
 
     fn hoped(&self, zone: &Zone, place: &Vector2<f64>) -> f64 {

@@ -349,12 +349,12 @@ fn score(
     scale: &SignalModel,
     x: &[f64],
     mut gradient: Option<&mut [f64]>,
-    told: &mut Option<ProfiledLikelihood>,
+    found: &mut Option<ProfiledLikelihood>,
 ) -> f64 {
     let (lengths, noise) = sought.parameters(x);
     let profile = likelihood.profile(&lengths, noise, scale, gradient.as_deref_mut());
     let Ok(profile) = profile else { return f64::NAN };
-    *told = Some(profile);
+    *found = Some(profile);
     for (i, (range, &log)) in sought.ranges().zip(x).enumerate() {
         let Some(prior) = range.prior else { continue };
         if let Some(slope) = gradient.as_deref_mut().and_then(|gradient| gradient.get_mut(i)) {

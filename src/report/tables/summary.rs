@@ -146,10 +146,10 @@ fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
         ),
         (events.duplicate_target, "random targets instead of planned ones: repeated target"),
     ];
-    let told: Vec<String> = counts
+    let found: Vec<String> = counts
         .iter()
         .filter(|(count, _)| *count > 0)
         .map(|(count, what)| format!("{count} {what}"))
         .collect();
-    (!told.is_empty()).then(|| format!("{planner}: {}", told.join("; ")))
+    (!found.is_empty()).then(|| format!("{planner}: {}", found.join("; ")))
 }

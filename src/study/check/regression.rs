@@ -94,7 +94,7 @@ pub fn differences(
     rules: &CheckOptions,
 ) -> Vec<String> {
     let (known, names) = (&old.header.planners, &new.header.planners);
-    let told = names.iter().filter_map(|name| {
+    let results = names.iter().filter_map(|name| {
         if !known.contains(name) {
             return Some(format!("{name}: new"));
         }
@@ -104,7 +104,7 @@ pub fn differences(
         Some(format!("{name}: {} {percent:+.2} % in {} trials", first.judged.title, planner.trials))
     });
     let gone = known.iter().filter(|name| !names.contains(name));
-    told.chain(gone.map(|name| format!("{name}: removed"))).collect()
+    results.chain(gone.map(|name| format!("{name}: removed"))).collect()
 }
 
 fn planner_of(

@@ -129,10 +129,10 @@ impl TwinProcess {
         let mut child =
             network.palpate(&["serve", path]).args(more).stdout(Stdio::piped()).spawn().unwrap();
         let events: Arc<Mutex<Vec<Value>>> = Arc::default();
-        let (lines, told) = (BufReader::new(child.stdout.take().unwrap()), Arc::clone(&events));
+        let (lines, values) = (BufReader::new(child.stdout.take().unwrap()), Arc::clone(&events));
         let reader = std::thread::spawn(move || {
             for line in lines.lines().map_while(Result::ok) {
-                told.lock().unwrap().push(serde_json::from_str(&line).unwrap());
+                values.lock().unwrap().push(serde_json::from_str(&line).unwrap());
             }
         });
         let twin = Self { child, events, reader: Some(reader) };

@@ -177,7 +177,7 @@ impl Rig {
             chain: chain.clone(),
             track: Arc::clone(&track),
         };
-        let (end, stopped, told) = (hub.clone(), Arc::clone(&stop), Arc::clone(&events));
+        let (end, stopped, values) = (hub.clone(), Arc::clone(&stop), Arc::clone(&events));
         let settings_of_arm = settings.clone();
         let thread = std::thread::spawn(move || {
             let connect = Box::new(move || Ok(Box::new(end.end(Side::Arm)) as _));
@@ -190,7 +190,7 @@ impl Rig {
                 0,
             )
             .unwrap();
-            twin.run(&stopped, &mut |at_s, event| told.lock().unwrap().push((at_s, event)))
+            twin.run(&stopped, &mut |at_s, event| values.lock().unwrap().push((at_s, event)))
                 .unwrap();
         });
         let (thread, wire) = (Some(thread), Wire::default());

@@ -172,9 +172,9 @@ impl Search {
                     }
                 }
             }
-            let told = values(&all);
+            let results = values(&all);
             let each = 1 + 2 * sides.len();
-            let around = all.chunks_exact(each).zip(told.chunks_exact(each));
+            let around = all.chunks_exact(each).zip(results.chunks_exact(each));
             for ((places, values), gradient) in around.zip(gradients) {
                 for (axis, slope) in gradient.iter_mut().enumerate() {
                     let [before, after] = [1, 2].map(|side| 2 * axis + side);
@@ -182,7 +182,7 @@ impl Search {
                         / (places[after][axis] - places[before][axis]);
                 }
             }
-            told.into_iter().step_by(each).collect()
+            results.into_iter().step_by(each).collect()
         }
     }
 }

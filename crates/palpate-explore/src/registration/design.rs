@@ -138,13 +138,13 @@ impl Design {
         let mut chosen: Vec<Candidate> = Vec::new();
         while chosen.len() < count + count / SPARE && !all.is_empty() {
             let Some(covariance) = information.try_inverse() else { break };
-            let told = |candidate: &Candidate| {
+            let results = |candidate: &Candidate| {
                 let rows = &candidate.rows;
                 let inner = DMatrix::identity(rows.nrows(), rows.nrows())
                     + rows * covariance * rows.transpose();
                 inner.determinant()
             };
-            let values: Vec<f64> = all.iter().map(told).collect();
+            let values: Vec<f64> = all.iter().map(results).collect();
             let best = (0..all.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
             let candidate = all.swap_remove(best.unwrap_or_default());
             if is_reached(robot, &candidate.approach) {
@@ -364,8 +364,8 @@ impl KinematicArm {
 
     fn report(&mut self, qdot: &Joints) {
         let joints = self.chain.joints.len();
-        let told = [(&mut self.reading.q, &self.q), (&mut self.reading.qdot, qdot)];
-        for (to, from) in told {
+        let results = [(&mut self.reading.q, &self.q), (&mut self.reading.qdot, qdot)];
+        for (to, from) in results {
             to.clear();
             to.extend(from.iter().take(joints));
         }

@@ -132,7 +132,7 @@ pub fn align(
         let moved = (step * middle_o - middle_o).norm() / size_m + step.rotation.angle();
         x_wo = fitted.state;
         if moved < SETTLED || round == ROUNDS {
-            return Ok(told(&problem, &fitted, mesh, round));
+            return Ok(values(&problem, &fitted, mesh, round));
         }
     }
     Err(InputError::new(FitError::Unsettled.to_string()))
@@ -147,7 +147,7 @@ fn plane(mesh: &MeshBvh, p_o: &Point3<f64>) -> (Point3<f64>, Vector3<f64>) {
     (nearest.point, face)
 }
 
-fn told(
+fn values(
     problem: &Planes<'_>,
     fitted: &Solution<Isometry3<f64>>,
     mesh: &MeshBvh,

@@ -132,8 +132,8 @@ pub fn register(
             )),
         });
     }
-    let told = conclude(&touches, robot, body, made_count)?;
-    Ok(RegistrationResult { fault: ended.map(|(_, fault)| fault), ..told })
+    let results = conclude(&touches, robot, body, made_count)?;
+    Ok(RegistrationResult { fault: ended.map(|(_, fault)| fault), ..results })
 }
 
 /// Fits the poses to `touches`, of `of` that were made.

@@ -57,7 +57,7 @@ pub fn compass<T, E>(
     budget: u32,
     mut f: impl FnMut(&[f64]) -> Result<(f64, T), E>,
 ) -> Result<(Optimum, T), E> {
-    let (value, mut told) = f(&start)?;
+    let (value, mut values) = f(&start)?;
     let mut best = Optimum { x: start, value, evaluations: 1, stop: Stop::Budget };
     // Number of consecutive axes without an improvement.
     let mut idle = 0;
@@ -79,7 +79,7 @@ pub fn compass<T, E>(
             let (value, new) = f(&x)?;
             best.evaluations += 1;
             if value > best.value {
-                (best.x, best.value, told, idle) = (x, value, new, 0);
+                (best.x, best.value, values, idle) = (x, value, new, 0);
                 break;
             }
         }
@@ -87,7 +87,7 @@ pub fn compass<T, E>(
             (step, idle) = (step / 2.0, 0);
         }
     }
-    Ok((best, told))
+    Ok((best, values))
 }
 
 #[cfg(test)]
@@ -114,9 +114,9 @@ mod tests {
                 Ok::<_, Infallible>((-away, x.to_vec()))
             };
             let start = start.to_vec();
-            let (found, told) = compass(start, &bounds, axis, [0.5, 1e-3], 10_000, bowl).unwrap();
+            let (found, values) = compass(start, &bounds, axis, [0.5, 1e-3], 10_000, bowl).unwrap();
             prop_assert_eq!(found.stop, Stop::Converged);
-            prop_assert_eq!(&told, &found.x);
+            prop_assert_eq!(&values, &found.x);
             prop_assert_eq!(found.evaluations, asked);
             for (x, top) in found.x.iter().zip(&top) {
                 prop_assert!((x - top.clamp(-1.0, 1.0)).abs() <= 1e-3);

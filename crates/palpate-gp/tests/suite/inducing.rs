@@ -65,8 +65,8 @@ fn it_is_the_posterior_of_its_equations() {
         let within = correlations(kernel, lengths, &kept, &kept);
         let across = correlations(kernel, lengths, &kept, &all);
         let inverse = within.clone().try_inverse().unwrap();
-        let told = across.transpose() * &inverse * &across;
-        let left: Vec<f64> = (0..120).map(|i| (1.0 - told[(i, i)]).max(0.0)).collect();
+        let values = across.transpose() * &inverse * &across;
+        let left: Vec<f64> = (0..120).map(|i| (1.0 - values[(i, i)]).max(0.0)).collect();
         let largest = left.iter().copied().fold(0.0, f64::max);
         assert!((left_sd - at.signal_sd * largest.sqrt()).abs() < 1e-5, "{left_sd}");
         let noise2 = (at.noise_sd / at.signal_sd).powi(2);

@@ -339,16 +339,19 @@ mod slips {
 
     pub(super) fn serialize<S: Serializer>(frames: &[Frame], to: S) -> Result<S::Ok, S::Error> {
         let known = frames.iter().any(|frame| frame.slip.is_some());
-        let told = if known { frames } else { &[] };
-        to.collect_seq(told.iter().map(|frame| frame.slip.map_or(2, u8::from)))
+        let results = if known { frames } else { &[] };
+        to.collect_seq(results.iter().map(|frame| frame.slip.map_or(2, u8::from)))
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(
         from: D,
     ) -> Result<Cow<'static, [Frame]>, D::Error> {
-        let told = Vec::<u8>::deserialize(from)?;
-        let slip = |told: u8| (told < 2).then_some(told == 1);
-        Ok(told.into_iter().map(|told| Frame { slip: slip(told), ..Frame::default() }).collect())
+        let results = Vec::<u8>::deserialize(from)?;
+        let slip = |results: u8| (results < 2).then_some(results == 1);
+        Ok(results
+            .into_iter()
+            .map(|results| Frame { slip: slip(results), ..Frame::default() })
+            .collect())
     }
 }
 

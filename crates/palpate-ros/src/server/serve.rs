@@ -90,7 +90,7 @@ pub struct SimulatedRobotServer {
     since: Instant,
     moved_s: Option<f64>,
     is_moving: bool,
-    told: ArmStatus,
+    values: ArmStatus,
     tick: u64,
     period_s: f64,
     /// Events that `run` has not reported yet, with their time since 1970.
@@ -124,7 +124,7 @@ impl SimulatedRobotServer {
             events: Vec::new(),
             body,
             settings: settings.clone(),
-            told: pc.status().clone(),
+            values: pc.status().clone(),
             pc,
             names,
             inbox,
@@ -190,7 +190,7 @@ impl SimulatedRobotServer {
 
     /// Returns the number of real-time overruns.
     pub fn overruns(&self) -> u64 {
-        self.told.overruns
+        self.values.overruns
     }
 
     /// Returns the number of refused commands.
@@ -266,15 +266,15 @@ impl SimulatedRobotServer {
     /// Publishes the arm's state at its rate, and immediately when it changes.
     fn publish_status(&mut self, now_s: f64) {
         let status = self.pc.status().clone();
-        let is_new = ArmStatus { overruns: self.told.overruns, ..status.clone() } != self.told;
+        let is_new = ArmStatus { overruns: self.values.overruns, ..status.clone() } != self.values;
         if !is_new && !self.is_due(STATUS_HZ) {
             return;
         }
         if is_new {
             self.tell(Event::Status(status.clone()));
         }
-        self.told = status;
-        let message = self.told.message(pace::now_s(), self.settings.topics.device());
+        self.values = status;
+        let message = self.values.message(pace::now_s(), self.settings.topics.device());
         self.send(Packet::Status(message), now_s);
     }
 
