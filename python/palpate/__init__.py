@@ -15,6 +15,7 @@ _load()
 from typing import TYPE_CHECKING, Any
 
 from . import errors
+from ._check import Check, check
 from ._experiment import Experiment
 from ._palpate import Ball, Belief, Exploration, Scene, Touch, Zone, __version__
 from ._palpate import planners as _planners
@@ -31,6 +32,7 @@ __all__ = [
     "PLANNERS",
     "Ball",
     "Belief",
+    "Check",
     "Experiment",
     "Exploration",
     "GaussianProcess",
@@ -39,6 +41,7 @@ __all__ = [
     "Touch",
     "Zone",
     "__version__",
+    "check",
     "errors",
     "read_mesh",
     "write_mesh",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -95,6 +96,7 @@ class Experiment:
         progress: bool = False,
         limit_s: float | None = LIMIT_S,
         isolate: bool = False,
+        on_error: str = "record",
     ) -> Run:
         """Runs the missing trials.
 
@@ -114,9 +116,11 @@ class Experiment:
             limit_s: time limit for a target of your own planners, seconds; None means no limit, which also avoids the
                 overhead of a thread.
             isolate: run each of your own planners in its own process, which can be killed.
+            on_error: "record" stores an error of your own planner as the reason of its failed trial, continues, and
+                warns at the end; "raise" stops the run and raises PlannerError with the traceback.
 
         Raises:
-            PlannerError: if a planner is invalid; its later errors fail its trials instead.
+            PlannerError: if a planner is invalid; with on_error="raise", also at its first failed trial.
             TypeError: if `planners` is not a list.
             ValueError: if `limit_s` or `threads` is negative.
             KeyboardInterrupt: after Ctrl-C, when the running trials have finished; with `out` they are kept, and the
@@ -124,12 +128,63 @@ class Experiment:
             SimulationError: if the scene cannot be simulated.
             RunFolderError: if the folder contains other files.
         """
+        if limit_s is not None and not 0 < limit_s < float("inf"):
+            raise ValueError(f"limit_s = {limit_s}: allowed is above 0, or None for no limit")
+        if on_error not in ("record", "raise"):
+            raise ValueError(f'on_error = {on_error!r}: allowed are "record", "raise"')
+        core, workers = self._prepared(planners, trials, threads, limit_s, isolate)
+
+        def stop() -> None:
+            for started in workers.values():
+                started.stop()
+
+        look = Progress(self.name, progress)
+        folder = None if out is None else os.fspath(out)
+        how = (folder, fresh, threads, on_error == "raise")
+        run = Run(core.run(list(workers.items()), how, (look, stop)))
+        rows = run._core.trials()
+        failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
+        if failed:
+            first = failed[0]
+            warnings.warn(
+                f"{len(failed)} trials failed; the first, trial {rows['trial'][first]} of {rows['planner'][first]}: "
+                f"{rows['failure'][first]}",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        return run
+
+    def _check(
+        self,
+        baseline: str,
+        planners: Sequence[Any] | None,
+        accept: str | None,
+        tolerance: float,
+        max_trials: int,
+        threads: int,
+    ) -> dict[str, Any] | None:
+        core, workers = self._prepared(planners, max_trials, threads, LIMIT_S, False)
+
+        def stop() -> None:
+            for started in workers.values():
+                started.stop()
+
+        how = (baseline, accept, tolerance, threads)
+        return core.check(list(workers.items()), how, (Progress(self.name, False), stop))
+
+    def _prepared(
+        self,
+        planners: Sequence[Any] | None,
+        trials: int | None,
+        threads: int,
+        limit_s: float | None,
+        isolate: bool,
+    ) -> tuple[_palpate.Experiment, dict[str, Any]]:
+        """Returns the experiment with these planners and trials, and factories of the Python planners."""
         if isinstance(planners, (str, type)):
             raise TypeError(f"planners = {planners!r}: allowed is a list, [{planners!r}]")
         if threads < 0:
             raise ValueError(f"threads = {threads}: allowed is 0 (all cores) or more")
-        if limit_s is not None and not 0 < limit_s < float("inf"):
-            raise ValueError(f"limit_s = {limit_s}: allowed is above 0, or None for no limit")
         own: dict[str, Factory] = {}
         names = []
         for planner in self.planners if planners is None else planners:
@@ -146,17 +201,8 @@ class Experiment:
         if isolate:
             from ._isolated import ProcessPlannerFactory
 
-            workers: dict[str, Any] = {name: ProcessPlannerFactory(it, limit_s) for name, it in own.items()}
-        else:
-            workers = {name: ThreadPlannerFactory(it, limit_s) for name, it in own.items()}
-
-        def stop() -> None:
-            for started in workers.values():
-                started.stop()
-
-        look = Progress(self.name, progress)
-        folder = None if out is None else os.fspath(out)
-        return Run(core.run(list(workers.items()), (folder, fresh, threads), (look, stop)))
+            return core, {name: ProcessPlannerFactory(it, limit_s) for name, it in own.items()}
+        return core, {name: ThreadPlannerFactory(it, limit_s) for name, it in own.items()}
 
     def __repr__(self) -> str:
         return f"Experiment({self.name}: {self.trials} trials of {', '.join(self.planners)})"

@@ -366,9 +366,15 @@ class Experiment:
     def run(
         self,
         own: Sequence[tuple[str, Callable[[Zone | None, int], Any]]],
-        how: tuple[str | None, bool, int],
+        how: tuple[str | None, bool, int, bool],
         callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
     ) -> Run: ...
+    def check(
+        self,
+        own: Sequence[tuple[str, Callable[[Zone | None, int], Any]]],
+        how: tuple[str, str | None, float, int],
+        callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
+    ) -> dict[str, Any] | None: ...
 
 @final
 class Run:
@@ -392,5 +398,5 @@ class Run:
 def read_mesh(
     path: str, metres_per_unit: float = 1.0
 ) -> tuple[tuple[_Array, npt.NDArray[np.uint32]], str]: ...
-def main(arguments: Sequence[str], bring: Callable[[str], Any]) -> int: ...
+def main(arguments: Sequence[str], load_planner: Callable[[str], Any]) -> int: ...
 def planners() -> list[str]: ...

@@ -87,3 +87,8 @@ pub(crate) fn within(name: &str, value: u32, [least, most]: [u32; 2]) -> PyResul
         }
     }
 }
+
+/// Creates the error of a Python planner.
+pub(crate) fn planner(error: impl std::fmt::Display) -> PyErr {
+    exception("PlannerError", &error.to_string(), &[])
+}

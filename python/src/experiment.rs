@@ -6,11 +6,15 @@ use crate::program::COMMIT;
 use crate::run::Run;
 use crate::zone::Zone;
 use palpate::experiment::runner::{self, Progress};
-use palpate::experiment::store::{self, RunFolder, resolved};
+use palpate::experiment::store::{self, RunFolder, resolved, write_whole};
 use palpate::experiment::{self, Simulation};
-use palpate::explore::planner::PlannerFactory;
+use palpate::explore::planner::{PlannerFactory, is_external};
+use palpate::report::check;
+use palpate::study::check::{CheckOptions, CheckResult, StoredBaseline, accepted, run_check};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -76,18 +80,77 @@ impl Experiment {
     }
 
     /// Runs the missing trials. `own` pairs names of Python planners with their factories; `how`
-    /// has the folder, whether to start again, and the number of threads. `(look, stop)` are
+    /// has the folder, whether to start again, the number of threads, and whether the first error of a
+    /// Python planner ends the run. `(look, stop)` are
     /// callbacks: `look` gets the number of finished and of all trials at intervals, `stop` is
     /// called when the run is stopped.
     fn run(
         &self,
         py: Python<'_>,
         own: Vec<(String, Py<PyAny>)>,
-        how: (Option<PathBuf>, bool, usize),
+        how: (Option<PathBuf>, bool, usize, bool),
         callbacks: (Py<PyAny>, Py<PyAny>),
     ) -> PyResult<Run> {
-        let (out, fresh, threads) = how;
-        let (look, stop) = callbacks;
+        let (out, fresh, threads, raises) = how;
+        let simulation = self.simulation(py, own)?;
+        let callbacks = RunCallbacks { raises, ..RunCallbacks::new(callbacks) };
+        let run = match &out {
+            Some(folder) => callbacks.kept(py, &simulation, (folder, fresh), threads),
+            None => callbacks.in_memory(py, &simulation, threads),
+        };
+        // Releases the Python planners before the interpreter continues.
+        drop(simulation);
+        match callbacks.failure.into_inner().unwrap_or_default() {
+            Some(failure) => Err(errors::planner(failure)),
+            None => run,
+        }
+    }
+
+    /// Tests the planners for regressions against the baseline file `path`, as the command
+    /// `palpate check` does: returns verdict, remarks, and the columns of a table. With a reason to
+    /// `accept`, writes the file instead; returns `None`. `how` has the file, the reason, the
+    /// tolerance and the number of threads; `own` and `callbacks` are those of `run`.
+    fn check<'py>(
+        &self,
+        py: Python<'py>,
+        own: Vec<(String, Py<PyAny>)>,
+        how: (PathBuf, Option<String>, f64, usize),
+        callbacks: (Py<PyAny>, Py<PyAny>),
+    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let (path, accept, tolerance, threads) = how;
+        let mut old = match accept.is_some() && !path.exists() {
+            true => None,
+            false => Some(StoredBaseline::read(&path).map_err(errors::other)?),
+        };
+        if let Some(old) = &mut old {
+            old.check_pairs(&path, &self.0).map_err(errors::other)?;
+        }
+        let simulation = self.simulation(py, own)?;
+        let callbacks = RunCallbacks::new(callbacks);
+        let tick = |progress: Progress| callbacks.count(&progress);
+        let stop = &callbacks.is_stopped;
+        let jobs = runner::missing_jobs(&simulation, &[]).map_err(errors::other)?;
+        let rules = CheckOptions { tolerance, ..CheckOptions::default() };
+        let Some(why) = accept else {
+            let mut old = old.ok_or_else(|| errors::other("no baseline"))?;
+            old.keep_planners(&self.0.planners);
+            let run = || run_check(&simulation, &old, &rules, threads, stop, &tick);
+            let result = callbacks.watched(py, jobs.len(), run)?.map_err(errors::other)?;
+            return check_table(py, &result, &rules, self.0.trials).map(Some);
+        };
+        let total = jobs.len();
+        let run = || runner::run_in_memory(&simulation, jobs, threads, stop, &tick);
+        let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
+        let new = accepted(&simulation, &rows, &why, (old.as_ref(), true), &rules);
+        let text = new.map_err(errors::other)?.text().map_err(errors::other)?;
+        write_whole(&path, &text).map_err(errors::other)?;
+        Ok(None)
+    }
+}
+
+impl Experiment {
+    /// Builds the simulation, with the Python planners `own`.
+    fn simulation(&self, py: Python<'_>, own: Vec<(String, Py<PyAny>)>) -> PyResult<Simulation> {
         let makers = own
             .into_iter()
             .map(|(name, start)| -> PyResult<Box<dyn PlannerFactory>> {
@@ -103,21 +166,44 @@ impl Experiment {
                  allowed here is \"simulated\"",
             ));
         }
-        let simulation = simulation.with_planners(makers);
-        let callbacks = RunCallbacks {
-            look,
-            stop,
-            done: AtomicUsize::new(0),
-            is_stopped: AtomicBool::new(false),
-        };
-        let run = match &out {
-            Some(folder) => callbacks.kept(py, &simulation, (folder, fresh), threads),
-            None => callbacks.in_memory(py, &simulation, threads),
-        };
-        // Releases the Python planners before the interpreter continues.
-        drop(simulation);
-        run
+        Ok(simulation.with_planners(makers))
     }
+}
+
+/// Returns verdict, remarks and the columns of the table of a check.
+fn check_table<'py>(
+    py: Python<'py>,
+    result: &CheckResult,
+    rules: &CheckOptions,
+    most: u32,
+) -> PyResult<Bound<'py, PyDict>> {
+    let mut rows = Vec::new();
+    for planner in &result.planners {
+        let (name, trials) = (planner.name.as_str(), planner.trials);
+        if planner.judgements.is_empty() {
+            rows.push((name, "", [f64::NAN; 3], check::word(planner.verdict), trials));
+        }
+        for it in &planner.judgements {
+            let [low, high] = it.sequence.interval;
+            let percent = [it.sequence.mean, low, high].map(|at| it.judged.percent(at));
+            rows.push((name, it.judged.title, percent, check::word(it.verdict), trials));
+        }
+    }
+    let table = PyDict::new(py);
+    table.set_item("planner", rows.iter().map(|row| row.0).collect::<Vec<_>>())?;
+    table.set_item("measure", rows.iter().map(|row| row.1).collect::<Vec<_>>())?;
+    for (i, name) in ["change_percent", "low_percent", "high_percent"].iter().enumerate() {
+        table.set_item(*name, rows.iter().map(|row| row.2[i]).collect::<Vec<_>>())?;
+    }
+    let verdicts = rows.iter().map(|row| row.3.to_lowercase());
+    table.set_item("verdict", verdicts.collect::<Vec<_>>())?;
+    table.set_item("trials", rows.iter().map(|row| row.4).collect::<Vec<_>>())?;
+    let found = PyDict::new(py);
+    found.set_item("verdict", check::word(result.verdict()).to_lowercase())?;
+    found.set_item("remarks", check::remarks(result, rules, most))?;
+    found.set_item("table", table)?;
+    found.set_item("text", check::table(result).text())?;
+    Ok(found)
 }
 
 /// A run with its callbacks.
@@ -126,9 +212,31 @@ struct RunCallbacks {
     stop: Py<PyAny>,
     done: AtomicUsize,
     is_stopped: AtomicBool,
+    /// Whether the first failed trial of a Python planner ends the run.
+    raises: bool,
+    /// That trial and its reason.
+    failure: Mutex<Option<String>>,
 }
 
 impl RunCallbacks {
+    fn new((look, stop): (Py<PyAny>, Py<PyAny>)) -> Self {
+        let (done, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        Self { look, stop, done, is_stopped, raises: false, failure: Mutex::default() }
+    }
+
+    /// Counts a finished trial; stops the run if it failed and errors are raised.
+    fn count(&self, progress: &Progress) {
+        let Progress::Trial(row) = progress else { return };
+        self.done.fetch_add(1, Ordering::Relaxed);
+        if let (true, Some(reason)) = (self.raises && is_external(&row.planner), &row.failure)
+            && let Ok(mut failure) = self.failure.lock()
+        {
+            let text = || format!("{}, trial {}: {reason}", row.planner, row.trial);
+            failure.get_or_insert_with(text);
+            self.is_stopped.store(true, Ordering::Relaxed);
+        }
+    }
+
     fn kept(
         &self,
         py: Python<'_>,
@@ -143,10 +251,7 @@ impl RunCallbacks {
         self.done.store(done.len(), Ordering::Relaxed);
         let total = done.len() + jobs.len();
         let outcome = self.watched(py, total, || {
-            let tick = |progress: Progress| {
-                let trials = usize::from(matches!(progress, Progress::Trial(_)));
-                self.done.fetch_add(trials, Ordering::Relaxed);
-            };
+            let tick = |progress: Progress| self.count(&progress);
             runner::run(simulation, (&mut folder, jobs), threads, &self.is_stopped, None, &tick)
         });
         folder.sort(experiment).map_err(errors::run)?;
@@ -157,10 +262,7 @@ impl RunCallbacks {
     fn in_memory(&self, py: Python<'_>, simulation: &Simulation, threads: usize) -> PyResult<Run> {
         let jobs = runner::missing_jobs(simulation, &[]).map_err(errors::other)?;
         let rows = self.watched(py, jobs.len(), || {
-            let tick = |progress: Progress| {
-                let trials = usize::from(matches!(progress, Progress::Trial(_)));
-                self.done.fetch_add(trials, Ordering::Relaxed);
-            };
+            let tick = |progress: Progress| self.count(&progress);
             runner::run_in_memory(simulation, jobs, threads, &self.is_stopped, &tick)
         })?;
         Ok(Run(store::Run {

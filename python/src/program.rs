@@ -12,20 +12,20 @@ pub(crate) const COMMIT: &str = match option_env!("PALPATE_COMMIT") {
     None => "unknown",
 };
 
-/// Runs the program on `arguments`, the first of which is its name; returns its exit code. `bring`
+/// Runs the program on `arguments`, the first of which is its name; returns its exit code. `load_planner`
 /// returns the factory of a planner named `MODULE:CLASS`.
 #[pyfunction]
-pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> u8 {
-    let brought = |name: &str| {
+pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, load_planner: Py<PyAny>) -> u8 {
+    let loaded = |name: &str| {
         let start = Python::attach(|py| {
-            let start = bring.call1(py, (name,));
+            let start = load_planner.call1(py, (name,));
             let made = start.and_then(|start| PythonFactory::new(py, name.into(), start));
             made.map_err(|error| anyhow::anyhow!("{}", error.value(py)))
         });
         Some(start.map(|made| -> Box<dyn PlannerFactory> { Box::new(made) }))
     };
     py.detach(|| {
-        let host = Host { commit: COMMIT, load_planner: &brought };
+        let host = Host { commit: COMMIT, load_planner: &loaded };
         palpate::cli::main_with(arguments.into_iter().map(Into::into), &host)
     })
 }

@@ -1,6 +1,7 @@
 //! Command `palpate check`.
 
 use super::find::{EXPERIMENTS, find};
+use super::host::Host;
 use super::output::Overwrite;
 use super::prepare::{prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
@@ -10,7 +11,7 @@ use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, Simulation};
 use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{
-    CheckOptions, CheckResult, StoredBaseline, Verdict, differences, run_check,
+    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, run_check,
 };
 use anyhow::{Context, bail};
 use std::path::PathBuf;
@@ -21,6 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate check toy --baseline experiments/baselines/toy.jsonl --accept 'length scales are fitted in logarithms'
+  palpate check container --planner my_planner:Widest --baseline widest.jsonl
   palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
 
 Runs the first four trials of every planner. If their rows equal the baseline's byte for byte, the planner is identical \
@@ -33,6 +35,10 @@ Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 error.
 pub(super) struct Args {
     /// An experiment (.toml), or the name of one in experiments/.
     experiment: PathBuf,
+    /// Check this planner instead of the experiment's, built in or Python (MODULE:CLASS); may be
+    /// repeated. Python planners need the `palpate` of the Python package.
+    #[arg(long, value_name = "NAME")]
+    planner: Vec<String>,
     /// Baseline file, written by --accept.
     #[arg(long, value_name = "FILE")]
     baseline: PathBuf,
@@ -69,9 +75,14 @@ fn tolerance(text: &str) -> Result<f64, String> {
     share.ok_or("allowed is 0.0001 to 10, as in 0.05".into())
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Outcome> {
     let path = find(&args.experiment, EXPERIMENTS)?;
-    let mut experiment = Experiment::load(&path, &args.set)?;
+    let mut sets = args.set.clone();
+    if !args.planner.is_empty() {
+        let names: Vec<String> = args.planner.iter().map(|name| format!("{name:?}")).collect();
+        sets.push(format!("planners=[{}]", names.join(",")));
+    }
+    let mut experiment = Experiment::load(&path, &sets)?;
     experiment.trials = args.max_trials;
     let name = experiment.name.clone();
     for path in [&args.junit, &args.markdown, &args.svg].into_iter().flatten() {
@@ -86,7 +97,11 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
     };
     set_thread_count(args.threads)?;
-    let simulation = prepare_simulation(experiment, talk)?;
+    let (own, lacking) = host.load_planners(&experiment.planners);
+    if let Some(error) = lacking {
+        return Err(error);
+    }
+    let simulation = prepare_simulation(experiment, talk)?.with_planners(own);
     if simulation.is_real() {
         bail!("backend.kind: a check runs in simulation; allowed is \"simulated\"");
     }
@@ -95,7 +110,10 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     if let Some(why) = &args.accept {
         return accept_baseline(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
     }
-    let old = old.context("no baseline")?;
+    let mut old = old.context("no baseline")?;
+    if !args.planner.is_empty() {
+        old.keep_planners(&simulation.experiment().planners);
+    }
     let most = runner::missing_jobs(&simulation, &[])?.len();
     let bar = touches_bar(talk, simulation.experiment(), [most, 0]);
     let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
@@ -141,8 +159,7 @@ fn print_results(
     Ok(())
 }
 
-/// Runs all trials and writes them as the baseline; the header lists planners that differ from an
-/// existing baseline.
+/// Runs all trials and writes them as the baseline.
 fn accept_baseline(
     args: &Args,
     simulation: &Simulation,
@@ -161,8 +178,7 @@ fn accept_baseline(
     if stop.load(Ordering::Relaxed) {
         return Ok(Outcome::Interrupted);
     }
-    let mut new = StoredBaseline::new(simulation, &rows, why);
-    new.header.differs = old.map_or(Vec::new(), |old| differences(old, &new, rules));
+    let new = accepted(simulation, &rows, why, (old, !args.planner.is_empty()), rules)?;
     write_whole(&args.baseline, &new.text()?)?;
     let mut text = format!("{} trials in {}", rows.len(), args.baseline.display());
     new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));

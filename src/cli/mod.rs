@@ -7,6 +7,7 @@ mod columns;
 mod compare;
 mod completions;
 mod deprecated_commands;
+mod doctor;
 mod export;
 mod find;
 mod host;
@@ -93,6 +94,8 @@ enum Command {
     Calibrate(calibrate::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
+    /// Print the state of MuJoCo, display, ROS, clock and files, with remedies.
+    Doctor(doctor::Args),
     /// Print a shell completion script.
     Completions(completions::Args),
     /// Print every command, setting and column as Markdown.
@@ -170,13 +173,14 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Show(args) => show::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
         Command::Compare(args) => compare::run(&args),
-        Command::Check(args) => check::run(&args, talk),
+        Command::Check(args) => check::run(&args, talk, host),
         Command::Accuracy(args) => accuracy::run(&args, talk),
         Command::Serve(args) => serve::run(&args, talk),
         Command::Register(args) => register::run(&args, talk),
         Command::Replay(args) => replay::run(&args, talk),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::List(args) => list::run(&args),
+        Command::Doctor(_) => doctor::run(host),
         Command::Completions(args) => completions::run(&args, Cli::command()),
         Command::Reference(_) => print(reference().trim_end()).map(|()| Outcome::Done),
     }

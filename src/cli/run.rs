@@ -16,7 +16,6 @@ use crate::experiment::trial::row::TrialId;
 use crate::report;
 use crate::study::compare::compare;
 use anyhow::{Context, bail, ensure};
-use palpate_explore::planner;
 use palpate_input::config::ConfigError;
 use palpate_input::error::InputError;
 use palpate_input::files;
@@ -225,11 +224,9 @@ fn run_missing(
     stop: &mut Option<Arc<AtomicBool>>,
     (talk, host): (Verbosity, &Host),
 ) -> anyhow::Result<RunResult> {
-    let own = experiment.planners.iter().filter(|name| planner::is_external(name));
-    let (own, lacking): (Vec<_>, Vec<_>) =
-        own.filter_map(|name| (host.load_planner)(name)).partition(Result::is_ok);
+    let (own, lacking) = host.load_planners(&experiment.planners);
     let simulation = prepare_simulation(experiment, talk)?;
-    let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
+    let mut simulation = simulation.with_planners(own);
     let experiment = simulation.experiment();
     if args.record && !experiment.scene.simulator.moves_finger() && !simulation.is_real() {
         let body = experiment.scene.simulator.name();
@@ -272,7 +269,7 @@ fn run_missing(
     };
 
     // A planner that cannot be loaded is an error only if trials of it are missing.
-    let why = |error: InputError| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
+    let why = |error: InputError| lacking.unwrap_or(error.into());
     let mut jobs = runner::missing_jobs(&simulation, &done).map_err(why)?;
     if let Some(shard) = args.shard {
         shard.retain(&mut jobs);
@@ -319,6 +316,9 @@ fn run_one(
     let run = Run::read(path)?;
     let mut text = format!("{}\n{words}", report::tables::summary::text(&run));
     let analysis = Analysis::new(&run);
+    if let Some(conclusion) = report::findings::conclusion(&run, &analysis) {
+        text += &format!("\n{conclusion}");
+    }
     report::write_tables(&run, &analysis, path)?;
     if !made.is_finished() {
         text += &format!(

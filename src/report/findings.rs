@@ -192,6 +192,54 @@ pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
         .collect()
 }
 
+/// Ratio of the trials that detect a difference with a probability of 80 % to those whose 95 %
+/// interval has the difference as its half-width: ((1.96 + 0.84) / 1.96)².
+const POWER: f64 = 2.04;
+
+/// Largest number of trials that is proposed.
+// heuristic: more are never worth the time.
+const PROPOSED_MAX: f64 = 10_000.0;
+
+/// Returns one sentence about the planner with the smallest error: its mean difference from the
+/// first baseline in the same trials or, unless that is established, the number of trials that
+/// would show it. `None` if the planners cannot be compared.
+pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
+    let baseline = *run.experiment.baselines().first()?;
+    let error = run.experiment.error_measure();
+    let found = analysis.comparisons.iter();
+    let found = found.filter(|it| it.baseline == baseline && it.measure.id == error.id);
+    let best = found.min_by(|a, b| a.paired.mean.total_cmp(&b.paired.mean))?;
+    let (planner, paired) = (best.planner, &best.paired);
+    let [low, high] = paired.interval?;
+    let shown = |value: f64| digits(error.unit.per_si * value);
+    let size = |[low, high]: [f64; 2]| {
+        let unit = error.unit.symbol;
+        format!("{} {unit} [{}, {}]", shown(paired.mean.abs()), shown(low), shown(high))
+    };
+    let after = format!(
+        "{} than {baseline} after {} touches (mean of {} trials, 95 % interval)",
+        error.title, run.experiment.touches, paired.trials
+    );
+    Some(if high < 0.0 {
+        format!("{planner} is better: {} less {after}.", size([-high, -low]))
+    } else if low > 0.0 {
+        format!("{baseline} is best: {planner} has {} more {after}.", size([low, high]))
+    } else {
+        let ratio = 0.5 * (high - low) / paired.mean.abs();
+        let needed = (POWER * paired.trials as f64 * ratio * ratio).ceil();
+        let needed = match needed <= PROPOSED_MAX {
+            true => format!("about {needed} trials (--set trials={needed}) would probably show it"),
+            false => format!("more than {PROPOSED_MAX} trials would be needed to show one"),
+        };
+        let [low, high] = [low, high].map(shown);
+        format!(
+            "No difference is established: {planner} has {} {} [{low}, {high}] {after}; {needed}.",
+            shown(paired.mean),
+            error.unit.symbol,
+        )
+    })
+}
+
 /// Returns which planners have a smaller error after the last touch than the first baseline.
 fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let id = run.experiment.error_measure().id;

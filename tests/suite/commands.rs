@@ -159,3 +159,26 @@ fn an_exported_belief_replaces_its_own_files_only() {
     let onto_mesh = ["export", "runs/small", "--planner", "random", "--out", "mesh.obj"];
     fails(folder.path(), &onto_mesh, &["mesh.obj exists", "--force"]);
 }
+
+/// The doctor names every part; invalid ROS variables are wrong, with the allowed values.
+#[test]
+fn the_doctor_reports_every_part() {
+    let home = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut program = command(home, &["doctor"]);
+    program.env_remove("ROS_DOMAIN_ID").env_remove("ROS_LOCALHOST_ONLY");
+    let output = run_to_end(&mut program, "doctor");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in ["palpate", "MuJoCo", "machine", "shipped files", "working folder", "EGL", "clock"]
+    {
+        assert!(text.lines().any(|line| line[8..].starts_with(part)), "{part} in {text}");
+    }
+    assert!(output.status.success() && text.contains("experiments, "), "{text}");
+    if cfg!(feature = "ros2") {
+        let mut program = command(home, &["doctor"]);
+        program.env("ROS_DOMAIN_ID", "999");
+        let output = run_to_end(&mut program, "doctor");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains("WRONG") && text.contains("allowed are 0 to"), "{text}");
+        assert_eq!(output.status.code(), Some(1));
+    }
+}

@@ -131,6 +131,11 @@ impl StoredBaseline {
         Self { header, lines }
     }
 
+    /// Removes all planners other than `names`.
+    pub fn keep_planners(&mut self, names: &[String]) {
+        self.header.planners.retain(|name| names.contains(name));
+    }
+
     /// Reads a baseline file.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ use super::measures::{CHECK_MEASURES, CheckMeasure, Verdict};
 use super::sequence::ConfidenceSequence;
 use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Progress};
+use crate::experiment::trial::row::TrialRow;
 use palpate_input::error::InputError;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -87,12 +88,37 @@ pub fn run_check(
     Ok(CheckResult { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
 }
 
-/// Returns a line for each planner in `new` that differs from `old`, with the difference.
-pub fn differences(
-    old: &StoredBaseline,
-    new: &StoredBaseline,
+/// Returns the baseline of all trials of an experiment that replaces `old`. Its header lists
+/// planners that differ; planners of `old` that the experiment lacks are kept if `is_partial`.
+///
+/// # Errors
+/// If planners would be kept whose settings differ.
+pub fn accepted(
+    simulation: &Simulation,
+    rows: &[TrialRow],
+    why: &str,
+    (old, is_partial): (Option<&StoredBaseline>, bool),
     rules: &CheckOptions,
-) -> Vec<String> {
+) -> Result<StoredBaseline, InputError> {
+    let mut new = StoredBaseline::new(simulation, rows, why);
+    let Some(old) = old else { return Ok(new) };
+    let names = new.header.planners.clone();
+    let is_kept = |name: &String| is_partial && !names.contains(name);
+    let kept: Vec<_> = old.header.planners.iter().filter(|name| is_kept(name)).collect();
+    if !kept.is_empty() && old.header.settings != new.header.settings {
+        return Err(InputError::new(format!(
+            "the settings differ, so the rows of {kept:?} in the baseline cannot be kept; check all planners \
+             of the experiment, or use a new file"
+        )));
+    }
+    new.header.differs = differences(old, &new, rules);
+    new.header.planners.extend(kept.into_iter().cloned());
+    new.lines.extend(old.lines.iter().filter(|line| is_kept(&line.planner)).cloned());
+    Ok(new)
+}
+
+/// Returns a line for each planner in `new` that differs from `old`, with the difference.
+fn differences(old: &StoredBaseline, new: &StoredBaseline, rules: &CheckOptions) -> Vec<String> {
     let (known, names) = (&old.header.planners, &new.header.planners);
     let results = names.iter().filter_map(|name| {
         if !known.contains(name) {

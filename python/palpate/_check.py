@@ -1,0 +1,77 @@
+"""Regression tests of planners, for continuous integration."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ._experiment import Experiment
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Check", "check"]
+
+#: Verdicts that pass.
+PASSED = ("identical", "better", "ok")
+
+
+class Check:
+    """Result of a regression test."""
+
+    def __init__(self, found: dict[str, Any]) -> None:
+        #: Worst verdict of all planners: identical, better, ok, undecided, worse or missing.
+        self.verdict: str = found["verdict"]
+        #: Remarks, a sentence each.
+        self.remarks: list[str] = found["remarks"]
+        self._table = found["table"]
+        self._text = found["text"]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no planner is worse, missing or undecided."""
+        return self.verdict in PASSED
+
+    def table(self) -> pd.DataFrame:
+        """Returns a row per planner and measure: change and its 95 % interval, percent; verdict; trials."""
+        import pandas as pd
+
+        return pd.DataFrame(self._table)
+
+    def __repr__(self) -> str:
+        return "\n".join([self._text.rstrip(), *self.remarks, self.verdict])
+
+
+def check(
+    experiment: Experiment | str | os.PathLike[str],
+    baseline: str | os.PathLike[str],
+    planners: Sequence[Any] | None = None,
+    *,
+    accept: str | None = None,
+    tolerance: float = 0.05,
+    max_trials: int = 50,
+    threads: int = 0,
+) -> Check | None:
+    """Tests planners for regressions against a stored baseline, as the command `palpate check` does.
+
+        assert palpate.check("container", "widest.jsonl", [Widest]).passed
+
+    Args:
+        experiment: an experiment, its file, or the name of an experiment of the package.
+        baseline: file of the baseline; `accept` writes it.
+        planners: as for `Experiment.run`; default: the experiment's planners.
+        accept: reason to write the current results to the baseline; the function then returns None.
+        tolerance: largest relative increase in error that still passes.
+        max_trials: maximum number of trials per planner.
+        threads: number of threads, 0 for all cores.
+
+    Raises:
+        PalpateError: if the baseline cannot be read, or its trials do not pair with the experiment's.
+        PlannerError: if a planner is invalid.
+    """
+    loaded = experiment if isinstance(experiment, Experiment) else Experiment.load(experiment)
+    if not 1e-4 <= tolerance <= 10:
+        raise ValueError(f"tolerance = {tolerance}: allowed is 0.0001 to 10")
+    found = loaded._check(os.fspath(baseline), planners, accept, tolerance, max_trials, threads)
+    return None if found is None else Check(found)
