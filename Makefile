@@ -59,10 +59,11 @@ test-faults: setup
 # Regression test of planners against experiments/baselines; palpate check --accept REASON accepts a change.
 CHECKED := toy container bird
 
+# The program of the tests is used, because one without their dependencies' features is another build.
 check-planners: setup
+	cargo test --quiet --locked --features ros2 --no-run
 	for experiment in $(CHECKED); do \
-		cargo run --quiet --locked --features ros2 -- --quiet check $$experiment \
-			--baseline experiments/baselines/$$experiment.jsonl || exit; \
+		target/debug/palpate --quiet check $$experiment --baseline experiments/baselines/$$experiment.jsonl || exit; \
 	done
 
 # Compares instruction counts with experiments/baselines/cost.toml; skipped without valgrind.
@@ -196,15 +197,18 @@ $(DEPS)/peers/bin/python: benches/peers.txt
 
 # Wheel without a Rust dependency: program, extension and shipped files, in target/wheels.
 PYTHON := $(DEPS)/python/bin/python
+PYTHON_READY := $(DEPS)/python/ready
 PYTHON_HOME := python/palpate/home
-# The wheel uses MuJoCo's library from the package mujoco and bundles no library.
-MATURIN = $(DEPS)/python/bin/maturin build --quiet --locked --auditwheel skip -m python/Cargo.toml
+# The wheel contains MuJoCo's library, which maturin finds by LD_LIBRARY_PATH.
+MATURIN = LD_LIBRARY_PATH=$(abspath $(DEPS)/lib) PATH=$(abspath $(DEPS)/python/bin):$$PATH \
+	maturin build --quiet --locked -m python/Cargo.toml
 
-wheel: setup $(PYTHON) $(PYTHON_HOME)
-	$(MATURIN) --release --out target/wheels
+# Zig links against the C library of manylinux_2_28, so that the wheel runs on every Linux since 2018.
+wheel: setup $(PYTHON_READY) $(PYTHON_HOME)
+	$(MATURIN) --release --zig --compatibility manylinux_2_28 --out target/wheels
 
 # Installs a development build into the test environment; otherwise equal to the release wheel.
-install-python: setup $(PYTHON) $(PYTHON_HOME)
+install-python: setup $(PYTHON_READY) $(PYTHON_HOME)
 	rm -rf target/wheels-dev
 	$(MATURIN) --profile dev --out target/wheels-dev
 	$(PYTHON) -m pip install --quiet --no-deps --force-reinstall target/wheels-dev/*.whl
@@ -228,7 +232,7 @@ docs: install-python
 notebooks: install-python
 	$(PYTHON) python/notebooks/run.py
 
-$(PYTHON): python/requirements.txt
+$(PYTHON_READY): python/requirements.txt
 	python3 -m venv $(DEPS)/python
 	$(PYTHON) -m pip install --quiet --only-binary=:all: -r python/requirements.txt
 	touch $@
@@ -237,7 +241,7 @@ $(PYTHON): python/requirements.txt
 $(PYTHON_HOME): FORCE
 	rm -rf $@ && mkdir -p $@
 	cp -r experiments scenes models $@
-	mkdir $@/licences && cp LICENSE-* $@/licences
+	mkdir $@/licences && cp LICENSE-* $@/licences && cp -r $(MUJOCO_LICENCES) $@/licences/mujoco
 	python3 .cargo/licences.py --package palpate-python > $@/licences/packages.txt
 	rm -r $@/models/*.rs $@/experiments/ci $@/experiments/slurm $@/experiments/kubernetes $@/experiments/baselines
 

@@ -8,10 +8,6 @@ next touch. All quantities are in SI units, and names end with the unit.
     >>> frame = run.summary()
 """
 
-from ._library import load as _load
-
-_load()
-
 from typing import TYPE_CHECKING, Any
 
 from . import errors

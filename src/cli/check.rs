@@ -91,6 +91,10 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     let old = match &args.accept {
         Some(_) if !args.baseline.exists() => None,
         _ => {
+            if !args.baseline.exists() {
+                let file = args.baseline.display();
+                bail!("{file}: no such baseline; write it with --accept REASON");
+            }
             let old = StoredBaseline::read(&args.baseline)?;
             old.check_pairs(&args.baseline, &experiment)?;
             Some(old)

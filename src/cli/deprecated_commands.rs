@@ -73,7 +73,12 @@ pub(super) fn translate(
     };
     arguments[at] = now.into();
     arguments.append(&mut rest);
-    Ok((arguments, Some(format!("palpate {name} is now palpate {words}"))))
+    let former = match name.as_str() {
+        "check" => "--bless",
+        "accuracy" => "--fresh",
+        name => name,
+    };
+    Ok((arguments, Some(format!("`{former}` is now `palpate {words}`"))))
 }
 
 /// Whether the option `name` is among `arguments`.

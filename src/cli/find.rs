@@ -26,7 +26,12 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     }
     let word = name.to_string_lossy();
     let known = format::nearest(&word, &file_stems(folder));
-    let meant = known.map_or(String::new(), |known| format!(", did you mean `{known}`?"));
+    let home = || format!("; set {HOME} to the folder that has {EXPERIMENTS}/ and {SCENES}/");
+    let meant = match known {
+        Some(known) => format!(", did you mean `{known}`?"),
+        None if file_stems(folder).is_empty() => home(),
+        None => String::new(),
+    };
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
 }
 

@@ -54,11 +54,10 @@ impl Overwrite {
     /// # Errors
     /// If it exists without `--force`, or is not a file.
     pub(super) fn check_new_file(self, path: &Path) -> anyhow::Result<()> {
-        self.check_file(path)?;
-        if path.exists() && !self.force {
+        if path.is_file() && !self.force {
             bail!("{} exists; use --force to replace it", path.display());
         }
-        Ok(())
+        self.check_file(path)
     }
 
     /// Checks that `path` may be a folder of results that contain `own`: it does not exist, is

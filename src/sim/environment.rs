@@ -45,7 +45,7 @@ pub enum ObjectShape {
 
 /// Returns the error of a scene that lacks `part`.
 pub(super) fn missing_part(part: &str) -> InputError {
-    InputError::new(format!("the scene has no {part}, which its body needs"))
+    InputError::new(format!("the scene has no {part}, which its simulator needs"))
 }
 
 /// Returns an [`Invalid`] with the message of another error.

@@ -142,7 +142,8 @@ impl TrialRow {
             let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));
             squares.sum::<f64>().sqrt()
         });
-        Some(lengths.sum())
+        // The sum of no lengths is −0.
+        Some(lengths.sum::<f64>() + 0.0)
     }
 }
 
