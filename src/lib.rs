@@ -1,9 +1,9 @@
 //! Palpate: a testbed for active touch.
 //!
-//! A robot finger explores an object it cannot see; a Gaussian process keeps a belief of its
-//! surface; a planner picks the next place to touch.
+//! A robot finger explores an object without vision; a Gaussian process estimates its
+//! surface; a planner selects the next target.
 //!
-//! This package holds the simulator and what is done with it. Its modules are layers: a module
+//! This package contains simulator, experiments and reports. Its modules are layers: a module
 //! imports only from those below it in this table.
 //!
 //! | module | content |
@@ -14,18 +14,18 @@
 //! | [`experiment`] | experiment, trial, runner, store, measures, statistics, ground truth |
 //! | [`sim`] | scene, object, effects, physics of the finger, simulated robots |
 //!
-//! A program for a robot needs none of it. It uses the packages below, which do not depend on this
-//! one, so that the explorer cannot see the ground truth:
+//! A robot program does not need it. It uses the packages below, which do not depend on this
+//! one, so that the robot program has no access to the ground truth:
 //!
 //! | package | here | content |
 //! |---|---|---|
 //! | `palpate-explore` | [`explore`], [`task`], [`robot`], [`backend`] | belief, planners, servo |
-//! | `palpate-ros` | [`ros`] | an arm behind topics, its simulated twin, recordings |
+//! | `palpate-ros` | [`ros`] | an arm over topics, a simulated robot, recordings |
 //! | `palpate-gp` | [`gp`], [`math`] | Gaussian-process regression |
-//! | `palpate-geometry` | [`geometry`] | meshes, and where rays and fingers meet them |
+//! | `palpate-geometry` | [`geometry`] | meshes, ray intersections, sweeps of fingers |
 //! | `palpate-input` | [`config`], [`error`], [`files`], [`mod@format`] | settings, errors, files |
 //!
-//! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. A
+//! [`experiment::Simulation`] is the entry point: it runs the trials of an experiment. A
 //! [`Servo`](explore::probe::servo::Servo) is made of a task, a robot and any
 //! [`Backend`](backend::Backend), simulated or real.
 //!

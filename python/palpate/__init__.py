@@ -1,6 +1,6 @@
 """Palpate: a testbed for active touch.
 
-A robot finger explores an object it cannot see; a Gaussian process estimates the surface; a planner chooses the
+A robot finger explores an object without vision; a Gaussian process estimates the surface; a planner selects the
 next touch. All quantities are in SI units, and names end with the unit.
 
     >>> import palpate

@@ -80,10 +80,9 @@ impl Experiment {
     }
 
     /// Runs the missing trials. `own` pairs names of Python planners with their factories; `how`
-    /// has the folder, whether to start again, the number of threads, and whether the first error of a
-    /// Python planner ends the run. `(look, stop)` are
-    /// callbacks: `look` gets the number of finished and of all trials at intervals, `stop` is
-    /// called when the run is stopped.
+    /// has the folder, whether to start again, the number of threads, and whether the first error
+    /// of a Python planner ends the run. `(look, stop)` are callbacks: `look` gets the number of
+    /// finished and of all trials at intervals, `stop` is called when the run is stopped.
     fn run(
         &self,
         py: Python<'_>,

@@ -12,8 +12,8 @@ pub(crate) const COMMIT: &str = match option_env!("PALPATE_COMMIT") {
     None => "unknown",
 };
 
-/// Runs the program on `arguments`, the first of which is its name; returns its exit code. `load_planner`
-/// returns the factory of a planner named `MODULE:CLASS`.
+/// Runs the program on `arguments`, the first of which is its name; returns its exit code.
+/// `load_planner` returns the factory of a planner named `MODULE:CLASS`.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, load_planner: Py<PyAny>) -> u8 {
     let loaded = |name: &str| {

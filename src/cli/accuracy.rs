@@ -52,21 +52,21 @@ pub(super) struct Args {
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Origin of the errors: the unchanged scene for effects, the reference or the truth for levels
-    /// [default: both; with --tolerance verdict scene].
+    /// Reference of the errors: `scene` (effects), `reference` (finest level) or `truth` (levels)
+    /// [default: levels and effects; with --tolerance verdict: scene].
     #[arg(long, value_name = "ORIGIN")]
     against: Option<Origin>,
-    /// Touches per variant [default: 24 of a level, 120 of an effect].
+    /// Touches per variant [default: 24 per level, 120 per effect].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=1000))]
     touches: Option<u16>,
     /// Seed of the targets.
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u16,
-    /// Pairs of touches timed with each effect.
+    /// Number of paired touches that time each effect.
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     pairs: u16,
-    /// Trials of each planner with each effect; 0 runs none [default: 10; 0 with a tolerance of
-    /// touches, 40 with --tolerance verdict].
+    /// Trials per planner and effect; 0 runs none [default: 10; 0 with a tolerance in mm, N or
+    /// counts, 40 with --tolerance verdict].
     #[arg(long, value_name = "N")]
     trials: Option<u16>,
     /// Touches per trial.
@@ -76,7 +76,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "0.2mm|0.1N|20counts|verdict")]
     tolerance: Option<Criterion>,
     /// Held-out targets or trials that test the cheapest scene [default: 200 targets for effects,
-    /// else as many as are compared].
+    /// otherwise the number compared].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     held_out: Option<u16>,
     /// Start from the scene with every effect that its simulator supports.
@@ -146,7 +146,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
             orders = compared.orders(&scene)?;
         }
         print(&format!("levels; the reference is the finest:\n{}", table(&compared)))?;
-        let words = ["does NOT shrink", "shrinks"];
+        let words = ["does NOT decrease", "decreases"];
         if let Some(is_converging) = compared.is_converging() {
             let words = words[usize::from(is_converging)];
             print(&format!("the force error {words} at every level towards the reference"))?;
@@ -167,7 +167,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
             .criterion
             .map_or(String::new(), |it| format!(", within {}", criterion_text(it)));
         print(&format!(
-            "effects{within}; keep an effect that the real finger has if it is needed:"
+            "effects{within}; keep every effect that is marked needed and that the real finger has:"
         ))?;
         print(&format!("{}{INTERVAL_NOTE}", table(&compared)))?;
         effects = Some(compared);
@@ -303,7 +303,9 @@ fn cheapest_text(cheapest: &CheapestScene, criterion: Criterion, origin: Origin)
             let [verdict, change] = [variant.verdict_m, variant.verdict_change_m];
             let trials = change.map_or(0, |change| change.trials);
             let [verdict, change] = [verdict, change].map(paired);
-            format!("active - random is {verdict} mm in {trials} trials, a change of {change}")
+            format!(
+                "RMSE of active minus random: {verdict} mm (n = {trials} trials), change {change} mm"
+            )
         }
     };
     let CheapestScene { selected, held_out, is_confirmed, .. } = cheapest;
@@ -325,13 +327,13 @@ type Column = (&'static str, fn(&Variant) -> String);
 /// Columns of both tables; columns without a value are omitted.
 const COLUMNS: [Column; 17] = [
     ("variant", |it| it.name.clone()),
-    ("error to truth mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
+    ("error relative to truth, mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
     ("95 %", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.p95), 3)),
     ("max", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.max), 3)),
-    ("error to reference mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
+    ("error relative to reference, mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
     ("95 %", |it| cell(it.contact_m.map(|spread| 1e3 * spread.p95), 3)),
     ("force N", |it| mean(it.force_n, 1.0, 4)),
-    ("electrodes counts", |it| mean(it.electrode_counts, 1.0, 2)),
+    ("electrodes, counts", |it| mean(it.electrode_counts, 1.0, 2)),
     ("surface RMSE mm", |it| cell(it.surface_rmse_m.map(|m| 1e3 * m), 3)),
     ("time per touch", |it| it.wall_s.map_or(EMPTY_CELL.into(), duration)),
     ("real-time factor", |it| cell(it.real_time_factor(), 1)),
@@ -346,7 +348,7 @@ const COLUMNS: [Column; 17] = [
         "finger bytes",
         |it| if it.touches > 0 { it.finger_bytes.to_string() } else { EMPTY_CELL.into() },
     ),
-    ("active - random RMSE mm", |it| paired(it.verdict_m)),
+    ("RMSE active - random, mm", |it| paired(it.verdict_m)),
     ("change", |it| paired(it.verdict_change_m)),
     ("beyond the tolerance", |it| it.beyond.as_ref().map_or(EMPTY_CELL.into(), beyond)),
     ("relevance", |it| it.relevance.map_or(EMPTY_CELL, |relevance| relevance.words()).into()),
@@ -370,5 +372,8 @@ fn paired(paired: Option<PairedDifference>) -> String {
 
 fn beyond(share: &TouchShare) -> String {
     let [low, high] = share.interval.map(|share| 100.0 * share);
-    format!("{} of {} beyond, [{low:.1}, {high:.1}] %", share.count, share.of)
+    format!(
+        "{} of {} touches beyond the tolerance, 95 % interval [{low:.1}, {high:.1}] %",
+        share.count, share.of
+    )
 }

@@ -2,8 +2,8 @@
 
 use palpate_explore::planner::{self, PlannerFactory};
 
-/// Loads the planner of an [external](palpate_explore::planner::is_external) name; returns `None` if the
-/// program has no such planners.
+/// Loads the planner of an [external](palpate_explore::planner::is_external) name; returns `None`
+/// if the program has no such planners.
 pub type PlannerLoader<'a> = dyn Fn(&str) -> Option<anyhow::Result<Box<dyn PlannerFactory>>> + 'a;
 
 /// The program that runs the command line.

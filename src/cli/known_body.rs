@@ -6,10 +6,10 @@ use palpate_explore::registration::CalibrationBody;
 
 #[derive(clap::Args)]
 pub(super) struct KnownBodyArgs {
-    /// Touch a ball of this radius.
+    /// Ball of this radius, m, in place of the object.
     #[arg(long, value_name = "RADIUS_M", value_parser = radius, requires = "at", conflicts_with = "plate")]
     ball: Option<f64>,
-    /// Touch a plate with this normal, towards the finger, in W.
+    /// Plate with this normal (towards the finger, in W) in place of the object.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, requires = "at", allow_hyphen_values = true)]
     plate: Option<[f64; 3]>,
     /// Centre of the ball or a point of the plate, in W; with --cloud the initial position of the

@@ -38,7 +38,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use terminal::{Outcome, Verbosity, print};
 
-/// A testbed for active touch: a robot finger explores an object it cannot see.
+/// A testbed for active touch: a robot finger explores an object without vision.
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES, arg_required_else_help = true)]
 struct Cli {

@@ -31,7 +31,7 @@ pub(super) struct Args {
     /// Side that faces the finger.
     #[arg(long, value_enum, default_value_t)]
     side: Side,
-    /// Axis of the file that is up [default: y for glTF and OBJ, z for others].
+    /// Up axis of the file [default: y for glTF and OBJ, z for others].
     #[arg(long, value_enum)]
     up: Option<Up>,
     /// Unit of the file's numbers [default: guessed].

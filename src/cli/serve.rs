@@ -40,8 +40,8 @@ fn failures() -> String {
 #[derive(clap::Args)]
 #[command(after_help = format!("{HELP}\n\nFailures:\n{}", failures()))]
 pub(super) struct Args {
-    /// Experiment or scene (.toml, or the name of a shipped one) with a moving finger and a soft
-    /// finger.
+    /// Experiment or scene (.toml, or the name of a shipped one) with simulator `kinematic` or
+    /// `dynamic` and a soft finger.
     path: PathBuf,
     /// Body for `palpate register`, in place of the scene's object.
     #[command(flatten)]

@@ -17,7 +17,7 @@ use palpate_explore::probe::{Probe, SweptVolume, Touch};
 use palpate_explore::task::Approach;
 use std::path::Path;
 
-/// Options of the watched trial.
+/// Options of the displayed trial.
 #[derive(clap::Args)]
 pub(super) struct WatchArgs {
     /// Open MuJoCo's viewer on a trial while it runs (needs a build with `--features viewer`).
@@ -32,7 +32,7 @@ pub(super) struct WatchArgs {
     /// Trial number.
     #[arg(long, default_value_t = 0, value_name = "N", requires = "watch")]
     trial: u32,
-    /// Maximum simulated seconds per real second.
+    /// Largest real-time factor (simulated seconds per second).
     #[arg(long, default_value_t = 1.0, value_name = "X", requires = "watch", value_parser = speed)]
     speed: f64,
 }

@@ -43,11 +43,11 @@ pub struct Experiment {
     pub initial_touches: u32,
     /// Touches per trial, initial ones included.
     pub touches: u32,
-    /// Held-out touches after these, at low-discrepancy places: they test the belief's predictions
-    /// without ground truth.
+    /// Held-out touches after the last one, at low-discrepancy places: they test the predictions
+    /// of the belief without ground truth.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub verification_touches: u32,
-    /// Touches after those that repeat earlier targets, to measure repeatability.
+    /// Touches at earlier targets, after the held-out ones, to measure repeatability.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub repeat_touches: u32,
     /// Test points along each side of the zone, on which the errors are computed.

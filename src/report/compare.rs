@@ -48,7 +48,7 @@ pub fn overall(compared: &SuiteComparison) -> Table {
             .note("Fraction of the touches after the initial ones without contact.")
             .unit("%", 100.0, 1),
         Column::new("stalled")
-            .note("Fraction of these touches for which the planner's own rule found no target.")
+            .note("Fraction of fallback plans, for which the planner found no target.")
             .unit("%", 100.0, 1),
         Column::new("travel").note("Mean lateral travel of a trial.").unit("m", 1.0, 2),
         Column::new("in the band")
@@ -57,7 +57,7 @@ pub fn overall(compared: &SuiteComparison) -> Table {
             .note("Mean squared error of the probability that a place has a surface.")
             .unit("", 1.0, 3),
         Column::new("IoU")
-            .note("Intersection over union of the believed and the true silhouette.")
+            .note("Intersection over union of the estimated and the true silhouette.")
             .unit("", 1.0, 3),
         Column::new(format!("better than {}", compared.reference))
             .note("Probability that a trial has a smaller error than one of the reference.")
@@ -128,7 +128,7 @@ pub fn note(against: &str) -> String {
          the same trial; geometric mean over trials and objects, with the 95 % interval of a bootstrap \
          over trials. Less is better; better and worse mean that the interval excludes 1. Gap closed: \
          fraction of the way from {BASELINE_PLANNER} to {ORACLE}, which uses the ground truth, in mean log error. \
-         Missed: touches without contact. Stalled: plans for which the planner's own rule found no \
+         Missed: fraction of touches without contact. Stalled: fraction of fallback plans, for which the planner found no \
          target. In the band: objects with 90 to 98 % of the truth in the 95 % band after the last \
          touch. Brier and IoU, for objects that do not fill their zone: mean squared error of the \
          probability that a place has a surface, and intersection over union of the silhouettes. Last \
@@ -197,7 +197,7 @@ pub fn file(compared: &SuiteComparison) -> Table {
         Column::new("missed")
             .note("Fraction of the touches after the initial ones without contact."),
         Column::new("stalled")
-            .note("Fraction of these touches for which the planner's own rule found no target."),
+            .note("Fraction of fallback plans, for which the planner found no target."),
         Column::new("travel_m").note("Mean lateral travel of a trial."),
         Column::new("coverage")
             .note("Fraction of the truth in the 95 % band after the last touch."),

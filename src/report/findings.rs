@@ -197,7 +197,7 @@ pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
 const POWER: f64 = 2.04;
 
 /// Largest number of trials that is proposed.
-// heuristic: more are never worth the time.
+// heuristic: beyond it a difference is negligible.
 const PROPOSED_MAX: f64 = 10_000.0;
 
 /// Returns one sentence about the planner with the smallest error: its mean difference from the

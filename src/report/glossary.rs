@@ -6,14 +6,14 @@ use super::canvas::escape;
 const TERMS: &[(&str, &str)] = &[
     (
         "R (Eq. 5)",
-        "Correlation of believed and true heights without subtracting their means (Yi et al. 2016, \
+        "Correlation of estimated and true heights without subtracting their means (Yi et al. 2016, \
          Eq. 5); 1 is perfect.",
     ),
     (
         "centred R",
-        "Correlation of believed and true heights after subtracting each one's mean; 1 is perfect.",
+        "Correlation of estimated and true heights after subtracting each one's mean; 1 is perfect.",
     ),
-    ("RMSE", "Root mean square error of the believed heights."),
+    ("RMSE", "Root mean square error of the estimated heights."),
     (
         "95 % band",
         "Interval that contains the true surface with a probability of 95 %, according to the belief.",
@@ -24,20 +24,26 @@ const TERMS: &[(&str, &str)] = &[
          overconfident belief scores badly.",
     ),
     ("Brier", "Mean squared error of the probability that a place has a surface; 0 is perfect."),
-    ("IoU", "Intersection over union of the believed and the true shape; 1 is perfect."),
+    ("IoU", "Intersection over union of the estimated and the true shape; 1 is perfect."),
     (
         "intersection over union",
-        "Overlap of the believed and the true shape, divided by their union; 1 is perfect.",
+        "Overlap of the estimated and the true shape, divided by their union; 1 is perfect.",
     ),
-    ("Chamfer distance", "Mean distance between the believed and the true surface, both ways."),
+    (
+        "Chamfer distance",
+        "Mean distance between the estimated and the true surface, averaged over both directions.",
+    ),
     (
         "F-score",
-        "Harmonic mean of the fractions of the believed and of the true surface that lie within a \
+        "Harmonic mean of the fractions of the estimated and of the true surface that lie within a \
          distance of the other; 1 is perfect.",
     ),
     ("standard deviation", "Uncertainty of the belief, σ of the Gaussian process."),
-    ("posterior mean", "Surface that the Gaussian process expects after the touches."),
-    ("bootstrap", "Interval from drawing the trials again with replacement, many times."),
+    ("posterior mean", "Mean of the Gaussian process, conditioned on the touches."),
+    (
+        "bootstrap",
+        "Interval of a statistic over many samples of the trials, drawn with replacement.",
+    ),
     ("standard error", "Standard deviation of a mean of several trials."),
     ("geometric mean", "Exponential of the mean logarithm."),
     ("interquartile mean", "Mean of the middle half of the values."),
@@ -45,7 +51,7 @@ const TERMS: &[(&str, &str)] = &[
     ("overconfident", "The 95 % band contains too little of the truth."),
     ("underconfident", "The 95 % band is wider than necessary."),
     ("baseline", "Planner with which the others are compared."),
-    ("planner", "Method that chooses the next touch."),
+    ("planner", "Method that selects the next target."),
     ("belief", "Surface with its uncertainty, estimated by a Gaussian process from the touches."),
     ("length scale", "Distance over which the Gaussian process correlates heights."),
     ("datum", "Plane from which heights are measured."),

@@ -20,7 +20,7 @@ pub struct PointCloud {
 }
 
 impl PointCloud {
-    /// Formats the points as PLY: `x y z nx ny nz`, with deviations `red green blue sigma_m`, with
+    /// Formats the points as PLY: `x y z nx ny nz`, with σ `red green blue sigma_m`, with
     /// errors `error_m`.
     pub fn ply(&self) -> String {
         let mut text = String::from("ply\nformat ascii 1.0\n");
@@ -59,7 +59,7 @@ impl PointCloud {
     }
 
     /// Formats the points as OBJ, which has no properties: the colour follows the coordinates, as
-    /// most programs read it, and deviation and error are in a comment.
+    /// most programs read it, and σ and error are in a comment.
     pub fn obj(&self) -> String {
         let mut text = String::new();
         self.comments.iter().for_each(|comment| text += &format!("# {comment}\n"));

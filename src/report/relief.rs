@@ -35,7 +35,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Creates a camera turned about z from y towards x, with one pixel a metre about the drawing's
+    /// Creates a camera turned about z from y towards x, at 1 px/m, its origin at the drawing's
     /// corner.
     pub fn from_azimuth(azimuth_deg: f64, stretch: f64) -> Self {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
@@ -51,7 +51,7 @@ impl Camera {
         (area.width / (high[0] - low[0])).min(area.height / (high[1] - low[1]))
     }
 
-    /// Returns the camera with a scale of `px_per_m`, and all `points` about the middle of `area`.
+    /// Returns the camera with a scale of `px_per_m`, and all `points` centred in `area`.
     pub fn scaled(self, px_per_m: f64, points: &[Vector3<f64>], area: Area) -> Self {
         let ([low, high], centre) = (self.ends(points), area.centre());
         let shift = std::array::from_fn(|i| centre[i] - px_per_m * 0.5 * (low[i] + high[i]));

@@ -1,7 +1,7 @@
 //! Style of all figures: colours, line widths and the font.
 //!
 //! The categorical colours are those of Okabe and Ito 2008, which differ for every kind of colour
-//! vision; the colour map of deviations is viridis.
+//! vision; the colour map of standard deviations is viridis.
 
 use serde_json::{Value, json};
 
@@ -32,10 +32,10 @@ pub fn touch(is_initial: bool) -> &'static str {
     if is_initial { INITIAL } else { PLANNED }
 }
 
-/// Colour of the place with the largest deviation.
+/// Colour of the place with the largest standard deviation.
 pub const MAXIMUM: &str = "#000000";
 
-/// Opacity of a band.
+/// Opacity of an uncertainty band.
 pub const BAND_OPACITY: f64 = 0.22;
 
 /// Colours of other planners: the rest of Okabe and Ito's, then others as dark.
@@ -128,7 +128,7 @@ pub fn hidden(colour: &str) -> String {
     format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
 }
 
-/// Colour map of deviations: viridis, dark to light.
+/// Colour map of standard deviations: viridis, dark to light.
 pub const DEVIATION: [u32; 9] =
     [0x440154, 0x472c7a, 0x3b518b, 0x2c718e, 0x21908d, 0x27ad81, 0x5cc863, 0xaadc32, 0xfde725];
 

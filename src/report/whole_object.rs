@@ -48,7 +48,7 @@ pub const FIGURE: ReportFigure = ReportFigure {
     name: "solids",
     caption: |run| {
         format!(
-            "Believed surfaces of trial {} from the front and from behind, coloured by their standard \
+            "Estimated surfaces of trial {} from the front and from behind, coloured by their standard \
              deviation, with the touches.",
             run.experiment.report.trial
         )
@@ -81,7 +81,9 @@ fn sequences(
         let mut sequence =
             PlannerSurfaces { planner: row.planner.clone(), ..PlannerSurfaces::default() };
         for (i, touch) in row.touches.iter().enumerate() {
-            let no_aim = || format!("{}: target is not an aim at a whole object", place(i + 1));
+            let no_aim = || {
+                format!("{}: the target has no direction, which a whole object needs", place(i + 1))
+            };
             let aim = touch.target.aim().with_context(no_aim)?;
             sequence.touches.push(SolidTouch {
                 aim_w: aim.p_w,
@@ -154,7 +156,10 @@ pub fn belief(
     let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
-        let aim = touch.target.aim().context("target is not an aim at a whole object")?;
+        let aim = touch
+            .target
+            .aim()
+            .context("the target has no direction, which a whole object needs")?;
         // The roll of the finger does not change its path.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
         let swept = swept(scene.finger.clone(), touch);

@@ -48,7 +48,7 @@ pub(super) fn missing_part(part: &str) -> InputError {
     InputError::new(format!("the scene has no {part}, which its simulator needs"))
 }
 
-/// Returns an [`Invalid`] with the message of another error.
+/// Returns an [`InputError`] with the message of another error.
 pub(super) fn invalid(error: impl std::fmt::Display) -> InputError {
     InputError::new(error.to_string())
 }

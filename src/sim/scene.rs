@@ -42,7 +42,7 @@ pub struct Scene {
     /// Finger; not used by `simulator = "analytic"`.
     #[serde(default)]
     pub finger: Finger,
-    /// Arm that carries the finger; default: a stage of three slides, with a wrist for a whole
+    /// Arm that carries the finger; default: a three-axis linear stage, with a wrist for a whole
     /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmSettings>,

@@ -20,16 +20,16 @@ const ROUNDING: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverSettings {
-    /// Time step, s; a control period is one or several. The skin's force is constant during a
+    /// Time step, s; a control period is a whole number of steps. The skin's force is constant in a
     /// step.
     pub step_s: f64,
     /// Integrator.
     pub integrator: Integrator,
-    /// Collision geometry of the object for parts that MuJoCo lets collide; default: that of
-    /// [`Collision`].
+    /// Collision geometry of the object for parts that MuJoCo lets collide; default:
+    /// `height_field`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub collision: Option<Collision>,
-    /// Contact search of `collision = "sdf"`; default: that of [`Sdf`].
+    /// Contact search of `collision = "sdf"`; default: that of MuJoCo.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sdf: Option<Sdf>,
 }

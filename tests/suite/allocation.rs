@@ -32,7 +32,7 @@ fn interlocks_allocate_nothing() {
     let environment = shipped::environment("container_finger.toml", &sets);
     let body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
     let (robot, task) = (environment.robot().unwrap(), environment.task());
-    // The tip is so close to the table that the guard checks every tick.
+    // The tip is so close to the table that the clearance interlock checks every tick.
     let settings = InterlockSettings { lowest_m: Some(0.22), ..InterlockSettings::default() };
     let mut body = with_interlocks(body, &robot, task, None, &settings).unwrap();
     let mut command = Command { qdot: vec![0.0; 7] };

@@ -63,9 +63,9 @@ fn a_side_is_the_same_from_wherever_it_is_explored() {
         Translation3::new(0.1, -0.2, 0.05),
         UnitQuaternion::from_euler_angles(0.4, -0.3, 2.1),
     );
-    // The rigid hull is exact in any frame. The slides of a stage are parallel to W's axes, so the
+    // The rigid hull is exact in any frame. A stage's linear axes are parallel to W's axes, so the
     // soft finger moves equally if the zone's axes are a permutation of W's; in an oblique frame
-    // three slides brake together.
+    // three linear axes brake together.
     for (name, sets, sides) in [
         ("bird.toml", &[][..], &[from_x, askew][..]),
         ("container.toml", &[], &[from_x, askew]),

@@ -1,4 +1,4 @@
-//! Tests of collisions of links: MuJoCo models them, and the guard stops before them.
+//! Tests of collisions of links: MuJoCo models them, and the interlock stops the arm before them.
 
 use crate::common::shipped::environment;
 use palpate::backend::interlock::InterlockSettings;

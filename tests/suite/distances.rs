@@ -109,7 +109,7 @@ fn surface(kind: &str, ends: &[f64], radius_m: f64) -> Vec<Point3<f64>> {
     points
 }
 
-/// The guard's capsules contain the model's shapes, so that it never reports touching links as
+/// The interlock's capsules contain the model's shapes: it never reports touching links as
 /// separate.
 #[test]
 fn every_shape_of_the_models_lies_within_the_capsules_of_its_link() {
@@ -141,7 +141,7 @@ fn every_shape_of_the_models_lies_within_the_capsules_of_its_link() {
 
 proptest! {
     /// No point within a finger's radius of any link moves by more than the bound within which the
-    /// guard skips checks.
+    /// interlock skips checks.
     #[test]
     fn no_point_moves_by_more_than_the_joints_reaches_say(
         q in prop::array::uniform7(-1.0f64..1.0),

@@ -49,7 +49,7 @@ impl FaultScenario {
         (said, halt["time_unix_s"].as_f64().unwrap())
     }
 
-    /// Time from `since_s` to the first rest of the twin; it must be at rest now.
+    /// Time from `since_s` to the first rest of the simulated robot; it must be at rest now.
     fn rest_s(&self, since_s: f64) -> f64 {
         assert!(self.twin.rest_s().is_some(), "{:?}", self.twin.events);
         let events = self.twin.events.lock().unwrap();

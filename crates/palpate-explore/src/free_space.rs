@@ -31,7 +31,7 @@ use palpate_gp::{Hyperparameters, Observation, Posterior};
 /// zone that takes more than a few touches.
 const PER_SIDE: usize = 41;
 
-/// Largest number of places at which a belief is truncated. Largest number of places at which a
+/// Largest number of places at which a
 /// belief is truncated; a heuristic: a few for every touch whose bound can still be violated.
 const CUTS_MAX: usize = 16;
 

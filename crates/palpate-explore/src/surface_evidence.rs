@@ -28,7 +28,7 @@ use palpate_gp::{
 use std::cell::OnceCell;
 
 /// Probability of a surface one radius beyond a contact, on the side of the hull's middle.
-/// Probability of a surface one radius beyond a contact, on the side of the hull's middle: that for
+/// It is that for
 /// a hull resting on its middle, minus `LESS_AT_THE_RIM` times (distance of the contact from the
 /// middle / radius)². Estimated from the touches of a Sobol sequence on the suite's tuning objects,
 /// where it is 0.93 of contacts in the innermost tenth and 0.19 of those on the rim.

@@ -28,17 +28,17 @@ pub struct Fit {
     /// heights' unit, if the posterior is approximate.
     #[serde(default, alias = "left_sd", skip_serializing_if = "Option::is_none")]
     pub nystrom_residual_sd: Option<f64>,
-    /// Number of factored covariance matrices, not counting those of the scan that grew by a row.
+    /// Number of full covariance factorisations; rows appended during the scan are not counted.
     pub factorisations: u32,
     /// Number of observations at the last scan of the whole box, in this fit or an earlier one that
     /// it continued.
     pub scanned_at: usize,
-    /// Reason why the winning climb stopped.
+    /// Reason why the best BFGS run stopped.
     pub stop: Stop,
 }
 
-/// Number of observations up to which each fit scans the whole box. (reason in a second sentence) A
-/// heuristic: they need 8 MB.
+/// Number of observations up to which each fit scans the whole box; a
+/// heuristic: the scans need 8 MB.
 const SCAN_ALWAYS: usize = 128;
 /// Growth of the observations since the last scan at which a larger fit scans again; in between it
 /// climbs from the last optimum; a heuristic.
@@ -204,8 +204,8 @@ const MANNER: BfgsOptions =
 const HOPE: f64 = 4.0;
 /// Distance from the highest optimum, in units of the box's sides, at which a lower climb stops.
 const SAME_TOP: f64 = 0.02;
-/// Largest number of local maxima of the scan that are refined. Largest number of hills of the scan
-/// that are climbed; a heuristic: sufficient for the fits of the toy that were compared with a
+/// Largest number of local maxima of the scan
+/// that are refined; a heuristic: sufficient for the fits of the toy that were compared with a
 /// dense grid.
 const CLIMBS: usize = 2;
 /// Difference in nats below which optima are the same; a heuristic: above the likelihood's

@@ -19,8 +19,8 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place as solve_low
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// Residual variance, as a fraction of the noise variance, below which no inducing touch is added.
-/// No inducing touches are added once the residual variance of all others is below this fraction of
-/// the noise variance; a heuristic: their errors are then those of their own noise.
+/// It applies to the largest residual variance of all other touches;
+/// a heuristic: their errors are then those of their own noise.
 const NEGLIGIBLE: f64 = 1e-4;
 /// The same limit as a fraction of the signal variance, which is rounding.
 const ROUNDING: f64 = 1e-12;

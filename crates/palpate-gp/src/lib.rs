@@ -40,7 +40,7 @@
 //! let sd_m = belief.variance(&[1.25], &mut scratch).sqrt();
 //! assert!((mean_m - wave(1.25)).abs() < 1e-3 && sd_m < 1e-3);
 //!
-//! // Far from all of them it falls back to its prior: mean 0, and the signal's deviation.
+//! // Far from all touches it returns to the prior: mean 0, the signal's standard deviation.
 //! let far_m = belief.variance(&[100.0], &mut scratch).sqrt();
 //! assert!((far_m - belief.hyperparameters().signal_sd).abs() < 1e-9);
 //! # Ok::<(), palpate_gp::covariance::CovarianceError>(())

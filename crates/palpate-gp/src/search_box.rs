@@ -109,7 +109,7 @@ impl From<(f64, f64)> for Range {
 pub struct LogNormal {
     /// Median of the log-normal prior.
     pub median: f64,
-    /// Factor of one standard deviation, above 1.
+    /// Geometric standard deviation: exp of the standard deviation of ln x; above 1.
     pub spread: f64,
 }
 

@@ -223,7 +223,10 @@ impl RosArm {
             let state = &heard.topics[topic as usize];
             if self.settings().is_on_change(topic) {
                 if self.link.publisher_count(topic) == 0 {
-                    let words = format!("the publisher on {} has gone", topics.name(topic));
+                    let words = format!(
+                        "no publisher on {} any more; check that the arm's driver runs",
+                        topics.name(topic)
+                    );
                     return Err(InputError::new(words).into());
                 }
                 continue;
@@ -240,7 +243,7 @@ impl RosArm {
     }
 }
 
-/// Writes the sensor's records into the mailbox; a record with an error status is refused.
+/// Stores the sensor's records as latest messages; a record with an error status is refused.
 fn listen(settings: &NetFtSettings, mailbox: &Arc<TopicReceiver>) -> Result<NetFt, LinkFault> {
     let (mailbox, address) = (Arc::clone(mailbox), settings.address.clone());
     let take = move |record: Record| {

@@ -1,4 +1,4 @@
-//! Robot arm behind ROS 1 or ROS 2 topics, its simulated twin, and recordings of touches.
+//! Robot arm behind ROS 1 or ROS 2 topics, a simulated robot, and recordings of touches.
 //!
 //! | module | content |
 //! |---|---|
@@ -44,7 +44,7 @@ pub mod transport;
 
 use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
-pub use ros1::spare_certificates;
+pub use ros1::disable_tls_certificates;
 use settings::{BackendKind, BackendSettings};
 use topics::{Service, Side};
 use transport::Connect;

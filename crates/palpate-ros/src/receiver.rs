@@ -82,7 +82,7 @@ pub struct TopicReceiver {
 }
 
 impl TopicReceiver {
-    /// Creates a mailbox without messages.
+    /// Creates a receiver without messages.
     pub fn new(names: JointNames, settings: BackendSettings) -> Self {
         let heard = LatestMessages { since: Some(Instant::now()), ..LatestMessages::default() };
         Self { names, settings, heard: Mutex::new(heard) }

@@ -319,7 +319,7 @@ impl Transport for Ros2 {
 
     fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
-        let sent = sent.unwrap_or(Err("not this side's".into()));
+        let sent = sent.unwrap_or(Err("this side does not publish the topic".into()));
         sent.map_err(|words| cannot_send(&self.topics.name(packet.topic()), words))
     }
 
@@ -353,7 +353,8 @@ impl Transport for Ros2 {
 
     fn call(&mut self, service: &Service) -> Result<(), InputError> {
         let name = service.name(self.topics.namespace());
-        let (client, _) = self.client(service).ok_or_else(|| cannot_send(&name, "not known"))?;
+        let (client, _) =
+            self.client(service).ok_or_else(|| cannot_send(&name, "no server found"))?;
         let sent = client.send_request(TriggerRequest::default());
         sent.map(drop).map_err(|error| cannot_send(&name, error))
     }
@@ -367,7 +368,7 @@ impl Transport for Ros2 {
         let name = service.name(self.topics.namespace());
         let server = self.servers.iter().find(|(other, _)| other == service);
         let (Some((_, server)), Some(id)) = (server, self.calls.remove(&call)) else {
-            return Err(cannot_send(&name, "no call"));
+            return Err(cannot_send(&name, "the call is unknown or already answered"));
         };
         server.send_response(id, answer).map_err(|error| cannot_send(&name, error))
     }

@@ -17,9 +17,9 @@ pub enum BackendKind {
     /// The simulator of the scene.
     #[default]
     Simulated,
-    /// An arm, or its simulated twin, behind ROS 2 topics.
+    /// A real or simulated arm behind ROS 2 topics.
     Ros2,
-    /// An arm, or its simulated twin, behind ROS 1 topics.
+    /// A real or simulated arm behind ROS 1 topics.
     Ros1,
 }
 

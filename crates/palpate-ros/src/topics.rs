@@ -29,7 +29,7 @@ pub enum Topic {
 pub enum Side {
     /// The explorer, which sends commands and receives readings.
     Explorer,
-    /// The arm's computer or its simulated twin.
+    /// The arm's computer or a simulated robot.
     Arm,
 }
 
@@ -204,7 +204,7 @@ pub enum Service {
     ClearFault,
     /// Sets the zero of the force/torque sensor to its current value.
     Bias,
-    /// Starts or ends a failure by its name; supported by a twin only.
+    /// Starts or ends a failure by its name; supported by a simulated robot only.
     Twin(&'static str),
 }
 
@@ -214,7 +214,7 @@ impl Service {
         [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
 
     /// Whether the call is idempotent: false for a bias, which may be taken under load the second
-    /// time, and for a twin's failure, which a second call ends.
+    /// time, and for an injected failure, which a second call ends.
     pub fn is_idempotent(&self) -> bool {
         matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
     }

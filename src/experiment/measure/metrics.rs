@@ -24,8 +24,8 @@ pub struct Metrics {
     /// Root mean square error on the unreachable surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unreachable_rmse_m: Option<f64>,
-    /// Share of the truth within 1.96·sqrt(σ² + noise²) of the mean; the noise covers what a smooth
-    /// surface cannot follow.
+    /// Share of the truth within 1.96·sqrt(σ² + noise²) of the mean; the noise includes errors that
+    /// a smooth surface cannot represent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
     /// Mean negative log density of the true heights (in m): ½·ln(2π·s²) + ½·error²/s², s² = σ² +

@@ -41,7 +41,7 @@ pub struct EqualError<'a> {
     pub measure: &'static Measure,
     /// Trials finished by both.
     pub trials: usize,
-    /// Baseline's median error after the goal's touches.
+    /// Baseline's median error after `report.goal_touches` touches.
     pub goal: f64,
     /// Touches of the planner to the goal.
     pub touches: Estimate,
@@ -155,8 +155,8 @@ fn curves(
 }
 
 /// Returns when the planners of each pair reach the second planner's median error at `goal_index`,
-/// and the median path length to it, m. (index of the comparison: over a zone, touches after the
-/// initial ones)
+/// and the median path length to it, m. The index counts compared touch counts: over a zone,
+/// touches after the initial ones.
 fn reach_goal(
     medians: &[ErrorCurve<RankedValues>; 2],
     sample: &[usize],

@@ -251,8 +251,8 @@ fn require_run(path: &Path) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Removes the files of an earlier run except the `resolved.toml` that marks the folder. (check the
-/// name of the mark) Figures are drawn again; files of other programs are kept.
+/// Removes the files of an earlier run except the `resolved.toml` that marks the folder.
+/// Figures are drawn again; files of other programs are kept.
 fn clear(path: &Path) -> Result<(), RunError> {
     for recording in fs::read_dir(path.join(RECORDINGS)).into_iter().flatten().flatten() {
         let recording = recording.path();

@@ -69,7 +69,7 @@ fn line_error(error: &serde_json::Error) -> String {
 fn check_row(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     let (found, wanted) = (row.touches.len(), experiment.touches as usize);
     if row.failure.is_none() && found != wanted {
-        return Err(format!("{found} touches of {wanted} without a failure"));
+        return Err(format!("{found} touches of {wanted}, but no failure is recorded"));
     }
     if found > wanted {
         return Err(format!("{found} touches of {wanted}"));

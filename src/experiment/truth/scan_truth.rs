@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub struct ScanTruth {
     /// cloud.csv or cloud.ply of `palpate export`, relative to the experiment's file; in `W`.
     pub scan: PathBuf,
-    /// Minimum number of contacts within `within_m` of a test point that has a height.
+    /// Minimum number of contacts within `search_radius_m` for a test point to have a height.
     #[serde(default = "neighbours")]
     pub contacts_min: usize,
     /// Search radius around a test point, in the zone's plane (default: three times the median
@@ -42,8 +42,8 @@ impl Validate for ScanTruth {
         let named = !self.scan.as_os_str().is_empty();
         rules.require("scan", "\"\"", named, || "the name of a cloud.csv or cloud.ply".into());
         let enough = (3..=1000).contains(&self.contacts_min);
-        rules.require("neighbours", self.contacts_min, enough, || "3 to 1000".into());
-        rules.optional_number("within_m", self.search_radius_m, 1e-6..=1.0);
+        rules.require("contacts_min", self.contacts_min, enough, || "3 to 1000".into());
+        rules.optional_number("search_radius_m", self.search_radius_m, 1e-6..=1.0);
     }
 }
 

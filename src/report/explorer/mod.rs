@@ -20,7 +20,7 @@ const STYLE: &str = include_str!("explorer.css");
 // heuristic: a page stays below three megabytes.
 const BYTES_MAX: usize = 1_600_000;
 
-// heuristic: smallest share of the largest deviation that is shown apart.
+// heuristic: smallest standard deviation that is distinguished, as a share of the largest.
 pub(super) const LEAST_SHARE: f64 = 1e-4;
 
 /// Interactive view of a belief, touch by touch.

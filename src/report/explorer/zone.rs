@@ -47,7 +47,7 @@ const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches 
 // Largest number of places along the side of a curve and of a surface.
 // heuristic: more would not be visible at the size of the page.
 const PLACES_MAX: [usize; 2] = [301, 41];
-/// Bytes of one place in one frame: two for the mean, two for the deviation, in base 64.
+/// Bytes of one place in one frame: two each for mean and standard deviation, in base 64.
 const BYTES_OF_PLACE: usize = 6;
 // heuristic: margin above and below the heights of a curve, for its bands, and of a surface.
 const MARGIN: [f64; 2] = [0.3, 0.08];
@@ -104,7 +104,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     let Some((least, most)) = axes::range(all_m.copied()) else { return Ok(None) };
     let (low, high) = axis.range();
     let unit = Length::of(zone);
-    // Ranges of the codes of heights and of deviations (logarithmic).
+    // Ranges of the codes of heights and of standard deviations (logarithmic).
     let height_range_m = [low - (high - low), high + (high - low)];
     let deviation_range_m = [least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most];
     let heights = |heights_m: &mut dyn Iterator<Item = Option<f64>>| {

@@ -1,4 +1,4 @@
-//! Figure of the remaining deviation and the effect of a touch on it, Fig. 6 of Yi et al. 2016.
+//! Figure of the reducible standard deviation before and after a touch, Fig. 6 of Yi et al. 2016.
 
 use super::ReportFigure;
 use super::curves;
@@ -53,7 +53,7 @@ fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f6
     belief.planning_posterior().map_or(f64::NAN, |known| known.variance(place, scratch).sqrt())
 }
 
-/// Returns the place of the largest deviation: that of the plan, or else of `read`.
+/// Returns the place of the largest standard deviation: that of the plan, or else of `read`.
 fn maximum<'a>(replay: &'a Replay, read: &'a [MapValue]) -> Option<&'a [f64]> {
     let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.fallback.is_none());
     let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -72,13 +72,13 @@ fn ring(colour: &str) -> String {
 const LEFT_PX: f64 = 72.0;
 const TOP_PX: f64 = 66.0;
 
-/// Places at which the deviation of a curve is computed.
+/// Places at which the standard deviation of a curve is computed.
 const STEPS: usize = 300;
-/// Width of a panel, heights of those of beliefs and of deviations.
+/// Width of a panel, heights of those of beliefs and of standard deviations.
 const CURVE_PX: (f64, f64, f64) = (420.0, 210.0, 130.0);
 /// Largest height of a panel of beliefs with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 420.0;
-/// Distance between panels, and between a belief and its deviation.
+/// Distance between panels, and between a belief and its standard deviation.
 const GAPS_PX: (f64, f64) = (66.0, 40.0);
 
 fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
@@ -87,7 +87,7 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
         replays.iter().map(|replay| readings(zone.grid(STEPS), replay)).collect();
     let all = read.iter().flatten().map(|(_, sd_m, _)| sd_m * unit.per_m);
     let (_, largest) = Axis::around(all.chain([0.0]), 0.12, 4.0)?.range();
-    let found = (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found");
+    let found = (Swatch::Circle(ring(style::MAXIMUM)), "largest standard deviation found");
     let step_px = CURVE_PX.0 + GAPS_PX.0;
     let width = LEFT_PX + replays.len() as f64 * step_px;
     let most = Area { left: LEFT_PX, top: TOP_PX, width: CURVE_PX.0, height: CURVE_PX.1 };
@@ -141,7 +141,7 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let mut entries = vec![
         (Swatch::Cross(INITIAL), "initial touch"),
         (Swatch::Cross(PLANNED), "later touch"),
-        (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
+        (Swatch::Circle(ring(style::MAXIMUM)), "largest standard deviation found"),
     ];
     entries.extend(miss_entry(run));
     let most = Area { left: LEFT_PX, top: TOP_PX, width: MAP_PX.0, height: MAP_PX.1 };

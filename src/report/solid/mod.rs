@@ -65,7 +65,7 @@ impl SurfaceFrame {
         let (vertices, triangles) = &self.mesh;
         let finite = self.sd_m.iter().copied().filter(|sd_m| sd_m.is_finite());
         let largest_m = finite.fold(f64::MIN_POSITIVE, f64::max);
-        // An unknown deviation is shown as the largest.
+        // An unknown standard deviation is shown as the largest.
         let share = |sd_m: f64| if sd_m.is_finite() { sd_m / largest_m } else { 1.0 };
         let deviations = self.sd_m.iter().map(|&sd_m| (sd_m, style::deviation_rgb(share(sd_m))));
         PointCloud {

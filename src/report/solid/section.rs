@@ -72,7 +72,7 @@ const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches 
 
 // heuristic: smallest share of the range if all values are alike.
 const ALIKE_SHARE: f64 = 0.1;
-// heuristic: range of deviations if there are none.
+// heuristic: range of standard deviations if there are none.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
 /// Returns the data of beliefs in an object and of its true surface; `None` if there is nothing to
@@ -118,7 +118,7 @@ fn data(
     })))
 }
 
-/// Returns the range of the finite deviations above zero, widened if it is empty; `None` without
+/// Returns the range of the finite positive values of σ, widened if it is empty; `None` without
 /// any.
 pub(super) fn deviation_range<'a>(sds_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     let (least, most) = axes::range(sds_m.copied().filter(|&sd_m| sd_m > 0.0))?;
@@ -133,7 +133,7 @@ fn error_range<'a>(errors_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> 
     Some([-most, most])
 }
 
-/// Encodes a belief with its values between the ends of deviations and of errors, in metres.
+/// Encodes a belief with its values in the ranges of standard deviations and errors, in metres.
 fn coded<'a>(
     frame: &'a SurfaceFrame,
     cube: Cube,

@@ -1,4 +1,4 @@
-// Believed surface all around an object, to turn and to zoom.
+// Estimated surface of a whole object, to turn and to zoom.
 "use strict";
 
 function frameOf(state) {

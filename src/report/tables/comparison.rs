@@ -80,7 +80,7 @@ pub fn equal_error_file(found: &[EqualError]) -> Table {
         Column::new("baseline").note("Planner whose error is the goal."),
         Column::new("measure").note("Measure of the error."),
         Column::new("trials").note("Trials that both finished."),
-        Column::new("goal").note("The baseline's median error after the goal's touches."),
+        Column::new("goal").note("The baseline's median error after report.goal_touches touches."),
         Column::new("baseline_touches")
             .note("Touches until the baseline itself reaches the goal; empty: never."),
         Column::new("touches").note("Touches until the planner reaches the goal.").interval(),

@@ -96,7 +96,7 @@ pub fn json(run: &Run) -> Value {
 /// Returns the claims of a publication with the results: a row for each measure of each claim.
 pub fn claims(run: &Run) -> Table {
     let planners = &run.experiment.planners;
-    let heads = ["paper", "reported", "here after", "measure"].map(Column::new).into_iter();
+    let heads = ["paper", "reported", "touches", "measure"].map(Column::new).into_iter();
     let mut table = Table::new(heads.chain(planners.iter().map(Column::new)));
     let possible = run.experiment.initial_touches..=run.experiment.touches;
     let claims = run.experiment.report.claims.iter();

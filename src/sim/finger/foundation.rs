@@ -96,8 +96,8 @@ pub(super) struct SkinContact {
     pub sample: usize,
     pub section_m2: f64,
     pub gap_m: f64,
-    /// Whether there is fluid under the column; the fluid's pressure does not act on a dry column,
-    /// which displaces nothing.
+    /// Whether there is fluid under the column. The fluid's pressure does not act on a dry column,
+    /// and such a column displaces no fluid.
     pub wet: bool,
     /// Indentation; negative if only a bulging skin would reach the object.
     pub indentation_m: f64,
@@ -114,7 +114,7 @@ pub(super) struct SkinContact {
 #[derive(Clone, Debug)]
 pub(super) struct Foundation {
     pub column: Column,
-    /// Section of all columns with fluid.
+    /// Cross-sectional area of all columns with fluid, m².
     pub wet_m2: f64,
     /// Pressure per displaced volume, in Pa/m³; 0 without fluid.
     pub cavity_pa_m3: f64,

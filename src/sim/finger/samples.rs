@@ -84,7 +84,7 @@ pub struct Node {
     pub start: Point3<f64>,
     /// Direction of that ray.
     pub direction: UnitVector3<f64>,
-    /// Thickness of the fluid under it.
+    /// Thickness of the fluid under the node, m.
     pub gap_m: f64,
     /// Area that the node represents, along its outward normal, in m².
     pub area_m2: Vector3<f64>,

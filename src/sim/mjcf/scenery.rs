@@ -1,4 +1,4 @@
-//! Scenery of a picture: the object on its board, the floor, the cameras, the lights.
+//! Scenery of a rendered scene: backing board of the object, floor, cameras, lights.
 
 use super::text::{list, mesh_asset, pose};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};

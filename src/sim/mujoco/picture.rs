@@ -4,7 +4,7 @@ use mujoco_rs::renderer::{MjRenderer, RendererError, png::Compression};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use mujoco_rs::wrappers::mj_visualization::MjvCamera;
-use palpate_input::error::Invalid;
+use palpate_input::error::InputError;
 use std::path::Path;
 
 /// Renders `model` from `camera` at its first keyframe, or at q = 0 without one, and writes a PNG
@@ -12,17 +12,17 @@ use std::path::Path;
 ///
 /// # Errors
 /// If the camera is unknown, EGL is missing or the file cannot be written.
-pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), Invalid> {
+pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), InputError> {
     let id = model
         .name_to_id(MjtObjBase::mjOBJ_CAMERA, camera)
-        .ok_or_else(|| Invalid::new(format!("the model has no camera \"{camera}\"")))?;
+        .ok_or_else(|| InputError::new(format!("the model has no camera \"{camera}\"")))?;
     let draw = |cause: RendererError| {
-        Invalid::new(format!(
+        InputError::new(format!(
             "cannot draw: {cause}; this needs EGL (Debian: libegl1 and libgl1-mesa-dri)"
         ))
     };
     let mut data = MjData::try_new(model)
-        .map_err(|_| Invalid::new("no memory for the state of the MuJoCo model"))?;
+        .map_err(|_| InputError::new("no memory for the state of the MuJoCo model"))?;
     if model.nkey() > 0 {
         // Key 0 exists.
         let _ = data.reset_keyframe(0);
@@ -36,7 +36,7 @@ pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), Invalid
     renderer.sync_data(&mut data).map_err(draw)?;
     renderer.render().map_err(draw)?;
     renderer.save_rgb(path).map_err(|cause| match cause {
-        RendererError::IoError(cause) => Invalid::new(format!("cannot write the picture: {cause}")),
+        RendererError::IoError(cause) => InputError::new(format!("cannot write the picture: {cause}")),
         cause => draw(cause),
     })
 }

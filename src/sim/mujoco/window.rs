@@ -3,12 +3,12 @@
 use super::{compile, lacking};
 use crate::sim::Environment;
 use crate::sim::mjcf;
-use crate::sim::mjcf::Mode;
+use crate::sim::mjcf::ModelPurpose;
 use mujoco_rs::viewer::{MjViewer, MjViewerError};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeom};
-use palpate_explore::backend::watched::Seen;
-use palpate_input::error::Invalid;
+use palpate_explore::backend::live_view::ViewState;
+use palpate_input::error::InputError;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
 
@@ -30,17 +30,17 @@ impl Window {
     ///
     /// # Errors
     /// If the environment has nothing to show, or there is no display with OpenGL.
-    pub fn open(environment: &Environment, title: &str) -> Result<Self, Invalid> {
-        let picture = mjcf::scene(environment, Mode::Picture);
+    pub fn open(environment: &Environment, title: &str) -> Result<Self, InputError> {
+        let picture = mjcf::scene(environment, ModelPurpose::Picture);
         let picture = picture.ok_or_else(|| lacking("an object"))?;
         let model = Arc::new(compile(&picture)?);
         let data = MjData::try_new(Arc::clone(&model))
-            .map_err(|_| Invalid::new("no memory for the state of the MuJoCo model"))?;
+            .map_err(|_| InputError::new("no memory for the state of the MuJoCo model"))?;
         let builder = MjViewer::builder().window_name(title.to_owned()).max_user_geoms(MARKS_MAX);
         // The viewer panics on a display without configurations.
         let viewer = catch_unwind(AssertUnwindSafe(|| builder.build_passive(&model)))
             .map_err(|_| {
-                Invalid::new("cannot open a window: the display has no OpenGL configuration")
+                InputError::new("cannot open a window: the display has no OpenGL configuration")
             })?
             .map_err(no_display)?;
         Ok(Self { viewer, data })
@@ -55,7 +55,7 @@ impl Window {
     ///
     /// # Errors
     /// If the display fails.
-    pub fn draw(&mut self, seen: &Seen) -> Result<(), Invalid> {
+    pub fn draw(&mut self, seen: &ViewState) -> Result<(), InputError> {
         if seen.q.len() == self.data.qpos().len() {
             self.data.qpos_mut().copy_from_slice(&seen.q);
         }
@@ -79,6 +79,6 @@ impl Window {
     }
 }
 
-fn no_display(cause: MjViewerError) -> Invalid {
-    Invalid::new(format!("cannot open a window: {cause}; this needs X11 or Wayland with OpenGL"))
+fn no_display(cause: MjViewerError) -> InputError {
+    InputError::new(format!("cannot open a window: {cause}; this needs X11 or Wayland with OpenGL"))
 }

@@ -276,8 +276,8 @@ fn margin_m(stated: Option<f64>, reference: &Variant) -> anyhow::Result<f64> {
         (Some(margin_m), _) => Ok(margin_m),
         (None, Some([low, high])) if low > 0.0 || high < 0.0 => Ok(low.abs().min(high.abs())),
         _ => bail!(
-            "neither planner wins in {} trials (active - random: {:.3} mm): give the change that matters, as in \
-             --tolerance verdict:0.1mm, or use more --trials",
+            "neither planner wins in {} trials (RMSE of active minus random: {:.3} mm); give a margin, as in \
+             --tolerance verdict:0.1mm, or raise --trials",
             verdict.trials,
             1e3 * verdict.mean
         ),

@@ -190,7 +190,7 @@ pub struct MeasureResult {
 pub struct CheckOptions {
     /// Largest relative increase in error that still passes.
     pub tolerance: f64,
-    /// Probability of a false verdict on a planner's first measure, at any time. The other measures
+    /// Probability of a false alarm in a planner's first measure at any look. The other measures
     /// share the same probability, corrected after Holm 1979.
     pub alpha: f64,
     /// Number of trials in the first test for identical rows.

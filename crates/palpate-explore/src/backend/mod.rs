@@ -1,7 +1,7 @@
 //! Backends: robots that accept commands and return readings, simulated, recorded or real.
 //!
 //! [`Backend`] is the trait, one control tick at a time. `delay`, `interlock`, `trace` and
-//! `watched` are backends that wrap another.
+//! `live_view` are backends that wrap another.
 
 #[allow(clippy::module_inception)]
 mod backend;

@@ -17,7 +17,7 @@ pub struct RealTimePacer {
 }
 
 impl RealTimePacer {
-    /// Starts pacing now.
+    /// Creates a pacer whose first period starts now.
     pub fn new(period_s: f64) -> Self {
         let period = Duration::try_from_secs_f64(period_s).unwrap_or_default();
         Self { period, next: Instant::now(), overruns: 0 }

@@ -47,7 +47,7 @@ impl Default for PlanningSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegratedVarianceSettings {
-    /// Number of places over which the variance is summed.
+    /// Number of reference points over which the variance is integrated.
     pub places: u32,
 }
 
@@ -63,12 +63,12 @@ impl Default for IntegratedVarianceSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SilhouetteSettings {
-    /// Number of places over which the variance is summed.
+    /// Number of reference points over which the variance is integrated.
     pub places: u32,
     /// Number of candidate targets, drawn anew for each touch.
     pub candidates: u32,
-    /// Travel distance along the zone that costs as much time as one touch; values are then per
-    /// unit time.
+    /// Travel distance along the zone that takes as long as one touch; scores are then divided by
+    /// time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub travel_cost_m: Option<f64>,
 }

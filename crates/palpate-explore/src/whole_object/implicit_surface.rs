@@ -31,8 +31,8 @@ pub struct ImplicitSurface {
 }
 
 /// Signal's standard deviation before the first fit, as a fraction of the radius of the ball around
-/// the contacts, and its bounds. Signal's standard deviation before the first fit, as a fraction of
-/// the radius of the ball around the contacts, and its bounds; heuristics: the field is a distance,
+/// the contacts, and its bounds. Heuristics:
+/// the field is a distance,
 /// and the object fills a part of the ball.
 const SIGNAL: f64 = 0.5;
 const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];

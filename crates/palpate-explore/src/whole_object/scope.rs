@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use palpate_geometry::primitives::extent;
 use std::sync::Arc;
 
-/// Common offset of the surface that a soft finger estimates. Common offset of the surface found by
+/// Common offset of the surface that is estimated by
 /// a soft finger: on the twelve tuning objects, in 36 trials of 60 touches, 0.1 to 0.8 mm outwards,
 /// median 0.3 mm.
 const SOFT_OFFSET_M: f64 = 3e-4;

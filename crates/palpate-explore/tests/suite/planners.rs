@@ -257,7 +257,7 @@ fn integrated_variance_finds_the_largest_fall() {
 }
 
 /// A tour consists of the targets of `active` with the same fit, in another order: the same number
-/// of different places, including the one of the largest deviation, on a shorter path.
+/// of different places, including that of the largest standard deviation, on a shorter path.
 #[test]
 fn travel_tours_the_places_of_active_on_a_shorter_way() {
     let tour = PlanningSettings::default().travel.tour as usize;

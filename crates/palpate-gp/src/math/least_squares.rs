@@ -52,8 +52,8 @@ pub trait Problem {
 pub struct Solution<S> {
     /// Best parameters.
     pub state: S,
-    /// Covariance in the problem's units: s²(JᵀJ)⁻¹ in the determined directions, and 1, the
-    /// plausible value, in the others.
+    /// Covariance in the problem's units: s²(JᵀJ)⁻¹ in the determined directions, and 1, the prior
+    /// variance, in the others.
     pub covariance: DMatrix<f64>,
     /// Unit vectors of the directions that the data do not determine.
     pub undetermined: Vec<DVector<f64>>,

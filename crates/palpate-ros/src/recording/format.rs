@@ -39,10 +39,10 @@ pub struct TrialEnd {
     pub is_interrupted: bool,
 }
 
-/// Name of the metadata entry of an [`RecordingMetadata`].
+/// Name of the metadata entry of a [`RecordingMetadata`].
 pub(super) const ABOUT: &str = "palpate";
 
-/// Name of the metadata entry of an [`Ending`].
+/// Name of the metadata entry of a [`TrialEnd`].
 pub(super) const ENDING: &str = "palpate_ending";
 
 const FAILURE: &str = "failure";

@@ -91,7 +91,7 @@ pub struct ReplayBackend {
 }
 
 impl ReplayBackend {
-    /// Creates a player of `recorded`.
+    /// Creates a backend that replays `recorded`.
     pub fn new(recorded: RecordedTrial) -> Self {
         let entries = Entries::new(Arc::clone(&recorded.bytes));
         Self { recorded, entries, reading: Reading::default() }

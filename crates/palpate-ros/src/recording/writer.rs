@@ -172,7 +172,7 @@ impl McapWriter {
         time_s: f64,
         write: impl FnOnce(&mut Writer<NoSeek<Box<dyn Write + Send>>>) -> McapResult<()>,
     ) -> Result<(), Fault> {
-        let ended = || unrecorded(time_s, &"it has already ended");
+        let ended = || unrecorded(time_s, &"the recording has already ended");
         let writer = self.writer.as_mut().ok_or_else(ended)?;
         write(writer).map_err(|error| unrecorded(time_s, &error))
     }

@@ -17,14 +17,14 @@ const EVERY: Duration = Duration::from_millis(250);
 
 /// Count of known publishers of each topic, in its own thread, so that no caller waits for the
 /// master; the thread also configures new connections.
-pub struct Census {
+pub struct PublisherCounter {
     counts: Arc<[AtomicUsize; Topic::ALL.len()]>,
     /// Ends the thread when dropped.
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Census {
+impl PublisherCounter {
     /// Creates the census of `topics` at the master `uri`.
     pub fn new(uri: &str, topics: &Topics) -> Self {
         let counts: Arc<[AtomicUsize; Topic::ALL.len()]> = Arc::default();
@@ -38,7 +38,7 @@ impl Census {
                     shared.store(known, Ordering::Relaxed);
                 }
                 #[cfg(unix)]
-                send_at_once();
+                set_tcp_nodelay();
                 if stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout) {
                     break;
                 }
@@ -53,7 +53,7 @@ impl Census {
     }
 }
 
-impl Drop for Census {
+impl Drop for PublisherCounter {
     fn drop(&mut self) {
         self.stop = None;
         if let Some(thread) = self.thread.take() {
@@ -85,7 +85,7 @@ fn state(uri: &str) -> Option<String> {
 /// header, but roslibrust 0.26 ignores the request: a small message then waits for the
 /// acknowledgement of the previous one, for up to 40 ms.
 #[cfg(unix)]
-fn send_at_once() {
+fn set_tcp_nodelay() {
     use socket2::SockRef;
     use std::fs::read_dir;
     use std::os::fd::{BorrowedFd, RawFd};

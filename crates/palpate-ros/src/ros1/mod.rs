@@ -9,9 +9,9 @@ use crate::message::{
 };
 use crate::settings::BackendSettings;
 use crate::topics::{CommandMessage, Service, Side, TactileMessage, Topic, Topics};
-use crate::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
-use master::Census;
-use palpate_input::error::Invalid;
+use crate::transport::{Delivery, PacketMessage, Packet, Transport, Waker, cannot_open, cannot_send};
+use master::PublisherCounter;
+use palpate_input::error::InputError;
 use roslibrust::RosMessageType;
 use roslibrust::ros1::{NodeHandle, Publisher, ServiceServer};
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
-use wire::{Counted, Request, Trigger};
+use wire::{SequencedMessage, Request, Trigger};
 
 /// Queue length of a reader or writer; a heuristic: more than arrive while a thread is delayed.
 const QUEUE: usize = 64;
@@ -34,7 +34,7 @@ type Writer = Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>;
 pub struct Ros1 {
     runtime: Runtime,
     node: NodeHandle,
-    census: Census,
+    census: PublisherCounter,
     topics: Topics,
     /// Received items from any thread; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
@@ -48,7 +48,7 @@ pub struct Ros1 {
 
 /// Disables TLS certificates, which ROS 1 does not use; loading them for each dead publisher would
 /// delay messages by 200 ms. Call it before any thread runs, at the start of a program.
-pub fn spare_certificates() {
+pub fn disable_tls_certificates() {
     // SAFETY: no other thread reads the environment yet.
     unsafe {
         std::env::set_var("SSL_CERT_FILE", "/dev/null");
@@ -65,7 +65,7 @@ impl Ros1 {
         settings: &BackendSettings,
         side: Side,
         services: Vec<Service>,
-    ) -> Result<Self, Invalid> {
+    ) -> Result<Self, InputError> {
         let runtime = Runtime::new().map_err(cannot_open("threads"))?;
         // A second node of the same name would end the first.
         let name = match side {
@@ -80,7 +80,7 @@ impl Ros1 {
         let mut end = Self {
             runtime,
             node,
-            census: Census::new(&master, &settings.topics),
+            census: PublisherCounter::new(&master, &settings.topics),
             topics: settings.topics.clone(),
             inlet,
             outlet,
@@ -95,7 +95,7 @@ impl Ros1 {
         Ok(end)
     }
 
-    fn topics(&mut self, side: Side) -> Result<(), Invalid> {
+    fn topics(&mut self, side: Side) -> Result<(), InputError> {
         self.headed::<JointState>(side, Topic::Joints)?;
         self.headed::<WrenchStamped>(side, Topic::Wrench)?;
         self.headed::<DiagnosticArray>(side, Topic::Status)?;
@@ -114,17 +114,17 @@ impl Ros1 {
     }
 
     /// Creates a topic with messages of type `M`, which have a header.
-    fn headed<M: Packed + Clone>(&mut self, side: Side, topic: Topic) -> Result<(), Invalid>
+    fn headed<M: PacketMessage + Clone>(&mut self, side: Side, topic: Topic) -> Result<(), InputError>
     where
-        Counted<M>: RosMessageType,
+        SequencedMessage<M>: RosMessageType,
     {
-        self.topic::<Counted<M>>(
+        self.topic::<SequencedMessage<M>>(
             side,
             topic,
             |counted| counted.message.into(),
             |packet| {
                 let message = M::in_packet(packet)?.clone();
-                Some(Counted { seq: 0, message })
+                Some(SequencedMessage { seq: 0, message })
             },
         )
     }
@@ -137,7 +137,7 @@ impl Ros1 {
         topic: Topic,
         wrap: fn(M) -> Packet,
         pick: fn(&Packet) -> Option<M>,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         let name = self.topics.name(topic);
         if topic.publisher() == side {
             let publisher: Publisher<M> = self
@@ -163,7 +163,7 @@ impl Ros1 {
                         Delivery::Packet { packet, sender: 0, received }
                     }
                     Err(error) if error.to_string().contains("lag") => continue,
-                    Err(error) => Delivery::Garbled { topic, words: error.to_string() },
+                    Err(error) => Delivery::Malformed { topic, words: error.to_string() },
                 };
                 if inlet.send(Some(delivery)).is_err() {
                     break;
@@ -174,7 +174,7 @@ impl Ros1 {
     }
 
     /// Registers a service; the link's loop answers it, and the caller's task waits for that.
-    fn serve(&mut self, number: usize, service: Service) -> Result<(), Invalid> {
+    fn serve(&mut self, number: usize, service: Service) -> Result<(), InputError> {
         let name = service.name(self.topics.namespace());
         let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));
         let number = number as u64;
@@ -204,9 +204,9 @@ impl Transport for Ros1 {
         })
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+    fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
         let sent = self.writers.iter().find_map(|writer| writer(&self.runtime, packet));
-        let sent = sent.unwrap_or(Err("not this side's".into()));
+        let sent = sent.unwrap_or(Err("this side does not publish the topic".into()));
         sent.map_err(|words| cannot_send(&self.topics.name(packet.topic()), words))
     }
 
@@ -229,7 +229,7 @@ impl Transport for Ros1 {
         true
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+    fn call(&mut self, service: &Service) -> Result<(), InputError> {
         let (node, inlet, service) = (self.node.clone(), self.inlet.clone(), service.clone());
         let name = service.name(self.topics.namespace());
         self.runtime.spawn(async move {
@@ -239,7 +239,7 @@ impl Transport for Ros1 {
             };
             let failed = |message| TriggerResponse { success: false, message };
             let answer = answered.unwrap_or_else(failed);
-            let _ = inlet.send(Some(Delivery::Answered { service, answer }));
+            let _ = inlet.send(Some(Delivery::Response { service, answer }));
         });
         Ok(())
     }
@@ -249,9 +249,14 @@ impl Transport for Ros1 {
         service: &Service,
         call: u64,
         answer: TriggerResponse,
-    ) -> Result<(), Invalid> {
+    ) -> Result<(), InputError> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         let sent = waiting.remove(&call).and_then(|waiting| waiting.send(answer).ok());
-        sent.ok_or_else(|| cannot_send(&service.name(self.topics.namespace()), "no call"))
+        sent.ok_or_else(|| {
+            cannot_send(
+                &service.name(self.topics.namespace()),
+                "the call is unknown or already answered",
+            )
+        })
     }
 }

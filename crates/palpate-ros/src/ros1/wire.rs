@@ -1,6 +1,6 @@
 //! Wire format of ROS 1 messages: as in ROS 2, except that the header has a sequence number.
 
-use crate::definition::{Described, Text};
+use crate::definition::{HasDefinition, Text};
 use crate::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     TriggerResponse, WrenchStamped,
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// A message with a header as sent by ROS 1: the header's sequence number comes before its other
 /// fields, which are the first of the message.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Counted<M> {
+pub struct SequencedMessage<M> {
     /// Sequence number.
     pub seq: u32,
     /// The message.
@@ -32,17 +32,17 @@ macro_rules! ros1 {
 }
 
 ros1! {
-    Counted<JointState>: JointState =
+    SequencedMessage<JointState>: JointState =
         "sensor_msgs/JointState", "3066dcd76a6cfaef579bd0f34173e9fd";
-    Counted<WrenchStamped>: WrenchStamped =
+    SequencedMessage<WrenchStamped>: WrenchStamped =
         "geometry_msgs/WrenchStamped", "d78d3cb249ce23087ade7e7d0c40cfa7";
-    Counted<BioTacHand>: BioTacHand =
+    SequencedMessage<BioTacHand>: BioTacHand =
         "biotac_sensors/BioTacHand", "d96f900cbfb096d61de125081e11dcab";
-    Counted<BiotacAll>: BiotacAll =
+    SequencedMessage<BiotacAll>: BiotacAll =
         "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37";
-    Counted<DiagnosticArray>: DiagnosticArray =
+    SequencedMessage<DiagnosticArray>: DiagnosticArray =
         "diagnostic_msgs/DiagnosticArray", "60810da900de1dd6ddd437c3503511da";
-    Counted<JointTrajectory>: JointTrajectory =
+    SequencedMessage<JointTrajectory>: JointTrajectory =
         "trajectory_msgs/JointTrajectory", "65b4f94a94d1ed67169da35a02f33d3f";
     Float64MultiArray: Float64MultiArray =
         "std_msgs/Float64MultiArray", "4b7d974086d4060e7db4613a7e6c3ba4";

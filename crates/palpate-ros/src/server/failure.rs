@@ -1,4 +1,4 @@
-//! Injected failures of a twin, and the sender that applies them.
+//! Injected failures of a simulated robot, and the sender that applies them.
 
 use crate::link::Link;
 use crate::message::{DiagnosticStatus, JointState, Time};

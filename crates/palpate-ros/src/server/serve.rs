@@ -1,4 +1,4 @@
-//! Loop of a twin: receives commands, runs one tick of the simulated robot, sends readings, in real
+//! Loop of a simulated robot: receives commands, runs one tick, sends readings, in real
 //! time.
 
 use super::arm_computer::SimulatedArmComputer;
@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 /// Largest joint speed at rest, rad/s or m/s; a heuristic: above the sag of the servos.
 const REST: f64 = 2e-3;
 
-/// Largest delay, in ticks, that a twin catches up; beyond it the twin skips time.
+/// Largest delay that the simulated robot catches up, ticks; beyond it, it skips time.
 const SLACK_TICKS: u32 = 10;
 
 /// Rate at which the arm's state, joints and force are published, as by drivers.
@@ -31,11 +31,11 @@ const STATUS_HZ: f64 = 50.0;
 const JOINTS_HZ: f64 = 250.0;
 const WRENCH_HZ: f64 = 500.0;
 
-/// Event reported by a running twin.
+/// Event reported by a running simulated robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
-    /// The twin is publishing.
+    /// The simulated robot is publishing.
     Serving,
     /// The first movement after rest.
     Moving,
@@ -65,7 +65,7 @@ pub struct Injection {
     pub for_s: Option<f64>,
 }
 
-/// Returns the services of a twin.
+/// Returns the services of a simulated robot.
 pub fn services() -> Vec<Service> {
     let own = FAILURES.iter().map(|failure| Service::Twin(failure.name));
     Service::COMMON.into_iter().chain(own).collect()

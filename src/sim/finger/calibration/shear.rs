@@ -106,7 +106,7 @@ pub struct ShearComparison {
 /// Compares the model with the measured slopes of a sensor, in the session that fits its
 /// `recording` under normal force. Nothing is fitted to the slopes: the finger does not roll under
 /// shear.
-/// it is sheared.
+///
 ///
 /// The errors of [`fit`].
 /// The errors of [`fit`].

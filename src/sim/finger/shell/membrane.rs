@@ -1,7 +1,7 @@
 //! Shell of the skin in balance with the fluid under it, the core and an object.
 //!
 //! The shell rests where the energy of sheet, fluid (½ K V²), core and skin under the object is
-//! smallest. This module has that energy; `settle` minimises it. `Membrane::balance` minimises it
+//! smallest. This module has that energy; `equilibrium` minimises it, `Membrane::balance` also
 //! with the rays by which the skin meets an object.
 
 use super::compliance::Compliance;
@@ -167,7 +167,7 @@ impl Membrane {
         -self.nodes[node].direction.dot(&pose.moved_m[node])
     }
 
-    /// Returns the energy of sheet, fluid, core, and skin under the pushes.
+    /// Returns the energy of sheet, fluid, core and skin under the contacts, J.
     pub fn energy_j(&self, pushes: &[NodeContact], state: &ShellState) -> f64 {
         self.held_j(pushes, &state.here)
     }
@@ -305,8 +305,8 @@ impl MotionHistory {
             + numbers.iter().sum::<usize>() * size_of::<f64>()
     }
 
-    /// Returns the ratio of the object's present displacement to its last one, from each node's
-    /// overlap with it, and stores the overlaps.
+    /// Returns by how much the object's last displacement repeats (least squares over the nodes),
+    /// given each node's overlap with it, and stores the overlaps.
     pub fn times(&mut self, overlaps: impl Iterator<Item = (usize, f64)>) -> f64 {
         let (mut along_m2, mut last_m2) = (0.0, 0.0);
         std::mem::swap(&mut self.overlap_m, &mut self.before_m);

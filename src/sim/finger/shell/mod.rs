@@ -1,8 +1,8 @@
 //! Thin-shell model of the skin over the fluid: it carries load to its neighbours.
 //!
-//! `sheet` models the silicone, and `softness` its compliance at rest. `membrane` has its energy
-//! with fluid, core and object, under the rays by which the skin meets an object. `settle`
-//! minimises that energy, with `springs` for the places that may touch.
+//! `elastic_sheet` models the silicone, `compliance` its response. `membrane` has its energy
+//! with fluid, core and object, under the rays by which the skin meets an object. `equilibrium`
+//! minimises that energy, with `springs` for the points that may touch.
 
 mod compliance;
 pub mod elastic_sheet;

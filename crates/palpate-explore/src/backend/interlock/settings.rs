@@ -28,10 +28,10 @@ pub struct InterlockSettings {
     pub clearance_m: f64,
     /// Delay from a command until the robot reacts, s, assumed by predictive interlocks.
     pub reaction_s: f64,
-    /// Force above that at the start that is a fault, N; default 10 above `touch.force_limit_n`.
+    /// Force limit relative to the force at the start, N; default `touch.force_limit_n` + 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_limit_n: Option<f64>,
-    /// Torque about the fingertip that is a fault, N·m; default: the force limit times the finger's
+    /// Torque limit about the fingertip, N·m; default: the force limit times the finger's
     /// length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,

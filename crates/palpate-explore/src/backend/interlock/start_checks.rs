@@ -132,7 +132,7 @@ fn check_electrodes(
             let electrode = i + 1;
             return Err(InputError::new(format!(
                 "electrode E{electrode} at rest is {mean:.1} counts with a standard deviation of \
-                 {sd_counts:.2}; allowed is a value inside 0 to 4095 with one above 0 and at most {allowed_counts}"
+                 {sd_counts:.2}; allowed are a mean between 0 and 4095 and a standard deviation above 0 and at most {allowed_counts}"
             )));
         }
     }

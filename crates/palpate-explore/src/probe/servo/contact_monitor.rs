@@ -33,7 +33,7 @@ pub(super) struct ContactMonitor {
     force_n: f64,
     /// Mean force at rest: the sensor's bias and the finger's weight.
     force_at_rest_n: Option<Vector3<f64>>,
-    /// Sum and count of the forces since [`forget`](Self::forget).
+    /// Sum and count of the forces since [`clear_samples`](Self::clear_samples).
     forces: (Vector3<f64>, f64),
 }
 
@@ -87,7 +87,7 @@ impl ContactMonitor {
         wanted.fold(self.settings.frames, usize::max)
     }
 
-    /// Tares the sensors with the samples since [`forget`](Self::forget).
+    /// Tares the sensors with the samples since [`clear_samples`](Self::clear_samples).
     pub(super) fn tare(&mut self) {
         self.sensors.iter_mut().for_each(|sensor| sensor.tare());
         self.force_at_rest_n = (self.forces.1 > 0.0).then(|| self.forces.0 / self.forces.1);
@@ -99,7 +99,7 @@ impl ContactMonitor {
         self.forces = (Vector3::zeros(), 0.0);
     }
 
-    /// Number of samples since [`forget`](Self::forget), of the sensor with the most.
+    /// Number of samples since [`clear_samples`](Self::clear_samples), of the sensor with the most.
     pub(super) fn collected(&self) -> usize {
         self.sensors.iter().filter_map(|sensor| sensor.sample_count()).max().unwrap_or(0)
     }
@@ -109,7 +109,7 @@ impl ContactMonitor {
         self.sensors.iter().filter_map(|sensor| sensor.last_sample_s()).reduce(f64::max)
     }
 
-    /// Returns the contact in `T`, from the samples since [`forget`](Self::forget) of the first
+    /// Returns the contact in `T`, from the samples since the last clearing of the first
     /// sensor that the backend has.
     pub(super) fn contact(&self, finger: &Finger) -> Option<SensedContact> {
         self.sensors.iter().find(|sensor| sensor.is_present())?.locate(finger)

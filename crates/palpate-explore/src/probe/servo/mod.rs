@@ -22,7 +22,7 @@ pub use crate::task::approach::BEYOND_M;
 pub use reach::{ArmReach, check_reach};
 pub(super) use reach::{standoff, turning_point};
 
-/// Position tolerance at the end of a movement. Position tolerance at the end of a movement; a
+/// Position tolerance at the end of a movement; a
 /// heuristic: below what a touch resolves.
 const ARRIVED_M: f64 = 5e-5;
 

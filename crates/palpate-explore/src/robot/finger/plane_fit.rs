@@ -46,8 +46,8 @@ const MM: f64 = 1e-3;
 /// centimetres, so that it affects only undetermined components.
 const HELD: f64 = 1e3;
 
-/// Scale of the weights of presses by their error above the best. (two terms: a fraction of the
-/// best error, and noise in mm²)
+/// Scale of the weights of presses by their error above the best: a fraction of the
+/// best error, plus noise in mm².
 const WORSE: f64 = 0.3;
 const NOISE_MM2: f64 = 1e-4;
 

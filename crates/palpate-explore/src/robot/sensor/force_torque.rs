@@ -18,8 +18,8 @@ pub struct ForceTorqueTip {
 }
 
 /// Returns the point of a sphere of `radius_m` about the origin at which a pure, inward force
-/// produces the wrench `(f, τ)`: `p = (f × τ) / |f|² − λ f` with `|p| = radius`. (source in the
-/// second sentence) J. Robotics Research 12, point contact with friction). If measurement error
+/// produces the wrench `(f, τ)`: `p = (f × τ) / |f|² − λ f` with `|p| = radius` (Bicchi, Salisbury
+/// & Brock 1993, Int. J. Robotics Research 12, contact with friction). If measurement error
 /// makes the line of action miss the sphere, returns the sphere's nearest point. Returns `None` for
 /// a force of less than 0.1 N.
 pub fn point_on_sphere(radius_m: f64, wrench: &Wrench) -> Option<Point3<f64>> {
@@ -68,7 +68,7 @@ impl Sensor for ForceTorqueTip {
 }
 
 impl ForceTorqueTip {
-    /// Returns the mean of the wrenches since [`forget`](Sensor::forget).
+    /// Returns the mean of the wrenches since [`clear_samples`](Sensor::clear_samples).
     fn mean(&self) -> Option<Wrench> {
         let Self { sum, count, .. } = self;
         let mean = |sum: Vector3<f64>| sum / *count;
