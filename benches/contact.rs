@@ -211,7 +211,7 @@ fn step(
             let begun = Instant::now();
             for _ in 0..STEPS {
                 let reading = body.step(&command)?;
-                held += if reading.ideal().is_some() { 1.0 } else { 0.0 };
+                held += if reading.ideal_contact().is_some() { 1.0 } else { 0.0 };
             }
             least_us = least_us.min(begun.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS));
             all += f64::from(STEPS);

@@ -10,7 +10,7 @@ use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::backend::Fault;
 use palpate::experiment::measure::RMSE;
 use palpate::experiment::measure::metrics::Metrics;
-use palpate::experiment::statistics::equal_error::{Estimate, equal_error};
+use palpate::experiment::statistics::equal_error::{IntervalEstimate, equal_error};
 use palpate::experiment::statistics::{PairedDifference, median};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
@@ -175,7 +175,7 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
 }
 
 /// Formats an estimate with its interval; a dash if the error is not reached.
-fn shown(estimate: &Estimate, decimals: usize) -> String {
+fn shown(estimate: &IntervalEstimate, decimals: usize) -> String {
     let number = |value: f64| match value.is_finite() {
         true => format!("{value:.decimals$}"),
         false => "–".into(),

@@ -8,7 +8,7 @@ mod meshing;
 use anyhow::{Context, Result};
 use meshing::{Mesh, glb, nets, project};
 use nalgebra::{Point3, Vector3};
-use palpate::geometry::implicit::Implicit;
+use palpate::geometry::implicit::ImplicitSolid;
 use palpate::geometry::surfaces;
 use std::collections::HashMap;
 use std::fs;
@@ -48,7 +48,7 @@ fn main() -> Result<()> {
 
 /// Returns the surface as triangles: surface nets on a grid, projected onto the surface, relaxed,
 /// and split until every edge follows the surface.
-fn triangulate(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
+fn triangulate(surface: &dyn ImplicitSolid, cell_m: f64) -> Result<Mesh> {
     let mut mesh = nets(surface, cell_m)?;
     for _ in 0..SPLIT_ROUNDS {
         for _ in 0..RELAX_ROUNDS {
@@ -62,7 +62,7 @@ fn triangulate(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
 }
 
 /// Moves every vertex half way to the mean of its neighbours, along the surface.
-fn relax(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<()> {
+fn relax(mesh: &mut Mesh, surface: &dyn ImplicitSolid) -> Result<()> {
     let mut sums = vec![(Vector3::zeros(), 0.0); mesh.vertices.len()];
     for &[a, b, c] in &mesh.triangles {
         // Each edge is in two triangles, once in each direction.
@@ -81,7 +81,7 @@ fn relax(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<()> {
 
 /// Splits every edge whose middle is off the surface; returns false if there is none. Both
 /// triangles of an edge split it alike, so the mesh stays closed.
-fn split(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<bool> {
+fn split(mesh: &mut Mesh, surface: &dyn ImplicitSolid) -> Result<bool> {
     let Mesh { vertices, triangles } = mesh;
     let mut middles = HashMap::new();
     for &[a, b, c] in triangles.iter() {
@@ -125,12 +125,12 @@ fn parts(
 }
 
 /// Returns the distance of a point near the surface from it, to second order: |f| / |∇f|.
-fn distance_m(surface: &dyn Implicit, p: Point3<f64>) -> f64 {
+fn distance_m(surface: &dyn ImplicitSolid, p: Point3<f64>) -> f64 {
     let field = surface.field(p);
     field.value.abs() / field.gradient.norm()
 }
 
-fn describe(mesh: &Mesh, surface: &dyn Implicit) {
+fn describe(mesh: &Mesh, surface: &dyn ImplicitSolid) {
     let (mut sum_m, mut most_m, mut samples) = (0.0, 0.0_f64, 0.0);
     let (mut quality, mut worst, mut volume_m3) = (0.0, 1.0_f64, 0.0);
     for triangle in &mesh.triangles {

@@ -10,7 +10,7 @@ mod meshing;
 use anyhow::{Context, Result};
 use meshing::{glb, nets};
 use nalgebra::{Point3, Vector3, point, vector};
-use palpate::geometry::implicit::{Field, Implicit};
+use palpate::geometry::implicit::{Field, ImplicitSolid};
 use std::fs;
 use std::path::Path;
 
@@ -103,7 +103,7 @@ fn scene_around(shape: &Shape) -> String {
     )
 }
 
-impl Implicit for Shape {
+impl ImplicitSolid for Shape {
     fn field(&self, p: Point3<f64>) -> Field {
         (self.field)(p)
     }

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use nalgebra::{Point3, Vector3};
 use ndshape::{RuntimeShape, Shape};
-use palpate::geometry::implicit::Implicit;
+use palpate::geometry::implicit::ImplicitSolid;
 use serde_json::json;
 
 /// Closed triangle mesh, metres, wound counterclockwise as seen from outside.
@@ -14,7 +14,7 @@ pub struct Mesh {
 }
 
 /// Returns the surface as triangles: surface nets on a grid of cells, projected onto the surface.
-pub fn nets(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
+pub fn nets(surface: &dyn ImplicitSolid, cell_m: f64) -> Result<Mesh> {
     // A cell of air on every side, so that the mesh closes.
     let [low, high] = surface.bounds();
     let low = low.map(|x| x - cell_m);
@@ -39,7 +39,7 @@ pub fn nets(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
     Ok(Mesh { vertices, triangles })
 }
 
-pub fn project(surface: &dyn Implicit, p: Point3<f64>) -> Result<Point3<f64>> {
+pub fn project(surface: &dyn ImplicitSolid, p: Point3<f64>) -> Result<Point3<f64>> {
     surface.project(p).with_context(|| format!("{p} does not project onto the surface"))
 }
 

@@ -10,7 +10,7 @@ use crate::zone::Zone;
 use numpy::{PyArray1, PyArrayDyn};
 use palpate::experiment::store;
 use palpate::experiment::trial::row::TrialRow;
-use palpate::report::replay::Replay;
+use palpate::report::replay::BeliefReplay;
 use palpate::report::{tables, whole_object};
 use palpate::task;
 use pyo3::prelude::*;
@@ -105,7 +105,7 @@ impl Run {
             let touches = row.touches.get(..touch as usize).unwrap_or_default();
             whole_object::belief(experiment, touches).map_err(errors::other)?.map(Known::from)
         } else {
-            let replay = Replay::of(experiment, row, touch).map_err(errors::other)?;
+            let replay = BeliefReplay::of(experiment, row, touch).map_err(errors::other)?;
             replay.map(|replay| Known::HeightField(replay.belief))
         };
         let none = || {

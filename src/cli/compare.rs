@@ -3,7 +3,7 @@
 use super::output::{Overwrite, make_folder};
 use super::terminal::{Outcome, print};
 use crate::experiment::store::{Run, write_whole};
-use crate::report::compare::{each, file, html, interquartiles, overall, profiles};
+use crate::report::compare::{file, html, interquartiles, overall, per_object_table, profiles};
 use crate::study::compare::{SuiteComparison, compare};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -60,7 +60,7 @@ const PAGE: &str = "suite.html";
 
 /// Formats the tables of a comparison for a terminal, per object and overall.
 pub(super) fn text(compared: &SuiteComparison) -> String {
-    format!("{}\n{}", each(compared).text(), overall(compared).text())
+    format!("{}\n{}", per_object_table(compared).text(), overall(compared).text())
 }
 
 /// Writes a comparison to a folder as a page and a CSV table; returns the page's path.

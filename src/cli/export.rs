@@ -8,7 +8,7 @@ use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::report::points::PointCloud;
-use crate::report::replay::{self, Replay};
+use crate::report::replay::{self, BeliefReplay};
 use crate::report::{figures, files, style, whole_object};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
@@ -179,7 +179,7 @@ fn closed_surface(
 /// Belief over a zone as a mesh, and its error.
 fn zone_surface(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(PointCloud, String)> {
     let planner = args.planner();
-    let replay = Replay::new(run, planner, touches)?
+    let replay = BeliefReplay::new(run, planner, touches)?
         .with_context(|| format!("{planner} has no fit after {touches} touches"))?;
     let grid = args.side()?.unwrap_or(run.experiment.grid as usize);
     Ok((mesh(run, args, &replay, grid), replay.score()))
@@ -227,7 +227,7 @@ fn checked_touches(run: &Run, args: &Args) -> anyhow::Result<u32> {
 }
 
 /// Posterior mean as a surface in `W`, where a surface is more likely than none.
-fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> PointCloud {
+fn mesh(run: &Run, args: &Args, replay: &BeliefReplay, grid: usize) -> PointCloud {
     let zone = replay.belief.zone();
     let places = zone.grid(grid);
     let known = replay.is_drawn(places.iter().map(Vec::as_slice));

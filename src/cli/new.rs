@@ -4,7 +4,7 @@ use super::output::{Overwrite, make_folder};
 use super::terminal::{Outcome, print};
 use crate::experiment::experiment::is_name_character;
 use crate::experiment::store::write_whole;
-use crate::sim::placement::{self, Facing, Side, Up, ZoneProposal};
+use crate::sim::placement::{self, ObjectAxes, ObjectSide, UpAxis, ZoneProposal};
 use crate::sim::scene::Unit;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
@@ -30,10 +30,10 @@ pub(super) struct Args {
     mesh: PathBuf,
     /// Side that faces the finger.
     #[arg(long, value_enum, default_value_t)]
-    side: Side,
+    side: ObjectSide,
     /// Up axis of the file [default: y for glTF and OBJ, z for others].
     #[arg(long, value_enum)]
-    up: Option<Up>,
+    up: Option<UpAxis>,
     /// Unit of the file's numbers [default: guessed].
     #[arg(long, value_enum)]
     unit: Option<Unit>,
@@ -171,7 +171,7 @@ fn name(mesh: &Path) -> anyhow::Result<String> {
 
 /// Placement of a mesh in a scene, with the guesses that led to it.
 struct MeshPlacement {
-    up: Up,
+    up: UpAxis,
     unit: Unit,
     scale: f64,
     size_mm: [f64; 3],
@@ -184,7 +184,8 @@ impl MeshPlacement {
     fn new(args: &Args) -> anyhow::Result<Self> {
         let extension = args.mesh.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
-        let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
+        let up =
+            args.up.unwrap_or(if is_gltf || extension == "obj" { UpAxis::Y } else { UpAxis::Z });
         // Millimetres are the middle of all units, so that meshes in the largest and the smallest
         // unit can be read.
         let mesh = args.read(Unit::Mm.metres_per_unit())?;
@@ -197,7 +198,7 @@ impl MeshPlacement {
             placement::propose_size(extent(&mesh).max() / Unit::Mm.metres_per_unit(), unit);
         let mesh = mesh.scaled(unit.metres_per_unit() * scale / Unit::Mm.metres_per_unit());
         let size_mm = (extent(&mesh) * 1e3).into();
-        let facing = if is_gltf { Facing::of_gltf(up) } else { Facing::of(up) };
+        let facing = if is_gltf { ObjectAxes::of_gltf(up) } else { ObjectAxes::of(up) };
         let rotation_deg = placement::rotation_deg(facing, args.side);
         let turned = mesh.transformed(&pose([0.0; 3], rotation_deg));
         let position_m = placement::position_m(&turned);

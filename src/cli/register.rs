@@ -12,7 +12,7 @@ use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
 use anyhow::Context;
 use palpate_explore::probe::Touch;
-use palpate_explore::registration::{Design, register};
+use palpate_explore::registration::{RegistrationDesign, register};
 use palpate_gp::math::seed;
 use palpate_ros::arm::RosArm;
 use palpate_ros::settings::{BackendKind, BackendSettings};
@@ -82,8 +82,13 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let touch = environment.task().touch();
     let robot = environment.robot().context("this scene has no robot")?;
     let of = args.touches.into();
-    let design =
-        Design::new(&robot, &scene.touch, &body, of, &mut seed::stream(args.seed, 0, "design"))?;
+    let design = RegistrationDesign::new(
+        &robot,
+        &scene.touch,
+        &body,
+        of,
+        &mut seed::stream(args.seed, 0, "design"),
+    )?;
     design.check()?;
     let simulator = prepare_simulator(&environment, talk)?;
     let mut probe = match settings.kind {

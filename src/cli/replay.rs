@@ -3,7 +3,7 @@
 use super::prepare::prepare_simulation;
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::trial::recorded_trial::parts;
-use crate::experiment::trial::replay::{self, Difference, Replay};
+use crate::experiment::trial::replay::{self, Difference, ReplayResult};
 use anyhow::Context;
 use palpate_input::format::shorten;
 use palpate_ros::recording::RecordedTrial;
@@ -54,7 +54,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
 struct ReplayedPart {
     file: PathBuf,
     recorded: RecordedTrial,
-    replay: Replay,
+    replay: ReplayResult,
 }
 
 impl ReplayedPart {
@@ -85,8 +85,8 @@ impl ReplayedPart {
     }
 }
 
-fn text(recorded: &RecordedTrial, replay: &Replay) -> String {
-    let Replay { touches, is_cut, difference } = replay;
+fn text(recorded: &RecordedTrial, replay: &ReplayResult) -> String {
+    let ReplayResult { touches, is_cut, difference } = replay;
     let about = &recorded.about;
     let head =
         format!("{}, trial {}, recorded by palpate {}", about.planner, about.trial, about.version);

@@ -13,7 +13,7 @@ use palpate_ros::connect;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
 use palpate_ros::server::serve::{Injection, SimulatedRobotServer, services};
 use palpate_ros::settings::BackendKind;
-use palpate_ros::topics::Side;
+use palpate_ros::topics::Endpoint;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -113,7 +113,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     let stop = stop_on_interrupt("ticks")?;
-    let open = connect(&settings, Side::Arm, services())?;
+    let open = connect(&settings, Endpoint::Arm, services())?;
     let injections = args.inject.clone();
     let mut twin =
         SimulatedRobotServer::new(body, &robot.chain, &settings, open, injections, args.seed)

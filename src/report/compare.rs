@@ -11,23 +11,23 @@ use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
 use crate::experiment::measure::Direction;
 use crate::experiment::measure::silhouette::TENTHS;
-use crate::experiment::statistics::equal_error::Estimate;
+use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::mean;
 use crate::experiment::trial::planner_names::ORACLE;
 use crate::study::compare::{
-    BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric, interquartile,
-    profile, win_probability,
+    BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric_mean,
+    interquartile_mean_interval, profile, win_probability,
 };
 
 /// Seed of all bootstraps.
 const SEED: u64 = 0;
 
 /// Returns a planner's error on one object, relative to the reference.
-fn error_on(contender: &Entrant, object: usize) -> Option<Estimate> {
-    geometric(&[&contender.results[object].scores], SEED)
+fn error_on(contender: &Entrant, object: usize) -> Option<IntervalEstimate> {
+    geometric_mean(&[&contender.results[object].scores], SEED)
 }
 
-fn judged(error: Option<Estimate>) -> Cell {
+fn judged(error: Option<IntervalEstimate>) -> Cell {
     let interval = error.and_then(|error| error.interval);
     Cell::estimate(error).with_verdict(interval, 1.0, Direction::Minimise)
 }
@@ -79,7 +79,7 @@ pub fn overall(compared: &SuiteComparison) -> Table {
         let honest = coverages.filter(|share| CALIBRATED.contains(share)).count();
         table.rows.push(vec![
             contender.name.as_str().into(),
-            judged(geometric(&contender.scores(), SEED)),
+            judged(geometric_mean(&contender.scores(), SEED)),
             on("better"),
             on("worse"),
             Cell::estimate(gap_closed(compared, contender, &all, SEED)),
@@ -96,7 +96,7 @@ pub fn overall(compared: &SuiteComparison) -> Table {
 }
 
 /// Returns a table of geometric means, with a row for each object and a column for each planner.
-pub fn each(compared: &SuiteComparison) -> Table {
+pub fn per_object_table(compared: &SuiteComparison) -> Table {
     let rows = compared.objects.iter().enumerate().map(|(object, name)| (name.clone(), object));
     let columns = compared.contenders.iter().map(|it| (Column::new(&it.name), it)).collect();
     let cell =
@@ -114,8 +114,8 @@ pub fn interquartiles(compared: &SuiteComparison) -> Table {
     columns.push((Column::new("all"), None));
     Table::cross("interquartile mean", rows, columns, |scores: &Vec<&[f64]>, object| {
         let found = match object {
-            Some(object) => interquartile(&[scores[*object]], SEED),
-            None => interquartile(scores, SEED),
+            Some(object) => interquartile_mean_interval(&[scores[*object]], SEED),
+            None => interquartile_mean_interval(scores, SEED),
         };
         found.map(Cell::estimate)
     })
@@ -141,7 +141,7 @@ fn sentence(compared: &SuiteComparison) -> Option<String> {
     let against = &compared.reference;
     let others = compared.contenders.iter().filter(|it| it.name != *against);
     let verdicts = others.map(|it| {
-        let interval = geometric(&it.scores(), SEED).and_then(|error| error.interval);
+        let interval = geometric_mean(&it.scores(), SEED).and_then(|error| error.interval);
         (it.name.as_str(), verdict(interval, 1.0, Direction::Minimise))
     });
     let words = [
@@ -157,7 +157,7 @@ fn sentence(compared: &SuiteComparison) -> Option<String> {
 pub fn html(name: &str, question: &str, compared: &SuiteComparison) -> String {
     let note = note(&compared.reference);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
-    let each = tables("", &[each(compared)], "named", "");
+    let each = tables("", &[per_object_table(compared)], "named", "");
     let each = fold("Object by object", &each);
     let objects = compared.objects.len();
     let trials = compared.contenders.iter().flat_map(Entrant::scores).map(<[f64]>::len).max();

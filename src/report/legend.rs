@@ -100,9 +100,9 @@ pub const MISS: (Swatch, &str) = (Swatch::Diamond(PLANNED), "touch without conta
 /// Returns the legend entries of touches that a surface may hide.
 pub fn touch_entries() -> [(Swatch, &'static str); 3] {
     [
-        (Swatch::Circle(style::visible(INITIAL)), "initial touch"),
-        (Swatch::Circle(style::visible(PLANNED)), "later touch"),
-        (Swatch::Circle(style::hidden(PLANNED)), "behind the surface"),
+        (Swatch::Circle(style::visible_touch(INITIAL)), "initial touch"),
+        (Swatch::Circle(style::visible_touch(PLANNED)), "later touch"),
+        (Swatch::Circle(style::hidden_touch(PLANNED)), "behind the surface"),
     ]
 }
 

@@ -282,8 +282,8 @@ impl Relief {
         colour: &str,
     ) {
         let attributes = match self.hides(camera, p) {
-            true => style::hidden(colour),
-            false => style::visible(colour),
+            true => style::hidden_touch(colour),
+            false => style::visible_touch(colour),
         };
         canvas.circle(camera.at(p), radius, &attributes);
     }

@@ -19,7 +19,7 @@ use palpate_gp::Posterior;
 pub const NO_BELIEF: &str = "not reached in this trial";
 
 /// Belief of one planner after some touches of the drawn trial.
-pub struct Replay<'a> {
+pub struct BeliefReplay<'a> {
     /// Belief.
     pub belief: HeightField,
     /// Posterior of the surface.
@@ -33,7 +33,7 @@ pub struct Replay<'a> {
     initial_touches: usize,
 }
 
-impl<'a> Replay<'a> {
+impl<'a> BeliefReplay<'a> {
     /// Replays the belief of `planner` after `count` touches; `None` if the trial is missing, ended
     /// before, or had no fit then.
     ///
@@ -43,10 +43,10 @@ impl<'a> Replay<'a> {
         row(run, planner).map_or(Ok(None), |row| Self::of(&run.experiment, row, count))
     }
 
-    /// Replays the belief of a trial's `row` after `count` touches, as [`Replay::new`].
+    /// Replays the belief of a trial's `row` after `count` touches, as [`BeliefReplay::new`].
     ///
     /// # Errors
-    /// As [`Replay::new`].
+    /// As [`BeliefReplay::new`].
     pub fn of(
         experiment: &Experiment,
         row: &'a TrialRow,

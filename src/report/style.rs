@@ -79,7 +79,7 @@ pub const ON_DARK: [(&str, &str); 19] = [
 ];
 
 /// Returns a colour of drawings on light paper with its replacement on dark paper.
-pub fn on_both(colour: &'static str) -> [&'static str; 2] {
+pub fn light_and_dark(colour: &'static str) -> [&'static str; 2] {
     let dark = ON_DARK.iter().find(|(light, _)| *light == colour).map(|(_, dark)| *dark);
     [colour, dark.unwrap_or(colour)]
 }
@@ -90,8 +90,8 @@ pub fn touch_colours() -> Value {
         "deviation": DEVIATION.map(rgb),
         "error": ERROR.map(rgb),
         "truth": rgb(0x009e73),
-        "initial": on_both(INITIAL),
-        "later": on_both(PLANNED),
+        "initial": light_and_dark(INITIAL),
+        "later": light_and_dark(PLANNED),
         "height": HEIGHT.map(rgb),
     })
 }
@@ -119,12 +119,12 @@ pub fn dot(colour: &str) -> String {
 }
 
 /// Returns the attributes of a visible touch.
-pub fn visible(colour: &str) -> String {
+pub fn visible_touch(colour: &str) -> String {
     format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
 }
 
 /// Returns the attributes of a touch that a surface hides.
-pub fn hidden(colour: &str) -> String {
+pub fn hidden_touch(colour: &str) -> String {
     format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
 }
 
@@ -148,7 +148,7 @@ pub fn rgb(colour: u32) -> [f64; 3] {
 
 /// Returns the colour of a standard deviation, 0..1 of the largest.
 pub fn deviation(fraction: f64) -> String {
-    lit(&DEVIATION, fraction, 1.0)
+    shaded_colour(&DEVIATION, fraction, 1.0)
 }
 
 /// Returns the colour of a standard deviation as red, green and blue.
@@ -157,7 +157,7 @@ pub fn deviation_rgb(fraction: f64) -> [u8; 3] {
 }
 
 /// Returns the colour at a fraction of `map`, under light of strength 0..1.
-pub fn lit(map: &[u32], fraction: f64, light: f64) -> String {
+pub fn shaded_colour(map: &[u32], fraction: f64, light: f64) -> String {
     let channels = between(map, fraction).map(|channel| (channel * light).round() as u8);
     let [red, green, blue] = channels;
     format!("#{red:02x}{green:02x}{blue:02x}")
@@ -165,7 +165,7 @@ pub fn lit(map: &[u32], fraction: f64, light: f64) -> String {
 
 /// Returns the colour of a height, 0..1 of the range, under light of strength 0..1.
 pub fn height(fraction: f64, light: f64) -> String {
-    lit(&HEIGHT, fraction, light)
+    shaded_colour(&HEIGHT, fraction, light)
 }
 
 fn between(map: &[u32], fraction: f64) -> [f64; 3] {

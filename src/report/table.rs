@@ -4,7 +4,7 @@
 //! in SI units.
 
 use crate::experiment::measure::{Direction, Measure};
-use crate::experiment::statistics::equal_error::Estimate;
+use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::store::write_whole;
 use crate::report::canvas::escape;
 use crate::report::glossary::tooltip;
@@ -73,7 +73,7 @@ impl Column {
         Self { has_interval: true, ..self }
     }
 
-    fn shown(&self, value: f64) -> String {
+    fn format_measure(&self, value: f64) -> String {
         match self.scale {
             Some((per_si, decimals)) if value.is_finite() => {
                 format!("{:.decimals$}", per_si * value)
@@ -95,7 +95,7 @@ impl Column {
 
 impl Cell {
     /// Creates a cell with an estimate and its interval.
-    pub fn estimate(estimate: impl Into<Option<Estimate>>) -> Self {
+    pub fn estimate(estimate: impl Into<Option<IntervalEstimate>>) -> Self {
         let estimate = estimate.into();
         let interval = estimate.and_then(|estimate| estimate.interval);
         Self { interval, ..Self::from(estimate.map(|estimate| estimate.value)) }
@@ -113,7 +113,7 @@ impl Cell {
     }
 
     fn words(&self, column: &Column) -> String {
-        let shown = |value| column.shown(value);
+        let shown = |value| column.format_measure(value);
         match (&self.value, self.error) {
             (Value::Null, _) => "-".into(),
             (Value::String(words), _) => words.clone(),
@@ -352,7 +352,7 @@ pub fn with_interval(
 }
 
 /// Returns the title of a measure with its display unit.
-pub fn titled(measure: &Measure) -> String {
+pub fn title_with_unit(measure: &Measure) -> String {
     match measure.unit.symbol {
         "" => measure.title.into(),
         unit => format!("{}, {unit}", measure.title),

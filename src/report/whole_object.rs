@@ -12,7 +12,7 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use anyhow::Context;
 use nalgebra::Point3;
 use palpate_explore::task::Task;
-use palpate_explore::whole_object::{ImplicitSurface, Scope};
+use palpate_explore::whole_object::{ExplorationSetup, ImplicitSurface};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::decimate::decimate;
 
@@ -153,7 +153,7 @@ pub fn belief(
     let ball =
         ball.context("the scene has no ball of [whole_object]; resolved.toml is incomplete")?;
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
-    let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
+    let scope = ExplorationSetup::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
         let aim = touch

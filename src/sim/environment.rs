@@ -11,7 +11,7 @@ use palpate_explore::robot::arm::{ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
 use palpate_geometry::bvh::MeshBvh;
-use palpate_geometry::implicit::Implicit;
+use palpate_geometry::implicit::ImplicitSolid;
 use palpate_geometry::import::import_with;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::report::MeshReport;
@@ -264,7 +264,7 @@ impl Environment {
         surface.project(local).map(|nearest| x_wo * (nearest * object.scale))
     }
 
-    fn analytic(&self) -> Option<(&'static dyn Implicit, &ObjectSettings)> {
+    fn analytic(&self) -> Option<(&'static dyn ImplicitSolid, &ObjectSettings)> {
         let object = self.scene.object.as_ref()?;
         let surface = surfaces::by_name(object.truth.as_deref()?)?;
         Some((surface, object))

@@ -9,7 +9,7 @@ use palpate_geometry::mesh::Mesh;
 
 /// Side of an object, named by an observer in front of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Side {
+pub enum ObjectSide {
     /// Front: towards +z if y is up, as in glTF; towards −y if z is up.
     #[default]
     Front,
@@ -27,7 +27,7 @@ pub enum Side {
 
 /// Axis of a mesh file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Up {
+pub enum UpAxis {
     /// The y axis: the rule of glTF, and usual in OBJ files.
     Y,
     /// The z axis, usual in CAD.
@@ -74,23 +74,23 @@ const MIDDLE_Z_M: f64 = 0.5;
 
 /// Directions of an object's front and top in the frame of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facing {
+pub struct ObjectAxes {
     front_o: Vector3<f64>,
     up_o: Vector3<f64>,
 }
 
-impl Facing {
+impl ObjectAxes {
     /// Returns the directions for a file whose axis `up` is up, by the usual convention: the front
     /// is towards +z if y is up, towards −y if z is up.
-    pub fn of(up: Up) -> Self {
+    pub fn of(up: UpAxis) -> Self {
         match up {
-            Up::Y => Self { front_o: Vector3::z(), up_o: Vector3::y() },
-            Up::Z => Self { front_o: -Vector3::y(), up_o: Vector3::z() },
+            UpAxis::Y => Self { front_o: Vector3::z(), up_o: Vector3::y() },
+            UpAxis::Z => Self { front_o: -Vector3::y(), up_o: Vector3::z() },
         }
     }
 
     /// Returns the directions for a glTF file, whose y axis became z, and z became y, on import.
-    pub fn of_gltf(up: Up) -> Self {
+    pub fn of_gltf(up: UpAxis) -> Self {
         let turned = |v: Vector3<f64>| Vector3::new(-v.x, v.z, v.y);
         let Self { front_o, up_o } = Self::of(up);
         Self { front_o: turned(front_o), up_o: turned(up_o) }
@@ -100,15 +100,15 @@ impl Facing {
 /// Returns the rotation about the fixed axes x, y, z of `W`, in degrees, that turns `side` of an
 /// object towards the finger (+y) and keeps its top up. If the top faces the finger, the back is
 /// up; if the bottom does, the front.
-pub fn rotation_deg(Facing { front_o, up_o }: Facing, side: Side) -> [f64; 3] {
+pub fn rotation_deg(ObjectAxes { front_o, up_o }: ObjectAxes, side: ObjectSide) -> [f64; 3] {
     let right_o = up_o.cross(&front_o);
     let (faces_o, above_o) = match side {
-        Side::Front => (front_o, up_o),
-        Side::Back => (-front_o, up_o),
-        Side::Left => (-right_o, up_o),
-        Side::Right => (right_o, up_o),
-        Side::Top => (up_o, -front_o),
-        Side::Bottom => (-up_o, front_o),
+        ObjectSide::Front => (front_o, up_o),
+        ObjectSide::Back => (-front_o, up_o),
+        ObjectSide::Left => (-right_o, up_o),
+        ObjectSide::Right => (right_o, up_o),
+        ObjectSide::Top => (up_o, -front_o),
+        ObjectSide::Bottom => (-up_o, front_o),
     };
     let beside_o = faces_o.cross(&above_o);
     let r_wo = Matrix3::from_columns(&[beside_o, faces_o, above_o]).transpose();

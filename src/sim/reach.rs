@@ -8,7 +8,7 @@
 use super::probe::resting_pose;
 use crate::sim::Environment;
 use crate::sim::scene::SimulatorKind;
-use palpate_explore::robot::finger::shape::Front;
+use palpate_explore::robot::finger::shape::FrontProfile;
 use palpate_explore::task::Zone;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -57,7 +57,7 @@ const PARTS: usize = 20;
 struct FingerGrid<'a> {
     environment: &'a Environment,
     zone: &'a Zone,
-    front: Front,
+    front: FrontProfile,
     /// Coordinates along each side of the zone, x fastest; z is 0 if the zone has only x.
     sides_m: [Vec<f64>; 2],
     /// y, in the zone's frame, of each tip at rest; `None` for a miss.

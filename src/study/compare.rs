@@ -7,7 +7,7 @@
 
 use super::check::measures::CHECK_MEASURES;
 use crate::experiment::measure::silhouette::TENTHS;
-use crate::experiment::statistics::equal_error::Estimate;
+use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::{RESAMPLES, central_95, mean};
 use crate::experiment::store::Run;
 use crate::experiment::trial::planner_names::ORACLE;
@@ -178,7 +178,7 @@ pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
 
 /// Interquartile mean over all strata, with the 95 % interval of a bootstrap within each stratum;
 /// `None` if a stratum is empty.
-pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
+pub fn interquartile_mean_interval(strata: &[&[f64]], seed: u64) -> Option<IntervalEstimate> {
     if strata.is_empty() || strata.iter().any(|stratum| stratum.is_empty()) {
         return None;
     }
@@ -216,7 +216,7 @@ pub fn profile(contender: &Entrant, score: f64) -> f64 {
 
 /// Geometric mean of scores over objects with equal weights, with the interval of a bootstrap over
 /// trials within each object; `None` if an object has no score, or there is no object.
-pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
+pub fn geometric_mean(strata: &[&[f64]], seed: u64) -> Option<IntervalEstimate> {
     if strata.is_empty() || strata.iter().any(|scores| scores.is_empty()) {
         return None;
     }
@@ -234,7 +234,7 @@ pub fn gap_closed(
     contender: &Entrant,
     objects: &[usize],
     seed: u64,
-) -> Option<Estimate> {
+) -> Option<IntervalEstimate> {
     let named = |name: &str| compared.contenders.iter().find(|it| it.name == name);
     let of = |it: &Entrant| -> Vec<Vec<f64>> {
         objects.iter().map(|object| log_scores(&it.results[*object].scores)).collect()
@@ -275,7 +275,7 @@ fn estimate(
     sizes: &[usize],
     (seed, purpose): (u64, &str),
     of: impl Fn(&[Vec<usize>]) -> f64,
-) -> Estimate {
+) -> IntervalEstimate {
     let mut rng = seed::stream(seed, 0, purpose);
     let mut picks: Vec<Vec<usize>> = sizes.iter().map(|size| (0..*size).collect()).collect();
     let value = of(&picks);
@@ -285,5 +285,5 @@ fn estimate(
         }
         of(&picks)
     });
-    Estimate { value, interval: Some(central_95(found.collect())) }
+    IntervalEstimate { value, interval: Some(central_95(found.collect())) }
 }

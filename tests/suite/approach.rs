@@ -138,7 +138,7 @@ proptest! {
             prop_assert!(zone.distance(&zone.place(&p_w), &place) < 1e-11);
         }
         prop_assert!((zone.height_m(&approach.p_near_w) + zone.datum_y_m() - 0.1).abs() < 1e-12);
-        let level = approach.level_with(&Point3::origin().coords, &approach.p_far_w.coords);
+        let level = approach.project_to_level(&Point3::origin().coords, &approach.p_far_w.coords);
         prop_assert!((level - approach.p_far_w.coords).dot(&approach.direction_w()).abs() < 1e-12);
         prop_assert!(level.cross(&approach.direction_w()).norm() < 1e-12);
     }

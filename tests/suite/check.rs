@@ -59,7 +59,7 @@ fn what_differs_is_found() {
         let values: Vec<f64> = (0..20).map(|_| 1.0 + normal(&mut rng)).collect();
         let sequence = ConfidenceSequence::new(&values, 10, ALPHA);
         found += u32::from(sequence.interval[0] > 0.0);
-        let wanted = sequence.wanted(1.0, ALPHA).unwrap();
+        let wanted = sequence.sample_size(1.0, ALPHA).unwrap();
         assert!((5..40).contains(&wanted), "{wanted}");
     }
     assert!(found > 150, "{found}");

@@ -1,9 +1,10 @@
 //! Tests of the comparison of planners over several runs.
 
 use crate::common::program::palpate;
-use palpate::experiment::statistics::equal_error::Estimate;
+use palpate::experiment::statistics::equal_error::IntervalEstimate;
 use palpate::study::compare::{
-    Entrant, ObjectResult, interquartile, interquartile_mean, profile, win_probability,
+    Entrant, ObjectResult, interquartile_mean, interquartile_mean_interval, profile,
+    win_probability,
 };
 use proptest::prelude::*;
 use std::fs;
@@ -21,8 +22,8 @@ fn the_interquartile_mean_is_the_textbooks() {
     assert_eq!(interquartile_mean(&[1.0, 2.0, 3.0, 4.0, 5.0]), Some(3.0));
     assert_eq!(interquartile_mean(&[7.0]), Some(7.0));
     assert_eq!(interquartile_mean(&[]), None);
-    assert_eq!(interquartile(&[&[1.0, 1.0], &[]], 0), None);
-    let equal = interquartile(&[&[2.0; 9], &[2.0; 4]], 0).unwrap();
+    assert_eq!(interquartile_mean_interval(&[&[1.0, 1.0], &[]], 0), None);
+    let equal = interquartile_mean_interval(&[&[2.0; 9], &[2.0; 4]], 0).unwrap();
     assert_eq!((equal.value, equal.interval), (2.0, Some([2.0, 2.0])));
 }
 
@@ -37,7 +38,7 @@ proptest! {
         let both = win_probability(&one, &other).unwrap() + win_probability(&other, &one).unwrap();
         prop_assert!((both - 1.0).abs() < 1e-12);
         prop_assert_eq!(win_probability(&one, &one), Some(0.5));
-        let Estimate { value: mean, interval } = interquartile(&[&a, &b], 3).unwrap();
+        let IntervalEstimate { value: mean, interval } = interquartile_mean_interval(&[&a, &b], 3).unwrap();
         let [low, high] = interval.unwrap();
         prop_assert!(low <= high && (0.1..=9.0).contains(&mean));
         let shares: Vec<f64> = (0..=90).map(|i| profile(&one, f64::from(i) * 0.1)).collect();

@@ -66,7 +66,7 @@ fn press(simulator: &Simulator, above: &Isometry3<f64>, deep: &Isometry3<f64>) -
             reading.clone_from(body.step(&Command { qdot }).unwrap());
         }
     }
-    reading.ideal().unwrap()
+    reading.ideal_contact().unwrap()
 }
 
 #[test]
@@ -122,10 +122,10 @@ fn a_slow_touch_is_the_kinematic_one() {
                 // Last tick before the finger is retracted.
                 let rests = |reading: &&Reading| {
                     reading.applied.qdot.iter().all(|qdot| qdot.abs() < 1e-3)
-                        && reading.ideal().is_some_and(|ideal| ideal.force_n > 0.0)
+                        && reading.ideal_contact().is_some_and(|ideal| ideal.force_n > 0.0)
                 };
                 let rest = readings.iter().rev().find(rests).unwrap();
-                (contact(touch).p_wc, rest.ideal().unwrap().force_n)
+                (contact(touch).p_wc, rest.ideal_contact().unwrap().force_n)
             });
             apart = apart.max((kinematic.0 - dynamic.0).norm());
             stronger = stronger.max((dynamic.1 / kinematic.1 - 1.0).abs());
@@ -146,7 +146,7 @@ fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
         // The tare averages the noise of one or two counts; only a contact exceeds this.
         above = if counts - rest > detection.threshold_counts { above + 1 } else { 0 };
         if above == detection.frames {
-            return reading.ideal().map_or(0.0, |ideal| ideal.force_n);
+            return reading.ideal_contact().map_or(0.0, |ideal| ideal.force_n);
         }
     }
     panic!("no contact");
@@ -176,7 +176,8 @@ fn a_touch_stops_gently_and_keeps_its_limits_and_its_line() {
         {
             let (touch, readings) = tapped(&environment, &target);
             contact(touch);
-            let force = |reading: &Reading| reading.ideal().map_or(0.0, |ideal| ideal.force_n);
+            let force =
+                |reading: &Reading| reading.ideal_contact().map_or(0.0, |ideal| ideal.force_n);
             let most_n = readings.iter().map(force).fold(0.0, f64::max);
             let over_n = most_n - detected_n(&environment, &readings);
             assert!(over_n < 1.0, "{name} {carrier} {target:?}: {over_n} N");

@@ -6,7 +6,7 @@ use palpate::experiment::store::Run;
 use palpate::report::FIGURES;
 use palpate::report::files::{pdf, tree};
 use palpate::report::legend::{Legend, Swatch};
-use palpate::report::replay::Replay;
+use palpate::report::replay::BeliefReplay;
 use palpate::report::style::{self, ON_DARK};
 use resvg::usvg::{Group, Node, Rect};
 
@@ -168,7 +168,7 @@ fn every_measure_has_a_band_from_the_first_belief_on() {
 #[test]
 fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     let run = run(SURFACE);
-    let replay = Replay::new(&run, "active", 20).unwrap().unwrap();
+    let replay = BeliefReplay::new(&run, "active", 20).unwrap().unwrap();
     let is_known = |place: &[f64]| replay.is_drawn([place])[0];
     let mut missed = 0;
     for touch in replay.touches {
@@ -188,7 +188,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     // If every touch meets the object, everything is drawn.
     let mut full = crate::common::runs::run(SURFACE);
     full.rows.iter_mut().for_each(|row| row.touches.retain(|touch| touch.contact.is_some()));
-    let replay = Replay::new(&full, "active", 8).unwrap().unwrap();
+    let replay = BeliefReplay::new(&full, "active", 8).unwrap().unwrap();
     let places = full.truth.places.iter().map(Vec::as_slice);
     assert!(replay.is_drawn(places).iter().all(|drawn| *drawn));
 }
@@ -246,7 +246,7 @@ fn luminance(colour: &str) -> f64 {
 
 #[test]
 fn colours_on_dark_paper_stand_out_and_differ() {
-    let [_, paper] = style::on_both(style::PAPER);
+    let [_, paper] = style::light_and_dark(style::PAPER);
     for (i, (light, dark)) in ON_DARK.iter().enumerate() {
         let contrast = (luminance(dark) + 0.05) / (luminance(paper) + 0.05);
         let least = match *light {

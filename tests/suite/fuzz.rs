@@ -15,7 +15,7 @@ use palpate::experiment::Experiment;
 use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::{Run, resolved};
 use palpate::geometry::import::import;
-use palpate::report::replay::Replay;
+use palpate::report::replay::BeliefReplay;
 use palpate::report::{FIGURES, tables};
 use palpate::sim::Scene;
 use proptest::prelude::*;
@@ -305,7 +305,7 @@ fn results(path: &Path, draw: bool) -> Result<(), String> {
     let analysis = Analysis::new(&run);
     drop((tables::summary::text(&run), analysis));
     for planner in &run.experiment.planners {
-        let replay = Replay::new(&run, planner, run.experiment.touches);
+        let replay = BeliefReplay::new(&run, planner, run.experiment.touches);
         replay.map(drop).map_err(|error| format!("{error:#}"))?;
     }
     for figure in FIGURES.iter().filter(|_| draw) {

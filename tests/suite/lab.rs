@@ -11,7 +11,7 @@ use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
 use palpate::ros::link::Link;
 use palpate::ros::settings::{BackendKind, BackendSettings, MappingKind};
-use palpate::ros::topics::{CommandTopic, Service, Side};
+use palpate::ros::topics::{CommandTopic, Endpoint, Service};
 use palpate::ros::transport::{Delivery, Packet};
 use serde_json::Value;
 use std::fs;
@@ -158,7 +158,7 @@ fn the_loop_loses_nothing_at_250_hz() {
         .spawn()
         .unwrap();
     let answers: Arc<Mutex<Vec<(f64, f64)>>> = Arc::default();
-    let open = connect(&network.settings, Side::Explorer, Vec::new()).unwrap();
+    let open = connect(&network.settings, Endpoint::Explorer, Vec::new()).unwrap();
     let period = Duration::from_millis(4);
     let echo = Arc::clone(&answers);
     let take = move |delivery| {

@@ -6,7 +6,7 @@ use palpate::backend::pace;
 use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
 use palpate::ros::link::Link;
-use palpate::ros::topics::{CommandTopic, Side};
+use palpate::ros::topics::{CommandTopic, Endpoint};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -197,7 +197,7 @@ fn a_second_publisher_of_commands_stops_the_arm() {
     let mut scene = FaultScenario::new(55, &[], &[]);
     scene.twin.wait_until_it_moves();
     let before_s = pace::now_s();
-    let open = connect(&scene.network.settings, Side::Explorer, Vec::new()).unwrap();
+    let open = connect(&scene.network.settings, Endpoint::Explorer, Vec::new()).unwrap();
     let second = Link::open(open, Duration::from_millis(20), drop, || None).unwrap();
     let topic = CommandTopic { max_age_s: 0.02, ..CommandTopic::default() };
     let joints = ["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from);

@@ -5,13 +5,13 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use nalgebra::{Matrix4, Point3, Vector3, point, vector};
-use palpate::geometry::implicit::Implicit;
+use palpate::geometry::implicit::ImplicitSolid;
 use palpate::geometry::surfaces;
 
 /// Largest distance of a triangle from the surface, m; `models/SOURCE.md` has the measured values.
 const MESH_ERROR_M: f64 = 5e-5;
 
-fn surface(name: &str) -> &'static dyn Implicit {
+fn surface(name: &str) -> &'static dyn ImplicitSolid {
     surfaces::by_name(name).unwrap()
 }
 
@@ -24,7 +24,7 @@ fn spread(n: usize) -> Vector3<f64> {
 }
 
 /// Point `n` of an even spread over the box of `surface`, with a margin of 20 mm.
-fn around(surface: &dyn Implicit, n: usize) -> Point3<f64> {
+fn around(surface: &dyn ImplicitSolid, n: usize) -> Point3<f64> {
     let [low, high] = surface.bounds().map(|corner| corner.coords);
     let margin = Vector3::repeat(0.02);
     Point3::from(low - margin + spread(n).component_mul(&(high - low + 2.0 * margin)))
@@ -183,13 +183,13 @@ fn bounds_enclose_the_surface() {
 }
 
 /// Height of the front: the largest y of the object over (x, z), m.
-fn front_m(surface: &dyn Implicit, x_m: f64, z_m: f64) -> Option<f64> {
+fn front_m(surface: &dyn ImplicitSolid, x_m: f64, z_m: f64) -> Option<f64> {
     let above_m = 0.2;
     surface.ray(point![x_m, above_m, z_m], -Vector3::y(), 1.0).map(|depth_m| above_m - depth_m)
 }
 
 /// Heights over a rectangle, at every millimetre.
-fn heights_m(surface: &dyn Implicit, x_mm: i32, z_mm: [i32; 2]) -> Vec<Option<f64>> {
+fn heights_m(surface: &dyn ImplicitSolid, x_mm: i32, z_mm: [i32; 2]) -> Vec<Option<f64>> {
     (-x_mm..=x_mm)
         .flat_map(|x| (z_mm[0]..=z_mm[1]).map(move |z| (f64::from(x) * 1e-3, f64::from(z) * 1e-3)))
         .map(|(x_m, z_m)| front_m(surface, x_m, z_m))
@@ -291,12 +291,12 @@ fn bird_mesh() -> Mesh {
 }
 
 /// Distance of a point near the surface from it, to second order.
-fn distance_m(surface: &dyn Implicit, p: Point3<f64>) -> f64 {
+fn distance_m(surface: &dyn ImplicitSolid, p: Point3<f64>) -> f64 {
     let field = surface.field(p);
     field.value.abs() / field.gradient.norm()
 }
 
-fn check(mesh: &Mesh, surface: &dyn Implicit, volume_cm3: f64) {
+fn check(mesh: &Mesh, surface: &dyn ImplicitSolid, volume_cm3: f64) {
     assert!((20_000..60_000).contains(&mesh.triangles.len()));
 
     let mut edges = HashSet::new();

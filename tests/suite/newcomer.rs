@@ -7,7 +7,7 @@ use palpate::experiment::Experiment;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::pose::pose;
 use palpate::sim::Scene;
-use palpate::sim::placement::{Facing, Side, Up, propose_size, rotation_deg};
+use palpate::sim::placement::{ObjectAxes, ObjectSide, UpAxis, propose_size, rotation_deg};
 use palpate::sim::scene::Unit;
 use std::fmt::Write;
 use std::fs;
@@ -127,22 +127,23 @@ fn the_side_that_is_named_faces_the_finger() {
 fn turns_are_those_that_are_named() {
     let gltf = |v: Vector3<f64>| Vector3::new(-v.x, v.z, v.y);
     let file = |v: Vector3<f64>| v;
-    for up in [Up::Y, Up::Z] {
+    for up in [UpAxis::Y, UpAxis::Z] {
         let (above, front) = match up {
-            Up::Y => (Vector3::y(), Vector3::z()),
-            Up::Z => (Vector3::z(), -Vector3::y()),
+            UpAxis::Y => (Vector3::y(), Vector3::z()),
+            UpAxis::Z => (Vector3::z(), -Vector3::y()),
         };
         let right = Vector3::x();
         type Read = fn(Vector3<f64>) -> Vector3<f64>;
-        for (facing, read) in [(Facing::of(up), file as Read), (Facing::of_gltf(up), gltf as Read)]
+        for (facing, read) in
+            [(ObjectAxes::of(up), file as Read), (ObjectAxes::of_gltf(up), gltf as Read)]
         {
             for (side, faces, stays) in [
-                (Side::Front, front, above),
-                (Side::Back, -front, above),
-                (Side::Right, right, above),
-                (Side::Left, -right, above),
-                (Side::Top, above, -front),
-                (Side::Bottom, -above, front),
+                (ObjectSide::Front, front, above),
+                (ObjectSide::Back, -front, above),
+                (ObjectSide::Right, right, above),
+                (ObjectSide::Left, -right, above),
+                (ObjectSide::Top, above, -front),
+                (ObjectSide::Bottom, -above, front),
             ] {
                 let turn: Isometry3<f64> = pose([0.0; 3], rotation_deg(facing, side));
                 let away = |v: Vector3<f64>, to: Vector3<f64>| (turn * read(v) - to).norm();

@@ -4,7 +4,7 @@ use crate::common::program::palpate;
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::study::check::measures::CHECK_MEASURES;
-use palpate::study::compare::{Entrant, ObjectResult, SuiteComparison, gap_closed, geometric};
+use palpate::study::compare::{Entrant, ObjectResult, SuiteComparison, gap_closed, geometric_mean};
 use proptest::prelude::*;
 use rayon::prelude::*;
 use std::fs;
@@ -47,11 +47,11 @@ proptest! {
 #[test]
 fn every_object_counts_once() {
     // Two trials of one object and four of another: (½·ln 1·4 + ¼·ln 1·1·16·16)/2 = ln 2√2.
-    let found = geometric(&[&[1.0, 4.0], &[1.0, 1.0, 16.0, 16.0]], 0).unwrap();
+    let found = geometric_mean(&[&[1.0, 4.0], &[1.0, 1.0, 16.0, 16.0]], 0).unwrap();
     assert!((found.value - 8.0_f64.sqrt()).abs() < 1e-12, "{found:?}");
     let [low, high] = found.interval.unwrap();
     assert!(low < found.value && found.value < high);
-    assert_eq!(geometric(&[&[1.0], &[]], 0), None);
+    assert_eq!(geometric_mean(&[&[1.0], &[]], 0), None);
     let none = compared(&[1.0, 2.0], &[1.0], &[0.5, 0.5]);
     assert_eq!(gap_closed(&none, &none.contenders[1], &[0], 0), None);
 }

@@ -112,7 +112,7 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
         Some(wrench) => all.extend(wrench.force_n.iter().chain(wrench.torque_nm.iter())),
         None => bits.push(None),
     }
-    match reading.ideal() {
+    match reading.ideal_contact() {
         Some(ideal) => {
             all.extend(ideal.p_tc.iter().chain(ideal.normal_t.iter()).chain([&ideal.force_n]));
         }
@@ -519,7 +519,7 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
 }
 
 #[track_caller]
-fn replayed(path: &Path, sets: &[&str]) -> Result<replay::Replay, Fault> {
+fn replayed(path: &Path, sets: &[&str]) -> Result<replay::ReplayResult, Fault> {
     let recorded = RecordedTrial::read(path).unwrap();
     let sets: Vec<String> = sets.iter().map(|set| (*set).into()).collect();
     let experiment = replay::experiment(&recorded, path, &sets).unwrap();

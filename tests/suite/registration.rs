@@ -7,7 +7,8 @@ use nalgebra::{
 use palpate::explore::registration::hand_eye::parameters;
 use palpate::explore::registration::icp::align;
 use palpate::explore::registration::{
-    CalibrationBody, Design, HandEyeFit, Outline, RegistrationTouch, conclude, register,
+    CalibrationBody, FingerOutline, HandEyeFit, RegistrationDesign, RegistrationTouch, conclude,
+    register,
 };
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
@@ -88,7 +89,7 @@ fn touches(
     (give_m, pressed_m): (f64, f64),
     random: &mut impl rand::Rng,
 ) -> Vec<RegistrationTouch> {
-    let outline = Outline::new(robot);
+    let outline = FingerOutline::new(robot);
     let touch = |_| {
         let (p_t, outward_t) =
             outline.at(random.random_range(-0.018..0.006), random.random_range(-1.2..1.2));
@@ -165,7 +166,7 @@ proptest! {
 /// tries negative values recovers.
 #[test]
 fn a_way_grows_with_the_give() {
-    let outline = Outline::new(&pa10(true));
+    let outline = FingerOutline::new(&pa10(true));
     let x_wt = Isometry3::translation(0.0, -0.6, 0.5);
     let way_m = |give_m| outline.contact(&BALL, &x_wt, give_m).1;
     let gives_m = [-3e-4, -1e-4, -1e-7, 0.0, 1e-4, 3e-4, 6e-4];
@@ -210,7 +211,8 @@ fn a_stage_is_refused_before_it_touches() {
     let robot = Robot { chain: stage(home, finger.r_at()), finger, is_soft: true };
     let mut random = seed::stream(0, 0, "design");
     let touch = TouchSettings::default();
-    let refused = Design::new(&robot, &touch, &BALL, 20, &mut random).unwrap_err().to_string();
+    let refused =
+        RegistrationDesign::new(&robot, &touch, &BALL, 20, &mut random).unwrap_err().to_string();
     assert!(refused.starts_with("the robot reaches 0 of 0 touches of the body"), "{refused}");
     assert!(refused.contains("required are 20; a finger must be turned"), "{refused}");
 }
@@ -238,7 +240,7 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     let touch = environment.task().touch().clone();
     let believed = BALL.moved([0.3, -0.2, 0.2]);
     let mut random = seed::stream(0, 0, "design");
-    let design = Design::new(&robot, &touch, &believed, 40, &mut random).unwrap();
+    let design = RegistrationDesign::new(&robot, &touch, &believed, 40, &mut random).unwrap();
     design.check().unwrap();
     let mut probe = Simulator::new(environment).unwrap().probe(1).unwrap();
     let found = register(&mut *probe, &robot, &touch, (&believed, &design), &mut |_| ()).unwrap();
@@ -270,7 +272,7 @@ fn a_correction_moves_the_tool() {
 #[test]
 fn too_few_contacts_are_refused() {
     let robot = pa10(false);
-    let outline = Outline::new(&robot);
+    let outline = FingerOutline::new(&robot);
     let start = HandEyeFit::start(BALL);
     let none: [RegistrationTouch; 0] = [];
     // Without touches the covariance is the prior's.
@@ -288,8 +290,12 @@ fn too_few_contacts_are_refused() {
             Ok(palpate::explore::probe::Touch::Miss)
         }
     }
-    let design =
-        Design { approaches: vec![], sds: [0.0; 12], undetermined: vec![], condition: 1.0 };
+    let design = RegistrationDesign {
+        approaches: vec![],
+        sds: [0.0; 12],
+        undetermined: vec![],
+        condition: 1.0,
+    };
     let touch = TouchSettings::default();
     let refused = register(&mut Nothing, &robot, &touch, (&BALL, &design), &mut |_| ());
     let refused = refused.unwrap_err().to_string();

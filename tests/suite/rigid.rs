@@ -285,7 +285,7 @@ fn every_integrator_presses_alike() -> Result<(), Fault> {
         for (speed_m_s, ticks) in [(0.05, 170), (0.005, 100), (0.0, 250)] {
             for _ in 0..ticks {
                 let reading = body.step(&Command { qdot: vec![0.0, -speed_m_s, 0.0] })?;
-                force_n = reading.ideal().map_or(0.0, |ideal| ideal.force_n);
+                force_n = reading.ideal_contact().map_or(0.0, |ideal| ideal.force_n);
             }
         }
         Ok(force_n)

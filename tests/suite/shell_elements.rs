@@ -1,7 +1,7 @@
 //! Tests of the skin's shell elements against closed forms: a strip, a plate, a dome.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use palpate::math::banded::Banded;
+use palpate::math::banded::BandedMatrix;
 use palpate::sim::finger::shell::elastic_sheet::{Material, Sheet};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -115,7 +115,7 @@ fn a_hemisphere_yields_under_a_point_as_reissner_says() {
         let free = 1 + (rings - 1) * around;
         let held: Vec<bool> = (0..points.len()).map(|k| k >= free).collect();
         let dome = Sheet::new(points, &triangles, &held, &Material { thickness_m, ..SILICONE });
-        let mut stiffness = Banded::zeros(3 * free, 9 * around);
+        let mut stiffness = BandedMatrix::zeros(3 * free, 9 * around);
         dome.stiffness(|[p, q], block| {
             if p < free && q < free {
                 for (a, b) in (0..9).map(|k| (k / 3, k % 3)) {

@@ -6,7 +6,7 @@
 //! the slope along the nail, where there is no hinge, and its volume is valid for small motions.
 
 use nalgebra::Vector3;
-use palpate::math::banded::{Banded, Factor};
+use palpate::math::banded::{BandedFactor, BandedMatrix};
 use palpate::robot::finger::Finger;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::samples::Lattice;
@@ -55,7 +55,7 @@ struct Other {
     /// Membrane elements of the shell, without bending.
     sheet: Sheet,
     hinges: Vec<Hinge>,
-    factor: Factor,
+    factor: BandedFactor,
     free: Vec<usize>,
 }
 
@@ -76,7 +76,7 @@ impl Other {
         let places: Vec<Option<usize>> = (0..nodes.len()).map(place).collect();
         let hinges = hinges(&lattice);
         // Nodes two rows apart share a hinge.
-        let mut banded = Banded::zeros(3 * free.len(), 6 * cells[1] + 2);
+        let mut banded = BandedMatrix::zeros(3 * free.len(), 6 * cells[1] + 2);
         let mut add = |p: usize, q: usize, a: usize, b: usize, value: f64| {
             if let (Some(i), Some(j)) = (places[p], places[q]) {
                 banded.add(3 * i + a, 3 * j + b, value);

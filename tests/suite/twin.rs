@@ -9,7 +9,7 @@ use palpate::explore::probe::Touch;
 use palpate::ros::arm::RosArm;
 use palpate::ros::server::serve::services;
 use palpate::ros::settings::BackendSettings;
-use palpate::ros::topics::{CommandMessage, Service, Side, TactileMessage};
+use palpate::ros::topics::{CommandMessage, Endpoint, Service, TactileMessage};
 
 /// Compares the contact over topics with that of the body itself at the same place.
 fn compare(scene: &str, settings: BackendSettings) {
@@ -70,7 +70,7 @@ fn joints_of_other_names_are_named() {
     let mut settings = BackendSettings { connect_timeout_s: 0.3, ..BackendSettings::default() };
     settings.joints = ["A", "B", "C"].map(String::from).to_vec();
     let hub = rig.hub.clone();
-    let connect = Box::new(move || Ok(Box::new(hub.end(Side::Explorer)) as _));
+    let connect = Box::new(move || Ok(Box::new(hub.end(Endpoint::Explorer)) as _));
     let chain = rig.simulator.environment().chain().unwrap();
     let error = RosArm::connect(&settings, &chain, connect).map(|_| ()).unwrap_err();
     let error = error.to_string();
@@ -82,7 +82,7 @@ fn joints_of_other_names_are_named() {
 fn nobody_there_is_said_with_names_and_types() {
     let settings = BackendSettings { connect_timeout_s: 0.1, ..BackendSettings::default() };
     let chain = palpate::robot::arm::ArmSettings::default().chain().unwrap();
-    let connect = Box::new(|| Ok(Box::new(Hub::default().end(Side::Explorer)) as _));
+    let connect = Box::new(|| Ok(Box::new(Hub::default().end(Endpoint::Explorer)) as _));
     let error = RosArm::connect(&settings, &chain, connect).map(|_| ()).unwrap_err().to_string();
     for word in ["0.1 s", "/joint_states (sensor_msgs/msg/JointState)", "/biotac_pub", "domain"] {
         assert!(error.contains(word), "{error}");

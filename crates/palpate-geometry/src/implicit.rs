@@ -2,7 +2,7 @@
 //!
 //! A solid is a scalar field, in metres: negative inside, positive outside, zero on the surface.
 //! Every field here is 1-Lipschitz, |f(p) - f(q)| <= |p - q|, so the distance to the surface is at
-//! least |f(p)|; this makes [`Implicit::ray`] safe. Shapes and blends follow Quilez, "Distance
+//! least |f(p)|; this makes [`ImplicitSolid::ray`] safe. Shapes and blends follow Quilez, "Distance
 //! functions" (iquilezles.org/articles/distfunctions), with exact gradients.
 //!
 //! Only + - * / and square roots are used, so that values have the same bits on every machine. A
@@ -21,7 +21,7 @@ const ZERO_M: f64 = 1e-15;
 const NEWTON_STEPS: usize = 50;
 
 /// A solid given by a 1-Lipschitz field, in its own frame, metres.
-pub trait Implicit: Send + Sync {
+pub trait ImplicitSolid: Send + Sync {
     /// Returns the field and its gradient at `p`.
     fn field(&self, p: Point3<f64>) -> Field;
 

@@ -3,8 +3,8 @@
 //! A mesh file is read by [`import`](import::import), or a mesh is given as vertices and triangles.
 //! Both are repaired, with a report of the repairs, and become a valid [`Mesh`](mesh::Mesh). A
 //! [`MeshBvh`](bvh::MeshBvh), a bounding volume hierarchy, computes exact, watertight intersections
-//! of a ray, a point or a moving capsule with it. An [`Implicit`](implicit::Implicit) surface is
-//! given by a formula instead. All lengths are in metres.
+//! of a ray, a point or a moving capsule with it. An [`ImplicitSolid`](implicit::ImplicitSolid)
+//! surface is given by a formula instead. All lengths are in metres.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};

@@ -6,13 +6,13 @@
 
 use nalgebra::{Point3, Vector3, matrix, point, vector};
 
-use super::implicit::{Field, Implicit};
+use super::implicit::{Field, ImplicitSolid};
 
 /// All analytic objects; add one line per object.
-static SURFACES: &[(&str, &dyn Implicit)] = &[("container", &Container), ("bird", &Bird)];
+static SURFACES: &[(&str, &dyn ImplicitSolid)] = &[("container", &Container), ("bird", &Bird)];
 
 /// Returns the analytic object called `name`.
-pub fn by_name(name: &str) -> Option<&'static dyn Implicit> {
+pub fn by_name(name: &str) -> Option<&'static dyn ImplicitSolid> {
     SURFACES.iter().find(|(known, _)| *known == name).map(|(_, surface)| *surface)
 }
 
@@ -26,7 +26,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// where |z| < 84 mm the front is y = 40 mm √(1 - (x / 60 mm)²).
 pub struct Container;
 
-impl Implicit for Container {
+impl ImplicitSolid for Container {
     fn field(&self, p: Point3<f64>) -> Field {
         // The front slopes by 45 degrees at x = 50 mm.
         let side = Field::ellipsoid(p.coords, vector![0.060, 0.040, f64::INFINITY]);
@@ -49,7 +49,7 @@ impl Implicit for Container {
 /// mirror-symmetric.
 pub struct Bird;
 
-impl Implicit for Bird {
+impl ImplicitSolid for Bird {
     fn field(&self, p: Point3<f64>) -> Field {
         let mut field = right_half(point![p.x.abs(), p.y, p.z]);
         if p.x < 0.0 {

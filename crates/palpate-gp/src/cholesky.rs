@@ -5,7 +5,7 @@
 //! right-hand sides are solved side by side, in lanes: a vector holds the same entry of some of
 //! them, and several rows of the factor go through them at once.
 
-use super::dense::{Dense, NotPositiveDefinite};
+use super::dense::{DenseMatrix, NotPositiveDefinite};
 use crate::math::simd::{dot, widest_fn};
 use crate::math::vector::{Vector, vectorised_fn};
 
@@ -28,9 +28,9 @@ fn row(rows: &[f64], i: usize) -> &[f64] {
     &rows[start(i)..start(i + 1)]
 }
 
-impl From<&Dense> for Factor {
+impl From<&DenseMatrix> for Factor {
     /// Copies the lower triangle of a factored matrix.
-    fn from(dense: &Dense) -> Self {
+    fn from(dense: &DenseMatrix) -> Self {
         let order = dense.order();
         let mut rows = vec![0.0; start(order)];
         for j in 0..order {
@@ -256,8 +256,8 @@ mod tests {
         factor
     }
 
-    fn dense(a: &DMatrix<f64>) -> Dense {
-        let mut dense = Dense::new(a.nrows());
+    fn dense(a: &DMatrix<f64>) -> DenseMatrix {
+        let mut dense = DenseMatrix::new(a.nrows());
         for j in 0..a.nrows() {
             for (below, entry) in dense.column_mut(j).iter_mut().enumerate() {
                 *entry = a[(j + below, j)];

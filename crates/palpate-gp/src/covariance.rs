@@ -8,7 +8,7 @@
 //! * cov(f_d(a), f(b)) = 2·u_d·c′, and cov(f(a), f_d(b)) = −2·u_d·c′
 //! * cov(f_d(a), f_e(b)) = −4·u_d·u_e·c″ − 2·[d = e]·c′
 
-use super::dense::{Dense, NotPositiveDefinite};
+use super::dense::{DenseMatrix, NotPositiveDefinite};
 use super::kernel::Kernel;
 use super::observations::{NoiseRatio, Observations};
 use std::ops::Range;
@@ -47,7 +47,7 @@ pub enum CovarianceError {
 /// # Errors
 /// If an observation is not finite, or even the largest jitter is insufficient.
 pub(super) fn factor(
-    dense: &mut Dense,
+    dense: &mut DenseMatrix,
     kernel: &dyn Kernel,
     observations: &Observations,
     length_scales: &[f64],
@@ -93,7 +93,7 @@ pub(super) fn factor(
 /// Writes the covariance of heights and slopes, and returns the largest diagonal entry without the
 /// noise: the large noise of one number must not make another's pivot appear lost.
 fn with_slopes(
-    dense: &mut Dense,
+    dense: &mut DenseMatrix,
     kernel: &dyn Kernel,
     observations: &Observations,
     length_scales: &[f64],

@@ -16,7 +16,7 @@ const TILED_MAX: usize = 320;
 /// A symmetric matrix that is factored in place; only its lower triangle is read and written.
 ///
 /// In tiles the order is rounded up, and the padding is the identity.
-pub struct Dense {
+pub struct DenseMatrix {
     order: usize,
     matrix: Mat<f64>,
     inverse: Mat<f64>,
@@ -24,7 +24,7 @@ pub struct Dense {
     log_determinant: f64,
 }
 
-impl Dense {
+impl DenseMatrix {
     /// Creates a zero matrix of order `n`.
     pub fn new(n: usize) -> Self {
         let padded = if n <= TILED_MAX { n.next_multiple_of(tiles::WIDE) } else { n };

@@ -129,7 +129,7 @@ impl FitState {
                     search.scan(Some(Arc::make_mut(&mut self.scan)));
                 }
                 None if count > HALVED => {
-                    let half = sought.fit(kernel, &observations.every(2));
+                    let half = sought.fit(kernel, &observations.subsample(2));
                     in_half = half.factorisations;
                     search.climb(&sought.log_parameters(&half.hyperparameters), None);
                 }
@@ -274,7 +274,8 @@ impl<'a> Search<'a> {
             };
             let sides = bounds.lower.iter().zip(bounds.upper);
             let is_apart = climb.best().x.iter().zip(&best.x).zip(sides).any(apart);
-            let is_hopeless = climb.is_measured() && climb.upper_bound(HOPE) < best.score;
+            let is_hopeless =
+                climb.has_curvature_estimate() && climb.upper_bound(HOPE) < best.score;
             !(is_lower && (is_hopeless || !is_apart))
         };
         let start = BfgsClimb::new(*bounds, start, curvature, MANNER);

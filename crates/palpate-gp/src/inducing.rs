@@ -9,7 +9,7 @@
 //! residual is the error of the approximation.
 
 use super::covariance::CovarianceError;
-use super::dense::{Dense, NotPositiveDefinite};
+use super::dense::{DenseMatrix, NotPositiveDefinite};
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::posterior::Posterior;
@@ -72,8 +72,8 @@ impl Posterior {
 }
 
 /// Copies the lower triangle into a dense matrix.
-fn dense(matrix: MatRef<f64>) -> Dense {
-    let mut dense = Dense::new(matrix.nrows());
+fn dense(matrix: MatRef<f64>) -> DenseMatrix {
+    let mut dense = DenseMatrix::new(matrix.nrows());
     for (j, column) in matrix.col_iter().enumerate() {
         let below = column.iter().skip(j);
         dense.column_mut(j).iter_mut().zip(below).for_each(|(to, entry)| *to = *entry);

@@ -63,7 +63,7 @@ fn is_zero(value: &f64) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub struct SquaredExponential;
 
-impl Radial for SquaredExponential {
+impl RadialKernel for SquaredExponential {
     #[inline(always)]
     fn correlation_slope(r2: f64) -> (f64, f64) {
         let correlation = exp_of_negative(-0.5 * r2);
@@ -84,7 +84,7 @@ impl Radial for SquaredExponential {
 #[derive(Clone, Copy, Debug)]
 pub struct Matern32;
 
-impl Radial for Matern32 {
+impl RadialKernel for Matern32 {
     #[inline(always)]
     fn correlation_slope(r2: f64) -> (f64, f64) {
         let s = (3.0 * r2).sqrt();
@@ -97,7 +97,7 @@ impl Radial for Matern32 {
 #[derive(Clone, Copy, Debug)]
 pub struct Matern52;
 
-impl Radial for Matern52 {
+impl RadialKernel for Matern52 {
     #[inline(always)]
     fn correlation_slope(r2: f64) -> (f64, f64) {
         let s = (5.0 * r2).sqrt();
@@ -125,7 +125,7 @@ fn bounded(value: f64) -> f64 {
 /// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
 ///
 /// A new kernel is a type with this trait and one line in [`KERNELS`].
-pub trait Radial: Send + Sync {
+pub trait RadialKernel: Send + Sync {
     /// Correlation c(r²), with c(0) = 1, and its derivative dc/d(r²). Branch-free and
     /// `#[inline(always)]`, so that loops over it are vectorised.
     fn correlation_slope(r2: f64) -> (f64, f64);
@@ -150,7 +150,7 @@ pub trait Kernel: Send + Sync {
     /// Replaces each r² by c(r²) and writes dc/d(r²) into `slopes`.
     fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]);
 
-    /// Whether it supports observed slopes; see [`Radial::HAS_SLOPES`].
+    /// Whether it supports observed slopes; see [`RadialKernel::HAS_SLOPES`].
     fn has_slopes(&self) -> bool;
 
     /// Replaces each r² by c(r²) and writes its first three derivatives with respect to r².
@@ -158,13 +158,13 @@ pub trait Kernel: Send + Sync {
 }
 
 widest_fn! {
-    fn correlate<'a, R: Radial>(r2: &'a mut [f64]) -> () {
+    fn correlate<'a, R: RadialKernel>(r2: &'a mut [f64]) -> () {
         r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0);
     }
 }
 
 widest_fn! {
-    fn correlate_slope<'a, R: Radial>(r2: &'a mut [f64], slopes: &'a mut [f64]) -> () {
+    fn correlate_slope<'a, R: RadialKernel>(r2: &'a mut [f64], slopes: &'a mut [f64]) -> () {
         for (r2, slope) in r2.iter_mut().zip(slopes) {
             (*r2, *slope) = R::correlation_slope(*r2);
         }
@@ -173,14 +173,14 @@ widest_fn! {
 
 widest_fn! {
     /// Writes the second and third derivatives.
-    fn curve<'a, R: Radial>(r2: &'a [f64], second: &'a mut [f64], third: &'a mut [f64]) -> () {
+    fn curve<'a, R: RadialKernel>(r2: &'a [f64], second: &'a mut [f64], third: &'a mut [f64]) -> () {
         for (r2, (second, third)) in r2.iter().zip(second.iter_mut().zip(third)) {
             (*second, *third) = R::curvatures(*r2);
         }
     }
 }
 
-impl<R: Radial> Kernel for R {
+impl<R: RadialKernel> Kernel for R {
     fn correlate(&self, r2: &mut [f64]) {
         correlate::<R>(r2);
     }

@@ -3,7 +3,7 @@
 use super::covariance;
 use super::covariance::CovarianceError;
 use super::covariance::{Correlations, batches};
-use super::dense::Dense;
+use super::dense::DenseMatrix;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{NoiseRatio, Observations};
 use super::search_box::MeanModel;
@@ -22,7 +22,7 @@ pub struct Likelihood<'a> {
     kernel: &'static dyn Kernel,
     mean: MeanModel,
     observations: &'a Observations,
-    dense: Dense,
+    dense: DenseMatrix,
     /// Buffer: L⁻¹·y, then A⁻¹·y if a gradient is requested.
     weights: Vec<f64>,
     scratch: Vec<f64>,
@@ -64,7 +64,7 @@ impl<'a> Likelihood<'a> {
             kernel,
             mean,
             observations,
-            dense: Dense::new(count),
+            dense: DenseMatrix::new(count),
             weights: Vec::with_capacity(count),
             scratch: Vec::with_capacity(count),
             pair: Default::default(),
@@ -141,7 +141,7 @@ impl<'a> Likelihood<'a> {
         let order = self.observations.order();
         let value = of_height(fit, signal_sd, order, self.dense.log_determinant());
         let logs: f64 = length_scales.iter().map(|length| length.ln()).sum();
-        value + self.observations.sloped() as f64 * logs
+        value + self.observations.slope_count() as f64 * logs
     }
 
     fn factor(&mut self, length_scales: &[f64], noise: NoiseRatio) -> Result<(), CovarianceError> {

@@ -119,7 +119,7 @@ impl Observations {
     }
 
     /// Returns every `step`th observation.
-    pub fn every(&self, step: usize) -> Self {
+    pub fn subsample(&self, step: usize) -> Self {
         let mut some = Self::new(self.dimension());
         for i in (0..self.len()).step_by(step.max(1)) {
             let place: Vec<f64> = self.place(i).collect();
@@ -173,7 +173,7 @@ impl Observations {
     }
 
     /// Returns the number of places with a slope.
-    pub fn sloped(&self) -> usize {
+    pub fn slope_count(&self) -> usize {
         self.slopes.len() / self.dimension().max(1)
     }
 

@@ -5,7 +5,7 @@ use super::covariance;
 use super::covariance::Correlations;
 use super::covariance::CovarianceError;
 use super::covariance::DerivativeCovariance;
-use super::dense::Dense;
+use super::dense::DenseMatrix;
 use super::dense::NotPositiveDefinite;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{Observation, Observations};
@@ -43,7 +43,7 @@ impl Posterior {
         hyperparameters: Hyperparameters,
         observations: Observations,
     ) -> Result<Self, CovarianceError> {
-        let mut dense = Dense::new(observations.order());
+        let mut dense = DenseMatrix::new(observations.order());
         let noise_ratio = hyperparameters.noise_ratio();
         let lengths = &hyperparameters.length_scales;
         let buffer = &mut Correlations::default();
@@ -58,7 +58,7 @@ impl Posterior {
         kernel: &'static dyn Kernel,
         hyperparameters: Hyperparameters,
         observations: Observations,
-        covariance: &Dense,
+        covariance: &DenseMatrix,
     ) -> Self {
         let factor = Factor::from(covariance);
         let (whitened, weights) = (Vec::new(), Vec::new());

@@ -5,7 +5,7 @@ use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest_dot;
 
 /// A posterior with the reference places at which its variance is summed.
-pub struct Reduction<'a> {
+pub struct VarianceReduction<'a> {
     posterior: &'a Posterior,
     references: Observations,
     /// Weight of each reference place.
@@ -14,7 +14,7 @@ pub struct Reduction<'a> {
     whitened: Vec<f64>,
 }
 
-impl<'a> Reduction<'a> {
+impl<'a> VarianceReduction<'a> {
     /// Prepares for `references`: n² operations per reference.
     pub fn new<'b>(posterior: &'a Posterior, references: impl Iterator<Item = &'b [f64]>) -> Self {
         let mut places = Observations::new(posterior.observations().dimension());

@@ -3,7 +3,7 @@
 //! A search runs over their logarithms: of each length scale, of the noise ratio, and of the slope
 //! noise ratio if there is one. The signal's standard deviation follows from these.
 
-use super::dense::Dense;
+use super::dense::DenseMatrix;
 use super::kernel::Hyperparameters;
 use super::observations::{NoiseRatio, Observations};
 use schemars::JsonSchema;
@@ -196,7 +196,7 @@ impl MeanModel {
         self,
         observations: &Observations,
         length_scales: &[f64],
-        factored: &Dense,
+        factored: &DenseMatrix,
         [weights, observed]: [&mut Vec<f64>; 2],
     ) -> f64 {
         let heights = observations.heights();

@@ -6,7 +6,7 @@ use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
 use super::settings::BackendSettings;
 use super::status::ArmStatus;
-use super::topics::{Service, Side, Topic};
+use super::topics::{Endpoint, Service, Topic};
 use super::transport::{Connect, cannot_open};
 use palpate_explore::backend::interlock::check_start;
 use palpate_explore::backend::pace::RealTimePacer;
@@ -44,7 +44,7 @@ impl RosArm {
     /// # Errors
     /// The errors of [`connect`](Self::connect), and an error if this build lacks the transport.
     pub fn connect_over(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
-        let open = super::connect(settings, Side::Explorer, Service::COMMON.into())?;
+        let open = super::connect(settings, Endpoint::Explorer, Service::COMMON.into())?;
         Self::connect(settings, chain, open)
     }
 

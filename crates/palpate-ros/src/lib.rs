@@ -46,7 +46,7 @@ use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
 pub use ros1::disable_tls_certificates;
 use settings::{BackendKind, BackendSettings};
-use topics::{Service, Side};
+use topics::{Endpoint, Service};
 use transport::Connect;
 
 /// Returns a function that opens the transport of `settings`, to be called in the thread that will
@@ -56,7 +56,7 @@ use transport::Connect;
 /// If this build lacks the transport.
 pub fn connect(
     settings: &BackendSettings,
-    side: Side,
+    side: Endpoint,
     services: Vec<Service>,
 ) -> Result<Connect, InputError> {
     let owned = settings.clone();

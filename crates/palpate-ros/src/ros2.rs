@@ -7,7 +7,7 @@ use super::message::{
 };
 use super::network::network;
 use super::settings::{BackendSettings, MappingKind};
-use super::topics::{CommandMessage, Service, Side, TactileMessage, Topic, Topics};
+use super::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic, Topics};
 use super::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
 };
@@ -50,7 +50,7 @@ pub struct Ros2 {
     context: Context,
     node: Node,
     topics: Topics,
-    side: Side,
+    side: Endpoint,
     poll: Poll,
     events: Events,
     waker: Arc<mio1::Waker>,
@@ -109,7 +109,7 @@ impl Ros2 {
     /// If the network cannot be joined.
     pub fn open(
         settings: &BackendSettings,
-        side: Side,
+        side: Endpoint,
         services: Vec<Service>,
     ) -> Result<Self, InputError> {
         let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
@@ -122,8 +122,8 @@ impl Ros2 {
         let context = Context::from_domain_participant(participant)
             .map_err(cannot_open("a DDS participant"))?;
         let name = match side {
-            Side::Explorer => "explorer",
-            Side::Arm => "arm",
+            Endpoint::Explorer => "explorer",
+            Endpoint::Arm => "arm",
         };
         let name = NodeName::new("/palpate", name).map_err(cannot_open("a node"))?;
         let options = NodeOptions::new().start_parameter_services(false);
@@ -149,10 +149,10 @@ impl Ros2 {
         };
         end.topics()?;
         match side {
-            Side::Explorer => {
+            Endpoint::Explorer => {
                 end.clients = services.into_iter().map(|service| (service, None)).collect();
             }
-            Side::Arm => services.into_iter().try_for_each(|service| end.serve(service))?,
+            Endpoint::Arm => services.into_iter().try_for_each(|service| end.serve(service))?,
         }
         Ok(end)
     }
@@ -161,7 +161,7 @@ impl Ros2 {
         self.topic::<JointState>(Topic::Joints)?;
         self.topic::<WrenchStamped>(Topic::Wrench)?;
         self.topic::<DiagnosticArray>(Topic::Status)?;
-        if self.side == Side::Explorer {
+        if self.side == Endpoint::Explorer {
             // A status that is published on change may have been published before this side
             // started.
             self.subscribe::<DiagnosticArray>(Topic::Status, latched())?;

@@ -26,7 +26,7 @@ pub enum Topic {
 
 /// Side of the topics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum Endpoint {
     /// The explorer, which sends commands and receives readings.
     Explorer,
     /// The arm's computer or a simulated robot.
@@ -39,8 +39,8 @@ impl Topic {
         [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command];
 
     /// Returns the side that publishes it.
-    pub fn publisher(self) -> Side {
-        if self == Self::Command { Side::Explorer } else { Side::Arm }
+    pub fn publisher(self) -> Endpoint {
+        if self == Self::Command { Endpoint::Explorer } else { Endpoint::Arm }
     }
 
     /// Returns its key in `[backend.topics]`.

@@ -23,7 +23,7 @@ pub fn errors() -> impl Iterator<Item = &'static Measure> {
 /// A number with its 95 % bootstrap interval, `None` for a single trial; infinite if the goal is
 /// not reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct IntervalEstimate {
     /// Value over all trials.
     pub value: f64,
     /// Interval that contains 95 % of the bootstrap samples.
@@ -44,13 +44,13 @@ pub struct EqualError<'a> {
     /// Baseline's median error after `report.goal_touches` touches.
     pub goal: f64,
     /// Touches of the planner to the goal.
-    pub touches: Estimate,
+    pub touches: IntervalEstimate,
     /// Touches of the baseline to the goal.
     pub baseline_touches: f64,
     /// Ratio of the two touch counts.
-    pub ratio: Estimate,
+    pub ratio: IntervalEstimate,
     /// Ratio of the median lateral path lengths from the initial touches to the goal.
-    pub path_ratio: Estimate,
+    pub path_ratio: IntervalEstimate,
 }
 
 /// Compares every planner with every baseline in every error that both have.
@@ -92,7 +92,7 @@ pub fn equal_error<'a>(
     let estimate = |of: fn([[f64; 2]; 2]) -> f64| {
         let values = samples.iter().map(|met| of(*met)).collect();
         let interval = (!samples.is_empty()).then(|| central_95(values));
-        Estimate { value: of(found), interval }
+        IntervalEstimate { value: of(found), interval }
     };
     Some(EqualError {
         planner,

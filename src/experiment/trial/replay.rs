@@ -14,7 +14,7 @@ use std::path::Path;
 
 /// Result of a replay.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Replay {
+pub struct ReplayResult {
     /// Touches with identical decision and belief, byte for byte.
     pub touches: u32,
     /// Whether the recording ends before its trial.
@@ -82,7 +82,7 @@ pub fn experiment(
 /// # Errors
 /// If its planner is unknown, a touch in it cannot be read, or the robot cannot be moved to the
 /// recording's start.
-pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Replay, Fault> {
+pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<ReplayResult, Fault> {
     let about = &recorded.about;
     let planner = simulation.planner(&about.planner).ok_or_else(|| {
         let name = &about.planner;
@@ -133,7 +133,7 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
             (!is_same).then_some(end)
         }
     };
-    Ok(Replay { touches, is_cut, difference })
+    Ok(ReplayResult { touches, is_cut, difference })
 }
 
 /// Returns the rows of the touches made before the recording started.

@@ -5,7 +5,7 @@ use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{self, Axis, Length};
 use crate::report::relief::Space;
-use crate::report::replay::{self, Grid, Replay, drawn_caption};
+use crate::report::replay::{self, BeliefReplay, Grid, drawn_caption};
 use crate::report::style;
 use palpate_explore::task::Zone;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -62,7 +62,7 @@ struct Frame {
 }
 
 impl Frame {
-    fn of(replay: &Replay, places: &[&[f64]]) -> Self {
+    fn of(replay: &BeliefReplay, places: &[&[f64]]) -> Self {
         let predictions = replay.surface.predict(places.iter().copied());
         let drawn = replay.is_drawn(places.iter().copied()).into_iter().zip(&predictions);
         Self {
@@ -90,7 +90,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     let mut beliefs = Vec::new();
     for name in names() {
         let frame = |&count: &u32| {
-            let replay = Replay::new(run, name, count)?;
+            let replay = BeliefReplay::new(run, name, count)?;
             anyhow::Ok(replay.map(|replay| Frame::of(&replay, &places)))
         };
         let frames: Vec<Option<Frame>> =
@@ -129,7 +129,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
         let contacts = touches.iter().map(|touch| contact(zone, touch, unit));
         json!({
             "name": name,
-            "colours": style::on_both(style::planner(&experiment.planners, name)),
+            "colours": style::light_and_dark(style::planner(&experiment.planners, name)),
             "contacts": contacts.collect::<Vec<_>>(),
             "frames": frames.iter().map(frame).collect::<Vec<_>>(),
         })

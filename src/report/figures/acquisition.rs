@@ -7,7 +7,7 @@ use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::Area;
 use crate::report::heat_map::{HeatMap, MapValue};
 use crate::report::legend::{FigureLayout, Swatch, miss_entry};
-use crate::report::replay::{Replay, drawn_caption};
+use crate::report::replay::{BeliefReplay, drawn_caption};
 use crate::report::style::{self, INITIAL, PLANNED};
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
@@ -39,9 +39,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     else {
         return Ok(None);
     };
-    let Some(before) = Replay::new(run, planner, count)? else { return Ok(None) };
-    let after = Replay::new(run, planner, count + 1)?;
-    let replays: Vec<Replay> = std::iter::once(before).chain(after).collect();
+    let Some(before) = BeliefReplay::new(run, planner, count)? else { return Ok(None) };
+    let after = BeliefReplay::new(run, planner, count + 1)?;
+    let replays: Vec<BeliefReplay> = std::iter::once(before).chain(after).collect();
     Ok(match zone.dimension() {
         1 => draw_curves((run, zone), planner, &replays),
         _ => draw_maps((run, zone), planner, &replays),
@@ -54,14 +54,14 @@ fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f6
 }
 
 /// Returns the place of the largest standard deviation: that of the plan, or else of `read`.
-fn maximum<'a>(replay: &'a Replay, read: &'a [MapValue]) -> Option<&'a [f64]> {
+fn maximum<'a>(replay: &'a BeliefReplay, read: &'a [MapValue]) -> Option<&'a [f64]> {
     let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.fallback.is_none());
     let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let planned = next.and_then(|next| next.target.place());
     planned.or_else(|| largest().map(|(place, ..)| place.as_slice()))
 }
 
-fn title(planner: &str, replay: &Replay) -> String {
+fn title(planner: &str, replay: &BeliefReplay) -> String {
     format!("{planner}, after {} touches", replay.touches.len())
 }
 
@@ -81,7 +81,11 @@ const EQUAL_HEIGHT_PX: f64 = 420.0;
 /// Distance between panels, and between a belief and its standard deviation.
 const GAPS_PX: (f64, f64) = (66.0, 40.0);
 
-fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
+fn draw_curves(
+    (run, zone): (&Run, &Zone),
+    planner: &str,
+    replays: &[BeliefReplay],
+) -> Option<String> {
     let unit = Length::of(zone);
     let read: Vec<Vec<MapValue>> =
         replays.iter().map(|replay| readings(zone.grid(STEPS), replay)).collect();
@@ -120,7 +124,7 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
     Some(sheet.canvas.finish())
 }
 
-fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<MapValue> {
+fn readings(places: Vec<Vec<f64>>, replay: &BeliefReplay) -> Vec<MapValue> {
     let mut scratch = Scratch::default();
     let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));
     let read = |(place, is_drawn): (Vec<f64>, bool)| {
@@ -135,7 +139,11 @@ const MAP_PX: (f64, f64) = (400.0, 640.0);
 /// Smallest distance between maps: below them is the label of the colour bar.
 const MAP_STEP_PX: f64 = 330.0;
 
-fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
+fn draw_maps(
+    (run, zone): (&Run, &Zone),
+    planner: &str,
+    replays: &[BeliefReplay],
+) -> Option<String> {
     let unit = Length::of(zone);
     let [x, z] = [zone.x_m, zone.z_m?].map(|side| side.map(|end| end * unit.per_m));
     let mut entries = vec![

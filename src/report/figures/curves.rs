@@ -5,7 +5,7 @@ use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::legend::{FigureLayout, Swatch, miss_entry};
-use crate::report::replay::{self, NO_BELIEF, Replay, drawn_caption};
+use crate::report::replay::{self, BeliefReplay, NO_BELIEF, drawn_caption};
 use crate::report::style::{self, FAINT_INK, INITIAL, INK, PLANNED, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
@@ -52,8 +52,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let area = sheet.area(column, row as f64);
             let panel = Panel { area, ..shape.clone() };
             let canvas = &mut sheet.canvas;
-            let replay = Replay::new(run, planner, count)?;
-            let score = replay.as_ref().map_or(NO_BELIEF.into(), Replay::score);
+            let replay = BeliefReplay::new(run, planner, count)?;
+            let score = replay.as_ref().map_or(NO_BELIEF.into(), BeliefReplay::score);
             let is_last_row = row + 1 == planners.len();
             panel.frame(canvas);
             let x_label = if is_last_row { unit.named("x") } else { String::new() };
@@ -110,7 +110,7 @@ pub(super) fn draw_belief(
     canvas: &mut Canvas,
     panel: &Panel,
     run: &Run,
-    replay: &Replay,
+    replay: &BeliefReplay,
     colour: &str,
 ) {
     let per_m = Length::of(replay.belief.zone()).per_m;
@@ -137,7 +137,7 @@ pub(super) fn draw_belief(
 }
 
 /// Returns (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
-fn read(replay: &Replay) -> Vec<(f64, f64, f64)> {
+fn read(replay: &BeliefReplay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
     let places = replay.belief.zone().grid(STEPS);
     let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));

@@ -6,7 +6,7 @@ use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, miss_entry, touch_entries};
 use crate::report::relief::{ON_RELIEF, Relief, ReliefPanel, Space};
-use crate::report::replay::{self, Grid, NO_BELIEF, Replay, drawn_caption};
+use crate::report::replay::{self, BeliefReplay, Grid, NO_BELIEF, drawn_caption};
 use crate::report::style;
 use nalgebra::Vector3;
 use palpate_explore::task::Zone;
@@ -65,8 +65,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         for (column, &count) in counts.iter().enumerate() {
             let panel = ReliefPanel::new(unit, sheet.area(column, row as f64), space);
             let canvas = &mut sheet.canvas;
-            let replay = Replay::new(run, planner, count)?;
-            let score = replay.as_ref().map_or(NO_BELIEF.into(), Replay::score);
+            let replay = BeliefReplay::new(run, planner, count)?;
+            let score = replay.as_ref().map_or(NO_BELIEF.into(), BeliefReplay::score);
             panel.frame(canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
                 let mut scratch = Scratch::default();
@@ -105,7 +105,13 @@ fn space(run: &Run, zone: &Zone) -> Option<Space> {
 
 /// Marks touches: a point for a contact, hollow if the surface hides it; a diamond at the back for
 /// a miss.
-fn mark(panel: &ReliefPanel, canvas: &mut Canvas, zone: &Zone, relief: &Relief, replay: &Replay) {
+fn mark(
+    panel: &ReliefPanel,
+    canvas: &mut Canvas,
+    zone: &Zone,
+    relief: &Relief,
+    replay: &BeliefReplay,
+) {
     for (touch, colour) in replay.marks() {
         match replay::contact(zone, touch) {
             Some((place, height)) => {

@@ -94,8 +94,8 @@ fn belief(
             axis.fraction(sd_m * MM.per_m).clamp(0.0, 1.0)
         });
         match shares.iter().sum::<f64>() / 3.0 {
-            share if share.is_finite() => style::lit(&style::DEVIATION, share, light),
-            _ => style::lit(&UNKNOWN, 0.0, light),
+            share if share.is_finite() => style::shaded_colour(&style::DEVIATION, share, light),
+            _ => style::shaded_colour(&UNKNOWN, 0.0, light),
         }
     };
     let relief = view.relief(canvas, &frame.mesh, colour);

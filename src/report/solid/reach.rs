@@ -40,7 +40,7 @@ pub fn picture(
     let entries = [
         (spots, Swatch::Box(LEGEND[0]), "reachable"),
         (spots, Swatch::Box(LEGEND[1]), "not reachable by a straight approach"),
-        (sides, Swatch::Circle(style::visible(MARKS[0])), "possible direction of approach"),
+        (sides, Swatch::Circle(style::visible_touch(MARKS[0])), "possible direction of approach"),
         (sides, Swatch::Cross(MARKS[1]), "impossible direction of approach"),
     ];
     let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
@@ -53,7 +53,7 @@ pub fn picture(
         let canvas = &mut sheet.canvas;
         view.title(canvas, "reachable surface", "");
         let relief = view.relief(canvas, &drawn, |triangle, light| {
-            style::lit(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
+            style::shaded_colour(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
         });
         canvas.grouped(ON_RELIEF, |canvas| {
             for (p_w, is_reached) in sides {
@@ -61,7 +61,9 @@ pub fn picture(
                 let colour = MARKS[usize::from(!is_reached)];
                 match relief.hides(&view.camera, &p_w.coords) {
                     true => {}
-                    false if *is_reached => canvas.circle(at, RADIUS_PX, &style::visible(colour)),
+                    false if *is_reached => {
+                        canvas.circle(at, RADIUS_PX, &style::visible_touch(colour))
+                    }
                     false => canvas.cross(at, colour),
                 }
             }

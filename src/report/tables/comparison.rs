@@ -3,9 +3,9 @@
 
 use crate::experiment::measure::{Direction, MEASURES, Measure, measures_with_columns};
 use crate::experiment::statistics::comparison::PairedComparison;
-use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
+use crate::experiment::statistics::equal_error::{EqualError, IntervalEstimate, errors};
 use crate::experiment::store::Run;
-use crate::report::table::{Cell, Column, Table, digits, titled, with_interval};
+use crate::report::table::{Cell, Column, Table, digits, title_with_unit, with_interval};
 
 /// Returns the table of `comparison.csv`, with a row per planner, baseline and measure after the
 /// last touch.
@@ -22,7 +22,7 @@ pub fn comparison_file(found: &[PairedComparison]) -> Table {
             .note("Fraction of the trials in which the planner is better; a tie counts half."),
     ]);
     for PairedComparison { planner, baseline, measure, paired } in found {
-        let difference = Estimate { value: paired.mean, interval: paired.interval };
+        let difference = IntervalEstimate { value: paired.mean, interval: paired.interval };
         let names = [*planner, *baseline, measure.id].map(Cell::from);
         let numbers = [paired.trials.into(), Cell::estimate(difference), paired.won.into()];
         table.rows.push(names.into_iter().chain(numbers).collect());
@@ -33,7 +33,7 @@ pub fn comparison_file(found: &[PairedComparison]) -> Table {
 /// Returns a table for each baseline: a row for each measure, a column for each other planner.
 pub fn comparisons(run: &Run, found: &[PairedComparison]) -> Vec<Table> {
     let table = |baseline: &str| {
-        let rows = MEASURES.iter().map(|measure| (titled(measure), measure));
+        let rows = MEASURES.iter().map(|measure| (title_with_unit(measure), measure));
         let cell = |measure: &&Measure, planner: &&String| {
             let is_it = |it: &&PairedComparison| {
                 (it.baseline, it.planner, it.measure.id) == (baseline, planner, measure.id)
@@ -142,7 +142,7 @@ fn effort(equal: &EqualError, most: u32) -> Cell {
         let some = if low.is_finite() { format!(", at least {low:.0}") } else { String::new() };
         return format!("{}{some}", touches(f64::INFINITY, most)).into();
     }
-    let shown = |estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
+    let shown = |estimate: &IntervalEstimate, shown: &dyn Fn(f64) -> String| {
         with_interval(estimate.value, estimate.interval, shown)
     };
     let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };

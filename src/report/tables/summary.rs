@@ -5,7 +5,7 @@ use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
 use crate::experiment::store::Run;
-use crate::report::table::{Cell, Column, Table, shown, titled};
+use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
 use serde_json::{Value, json};
 
 /// Returns a table with a row for each planner and tabled touch count; columns without a value are
@@ -109,7 +109,7 @@ pub fn claims(run: &Run) -> Table {
                 once(&claim.source),
                 once(&claim.text),
                 format!("{} touches", claim.touches).into(),
-                format!("{kind} {}", titled(measure)).into(),
+                format!("{kind} {}", title_with_unit(measure)).into(),
             ];
             let value = |planner: &String| {
                 let value = representative_value(&run.rows, planner, claim.touches, measure);

@@ -104,7 +104,7 @@ impl Patches {
     }
 
     /// Allocates memory for [`near`](Self::near).
-    pub fn vicinity(&self) -> NearbyPatches {
+    pub fn nearby_patches(&self) -> NearbyPatches {
         NearbyPatches { near: Vec::with_capacity(self.patches.len()), ..NearbyPatches::default() }
     }
 

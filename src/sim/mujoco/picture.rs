@@ -36,7 +36,9 @@ pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), InputEr
     renderer.sync_data(&mut data).map_err(draw)?;
     renderer.render().map_err(draw)?;
     renderer.save_rgb(path).map_err(|cause| match cause {
-        RendererError::IoError(cause) => InputError::new(format!("cannot write the picture: {cause}")),
+        RendererError::IoError(cause) => {
+            InputError::new(format!("cannot write the picture: {cause}"))
+        }
         cause => draw(cause),
     })
 }

@@ -172,7 +172,7 @@ fn pressed(environment: &Arc<Environment>) -> anyhow::Result<Option<Vec<f64>>> {
     let ticks = |way_m: f64, speed_m_s: f64| (way_m / (speed_m_s * PERIOD_S)).round() as usize;
     let mut go = |speed_m_s: f64, count: usize| {
         let command = Command { qdot: ahead_w.scale(speed_m_s).as_slice().into() };
-        let force = |_| Ok(body.step(&command)?.ideal().map_or(0.0, |ideal| ideal.force_n));
+        let force = |_| Ok(body.step(&command)?.ideal_contact().map_or(0.0, |ideal| ideal.force_n));
         (0..count).map(force).collect::<anyhow::Result<Vec<f64>>>()
     };
     go(TRAVEL_M_S, ticks(far_m, TRAVEL_M_S))?;

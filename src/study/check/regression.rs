@@ -238,7 +238,7 @@ impl CheckOptions {
         all.map(|(((judged, _), sequence), &is_sure)| MeasureResult {
             judged,
             verdict: self.verdict(judged, sequence, is_sure),
-            trials_needed: sequence.wanted(judged.allowed(self.tolerance), self.alpha),
+            trials_needed: sequence.sample_size(judged.allowed(self.tolerance), self.alpha),
             sequence: *sequence,
         })
         .collect()

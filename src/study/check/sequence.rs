@@ -64,7 +64,7 @@ impl ConfidenceSequence {
 
     /// Number of values for an interval with half width `half`; `None` if the spread is unknown or
     /// the number exceeds 100 000.
-    pub fn wanted(&self, half: f64, alpha: f64) -> Option<usize> {
+    pub fn sample_size(&self, half: f64, alpha: f64) -> Option<usize> {
         let sd = self.sd?;
         (2..TRIALS_MAX).find(|&n| sd * width(n, alpha) <= half * (n as f64).sqrt())
     }

@@ -6,7 +6,7 @@ use palpate::experiment::Experiment;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::explore::probe::{Contact, SweptVolume, Touch};
-use palpate::explore::whole_object::{ImplicitSurface, Scope, SpatialGpSettings};
+use palpate::explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::robot::Finger;
@@ -51,7 +51,7 @@ pub fn belief_with(settings: SpatialGpSettings, ball_m: f64, radius_m: f64) -> I
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
     let task = Task::new(ball, TouchSettings::default(), &finger).unwrap();
-    ImplicitSurface::new(Scope::new(ball, &task, (&finger, false)), settings)
+    ImplicitSurface::new(ExplorationSetup::new(ball, &task, (&finger, false)), settings)
 }
 
 pub fn approach(belief: &ImplicitSurface, aim: &Aim) -> Approach {

@@ -2,7 +2,7 @@
 
 use palpate::error::InputError;
 use palpate::ros::message::TriggerResponse;
-use palpate::ros::topics::{Service, Side, Topic};
+use palpate::ros::topics::{Endpoint, Service, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -20,7 +20,7 @@ struct Ends {
 
 struct End {
     id: u64,
-    side: Side,
+    side: Endpoint,
     /// Queue of incoming messages; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
 }
@@ -29,14 +29,14 @@ struct End {
 pub struct Memory {
     hub: Hub,
     id: u64,
-    side: Side,
+    side: Endpoint,
     inlet: Sender<Option<Delivery>>,
     outlet: Receiver<Option<Delivery>>,
 }
 
 impl Hub {
     /// Creates an end on one side.
-    pub fn end(&self, side: Side) -> Memory {
+    pub fn end(&self, side: Endpoint) -> Memory {
         let (inlet, outlet) = channel();
         let mut ends = self.lock();
         let id = ends.count;

@@ -14,7 +14,7 @@ use palpate::ros::message::TriggerResponse;
 use palpate::ros::server::failure::by_name;
 use palpate::ros::server::serve::{Event, Injection, SimulatedRobotServer};
 use palpate::ros::settings::BackendSettings;
-use palpate::ros::topics::{Service, Side, Topic};
+use palpate::ros::topics::{Endpoint, Service, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use palpate::sim::finger::effects::wrench::WrenchEffect;
 use palpate::sim::simulator::Simulator;
@@ -180,7 +180,7 @@ impl Rig {
         let (end, stopped, values) = (hub.clone(), Arc::clone(&stop), Arc::clone(&events));
         let settings_of_arm = settings.clone();
         let thread = std::thread::spawn(move || {
-            let connect = Box::new(move || Ok(Box::new(end.end(Side::Arm)) as _));
+            let connect = Box::new(move || Ok(Box::new(end.end(Endpoint::Arm)) as _));
             let mut twin = SimulatedRobotServer::new(
                 Box::new(body),
                 &chain,
@@ -198,7 +198,7 @@ impl Rig {
     }
 
     pub fn lab(&self) -> Result<Arc<RosArm>, LinkFault> {
-        let (end, wire) = (self.hub.end(Side::Explorer), self.wire.clone());
+        let (end, wire) = (self.hub.end(Endpoint::Explorer), self.wire.clone());
         let connect = Box::new(move || Ok(Box::new(Wired { end, wire }) as _));
         RosArm::connect(&self.settings, &self.simulator.environment().chain().unwrap(), connect)
     }

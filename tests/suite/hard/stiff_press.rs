@@ -182,7 +182,7 @@ impl WallPress {
 }
 
 fn force_n(reading: &Reading) -> f64 {
-    reading.ideal().map_or(0.0, |ideal| ideal.force_n)
+    reading.ideal_contact().map_or(0.0, |ideal| ideal.force_n)
 }
 
 /// Depth at which the skin bears [`FORCE_N`].

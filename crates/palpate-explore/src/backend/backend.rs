@@ -119,7 +119,7 @@ impl Reading {
     }
 
     /// Returns the exact contact of a simulator, for scenes without a simulated tactile sensor.
-    pub fn ideal(&self) -> Option<IdealContact> {
+    pub fn ideal_contact(&self) -> Option<IdealContact> {
         self.samples.iter().find_map(|sample| match sample {
             Sample::Ideal(contact) => Some(*contact),
             _ => None,

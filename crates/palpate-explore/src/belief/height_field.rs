@@ -120,7 +120,7 @@ impl HeightField {
             // Thinned evenly, so that some touches are close to each other and determine the noise;
             // the same ones for as long as possible, so that the last fit remains a valid start.
             Some(most) => {
-                let thinned = self.contacts.every(self.contacts.len() / most);
+                let thinned = self.contacts.subsample(self.contacts.len() / most);
                 self.kernels.fit(&search_box, &thinned)
             }
         };

@@ -6,7 +6,7 @@ pub use height_field::HeightField;
 
 use super::gp_settings::GpSettings;
 use super::probe::{SweptVolume, Touch};
-use super::whole_object::{ImplicitSurface, Scope, SpatialGpSettings};
+use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use crate::robot::Finger;
 use crate::task::{Approach, Region, Target, Task};
 use palpate_gp::Posterior;
@@ -34,7 +34,7 @@ impl Belief {
         match task.region() {
             Region::Zone(zone) => HeightField::new(zone.clone(), gp.clone()).into(),
             Region::Ball(ball) => {
-                let scope = Scope::new(*ball, task, (finger, is_soft));
+                let scope = ExplorationSetup::new(*ball, task, (finger, is_soft));
                 ImplicitSurface::new(scope, space.clone()).into()
             }
         }

@@ -198,7 +198,7 @@ pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option
     let mut holes: Vec<(f64, Point3<f64>)> = (0..PLACES)
         .map(|_| in_ball(whole, rng))
         .filter(|p_w| surface.value(p_w) > 0.0)
-        .map(|p_w| (belief.hole_m(&p_w), p_w))
+        .map(|p_w| (belief.distance_to_evidence_m(&p_w), p_w))
         .filter(|(hole_m, _)| *hole_m > HOLE * whole.radius_m)
         .collect();
     holes.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -8,7 +8,7 @@ use super::sobol;
 use crate::belief::{Belief, HeightField};
 use crate::whole_object::ImplicitSurface;
 use palpate_gp::posterior::Scratch;
-use palpate_gp::reduction::Reduction;
+use palpate_gp::reduction::VarianceReduction;
 use rand::RngExt;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
@@ -35,7 +35,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 fn in_zone(search: &mut Search, seed: u32, field: &HeightField) -> Plan {
     let Some(posterior) = field.planning_posterior() else { return search.anywhere(field.zone()) };
     let places = sobol::places(field.zone(), search.settings.integrated_variance.places, seed);
-    let reduction = Reduction::new(posterior, places.iter().map(Vec::as_slice));
+    let reduction = VarianceReduction::new(posterior, places.iter().map(Vec::as_slice));
     let mut scratch = Scratch::default();
     let score = search.with_gradients(field.zone(), |places| {
         places.iter().map(|place| reduction.at(place, &mut scratch)).collect()
@@ -47,7 +47,7 @@ fn around(search: &mut Search, surface: &ImplicitSurface) -> Plan {
     Candidates::plan(surface, &mut search.rng, |candidates| {
         let all = &candidates.all;
         let places = || all.iter().map(|candidate| candidate.p_w.coords.as_slice());
-        let reduction = Reduction::new(candidates.surface().posterior(), places());
+        let reduction = VarianceReduction::new(candidates.surface().posterior(), places());
         let mut scratch = Scratch::default();
         places().map(|place| reduction.at(place, &mut scratch)).collect()
     })

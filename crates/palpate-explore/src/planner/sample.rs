@@ -2,7 +2,7 @@
 
 use crate::belief::Belief;
 use crate::task::{Aim, Ball, Target, Zone};
-use crate::whole_object::Scope;
+use crate::whole_object::ExplorationSetup;
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +37,7 @@ pub fn target_from_fractions(belief: &Belief, mut next: impl FnMut(usize) -> Vec
 const TRIED: usize = 1000;
 
 /// Returns an aim at the ball's centre from a uniformly random direction among the reachable ones.
-pub fn random_aim(scope: &Scope, rng: &mut ChaCha8Rng) -> Aim {
+pub fn random_aim(scope: &ExplorationSetup, rng: &mut ChaCha8Rng) -> Aim {
     reached(scope, || fractions(2, rng))
 }
 
@@ -49,7 +49,7 @@ pub(super) fn in_ball(ball: &Ball, rng: &mut ChaCha8Rng) -> Point3<f64> {
 }
 
 /// Returns an aim at the ball's centre from the first reachable direction.
-fn reached(scope: &Scope, mut side: impl FnMut() -> Vec<f64>) -> Aim {
+fn reached(scope: &ExplorationSetup, mut side: impl FnMut() -> Vec<f64>) -> Aim {
     let mut next = || Aim::against(scope.ball.centre_w, &outward(&side()));
     let first = next();
     std::iter::once(first)

@@ -129,7 +129,7 @@ impl Search {
             let highest = tops.fold(f64::NEG_INFINITY, f64::max);
             climbs.retain(|climb| {
                 climb.requested().is_none()
-                    || !climb.is_measured()
+                    || !climb.has_curvature_estimate()
                     || climb.upper_bound(GAIN_FACTOR) >= highest
             });
         }

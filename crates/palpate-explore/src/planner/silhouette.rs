@@ -16,7 +16,7 @@ use super::search::Search;
 use super::sobol;
 use crate::belief::HeightField;
 use palpate_gp::posterior::{Posterior, Scratch};
-use palpate_gp::reduction::Reduction;
+use palpate_gp::reduction::VarianceReduction;
 use rand::RngExt;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
@@ -46,10 +46,10 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
     let weights: Vec<f64> = places.iter().map(weigh).collect();
     let committee: Vec<Posterior> =
         COMMITTEE.iter().filter_map(|scale| posterior.scaled(*scale).ok()).collect();
-    let reductions: Vec<Reduction> = (committee.iter())
+    let reductions: Vec<VarianceReduction> = (committee.iter())
         .map(|member| {
             let places = places.iter().map(Vec::as_slice);
-            Reduction::new(member, places).weighted(weights.clone())
+            VarianceReduction::new(member, places).weighted(weights.clone())
         })
         .collect();
     let mut scratch = Scratch::default();

@@ -3,7 +3,7 @@
 use super::hand_eye::{
     HandEyeFit, PARAMETERS, RegistrationTouch, SENSING_PARAMETERS, parameters, undetermined,
 };
-use super::known_body::{CalibrationBody, Outline};
+use super::known_body::{CalibrationBody, FingerOutline};
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::control::posture;
 use crate::probe::Probe;
@@ -25,7 +25,7 @@ use rand::seq::SliceRandom;
 
 /// Touches to make, in order, and their predicted information.
 #[derive(Clone, Debug)]
-pub struct Design {
+pub struct RegistrationDesign {
     /// Approaches of the touches.
     pub approaches: Vec<Approach>,
     /// Predicted standard deviation of each parameter, in its own unit, from the expected scatter.
@@ -112,7 +112,7 @@ impl Candidate {
     }
 }
 
-impl Design {
+impl RegistrationDesign {
     /// Selects the `count` most informative touches of `body` that `robot` reaches, greedily by the
     /// volume of the parameters' ellipsoid (D-optimal design). Then they are simulated in the order
     /// of execution, and those that cannot follow their predecessor are dropped.
@@ -129,7 +129,7 @@ impl Design {
         if !robot.chain.has_revolute() {
             return Err(unreachable(0, 0, count));
         }
-        let outline = Outline::new(robot);
+        let outline = FingerOutline::new(robot);
         let free_w = free_side(robot, body);
         let mut all = candidates(&outline, robot, body, &free_w, rng);
         let tried = all.len();
@@ -228,7 +228,7 @@ fn free_side(robot: &Robot, body: &CalibrationBody) -> UnitVector3<f64> {
 /// Returns touches at every site of the finger, from every side of the body, at every spin; a
 /// subset if there are too many.
 fn candidates(
-    outline: &Outline,
+    outline: &FingerOutline,
     robot: &Robot,
     body: &CalibrationBody,
     free_w: &UnitVector3<f64>,

@@ -7,7 +7,7 @@
 //! only weakly, by the corner of its tip. There, the side of contact according to the electrodes is
 //! used too, with a fitted gain, within the region where a finger is mirror-symmetric.
 
-use super::known_body::{CalibrationBody, Outline};
+use super::known_body::{CalibrationBody, FingerOutline};
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::least_squares::{Problem, Solution};
 
@@ -29,7 +29,7 @@ pub struct HandEyeEstimate {
     pub correction: Isometry3<f64>,
     /// Pose of the body.
     pub body: CalibrationBody,
-    /// Indentation of the finger before contact is detected; see [`Outline::contact`].
+    /// Indentation of the finger before contact is detected; see [`FingerOutline::contact`].
     pub indentation_m: f64,
     /// Gain of the lateral contact position: measured over actual.
     pub gain: f64,
@@ -67,7 +67,7 @@ const ASKED: f64 = 0.45;
 
 /// Least-squares problem of touches of a known body.
 pub struct HandEyeFit<'a> {
-    outline: &'a Outline,
+    outline: &'a FingerOutline,
     touches: &'a [RegistrationTouch],
     /// Touches whose lateral position is used.
     felt: Vec<(usize, f64)>,
@@ -75,7 +75,7 @@ pub struct HandEyeFit<'a> {
 
 impl<'a> HandEyeFit<'a> {
     /// Creates the problem from `touches` with a finger of this outline.
-    pub fn new(outline: &'a Outline, touches: &'a [RegistrationTouch]) -> Self {
+    pub fn new(outline: &'a FingerOutline, touches: &'a [RegistrationTouch]) -> Self {
         let limit_m = ASKED * outline.radius_m();
         let felt = touches.iter().enumerate().filter_map(|(i, touch)| {
             let aside_m = touch.sensed_t?.y;

@@ -120,7 +120,7 @@ const STEPS: usize = 30;
 
 /// Outer surface of the finger in `T`.
 #[derive(Clone, Debug)]
-pub struct Outline {
+pub struct FingerOutline {
     profile: Profile,
     is_soft: bool,
     points: Vec<Sample>,
@@ -138,7 +138,7 @@ struct Sample {
     wet: bool,
 }
 
-impl Outline {
+impl FingerOutline {
     /// Creates the outline: a BioTac's for a soft finger, the hull for a rigid one.
     pub fn new(robot: &Robot) -> Self {
         let profile = match robot.is_soft {

@@ -1,8 +1,8 @@
 //! Registration by touch: pose of the finger on its mount and of a known body, or of an object with
 //! a known mesh.
 //!
-//! [`Design`] selects the most informative touches of a ball or a plate; [`register`] makes them
-//! with any probe and fits the poses. [`icp`] registers a cloud of contacts to a mesh.
+//! [`RegistrationDesign`] selects the most informative touches of a ball or a plate; [`register`]
+//! makes them with any probe and fits the poses. [`icp`] registers a cloud of contacts to a mesh.
 
 pub mod design;
 pub mod hand_eye;
@@ -10,7 +10,7 @@ pub mod icp;
 mod known_body;
 mod register;
 
-pub use design::Design;
+pub use design::RegistrationDesign;
 pub use hand_eye::{HandEyeEstimate, HandEyeFit, RegistrationTouch};
-pub use known_body::{CalibrationBody, Outline};
+pub use known_body::{CalibrationBody, FingerOutline};
 pub use register::{RegistrationResult, conclude, register};

@@ -1,10 +1,10 @@
 //! Registration by touch: makes the touches of a design and fits the poses.
 
-use super::design::{Design, pressed_m};
+use super::design::{RegistrationDesign, pressed_m};
 use super::hand_eye::{
     HandEyeEstimate, HandEyeFit, PARAMETERS, RegistrationTouch, depths_m, parameters, undetermined,
 };
-use super::known_body::{CalibrationBody, Outline};
+use super::known_body::{CalibrationBody, FingerOutline};
 use crate::backend::Fault;
 use crate::probe::{Probe, Touch};
 use crate::robot::Robot;
@@ -95,7 +95,7 @@ pub fn register(
     probe: &mut dyn Probe,
     robot: &Robot,
     touch: &TouchSettings,
-    (body, design): (&CalibrationBody, &Design),
+    (body, design): (&CalibrationBody, &RegistrationDesign),
     made: &mut dyn FnMut(&Touch),
 ) -> Result<RegistrationResult, InputError> {
     let of = design.approaches.len();
@@ -146,7 +146,7 @@ pub fn conclude(
     body: &CalibrationBody,
     of: usize,
 ) -> Result<RegistrationResult, InputError> {
-    let outline = Outline::new(robot);
+    let outline = FingerOutline::new(robot);
     let problem = HandEyeFit::new(&outline, touches);
     let fitted = fit(&problem, &HandEyeFit::start(*body))
         .map_err(|error| InputError::new(error.to_string()))?;

@@ -44,7 +44,7 @@ impl Approach {
     }
 
     /// Returns `p_w` moved along the approach to the level of `level_w`.
-    pub fn level_with(&self, p_w: &Vector3<f64>, level_w: &Vector3<f64>) -> Vector3<f64> {
+    pub fn project_to_level(&self, p_w: &Vector3<f64>, level_w: &Vector3<f64>) -> Vector3<f64> {
         let r_aw = self.r_wa.inverse();
         let (mut p_a, level_a) = (r_aw * p_w, r_aw * level_w);
         p_a.y = level_a.y;

@@ -2,7 +2,7 @@
 //! inside (Williams & Fitzgibbon 2007).
 
 use super::evidence::{PriorMean, TouchEvidence};
-use super::scope::Scope;
+use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
@@ -21,7 +21,7 @@ use palpate_gp::{
 /// Belief of one trial around a whole object.
 #[derive(Clone)]
 pub struct ImplicitSurface {
-    scope: Scope,
+    scope: ExplorationSetup,
     settings: SpatialGpSettings,
     kernel: &'static dyn Kernel,
     evidence: TouchEvidence,
@@ -51,7 +51,7 @@ const STEP_LAST: f64 = 0.1;
 
 impl ImplicitSurface {
     /// Creates a belief without data.
-    pub fn new(scope: Scope, settings: SpatialGpSettings) -> Self {
+    pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (TouchEvidence::default(), Vec::new());
         Self { scope, settings, kernel, evidence, asked, fit: None, surface: None }
@@ -174,7 +174,7 @@ impl ImplicitSurface {
     }
 
     /// The region and the finger.
-    pub fn scope(&self) -> &Scope {
+    pub fn scope(&self) -> &ExplorationSetup {
         &self.scope
     }
 
@@ -184,7 +184,7 @@ impl ImplicitSurface {
     }
 
     /// Distance of `p_w` from all contacts and swept paths.
-    pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
+    pub fn distance_to_evidence_m(&self, p_w: &Point3<f64>) -> f64 {
         self.evidence.distance_to_evidence_m(p_w)
     }
 

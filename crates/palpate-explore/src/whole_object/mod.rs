@@ -8,6 +8,6 @@ pub mod settings;
 pub mod surface;
 
 pub use implicit_surface::ImplicitSurface;
-pub use scope::Scope;
+pub use scope::ExplorationSetup;
 pub use settings::SpatialGpSettings;
 pub use surface::Surface;

@@ -13,7 +13,7 @@ const SOFT_OFFSET_M: f64 = 3e-4;
 
 /// A ball that contains the object, and the finger that touches it.
 #[derive(Clone, Debug)]
-pub struct Scope {
+pub struct ExplorationSetup {
     /// The ball that contains the object.
     pub ball: Ball,
     /// Radius of the fingertip.
@@ -23,7 +23,7 @@ pub struct Scope {
     task: Arc<Task>,
 }
 
-impl Scope {
+impl ExplorationSetup {
     /// Creates the scope of the `ball` of a task, with `finger`; a soft finger is marked so.
     pub fn new(ball: Ball, task: &Task, (finger, is_soft): (&Finger, bool)) -> Self {
         let offset_m = if is_soft { SOFT_OFFSET_M } else { 0.0 };

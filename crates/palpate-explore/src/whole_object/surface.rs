@@ -2,7 +2,7 @@
 
 use super::evidence::PriorMean;
 use super::grid::{touched_components, zero_set};
-use super::scope::Scope;
+use super::scope::ExplorationSetup;
 use crate::task::Ball;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
@@ -43,7 +43,7 @@ const STEPS: usize = 2;
 
 impl Surface {
     pub(super) fn new<'a>(
-        scope: &Scope,
+        scope: &ExplorationSetup,
         prior: PriorMean,
         posterior: Posterior,
         (contacts, offset_m): (impl Iterator<Item = &'a Point3<f64>>, f64),

@@ -11,7 +11,7 @@ use palpate_gp::Posterior;
 use palpate_gp::kernel::SquaredExponential;
 use palpate_gp::math::seed;
 use palpate_gp::posterior::Scratch;
-use palpate_gp::reduction::Reduction;
+use palpate_gp::reduction::VarianceReduction;
 use rand::RngExt;
 
 const SQUARE: Zone = Zone { datum_y_m: Some(-0.6), ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
@@ -139,7 +139,7 @@ fn reduction_is_what_a_refit_with_the_candidate_finds() {
             let belief = belief(zone, trial, 6 + 9 * trial as usize, if noisy { 2 } else { 99 });
             let posterior = belief.planning_posterior().unwrap();
             let references = zone.grid(9);
-            let reduction = Reduction::new(posterior, references.iter().map(Vec::as_slice));
+            let reduction = VarianceReduction::new(posterior, references.iter().map(Vec::as_slice));
             let mut scratch = Scratch::default();
             let mut rng = seed::stream(5, trial, "candidates");
             for _ in 0..20 {
@@ -251,7 +251,7 @@ fn slope_finds_the_unsure_and_steep() {
 fn integrated_variance_finds_the_largest_fall() {
     finds("integrated_variance", |belief, grid| {
         let places = grid.iter().step_by(7).map(Vec::as_slice);
-        let reduction = Reduction::new(belief.planning_posterior().unwrap(), places);
+        let reduction = VarianceReduction::new(belief.planning_posterior().unwrap(), places);
         Box::new(move |place, scratch| reduction.at(place, scratch))
     });
 }

@@ -15,14 +15,14 @@ const LEAST_PIVOT: f64 = 1e-9;
 
 /// Lower half of a symmetric banded matrix, row by row, the diagonal last.
 #[derive(Clone, Debug)]
-pub struct Banded {
+pub struct BandedMatrix {
     rows: Vec<f64>,
     width: usize,
 }
 
 /// Factors L and Lᵀ of A = L Lᵀ.
 #[derive(Clone, Debug)]
-pub struct Factor {
+pub struct BandedFactor {
     lower: Triangle,
     upper: Triangle,
 }
@@ -37,7 +37,7 @@ struct Triangle {
     upper: bool,
 }
 
-impl Banded {
+impl BandedMatrix {
     /// Creates a zero matrix with `size` rows and `width` entries left of the diagonal.
     pub fn zeros(size: usize, width: usize) -> Self {
         Self { rows: vec![0.0; size * (width + 1)], width }
@@ -52,7 +52,7 @@ impl Banded {
     }
 
     /// Returns the Cholesky factor, by rows.
-    pub fn factor(mut self) -> Factor {
+    pub fn factor(mut self) -> BandedFactor {
         let (width, stride) = (self.width, self.width + 1);
         for i in 0..self.rows.len() / stride {
             let first = i.saturating_sub(width);
@@ -74,14 +74,14 @@ impl Banded {
             _ => 0.0,
         };
         let size = self.rows.len() / stride;
-        Factor {
+        BandedFactor {
             lower: Triangle::new(size, width, false, entry),
             upper: Triangle::new(size, width, true, |i, j| entry(j, i)),
         }
     }
 }
 
-impl Factor {
+impl BandedFactor {
     /// Solves A x = b in place.
     pub fn solve(&self, x: &mut [f32]) {
         solve(self, x);
@@ -186,7 +186,7 @@ impl Triangle {
 }
 
 widest_fn! {
-    fn solve<'a>(factor: &'a Factor, x: &'a mut [f32]) -> () {
+    fn solve<'a>(factor: &'a BandedFactor, x: &'a mut [f32]) -> () {
         factor.lower.solve(x);
         factor.upper.solve(x);
     }

@@ -127,7 +127,7 @@ impl<'a> BfgsClimb<'a> {
     }
 
     /// Whether the curvature was estimated from steps, and not only initialised.
-    pub fn is_measured(&self) -> bool {
+    pub fn has_curvature_estimate(&self) -> bool {
         self.is_measured
     }
 

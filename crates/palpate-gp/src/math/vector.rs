@@ -30,7 +30,7 @@ macro_rules! vectorised_fn {
         $vis fn $name<$life $(, const $n: usize)?>($($arg: $of),*) -> $out {
             struct Work<$life $(, const $n: usize)?>($($of,)* std::marker::PhantomData<&$life ()>);
 
-            impl<$life $(, const $n: usize)?> $crate::math::vector::Vectorised
+            impl<$life $(, const $n: usize)?> $crate::math::vector::SimdWork
                 for Work<$life $(, $n)?>
             {
                 type Output = $out;
@@ -48,7 +48,7 @@ macro_rules! vectorised_fn {
 pub(crate) use vectorised_fn;
 
 /// Work written in vectors.
-pub trait Vectorised {
+pub trait SimdWork {
     /// Return type.
     type Output;
 
@@ -58,7 +58,7 @@ pub trait Vectorised {
 
 /// Runs `work` with the widest vectors of the processor.
 #[inline(always)]
-pub fn vectorised<Work: Vectorised>(work: Work) -> Work::Output {
+pub fn vectorised<Work: SimdWork>(work: Work) -> Work::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") {
@@ -109,16 +109,16 @@ impl Vector for f64 {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Vector, Vectorised};
+    use super::{SimdWork, Vector};
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub(super) fn with_512_bits<Work: Vectorised>(work: Work) -> Work::Output {
+    pub(super) fn with_512_bits<Work: SimdWork>(work: Work) -> Work::Output {
         work.call::<Wide>()
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub(super) fn with_256_bits<Work: Vectorised>(work: Work) -> Work::Output {
+    pub(super) fn with_256_bits<Work: SimdWork>(work: Work) -> Work::Output {
         work.call::<Narrow>()
     }
 

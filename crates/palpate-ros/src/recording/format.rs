@@ -218,9 +218,10 @@ impl LoadBuffer {
         self.wrench = reading
             .wrench
             .map(|Wrench { force_n: f, torque_nm: t }| [f.x, f.y, f.z, t.x, t.y, t.z]);
-        self.ideal = reading.ideal().map(|IdealContact { p_tc: p, normal_t: n, force_n }| {
-            [p.x, p.y, p.z, n.x, n.y, n.z, force_n]
-        });
+        self.ideal =
+            reading.ideal_contact().map(|IdealContact { p_tc: p, normal_t: n, force_n }| {
+                [p.x, p.y, p.z, n.x, n.y, n.z, force_n]
+            });
         self.frames.clear();
         self.frames.extend(reading.frames().cloned());
     }

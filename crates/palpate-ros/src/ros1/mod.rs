@@ -8,8 +8,10 @@ use crate::message::{
     TriggerResponse, WrenchStamped,
 };
 use crate::settings::BackendSettings;
-use crate::topics::{CommandMessage, Service, Side, TactileMessage, Topic, Topics};
-use crate::transport::{Delivery, PacketMessage, Packet, Transport, Waker, cannot_open, cannot_send};
+use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic, Topics};
+use crate::transport::{
+    Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
+};
 use master::PublisherCounter;
 use palpate_input::error::InputError;
 use roslibrust::RosMessageType;
@@ -19,7 +21,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
-use wire::{SequencedMessage, Request, Trigger};
+use wire::{Request, SequencedMessage, Trigger};
 
 /// Queue length of a reader or writer; a heuristic: more than arrive while a thread is delayed.
 const QUEUE: usize = 64;
@@ -63,14 +65,14 @@ impl Ros1 {
     /// If there is no master, or it rejects the node.
     pub fn open(
         settings: &BackendSettings,
-        side: Side,
+        side: Endpoint,
         services: Vec<Service>,
     ) -> Result<Self, InputError> {
         let runtime = Runtime::new().map_err(cannot_open("threads"))?;
         // A second node of the same name would end the first.
         let name = match side {
-            Side::Explorer => format!("/palpate_explorer_{}", std::process::id()),
-            Side::Arm => format!("/palpate_arm_{}", std::process::id()),
+            Endpoint::Explorer => format!("/palpate_explorer_{}", std::process::id()),
+            Endpoint::Arm => format!("/palpate_arm_{}", std::process::id()),
         };
         let master = settings.master.clone();
         let node = runtime
@@ -89,13 +91,13 @@ impl Ros1 {
             waiting: Arc::default(),
         };
         end.topics(side)?;
-        if side == Side::Arm {
+        if side == Endpoint::Arm {
             services.into_iter().enumerate().try_for_each(|(i, service)| end.serve(i, service))?;
         }
         Ok(end)
     }
 
-    fn topics(&mut self, side: Side) -> Result<(), InputError> {
+    fn topics(&mut self, side: Endpoint) -> Result<(), InputError> {
         self.headed::<JointState>(side, Topic::Joints)?;
         self.headed::<WrenchStamped>(side, Topic::Wrench)?;
         self.headed::<DiagnosticArray>(side, Topic::Status)?;
@@ -114,7 +116,11 @@ impl Ros1 {
     }
 
     /// Creates a topic with messages of type `M`, which have a header.
-    fn headed<M: PacketMessage + Clone>(&mut self, side: Side, topic: Topic) -> Result<(), InputError>
+    fn headed<M: PacketMessage + Clone>(
+        &mut self,
+        side: Endpoint,
+        topic: Topic,
+    ) -> Result<(), InputError>
     where
         SequencedMessage<M>: RosMessageType,
     {
@@ -133,7 +139,7 @@ impl Ros1 {
     /// on the other.
     fn topic<M: RosMessageType>(
         &mut self,
-        side: Side,
+        side: Endpoint,
         topic: Topic,
         wrap: fn(M) -> Packet,
         pick: fn(&Packet) -> Option<M>,

@@ -245,14 +245,14 @@ fn write_flags(packet: &mut Packet, key: Option<&str>, texts: [&str; 2]) {
 }
 
 /// Sends packets through the active failures.
-pub struct FailingSender {
+pub struct FailureInjector {
     is_on: Vec<bool>,
     memory: FailureState,
     /// Delayed packets with their time of sending.
     delayed: VecDeque<(f64, Packet)>,
 }
 
-impl FailingSender {
+impl FailureInjector {
     /// Creates a sender without failures.
     pub fn new(seed: u64) -> Self {
         Self {

@@ -2,7 +2,7 @@
 //! time.
 
 use super::arm_computer::SimulatedArmComputer;
-use super::failure::{FAILURES, FailingSender, FailureEffect, by_name};
+use super::failure::{FAILURES, FailureEffect, FailureInjector, by_name};
 use crate::joints::JointNames;
 use crate::link::Link;
 use crate::message::{Header, TriggerResponse, Wrench as WrenchMessage, WrenchStamped};
@@ -80,7 +80,7 @@ pub struct SimulatedRobotServer {
     /// Deliveries, queued for the loop.
     inbox: Receiver<Delivery>,
     link: Link,
-    sender: FailingSender,
+    sender: FailureInjector,
     injections: Vec<Injection>,
     /// Pose of `T` in the sensor's frame.
     x_mt: Isometry3<f64>,
@@ -129,7 +129,7 @@ impl SimulatedRobotServer {
             names,
             inbox,
             link,
-            sender: FailingSender::new(seed),
+            sender: FailureInjector::new(seed),
             injections,
             x_mt: chain.tool,
             bias: Wrench::default(),

@@ -24,7 +24,7 @@ pub enum FreeParameters {
 
 /// Estimate of a constant from the recordings.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub struct ConstantEstimate {
     /// Key of the constant in a scene's `[effects]`.
     pub key: &'static str,
     /// Estimated value.
@@ -52,7 +52,7 @@ pub struct Fit {
     /// Sessions, one for each recording.
     pub sessions: Vec<Session>,
     /// Constants that the recordings determine.
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<ConstantEstimate>,
     /// Constants that the recordings do not determine.
     pub refused: Vec<UndeterminedConstant>,
 }
@@ -92,7 +92,7 @@ pub fn fit(
         let covariance = clustered_covariance(&problem, &state, |i| problem.electrode(i));
         let estimate = |(i, constant): (usize, &&'static Constant)| {
             let variance = covariance.as_ref().map_or(f64::INFINITY, |all| all[(i, i)]);
-            Estimate {
+            ConstantEstimate {
                 key: constant.key,
                 value: constant.value(&model),
                 factor: (constant.plausible * variance.max(0.0).sqrt()).exp(),

@@ -45,7 +45,7 @@ impl Session {
         bench: &mut PlateRig,
     ) -> Option<Vec<[f64; ELECTRODES]>> {
         let effect = self.electrodes(model, recording);
-        let electrodes = Electrodes::new(&effect, bench.wear(model)?, 1.0);
+        let electrodes = Electrodes::new(&effect, bench.set_skin(model)?, 1.0);
         let loads = recording.near_normal_loads.iter().zip(&self.roll_rad);
         loads
             .map(|(bin, &roll_rad)| {
@@ -93,7 +93,7 @@ impl Session {
     /// Returns the rise of pressure per newton from 4 to 8 N, relative to the first newton; `None`
     /// if a pose has no solution.
     pub fn saturation(&self, model: &FingerConstants, bench: &mut PlateRig) -> Option<f64> {
-        bench.wear(model)?;
+        bench.set_skin(model)?;
         let angles_rad = [self.pitch_rad, self.mean_roll_rad()];
         let mut pressure_pa = |force_n| Some(bench.press(angles_rad, force_n)?.pressure_pa);
         let (one, four, eight) = (pressure_pa(1.0)?, pressure_pa(4.0)?, pressure_pa(8.0)?);
@@ -125,7 +125,7 @@ pub struct PlateRig {
 impl PlateRig {
     /// Sets the skin of `model`, unless it is set already, and returns its points; `None` if it
     /// cannot be built.
-    pub fn wear(&mut self, model: &FingerConstants) -> Option<&[SkinSample]> {
+    pub fn set_skin(&mut self, model: &FingerConstants) -> Option<&[SkinSample]> {
         let is_worn = |(worn, _): &(FingerConstants, PlateContact)| {
             worn.skin == model.skin && worn.cavity_pa_m3 == model.cavity_pa_m3
         };

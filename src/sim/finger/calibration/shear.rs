@@ -140,7 +140,7 @@ fn slopes(
     axis_t: &Vector3<f64>,
 ) -> Option<[f64; ELECTRODES]> {
     let mut bench = PlateRig::default();
-    let samples = bench.wear(model)?;
+    let samples = bench.set_skin(model)?;
     let electrodes = Electrodes::new(&session.electrodes(model, recording), samples, 1.0);
     let shear = ShearCoupling::new(&electrodes, samples);
     let mut counts = |aside_n: f64| {

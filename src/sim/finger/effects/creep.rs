@@ -2,7 +2,7 @@
 //! gives less force than loading.
 
 use super::constants::effect;
-use super::effect::{Effect, OnLoad};
+use super::effect::{Effect, LoadHook};
 use crate::sim::finger::load::ContactLoad;
 
 effect! {
@@ -20,7 +20,7 @@ effect! {
 impl Effect for CreepEffect {
     type State = RelaxationState;
 
-    const ON_LOAD: Option<OnLoad<Self>> =
+    const ON_LOAD: Option<LoadHook<Self>> =
         Some(|effect, lag, _, dt_s, load| lag.step(effect, dt_s, load));
 }
 

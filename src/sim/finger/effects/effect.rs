@@ -22,7 +22,7 @@ pub trait Effect: Validate + Clone + Default + 'static {
 
     /// Hook that changes the load once in each step, after the effects above it in the table;
     /// `None` if the load stays unchanged.
-    const ON_LOAD: Option<OnLoad<Self>> = None;
+    const ON_LOAD: Option<LoadHook<Self>> = None;
 
     /// Returns the state at the start of a trial.
     fn start(&self) -> Self::State {
@@ -42,7 +42,7 @@ pub trait Effect: Validate + Clone + Default + 'static {
 
 /// Changes the load at the end of a step, given the state of the trial, the motion of the
 /// fingertip, and the step's duration in seconds.
-pub type OnLoad<E> = fn(&E, &mut <E as Effect>::State, &TipMotion, f64, &mut ContactLoad);
+pub type LoadHook<E> = fn(&E, &mut <E as Effect>::State, &TipMotion, f64, &mut ContactLoad);
 
 /// Requirement of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

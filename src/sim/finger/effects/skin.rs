@@ -178,7 +178,7 @@ impl Skin {
     pub fn relaxed(&self) -> SkinState {
         SkinState {
             touches: Vec::with_capacity(self.samples.len()),
-            vicinity: self.patches.vicinity(),
+            vicinity: self.patches.nearby_patches(),
             shell: self.shell.as_ref().map(Membrane::relaxed),
             inward_m: vec![0.0; self.samples.len()],
             indentation_m: vec![0.0; self.samples.len()],

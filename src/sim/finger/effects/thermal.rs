@@ -1,7 +1,7 @@
 //! Thermistor in a heated finger: TDC (temperature) and TAC (its change).
 
 use super::constants::effect;
-use super::effect::{Effect, OnLoad};
+use super::effect::{Effect, LoadHook};
 use crate::sim::finger::noise::converted;
 use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
 use rand::Rng;
@@ -46,7 +46,7 @@ impl Effect for ThermalEffect {
     const FILLS_FRAMES: bool = true;
 
     /// Leaves the load unchanged; its area cools the fluid.
-    const ON_LOAD: Option<OnLoad<Self>> =
+    const ON_LOAD: Option<LoadHook<Self>> =
         Some(|effect, heat, _, dt_s, load| heat.step(effect, load.area_m2, dt_s));
 
     fn start(&self) -> ThermalState {

@@ -6,7 +6,7 @@
 
 use super::elastic_sheet::Sheet;
 use nalgebra::Matrix3;
-use palpate_gp::math::banded::{Banded, Factor};
+use palpate_gp::math::banded::{BandedFactor, BandedMatrix};
 use palpate_gp::math::simd::Quad;
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -14,7 +14,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 #[derive(Clone, Debug)]
 pub struct Compliance {
     /// Factors of symmetric and antisymmetric motions.
-    halves: [Factor; 2],
+    halves: [BandedFactor; 2],
     /// Number of symmetric unknowns, which precede the antisymmetric ones.
     symmetric: usize,
     /// Unknowns of each node's three directions, with their shares.
@@ -39,7 +39,7 @@ impl Compliance {
             halves: [0..symmetric, symmetric..size].map(|unknowns| {
                 let mut width = 0;
                 each(sheet, place, &parts, &unknowns, |i, j, _| width = width.max(i.abs_diff(j)));
-                let mut half = Banded::zeros(unknowns.len(), width);
+                let mut half = BandedMatrix::zeros(unknowns.len(), width);
                 each(sheet, place, &parts, &unknowns, |i, j, value| half.add(i, j, value));
                 half.factor()
             }),
@@ -95,7 +95,7 @@ impl Compliance {
 
     /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
-        self.halves.iter().map(Factor::bytes).sum::<usize>()
+        self.halves.iter().map(BandedFactor::bytes).sum::<usize>()
             + size_of_val(self.parts.as_slice())
             + size_of_val(self.blocks.as_slice())
     }

@@ -147,7 +147,7 @@ impl Membrane {
         if !state.at_rest {
             state.here.moved_m.fill(Vector3::zeros());
             self.sheet.strain(&state.here.moved_m, &mut state.here.strained);
-            state.course.forget();
+            state.course.clear();
             (state.at_rest, state.fluid_age) = (true, 0);
         }
     }
@@ -292,7 +292,7 @@ impl MotionHistory {
     }
 
     /// Clears the history.
-    pub fn forget(&mut self) {
+    pub fn clear(&mut self) {
         self.overlap_m.fill(f64::NAN);
         self.grew_m.fill(f64::NAN);
     }

@@ -108,7 +108,7 @@ impl Interlock for CollisionMonitor {
         }
         self.looked = None;
         let mut pair = 0;
-        let below = ahead.below(limit, |q| {
+        let below = ahead.first_clearance_below(limit, |q| {
             let (distance_m, of) = self.nearest(now, q);
             self.looked.get_or_insert((*q, distance_m));
             pair = of;

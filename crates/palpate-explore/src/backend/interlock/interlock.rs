@@ -124,7 +124,11 @@ impl<'a> StoppingPath<'a> {
 
     /// Returns the first clearance below `least_m` along the path, by conservative advancement:
     /// `clearance_m` must not decrease faster than points move. Returns `None` if there is none.
-    pub fn below(&self, least_m: f64, mut clearance_m: impl FnMut(&Joints) -> f64) -> Option<f64> {
+    pub fn first_clearance_below(
+        &self,
+        least_m: f64,
+        mut clearance_m: impl FnMut(&Joints) -> f64,
+    ) -> Option<f64> {
         let length_m = self.by.abs().dot(&self.now.reaches_m);
         let mut part = 0.0;
         let mut found_m = f64::NEG_INFINITY;

@@ -69,7 +69,7 @@ impl Interlock for Workspace {
             if room.clearance_m(now, &now.q) > farthest_m {
                 continue;
             }
-            if let Some(found) = ahead.below(0.0, |q| room.clearance_m(now, q)) {
+            if let Some(found) = ahead.first_clearance_below(0.0, |q| room.clearance_m(now, q)) {
                 let part = if room.elbow.is_some() { "the elbow" } else { "the tip" };
                 return Trip::check(false, WORKSPACE.name, part, [found, 0.0], "m inside");
             }
@@ -91,7 +91,8 @@ impl Interlock for Depth {
         if left_m(now.x_wt.translation.vector.into()) > ahead.farthest_m(&now.q) {
             return Ok(());
         }
-        let below = ahead.below(0.0, |q| left_m(now.chain.forward(q).translation.vector.into()));
+        let below = ahead
+            .first_clearance_below(0.0, |q| left_m(now.chain.forward(q).translation.vector.into()));
         let found_m = self.margin_m - below.unwrap_or_default();
         let (measures, unit) = ([found_m, self.margin_m], "m beyond the turning point");
         Trip::check(below.is_none(), DEPTH.name, "", measures, unit)

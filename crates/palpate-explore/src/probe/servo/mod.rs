@@ -172,7 +172,7 @@ impl Servo {
     fn retract_to(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
         let here = self.x_wt();
         let from_w = here.translation.vector;
-        let back_w = approach.level_with(&from_w, &above.translation.vector);
+        let back_w = approach.project_to_level(&from_w, &above.translation.vector);
         if (back_w - from_w).dot(&approach.direction_w()) > -DEEPER_M {
             return Ok(());
         }
@@ -361,7 +361,7 @@ impl Probe for Servo {
             }
         };
         let here_w = self.x_wt().translation.vector;
-        let back_w = approach.level_with(&here_w, &above.translation.vector);
+        let back_w = approach.project_to_level(&here_w, &above.translation.vector);
         let back = Isometry3::from_parts(back_w.into(), above.rotation);
         self.move_straight("the retract position", back, travel_m_s, false)?;
         Ok(touch)

@@ -78,11 +78,11 @@ impl Finger {
     }
 
     /// Returns the hull as seen along the approach.
-    pub fn front(&self) -> Front {
-        Front { radius_m: self.radius_m, axis: self.axis_a() }
+    pub fn front(&self) -> FrontProfile {
+        FrontProfile { radius_m: self.radius_m, axis: self.axis_a() }
     }
 
-    /// Returns [`Front::y_m`] for a single place.
+    /// Returns [`FrontProfile::y_m`] for a single place.
     pub fn front_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
         self.front().y_m(dx_m, dz_m)
     }
@@ -90,12 +90,12 @@ impl Finger {
 
 /// The hull as seen along the approach, with its axis in the frame `A` precomputed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Front {
+pub struct FrontProfile {
     radius_m: f64,
     axis: Vector3<f64>,
 }
 
-impl Front {
+impl FrontProfile {
     /// Returns the y of the hull's foremost point (towards −y) at (`dx_m`, `dz_m`) beside the
     /// hemisphere's centre, relative to it, in the frame `A`; `None` outside the hull.
     ///
