@@ -153,7 +153,7 @@ messages: setup
 
 lint: setup
 	cargo fmt --all --check
-	cargo clippy --locked --all-targets --features ros2,viewer,render -- -D warnings
+	cargo clippy --locked --all-targets --features ros2 -- -D warnings
 	cargo clippy --locked --lib --bins --tests --no-default-features --features ros2 -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
 

@@ -213,7 +213,7 @@ struct RunCallbacks {
     is_stopped: AtomicBool,
     /// Whether the first failed trial of a Python planner ends the run.
     raises: bool,
-    /// That trial and its reason.
+    /// First failed trial and its reason.
     failure: Mutex<Option<String>>,
 }
 

@@ -303,9 +303,7 @@ fn cheapest_text(cheapest: &CheapestScene, criterion: Criterion, origin: Origin)
             let [verdict, change] = [variant.verdict_m, variant.verdict_change_m];
             let trials = change.map_or(0, |change| change.trials);
             let [verdict, change] = [verdict, change].map(paired);
-            format!(
-                "RMSE of active minus random: {verdict} mm (n = {trials} trials), change {change} mm"
-            )
+            format!("active - random is {verdict} mm in {trials} trials, a change of {change}")
         }
     };
     let CheapestScene { selected, held_out, is_confirmed, .. } = cheapest;
@@ -327,10 +325,10 @@ type Column = (&'static str, fn(&Variant) -> String);
 /// Columns of both tables; columns without a value are omitted.
 const COLUMNS: [Column; 17] = [
     ("variant", |it| it.name.clone()),
-    ("error relative to truth, mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
+    ("error to truth, mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
     ("95 %", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.p95), 3)),
     ("max", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.max), 3)),
-    ("error relative to reference, mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
+    ("error to reference, mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
     ("95 %", |it| cell(it.contact_m.map(|spread| 1e3 * spread.p95), 3)),
     ("force N", |it| mean(it.force_n, 1.0, 4)),
     ("electrodes, counts", |it| mean(it.electrode_counts, 1.0, 2)),
@@ -372,8 +370,5 @@ fn paired(paired: Option<PairedDifference>) -> String {
 
 fn beyond(share: &TouchShare) -> String {
     let [low, high] = share.interval.map(|share| 100.0 * share);
-    format!(
-        "{} of {} touches beyond the tolerance, 95 % interval [{low:.1}, {high:.1}] %",
-        share.count, share.of
-    )
+    format!("{} of {} beyond, [{low:.1}, {high:.1}] %", share.count, share.of)
 }

@@ -196,6 +196,11 @@ pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
 /// interval has the difference as its half-width: ((1.96 + 0.84) / 1.96)².
 const POWER: f64 = 2.04;
 
+/// Smallest number of paired trials for a conclusion.
+// heuristic: with fewer, not even equal signs of all differences are significant at 95 %, and
+// bootstrap intervals are too short.
+const TRIALS_MIN: usize = 6;
+
 /// Largest number of trials that is proposed.
 // heuristic: beyond it a difference is negligible.
 const PROPOSED_MAX: f64 = 10_000.0;
@@ -210,6 +215,12 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == error.id);
     let best = found.min_by(|a, b| a.paired.mean.total_cmp(&b.paired.mean))?;
     let (planner, paired) = (best.planner, &best.paired);
+    if paired.trials < TRIALS_MIN {
+        return Some(format!(
+            "{} paired trials are too few to compare planners; use --set trials={TRIALS_MIN} or more.",
+            paired.trials
+        ));
+    }
     let [low, high] = paired.interval?;
     let shown = |value: f64| digits(error.unit.per_si * value);
     let size = |[low, high]: [f64; 2]| {

@@ -50,7 +50,8 @@ run) first=(--set touches=21) last=(--set trials=4 --set grid=9 --no-report)
 check) last=(--max-trials 4) ;;
 export) case "$*" in *--grid*|*runs/*) ;; *) last=(--grid 9x9) ;; esac ;;
 esac
-exec "$PROGRAM" --quiet "$1" "${first[@]}" "${@:2}" "${last[@]}"
+# Tests in real time run beside it.
+exec nice -n 19 "$PROGRAM" --quiet "$1" "${first[@]}" "${@:2}" "${last[@]}"
 "#;
 
 /// Runs that the commands of a page read.

@@ -157,7 +157,8 @@ fn the_last_touch_stands_in_the_table() {
     let folder = folder("container.toml", &[]);
     let sets = ["--set", "report.touch_counts=[4]", "--set", "touches=9"];
     let text = table(&run(&folder, &sets));
-    let counts: Vec<&str> = (text.lines().filter(|line| line.contains("sobol")))
+    assert!(text.contains("2 paired trials are too few"), "{text}");
+    let counts: Vec<&str> = (text.lines().filter(|line| line.contains("  sobol")))
         .map(|line| line.split_whitespace().next().unwrap())
         .collect();
     assert_eq!(counts, ["4", "9"], "{text}");

@@ -333,3 +333,31 @@ fn planners_are_held_against_their_baselines() {
     assert_eq!(asked(["sobol", "random", "grid"], &[]), same(&["sobol random"]));
     assert_eq!(asked(["sobol", "random", "grid"], &["sobol"]), same(&["random sobol"]));
 }
+
+/// A clear difference is named with its size and interval; an unclear one with the trials needed.
+#[test]
+fn a_run_ends_with_one_conclusion() {
+    // Final errors of active in mm, those of random being 2 mm; all vary equally over the trials.
+    let say = |active_mm: fn(u32) -> f64, trials: u32| {
+        let text = CURVE.replace("trials = 2", &format!("trials = {trials}"));
+        let mut run = run(&text.replace(", \"sobol\"", ""));
+        for row in &mut run.rows {
+            let mm = if row.planner == "active" { active_mm(row.trial) } else { 2.0 };
+            let metrics = row.touches.last_mut().unwrap().metrics.as_mut().unwrap();
+            metrics.rmse_m = 1e-3 * (mm + 0.1 * f64::from(row.trial % 3));
+        }
+        report::findings::conclusion(&run, &Analysis::new(&run)).unwrap()
+    };
+    let better = say(|_| 1.0, 12);
+    let size = "active is better: 1.00 mm [1.00, 1.00] less RMSE than random after 12 touches";
+    assert!(better.starts_with(size) && better.contains("mean of 12 trials"), "{better}");
+    let worse = say(|_| 3.0, 12);
+    assert!(worse.starts_with("random is best: active has 1.00 mm [1.00, 1.00] more"), "{worse}");
+    let open = say(|trial| if trial % 2 == 0 { 1.8 } else { 2.19 }, 12);
+    assert!(open.starts_with("No difference is established: active has"), "{open}");
+    assert!(
+        open.contains("trials (--set trials=") && open.contains("would probably show it"),
+        "{open}"
+    );
+    assert!(say(|_| 1.0, 4).contains("too few"));
+}
