@@ -74,7 +74,7 @@ impl RefitSequence {
         Self { kernel, free: FitState::default(), bound: FitState::default() }
     }
 
-    /// Its kernel.
+    /// Returns the kernel.
     pub fn kernel(&self) -> &'static dyn Kernel {
         self.kernel
     }

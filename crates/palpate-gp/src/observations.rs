@@ -19,7 +19,7 @@ pub struct Observation<'a> {
 /// The gradient of the height at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct Slope<'a> {
-    /// Its components, one per coordinate of the place.
+    /// Components of the gradient, one per coordinate of the place.
     pub gradient: &'a [f64],
     /// Standard deviation of each component's error, in units of the belief's slope noise.
     pub noise: f64,
@@ -262,7 +262,7 @@ impl Observations {
     }
 
     /// Writes the scaled squared distances Σ_d ((place_d − x_d) / l_d)² of `place` from the
-    /// observations beginning with `first`, as many as `r2` holds.
+    /// observations from number `first` on; the length of `r2` is their number.
     pub fn distances2(
         &self,
         place: impl Iterator<Item = f64>,

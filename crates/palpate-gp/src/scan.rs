@@ -20,8 +20,8 @@ use crate::math::simd::widest_dot;
 /// ratio, whose ends alone carry no information about the middle.
 const NOISE_STEP: f64 = 4.61;
 
-/// Largest number of length scales that are combined fully; the combinations of more are spread
-/// evenly, as many as of this number; a heuristic: as many as of three.
+/// Largest number of length scales with a full grid of combinations; more get `SPREAD` evenly
+/// spread combinations instead. A heuristic: 125 is the full grid of three, 5 per length.
 const COMBINED_MAX: usize = 3;
 const SPREAD: usize = 125;
 

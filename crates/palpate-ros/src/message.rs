@@ -175,7 +175,7 @@ messages! {
 
     /// A property of a device.
     diagnostic_msgs/KeyValue {
-        /// Its name.
+        /// Name of the property.
         string key,
         /// Value as text.
         string value,

@@ -24,7 +24,7 @@ pub enum BackendKind {
 }
 
 impl BackendKind {
-    /// Returns its name in a file.
+    /// Returns the name of this kind in settings files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Simulated => "simulated",

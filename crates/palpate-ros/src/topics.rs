@@ -43,7 +43,7 @@ impl Topic {
         if self == Self::Command { Endpoint::Explorer } else { Endpoint::Arm }
     }
 
-    /// Returns its key in `[backend.topics]`.
+    /// Returns the topic's key in `[backend.topics]`.
     pub fn key(self) -> &'static str {
         ["joints", "wrench", "tactile", "status", "command"][self as usize]
     }
@@ -219,7 +219,7 @@ impl Service {
         matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
     }
 
-    /// Returns its name for an arm with this namespace.
+    /// Returns the service's name for an arm with this namespace.
     pub fn name(&self, namespace: &str) -> String {
         match self {
             Self::Hold => format!("{namespace}/hold"),

@@ -23,7 +23,7 @@ macro_rules! packets {
         }
 
         impl Packet {
-            /// Returns its topic.
+            /// Returns the packet's topic.
             pub fn topic(&self) -> Topic {
                 match self {
                     $(Self::$kind(_) => Topic::$topic,)*

@@ -73,7 +73,7 @@ pub(super) fn check_equal(
         return Ok(());
     }
     let mut pairs = found.lines().zip(wanted.lines()).filter(|(a, b)| a != b);
-    let (found, wanted) = pairs.next().unwrap_or(("(fewer or more lines)", "..."));
+    let (found, wanted) = pairs.next().unwrap_or(("(a different number of lines)", "..."));
     let cause = InputError::new(format!(
         "{} contains another experiment: {file} has `{found}`, this one `{wanted}`",
         folder.display()

@@ -27,7 +27,7 @@ pub struct FinishedTouch<'a> {
     pub count: u32,
     /// Outcome of the touch.
     pub touch: &'a Touch,
-    /// Its part of the trial's row.
+    /// The touch's part of the trial's row.
     pub row: &'a TouchRow,
     /// Belief that includes the touch.
     pub belief: &'a Belief,

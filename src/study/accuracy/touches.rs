@@ -1,4 +1,4 @@
-//! Touches of a scene without sensor noise, so that only the model differs: contacts, loads, times.
+//! Touches of a scene without sensor noise: contacts, loads and times, to compare models.
 
 use crate::experiment::truth::Truth;
 use crate::sim::environment::ObjectShape;

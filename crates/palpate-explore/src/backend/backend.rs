@@ -154,10 +154,10 @@ impl Reading {
 /// simulator also drives the arm. Limits, recording and fault injection are backends that wrap
 /// another.
 pub trait Backend: Send {
-    /// Returns its capabilities; needs no connection.
+    /// Returns the backend's capabilities; needs no connection.
     fn capabilities(&self) -> &Capabilities;
 
-    /// Moves it to its start and returns the first reading.
+    /// Moves the robot to its start and returns the first reading.
     ///
     /// # Errors
     /// If it cannot be reached or moved there.

@@ -104,7 +104,7 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// Returns its approach if the body is at its expected place: it ends there.
+    /// Returns the approach that ends at the surface of the body in its expected pose.
     fn expected(&self) -> Approach {
         let beyond_m = MARGIN_M + BEYOND_M;
         let back_w = self.approach.direction_w().scale(beyond_m);
@@ -352,7 +352,7 @@ struct KinematicArm {
     reading: Reading,
 }
 
-/// Its control period; a heuristic: sufficient for a resolved-rate controller, not for a servo.
+/// Control period, s; a heuristic: sufficient for a resolved-rate controller, not for a servo.
 const PERIOD_S: f64 = 0.01;
 
 impl KinematicArm {

@@ -107,7 +107,7 @@ fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> InputError {
         Some(line) => {
             let found = bytes.split(|&byte| byte == b'\n').nth(line.saturating_sub(1));
             let found = String::from_utf8_lossy(found.unwrap_or_default());
-            bad_line(line, "PLY as its header declares it", &found)
+            bad_line(line, "data as declared in the PLY header", &found)
         }
         None => {
             // Removes the prefix "Line 7: ": binary data has no lines.

@@ -153,7 +153,7 @@ pub fn robust<P: Problem>(problem: &P, start: &P::State) -> Result<(P::State, f6
     Ok((state, cost))
 }
 
-/// Predicts how well a problem's data determine its parameters at `state`, before they are
+/// Predicts the covariance of a problem's parameters at `state`, before its data are
 /// measured.
 ///
 /// # Errors

@@ -13,7 +13,7 @@ pub enum Stop {
     Budget,
     /// Rounding errors prevented progress; the result is the best place found.
     Roundoff,
-    /// It could not start or was aborted; the result is the best place found.
+    /// The search could not start or was aborted; the result is the best place found.
     Failed,
 }
 

@@ -1,4 +1,4 @@
-//! Poses in the notation of files.
+//! Conversion of poses from and to position and rotation angles, as settings files give them.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
@@ -12,7 +12,7 @@ pub fn pose(position_m: [f64; 3], rotation_deg: [f64; 3]) -> Isometry3<f64> {
     )
 }
 
-/// Returns position and rotation of a pose in the notation of files: the inverse of [`pose`].
+/// Returns position, m, and rotation about the fixed axes, deg: the inverse of [`pose`].
 pub fn parts(pose: &Isometry3<f64>) -> ([f64; 3], [f64; 3]) {
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
     (pose.translation.vector.into(), [roll, pitch, yaw].map(f64::to_degrees))

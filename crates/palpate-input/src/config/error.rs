@@ -10,7 +10,7 @@ use thiserror::Error;
 pub enum Origin {
     /// A file, and the line if it contains the key.
     File {
-        /// Its path as given.
+        /// Path of the file, as given.
         path: PathBuf,
         /// Line of the key, counted from 1.
         line: Option<usize>,

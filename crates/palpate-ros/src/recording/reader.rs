@@ -75,7 +75,7 @@ impl RecordedTrial {
         Ok(Self { about, touches, earlier_touches: made, tick_count, ending, bytes })
     }
 
-    /// Returns its ticks, from the first.
+    /// Returns the recording's ticks, from the first.
     pub fn ticks(&self) -> impl Iterator<Item = TickMessage<'static>> + use<> {
         let mut entries = Entries::new(Arc::clone(&self.bytes));
         std::iter::from_fn(move || next_tick(&mut entries))

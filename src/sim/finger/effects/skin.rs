@@ -90,7 +90,7 @@ pub struct Skin {
     bulge_m: f64,
 }
 
-/// Workspace of one trial for [`Skin::press`].
+/// Buffers of one trial for [`Skin::press`], with the results of its last call.
 #[derive(Clone, Debug, Default)]
 pub struct SkinState {
     touches: Vec<SkinContact>,

@@ -69,7 +69,7 @@ impl RobotState {
 pub struct InterlockEntry {
     /// Name in documentation and tests.
     pub name: &'static str,
-    /// Creates it at each reset; `None` if there is nothing to monitor.
+    /// Creates the interlock at each reset; `None` if there is nothing to monitor.
     pub make: fn(&SafetyContext, &InterlockSettings, &Capabilities) -> Option<Box<dyn Interlock>>,
 }
 
