@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// An experiment: all settings that decide its results and its report.
+/// An experiment: all settings that determine its results and its report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
@@ -43,8 +43,8 @@ pub struct Experiment {
     pub initial_touches: u32,
     /// Touches per trial, initial ones included.
     pub touches: u32,
-    /// Held-out touches after the last one, at low-discrepancy places: they test the predictions
-    /// of the belief without ground truth.
+    /// Held-out touches after the trial's `touches`, at low-discrepancy places: they test the
+    /// predictions of the belief without ground truth.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub verification_touches: u32,
     /// Touches at earlier targets, after the held-out ones, to measure repeatability.

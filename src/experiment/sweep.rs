@@ -16,7 +16,7 @@ const FILES: [&str; 4] = ["scene", "backend", "scene.object.mesh", "truth.scan"]
 /// One combination of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SweepCase {
-    /// Label that distinguishes it from the others, usable in a folder's name.
+    /// Unique label of the combination, usable in a folder's name.
     pub label: String,
     /// Assignments, in the form of `--set`.
     pub sets: Vec<String>,

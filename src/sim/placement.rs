@@ -7,7 +7,7 @@ use palpate_explore::task::Zone;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::mesh::Mesh;
 
-/// Side of an object, named by an observer in front of it.
+/// Side of an object, as seen from its front.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ObjectSide {
     /// Front: towards +z if y is up, as in glTF; towards −y if z is up.

@@ -66,7 +66,7 @@ struct FingerGrid<'a> {
     tolerance_m: f64,
 }
 
-/// Row of targets near a finger, with the y of its front over each relative to its tip.
+/// Row of targets near a finger, each with the y of the finger's front relative to its tip.
 struct TargetRow {
     /// Rows and columns from the finger's own target to the first.
     row: isize,
@@ -75,7 +75,7 @@ struct TargetRow {
 }
 
 impl<'a> FingerGrid<'a> {
-    /// Returns `None` without a zone.
+    /// Creates the grid over the task's zone; `None` without a zone.
     fn new(environment: &'a Environment) -> Option<Self> {
         let zone = environment.task().zone()?;
         let radius_m = environment.scene().finger.radius_m;

@@ -21,7 +21,7 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Settings of a scene, the file that decides everything a touch returns.
+/// Settings of a scene: the file that determines the result of every touch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -152,7 +152,7 @@ impl AnalyticCurve {
 pub struct ObjectSettings {
     /// Mesh file: .obj, .gltf, .glb, .stl or .ply, relative to the scene file.
     pub mesh: PathBuf,
-    /// Permission for a .gltf file to name buffers outside its own folder.
+    /// Whether a .gltf file may name buffers outside its own folder.
     #[serde(default, skip_serializing_if = "is_default")]
     pub allow_external_buffers: bool,
     /// Unit of the mesh file.

@@ -85,7 +85,7 @@ impl Simulator {
         }
     }
 
-    /// Returns the probe of the scene's simulator; `seed` decides all the randomness of its
+    /// Returns the probe of the scene's simulator; `seed` determines all random numbers of its
     /// sensors.
     ///
     /// # Errors

@@ -216,7 +216,7 @@ struct ResolvedRate {
     /// Jacobian with angular rows in units of the lever.
     jacobian: Jacobian,
     twist: Vector6<f64>,
-    /// Desired motion of the null space.
+    /// Desired null-space motion towards home.
     home: Joints,
     /// Distance to each limit, scaled: 1 far from it, 0 at it, negative beyond it.
     room: [Joints; 2],
@@ -283,8 +283,8 @@ impl ResolvedRate {
         Some((qdot.component_mul(weights), damping))
     }
 
-    /// Fraction of the desired twist that `qdot` achieves: their product over the square of the
-    /// desired one.
+    /// Fraction of the desired twist that `qdot` achieves: dot product of both twists over the
+    /// square of the desired one.
     fn followed(&self, qdot: &Joints) -> f64 {
         let wanted = self.twist.norm_squared();
         if wanted > 0.0 { (self.jacobian * qdot).dot(&self.twist) / wanted } else { 1.0 }

@@ -107,7 +107,7 @@ const PRIOR: f64 = -0.2;
 /// Noise variance n² of the evidence, in units of the signal's.
 const NOISE_VARIANCE: f64 = 0.1;
 
-/// Threshold c: the space between two contacts is not always surface.
+/// Decision threshold c, above 0 because the space between two contacts is not always surface.
 const DIVIDE: f64 = 0.3;
 
 /// Length scales of the evidence, in radii of the finger; heuristics.

@@ -48,10 +48,10 @@ pub struct RayHit {
     pub normal: Vector3<f64>,
 }
 
-/// The point of the mesh nearest to another.
+/// The point of the mesh nearest to a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestHit {
-    /// Distance to it, in metres.
+    /// Distance between both points, in metres.
     pub distance_m: f64,
     /// The point, in metres.
     pub point: Point3<f64>,
@@ -391,7 +391,7 @@ impl MeshParts {
 
     const NOTHING: Self = Self { nodes: [0; MOST], count: 0 };
 
-    /// Selects the parts within `radius_m` of `centre`, which is relative to that of the boxes:
+    /// Selects the parts within `radius_m` of `centre`, given relative to the centre of the boxes:
     /// descends level by level as long as all nodes of a level that the ball meets fit.
     fn new(bvh: &Bvh2, centre: &Point3<f64>, radius_m: f64) -> Self {
         let ball = SingleBall::new(centre);

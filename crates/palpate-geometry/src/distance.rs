@@ -78,8 +78,9 @@ fn between_segments_m(a: [&Point3<f64>; 2], b: [&Point3<f64>; 2]) -> f64 {
     ends.sqrt()
 }
 
-/// The squared distance of a point moving along the segment is convex, and its derivative is linear
-/// between the points where it crosses the plane of a side.
+/// Returns the distance of a segment from a box about the origin, m: the squared distance of a
+/// point moving along the segment is convex, and its derivative is linear between the points where
+/// it crosses the plane of a side.
 fn to_centred_box_m(ends: &[Vector3<f64>; 2], half_m: &Vector3<f64>) -> f64 {
     let along = ends[1] - ends[0];
     let beyond = |t: f64| (ends[0] + along * t).zip_map(half_m, |p, h| p - p.clamp(-h, h));

@@ -13,7 +13,7 @@ use nalgebra::{Point3, Vector3};
 /// Shortest step of a ray, m. A heuristic: a ray can miss at most a graze with a chord shorter than
 /// this, a ten-thousandth of the 1 mm that touch resolves.
 const SHORTEST_STEP_M: f64 = 1e-7;
-/// Length of the interval in which a ray's crossing is known, m; a heuristic.
+/// Length of the bracketing interval at which a ray's crossing is accepted, m; a heuristic.
 const RAY_TOLERANCE_M: f64 = 1e-12;
 /// Field value that counts as zero, m. A heuristic: some ten roundings at 0.1 m.
 const ZERO_M: f64 = 1e-15;

@@ -106,13 +106,13 @@ impl Sweep {
         self.face((b - a).cross(&(c - a)), &[*triangle], offer);
     }
 
-    /// The parallelogram of an extruded edge.
+    /// Offers the travel to the parallelogram of an extruded edge.
     fn side(&self, [a, b, c, d]: [&Point3<f64>; 4], offer: &mut impl FnMut(Option<f64>)) {
         let normal = (b - a).cross(&(d - a));
         self.face(normal, &[[*a, *b, *c], [*a, *c, *d]], offer);
     }
 
-    /// A flat face, offset by the radius against the motion.
+    /// Offers the travel to a flat face, offset by the radius against the motion.
     fn face(
         &self,
         normal: Vector3<f64>,
@@ -127,7 +127,7 @@ impl Sweep {
         }
     }
 
-    /// The cylinder around an edge, without its ends.
+    /// Returns the travel to the cylinder around an edge, without its ends, m.
     fn edge_travel(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64> {
         let (axis, length_m) = UnitVector3::try_new_and_get(b - a, 0.0)?;
         let arm = self.start - a;
@@ -145,7 +145,7 @@ impl Sweep {
         (0.0..=length_m).contains(&(arm_along + speed_along * travel_m)).then_some(travel_m)
     }
 
-    /// The sphere around a corner.
+    /// Returns the travel to the sphere around a corner, m.
     fn corner_travel(&self, corner: &Point3<f64>) -> Option<f64> {
         let arm = self.start - corner;
         let nearest_m = -arm.dot(&self.direction);

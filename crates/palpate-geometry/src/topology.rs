@@ -169,8 +169,8 @@ fn flood(neighbours: &Neighbours) -> Flood {
     flood
 }
 
-/// A component is open if it has an odd number of triangles on some edge. Two bodies that share
-/// an edge, each with two triangles on it, are both closed.
+/// Returns whether each component is open: has an odd number of triangles on some edge. Two bodies
+/// that share an edge, each with two triangles on it, are both closed.
 fn open_components(sides: &[Side], flood: &Flood) -> Vec<bool> {
     let mut open = vec![false; flood.members.len()];
     let mut owners = Vec::new();

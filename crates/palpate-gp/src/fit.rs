@@ -53,7 +53,8 @@ const HALVED: usize = 1024;
 #[derive(Clone)]
 pub struct RefitSequence {
     kernel: &'static dyn Kernel,
-    /// State of the search of the whole box, and of that with the sensor's noise.
+    /// State of the search of the whole box, and of the search with the noise fixed at the
+    /// sensor's.
     free: FitState,
     bound: FitState,
 }
@@ -62,9 +63,9 @@ pub struct RefitSequence {
 #[derive(Clone, Default)]
 struct FitState {
     last: Option<Fit>,
-    /// Negative second derivatives at its optimum.
+    /// Negative second derivatives at the optimum of the last fit.
     curvature: Vec<f64>,
-    /// Shared, since beliefs are cloned more often than fitted.
+    /// Cached factors, shared because beliefs are cloned more often than fitted.
     scan: Arc<Scan>,
 }
 
@@ -220,7 +221,7 @@ struct Maximum {
     x: Vec<f64>,
     score: f64,
     profile: ProfiledLikelihood,
-    /// Reason why the climb to it stopped.
+    /// Reason why the climb to the optimum stopped.
     stop: Stop,
     /// Negative second derivatives there, for the next climb in the same box.
     curvature: Vec<f64>,

@@ -22,7 +22,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 /// It applies to the largest residual variance of all other touches;
 /// a heuristic: their errors are then those of their own noise.
 const NEGLIGIBLE: f64 = 1e-4;
-/// The same limit as a fraction of the signal variance, which is rounding.
+/// The same limit as a fraction of the signal variance, at the level of rounding error.
 const ROUNDING: f64 = 1e-12;
 /// Number of evenly spread candidates per inducing touch; a heuristic.
 const CANDIDATES: usize = 2;

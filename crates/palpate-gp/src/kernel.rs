@@ -130,7 +130,7 @@ pub trait RadialKernel: Send + Sync {
     /// `#[inline(always)]`, so that loops over it are vectorised.
     fn correlation_slope(r2: f64) -> (f64, f64);
 
-    /// Whether its surfaces have continuously varying slopes, so that one slope is informative
+    /// Whether the kernel's surfaces have continuous slopes, so that one slope is informative
     /// about others nearby. If so, it must define [`curvatures`](Self::curvatures).
     const HAS_SLOPES: bool = false;
 
@@ -150,7 +150,7 @@ pub trait Kernel: Send + Sync {
     /// Replaces each r² by c(r²) and writes dc/d(r²) into `slopes`.
     fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]);
 
-    /// Whether it supports observed slopes; see [`RadialKernel::HAS_SLOPES`].
+    /// Whether the kernel supports observed slopes; see [`RadialKernel::HAS_SLOPES`].
     fn has_slopes(&self) -> bool;
 
     /// Replaces each r² by c(r²) and writes its first three derivatives with respect to r².

@@ -104,7 +104,7 @@ impl Observations {
         self.slope_noise2.push(observation.slope.map_or(0.0, |slope| slope.noise * slope.noise));
     }
 
-    /// Whether it starts with `others`.
+    /// Whether these observations start with `others`.
     pub(super) fn begin_with(&self, others: &Self) -> bool {
         let count = others.len();
         let same = |mine: &[f64], theirs: &[f64]| mine.get(..theirs.len()) == Some(theirs);

@@ -44,7 +44,7 @@ fn spread(dimension: usize) -> Vec<Vec<f64>> {
     (0..SPREAD).map(place).collect()
 }
 
-/// Returns the nearest `places` of each: as many as it would have on a grid.
+/// Returns the nearest neighbours of each of `places`, in pairs: as many as on a grid.
 fn beside(places: &[Vec<f64>]) -> Vec<Vec<[usize; 2]>> {
     let nearest = |place: &Vec<f64>| {
         let squares = |other: &Vec<f64>| -> f64 {

@@ -15,7 +15,7 @@ pub fn shorten(text: &str) -> String {
 }
 
 /// Returns the values that a parser with this error `message` accepts, if known: the message
-/// contains the types of the programming language.
+/// contains Rust types.
 pub fn allowed(message: &str) -> Option<String> {
     let (_, expected) = message.rsplit_once("expected ")?;
     let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();

@@ -208,10 +208,10 @@ pub struct Measure {
     pub scale: PanelAxis,
     /// Whether the summary on the terminal and the page lists it.
     pub in_tables: bool,
-    /// Whether it is an error: planners are compared in it after every touch, and in the touches
-    /// that they need to reduce it.
+    /// Whether the measure is an error: planners are compared in it after every touch, and in the
+    /// touches that they need to reduce it.
     pub is_error: bool,
-    /// Part of a row that it is computed from.
+    /// Part of a row from which the measure is computed.
     pub source: Source,
 }
 
@@ -319,7 +319,7 @@ const SECONDS: MeasureUnit =
     MeasureUnit { suffix: "_s", symbol: "s", decimals: 1, range: [-LARGE, LARGE], ..PLAIN };
 
 impl Measure {
-    /// Returns the columns of its statistics over many trials: mean and standard error, median and
+    /// Returns the columns of the statistics over many trials: mean and standard error, median and
     /// interval bounds.
     pub fn columns(&self) -> Vec<String> {
         let mut statistics = Vec::new();
@@ -342,7 +342,7 @@ impl Measure {
         self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
     }
 
-    /// Value after some touches; `None` if the trial has none.
+    /// Value after some touches; `None` if the trial has no value.
     pub fn value(&self, row: &TrialRow, touches: u32) -> Option<f64> {
         match self.source {
             Source::Trial(of) => of(row, touches),
@@ -361,7 +361,7 @@ impl Measure {
         }
     }
 
-    /// Whether it applies to whole objects.
+    /// Whether the measure applies to whole objects only.
     pub fn is_for_whole_objects(&self) -> bool {
         matches!(self.source, Source::Shape(_))
     }
@@ -376,17 +376,17 @@ impl Measure {
         Self { aggregate, ..self }
     }
 
-    /// Sets the axis on which it is drawn.
+    /// Sets the axis on which the measure is drawn.
     const fn drawn(self, scale: PanelAxis) -> Self {
         Self { scale, ..self }
     }
 
-    /// Removes it from the tables; it stays in files.
+    /// Removes the measure from the tables; it stays in files.
     const fn untabled(self) -> Self {
         Self { in_tables: false, ..self }
     }
 
-    /// Marks it as an error, in which planners are compared after every touch.
+    /// Marks the measure as an error, in which planners are compared after every touch.
     const fn error(self) -> Self {
         Self { is_error: true, ..self }
     }

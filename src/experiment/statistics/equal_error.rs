@@ -154,7 +154,7 @@ fn curves(
     planner_rows(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
 }
 
-/// Returns when the planners of each pair reach the second planner's median error at `goal_index`,
+/// Returns the index at which each planner reaches the second one's median error at `goal_index`,
 /// and the median path length to it, m. The index counts compared touch counts: over a zone,
 /// touches after the initial ones.
 fn reach_goal(

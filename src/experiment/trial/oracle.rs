@@ -31,12 +31,12 @@ pub(in crate::experiment) struct GroundTruth {
     pub(in crate::experiment) shape: Option<TrueShape>,
 }
 
-/// Step between the points of the true surface at which the oracle compares.
+/// Step between the points of the true surface at which the oracle computes the error.
 // heuristic: all points give the same choice in eight times the time.
 const LOOKED_AT: usize = 8;
 
 impl GroundTruth {
-    /// Returns the belief with a touch of a rigid finger at `target`, without a new fit.
+    /// Returns `belief` updated with a rigid finger's touch at `target`, without a new fit.
     fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
         let mut probe = exact_probe(Arc::clone(&self.environment));
         let approach = self.environment.task().approach(target)?;
@@ -64,7 +64,7 @@ impl GroundTruth {
     }
 }
 
-/// Factory of the oracles of trials with one ground truth.
+/// Factory of oracle planners, which share one ground truth.
 pub(in crate::experiment) struct OracleFactory(pub(in crate::experiment) Arc<GroundTruth>);
 
 impl PlannerFactory for OracleFactory {

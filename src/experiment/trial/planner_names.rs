@@ -12,7 +12,7 @@ pub fn known_planners() -> impl Iterator<Item = (&'static str, &'static str)> {
     PLANNERS.iter().map(|entry| (entry.name, entry.about)).chain([(ORACLE, oracle)])
 }
 
-/// Names allowed in place of `name`: those [`known_planners`], and `name` itself if it names an
+/// Names allowed in place of `name`: the [`known_planners`], and `name` itself if it names an
 /// [external](is_external) planner.
 pub fn allowed_names(name: &str) -> Vec<&str> {
     known_planners().map(|(name, _)| name).chain(is_external(name).then_some(name)).collect()

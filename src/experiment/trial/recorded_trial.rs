@@ -139,7 +139,7 @@ pub struct ResumedProbe<'a> {
     made: std::vec::IntoIter<TouchRow>,
     finger: Finger,
     probe: &'a mut dyn Probe,
-    /// The last touch, if it was made before, and the far end of its approach.
+    /// Last touch, if it was made before the interruption, and the far end of its approach.
     last: Option<(TouchRow, Point3<f64>)>,
     /// Simulator or robot time at the interruption.
     begun_s: f64,

@@ -10,7 +10,7 @@ use palpate_gp::fit::Fit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Identifies a trial of an experiment.
+/// Identifier of a trial of an experiment.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TrialId {
     /// Number of the trial.
@@ -31,7 +31,7 @@ pub struct TrialRow {
     pub failure: Option<String>,
     /// Touches in order.
     pub touches: Vec<TouchRow>,
-    /// Held-out touches after the last one.
+    /// Held-out touches, made after `touches`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub verification: Vec<VerificationRow>,
 }
@@ -80,7 +80,7 @@ pub struct TouchRow {
     pub shape: Option<ShapeMetrics>,
 }
 
-/// A held-out touch after a trial's last one.
+/// A held-out touch, made after all `touches` of a trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct VerificationRow {
     /// Target of the touch, as in the trial's touches.
@@ -102,7 +102,7 @@ pub struct VerificationRow {
     /// outside the estimated surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error_m: Option<f64>,
-    /// Standard deviation of that error.
+    /// Standard deviation of `error_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd_m: Option<f64>,
     /// Contact height minus the repeated touch's, corrected for the predicted slope between the two

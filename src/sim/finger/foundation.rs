@@ -38,13 +38,13 @@ pub struct Column {
 /// Response of a column to compression and pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColumnResponse {
-    /// u: inward motion of the skin's inner side, in metres.
+    /// Inward motion u of the skin's inner side, in metres.
     pub inward_m: f64,
     /// Stress between skin and object, in Pa.
     pub stress_pa: f64,
-    /// −∂u/∂p, in metres per Pa.
+    /// Compliance −∂u/∂p, in metres per Pa.
     pub compliance_m_pa: f64,
-    /// W, in J/m².
+    /// Energy W, in J/m².
     pub energy_j_m2: f64,
 }
 
@@ -82,7 +82,7 @@ impl Column {
     }
 }
 
-/// Balance of all contacts together, without the energy of their own responses.
+/// Equilibrium of all contacts together; the energy excludes that of the contacts' responses.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Balance {
     pub pressure_pa: f64,

@@ -54,7 +54,7 @@ struct Ball {
     radius_m: f64,
 }
 
-/// Patches that were within the margin of an object in some pose: all that can meet it until the
+/// Patches within the margin of an object in one pose: no others can meet the object until the
 /// finger has moved by the margin. It is the memory of one trial.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NearbyPatches {

@@ -51,7 +51,7 @@ impl PlateContact {
         Some(Self { pressed: skin.relaxed(), skin, bvh: MeshBvh::new(mesh) })
     }
 
-    /// Returns the load with the plate across the direction `towards_t` and the origin of `T`
+    /// Returns the load with the plate perpendicular to `towards_t` and the origin of `T`
     /// `height_m` above it.
     fn press(
         &mut self,
@@ -68,7 +68,7 @@ impl PlateContact {
         reach_m.fold(0.0, f64::max)
     }
 
-    /// Returns the height at which the plate takes a normal force.
+    /// Returns the height of `T` at which the plate exerts the given normal force, m.
     ///
     /// # Errors
     /// The errors of [`Skin::press`].
@@ -133,7 +133,7 @@ pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
 }
 
 /// Returns the largest slope of force over depth, in N/m, with a flat plate pressed on the skin
-/// across `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
+/// perpendicular to `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
 pub fn largest_stiffness_n_m(skin: &Skin, towards_t: &Vector3<f64>, force_n: f64) -> f64 {
     let Some(mut plate) = PlateContact::of(skin.clone()) else { return 0.0 };
     let top_m = plate.top_m(towards_t);

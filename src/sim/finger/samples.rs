@@ -88,9 +88,9 @@ pub struct Node {
     pub gap_m: f64,
     /// Area that the node represents, along its outward normal, in m².
     pub area_m2: Vector3<f64>,
-    /// Whether nail or back end clamp the node.
+    /// Whether the nail or the back end clamps the node.
     pub clamped: bool,
-    /// Index of its mirror image across y = 0.
+    /// Index of the node's mirror image across y = 0.
     pub mirror: usize,
 }
 
@@ -103,7 +103,7 @@ pub struct Lattice {
 
 impl Lattice {
     /// Creates the lattice with the given numbers of cells along and around it, an even number
-    /// around; all angles meet in the apex.
+    /// around; the lines of all angles meet at the apex.
     ///
     /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps
     /// of an arc. Their number is even, so that the corner at 45° is a node.

@@ -12,7 +12,7 @@ use palpate_input::error::InputError;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
 
-/// Largest number of marks drawn, the latest ones; as many as an experiment has touches at most.
+/// Largest number of marks drawn, the latest ones: that of touches with an exact fit.
 const MARKS_MAX: usize = 2000;
 
 // heuristic: radius and colour of a mark.

@@ -15,15 +15,15 @@ use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::Rules;
 use serde::Serialize;
 
-/// Offset to the seeds of held-out targets and trials; larger than any number of them.
+/// Offset of the seeds of held-out targets and trials; larger than any number of them.
 const HELD_OUT: u32 = 1_000_000;
 
 /// Number of measurements per variant.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasurementCounts {
-    /// Touches compared.
+    /// Number of touches compared.
     pub touches: usize,
-    /// Touches timed, each next to one of the reference; 0 times each target once.
+    /// Touches timed, each paired with one of the reference; if 0, each target is timed once.
     pub pairs: usize,
     /// Trials per planner.
     pub trials: u32,

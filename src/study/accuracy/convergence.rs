@@ -13,21 +13,21 @@ use palpate_explore::robot::finger::TipMotion;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Ticks per second, compared with the last. A stage takes 20 ms to stop from an approach at 20
-/// mm/s; ticks longer than a quarter of that do not resolve it.
+/// Ticks per second, each compared with the last. A stage takes 20 ms to stop from an approach at
+/// 20 mm/s; ticks longer than a quarter of that do not resolve it.
 const TICKS_PER_S: [f64; 5] = [200.0, 500.0, 1000.0, 2000.0, 8000.0];
 
-/// Number of skin points, compared with the last.
+/// Numbers of skin points, each compared with the last.
 const SAMPLES: [f64; 8] = [60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 8000.0, 32000.0];
 
-/// Number of skin points in the comparisons of steps, where its error cancels.
+/// Number of skin points in the comparisons of steps, where the error of this number cancels.
 const STEPPED_SAMPLES: usize = 250;
 
-/// Steps per second in contact, compared with the last: the longest allowed step, halved
+/// Steps per second in contact, each compared with the last: the longest allowed step, halved
 /// repeatedly, then an eighth.
 const STEPS_PER_S: [f64; 6] = [500.0, 1000.0, 2000.0, 4000.0, 8000.0, 64000.0];
 
-/// Control tick in contact, fixed because commands depend on it.
+/// Duration of a control tick in contact, fixed because commands depend on it.
 const PERIOD_S: f64 = 2e-3;
 
 /// Speed and duration of the press after the hull would rest on the object.

@@ -97,9 +97,9 @@ impl ErrorStatistics {
 /// Share of touches with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TouchShare {
-    /// Touches counted.
+    /// Number of touches counted.
     pub count: usize,
-    /// All touches.
+    /// Number of all touches.
     pub of: usize,
     /// 95 % interval of the share.
     pub interval: [f64; 2],

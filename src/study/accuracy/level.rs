@@ -32,7 +32,7 @@ pub struct FidelityLevel {
     pub samples: usize,
     /// Cells along and around a thin-shell skin.
     pub shell: Option<[usize; 2]>,
-    /// Duration of a control tick, and of a step of a simulation with masses.
+    /// Duration in s of a control tick, and of a step of a simulation with masses.
     pub period_s: f64,
     /// Integrator of a simulation with masses.
     pub integrator: Integrator,

@@ -1,4 +1,4 @@
-//! Accuracy against cost: variants of a scene, each with its error, its time and its verdict on
+//! Accuracy against cost: variants of a scene, each with its error, its time and its comparison of
 //! planners.
 //!
 //! There are two kinds of variants. A `level` is a coarser or finer simulation. One of the

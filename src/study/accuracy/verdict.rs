@@ -78,7 +78,7 @@ pub fn paired_differences_m(
     Ok(trials.into_par_iter().map(advantage).collect())
 }
 
-/// Mean of `a`, or of its excess over `b` in the trials in which both are known.
+/// Mean of `a`, or of `a` minus `b` over the trials in which both are known.
 pub fn difference(a: &[Option<f64>], b: Option<&[Option<f64>]>) -> Option<PairedDifference> {
     let other = |i: usize| b.map_or(Some(0.0), |b| b[i]);
     let pairs = a.iter().enumerate().filter_map(|(i, a)| (*a).zip(other(i)));

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub struct Header {
     /// Name of the experiment.
     pub experiment: String,
-    /// Version of Palpate that wrote it.
+    /// Version of Palpate that wrote the file.
     pub palpate: String,
     /// Reason for this baseline, given by its author.
     pub why: String,
@@ -52,12 +52,12 @@ pub struct TrialLine {
     pub trial: u32,
     /// Name of the planner.
     pub planner: String,
-    /// First half of the SHA-256 of its row.
+    /// First half of the SHA-256 of the trial's row.
     pub row: String,
     /// Reason of a failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Values of its measures, by [`CheckMeasure::id`](super::measures::CheckMeasure::id).
+    /// Values of the measures, by [`CheckMeasure::id`](super::measures::CheckMeasure::id).
     pub values: BTreeMap<String, f64>,
 }
 

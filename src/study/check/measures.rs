@@ -12,10 +12,10 @@ pub struct CheckMeasure {
     pub id: &'static str,
     /// Title for readers.
     pub title: &'static str,
-    /// Whether it is a logarithm, so that a difference of 0.05 means 5 %; otherwise it is a share
+    /// Whether the value is a logarithm (a difference of 0.05 means 5 %); otherwise it is a share
     /// of a trial's touches.
     pub is_log: bool,
-    /// Computes its value from the touches after the initial ones; `None` if the trial has no
+    /// Computes the value from the touches after the initial ones; `None` if the trial has no
     /// value.
     pub value: fn(&TrialRow, &Experiment) -> Option<f64>,
 }

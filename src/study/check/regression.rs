@@ -190,8 +190,8 @@ pub struct MeasureResult {
 pub struct CheckOptions {
     /// Largest relative increase in error that still passes.
     pub tolerance: f64,
-    /// Probability of a false alarm in a planner's first measure at any look. The other measures
-    /// share the same probability, corrected after Holm 1979.
+    /// Probability of a false alarm in a planner's first measure at any evaluation. The other
+    /// measures share the same probability, corrected after Holm 1979.
     pub alpha: f64,
     /// Number of trials in the first test for identical rows.
     pub first: usize,

@@ -170,8 +170,8 @@ pub trait Backend: Send {
     /// A fault ends the touch; the backend is left at rest.
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault>;
 
-    /// Stops by the brakes instead of the servos: a simulated arm for its next step, which commands
-    /// zero velocity; an arm behind topics until an operator clears it. A backend without brakes
-    /// ignores the call.
+    /// Stops the robot by its brakes, not its servos: a simulated arm for the next step, which
+    /// commands zero velocity; an arm behind topics until an operator clears it. A backend without
+    /// brakes ignores the call.
     fn brake(&mut self) {}
 }

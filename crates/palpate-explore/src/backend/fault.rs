@@ -35,9 +35,9 @@ pub enum Fault {
         goal: &'static str,
         /// Time since reset, s.
         time_s: f64,
-        /// Smallest distance found, m.
+        /// Position error of the closest pose found, m.
         distance_m: f64,
-        /// Angle at that distance, rad.
+        /// Orientation error of that pose, rad.
         angle_rad: f64,
     },
     /// The state is not finite or outside its limits.

@@ -15,7 +15,7 @@ use palpate_gp::posterior::Posterior;
 use palpate_gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
 
 /// Distance between contact and target above which the target counts as unreached, in units of the
-/// zone's sides; a heuristic: well above rounding, below any grid of a figure.
+/// zone's sides; a heuristic: well above rounding, below the grid spacing of any figure.
 const REACHED_WITHIN: f64 = 1e-3;
 
 /// Smallest y of a normal in the zone that is used: below it the slope is nearly infinite, and a
@@ -156,8 +156,8 @@ impl HeightField {
         (self.contacts.len() > most).then_some(most)
     }
 
-    /// Returns the posterior given all contacts, and the standard deviation lost by an
-    /// approximation.
+    /// Returns the posterior given all contacts, and the residual standard deviation of an
+    /// approximate posterior.
     fn posterior(
         &self,
         hyperparameters: Hyperparameters,

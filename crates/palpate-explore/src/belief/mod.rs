@@ -24,7 +24,7 @@ pub enum Belief {
 }
 
 impl Belief {
-    /// Creates a belief without data for `task` and `finger`; a soft finger is marked so.
+    /// Creates a belief without data for `task` and `finger`; the flag marks a soft finger.
     pub fn new(
         task: &Task,
         (finger, is_soft): (&Finger, bool),

@@ -185,8 +185,8 @@ const SIDES: usize = 5;
 /// Unexplored gaps smaller than this share of the ball's radius are ignored; a heuristic.
 const HOLE: f64 = 0.15;
 
-/// Returns an aim into the largest reachable gap between contacts and swept space; `None` if it is
-/// not due or no gap is large enough.
+/// Returns an aim into the largest reachable gap between contacts and swept space; `None` if such a
+/// touch is not due or no gap is large enough.
 pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;

@@ -22,9 +22,9 @@ fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..count).map(|_| rng.random()).collect()
 }
 
-/// Returns the target at the fractions in 0..1 returned by `next`, whose argument is their number,
-/// one or two. For a whole object, they encode a direction, and `next` is called until one is
-/// reachable.
+/// Returns the target at the fractions in 0..1 returned by `next`, whose argument is the number of
+/// fractions, one or two. For a whole object, they encode a direction, and `next` is called until
+/// one is reachable.
 pub fn target_from_fractions(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Target {
     match belief {
         Belief::HeightField(field) => field.zone().at(&next(field.zone().dimension())).into(),

@@ -24,7 +24,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 };
 
 /// Returns the first `count` places of the sequence scrambled by `seed`: evenly spread, with no
-/// period in common with a surface's.
+/// period that could coincide with that of a surface.
 pub(super) fn places(zone: &Zone, count: u32, seed: u32) -> Vec<Vec<f64>> {
     (0..count).map(|index| zone.at(&fractions(zone.dimension(), index, seed))).collect()
 }

@@ -44,8 +44,8 @@ const CONDITION_MAX: f64 = 1000.0;
 /// error of finger and body.
 const MARGIN_M: f64 = 0.012;
 
-/// Free distance in front of that, so that the finger can move from one side of the body to
-/// another; a heuristic.
+/// Free distance in front of the search region, so that the finger can move from one side of the
+/// body to another; a heuristic.
 const STANDOFF_M: f64 = 0.05;
 
 /// Largest approach speed: 50 µm in the 10 ms between two frames; a heuristic.
@@ -70,7 +70,7 @@ const SPINS: usize = 12;
 /// Largest number of candidate touches; a heuristic.
 const CANDIDATES: usize = 600;
 
-/// One additional touch per this many, since the arm cannot make some; a heuristic.
+/// Number of touches per spare one, since the arm cannot make some of them; a heuristic.
 const SPARE: usize = 2;
 
 /// Allowed penetration of the body by a candidate away from its point of contact.
@@ -303,7 +303,7 @@ fn pose(
     Some(Isometry3::from_parts(Translation3::from(p_wt.coords), r_wt))
 }
 
-/// Returns the approach to that pose against `side_w`.
+/// Returns the approach to the pose `x_wt` against `side_w`.
 fn approach(x_wt: &Isometry3<f64>, side_w: &UnitVector3<f64>, finger: &Finger) -> Approach {
     let p_wt = Point3::from(x_wt.translation.vector);
     let [across, _] = CalibrationBody::axes(side_w);

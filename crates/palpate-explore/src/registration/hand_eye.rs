@@ -169,8 +169,8 @@ pub fn parameters(body: &CalibrationBody) -> [(&'static str, f64); PARAMETERS] {
     ]
 }
 
-/// Largest fraction of a parameter's squared direction in undetermined directions for a determined
-/// parameter; a heuristic.
+/// Largest squared projection of a determined parameter's axis onto the undetermined
+/// directions; a heuristic.
 const LOST: f64 = 0.05;
 
 /// Returns the parameters that a fit leaves undetermined.

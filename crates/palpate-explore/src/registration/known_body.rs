@@ -18,15 +18,15 @@ pub enum CalibrationBody {
     },
     /// A flat plate, large relative to the finger.
     Plate {
-        /// A point of it, around which it is touched.
+        /// A point of the plate, around which the touches are made.
         point_w: Point3<f64>,
         /// Normal, towards the finger.
         normal_w: UnitVector3<f64>,
     },
 }
 
-/// Plausible error of its given pose: position along each axis, and tilt of a plate; heuristics:
-/// laid down against a mark.
+/// Plausible error of the given pose of the body: position along each axis, and tilt of a plate;
+/// heuristics: laid down against a mark.
 const PLACE_M: f64 = 0.01;
 const TURN_RAD: f64 = 0.1;
 
@@ -34,7 +34,7 @@ impl CalibrationBody {
     /// Number of pose parameters.
     pub const PARAMETERS: usize = 3;
 
-    /// Signed distance of a point of `W` from its surface; negative inside.
+    /// Signed distance of a point of `W` from the body's surface, m; negative inside.
     pub fn distance_m(&self, p_w: &Point3<f64>) -> f64 {
         match self {
             Self::Ball { centre_w, radius_m } => (p_w - centre_w).norm() - radius_m,
@@ -69,7 +69,7 @@ impl CalibrationBody {
         [across, normal_w.cross(&across)]
     }
 
-    /// Names of its three parameters.
+    /// Names of the three pose parameters.
     pub fn names(&self) -> [&'static str; Self::PARAMETERS] {
         match self {
             Self::Ball { .. } => ["ball x", "ball y", "ball z"],
@@ -77,7 +77,7 @@ impl CalibrationBody {
         }
     }
 
-    /// Units of the steps of its parameters, m or rad.
+    /// Step units of the pose parameters, m or rad.
     pub fn units(&self) -> [f64; Self::PARAMETERS] {
         match self {
             Self::Ball { .. } => [PLACE_M; 3],
@@ -85,7 +85,8 @@ impl CalibrationBody {
         }
     }
 
-    /// Pose of its frame in `W`: a ball's centre, or a point of a plate whose +y is its normal.
+    /// Pose of the body's frame in `W`: at a ball's centre, or at a plate's point with +y along its
+    /// normal.
     pub fn x_wo(&self) -> Isometry3<f64> {
         match self {
             Self::Ball { centre_w, .. } => {

@@ -13,8 +13,8 @@ use std::ops::RangeInclusive;
 /// heuristic.
 pub const BEYOND_M: f64 = 0.01;
 
-/// Approach of a touch: the centre of the fingertip's hemisphere moves over `p_near_w` and straight
-/// on over `p_far_w`, wherever the surface between them is.
+/// Approach of a touch: the centre of the fingertip's hemisphere moves through `p_near_w` and
+/// straight on through `p_far_w`, wherever the surface between them is.
 ///
 /// It is defined by a frame `A` whose −y is the direction of the approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Approach {
     pub r_wa: UnitQuaternion<f64>,
     /// Attitude of the fingertip `T` in `A`.
     pub r_at: UnitQuaternion<f64>,
-    /// Ball between this approach and others; `None` if the finger moves straight from one to the
+    /// Ball to avoid between approaches; `None` if the finger moves straight from one to the
     /// next.
     pub obstacle: Option<Ball>,
 }
@@ -144,8 +144,8 @@ impl Ball {
         [along_m - half_m, along_m + half_m]
     }
 
-    /// Returns the approach of `finger` straight over the aim's point, from where the line enters
-    /// the ball to where it leaves it, or to where the hull would be too low. It starts
+    /// Returns the approach of `finger` straight through the aim's point, from where the line
+    /// enters the ball to where it leaves it, or to where the hull would be too low. It starts
     /// `standoff_m` before the ball, and the finger travels around the ball to get there.
     ///
     /// The finger lies behind and below its tip, as far as the direction permits: z of `A` points
@@ -225,8 +225,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The approach of an aim passes over its point along its direction, from the ball's
-        /// surface to its surface.
+        /// The approach of an aim passes through the aim's point along its direction, from the
+        /// ball's surface to its surface.
         #[test]
         fn an_approach_goes_over_its_point(
             at in prop::array::uniform3(-0.5f64..0.5),

@@ -78,7 +78,7 @@ impl From<Aim> for Target {
     }
 }
 
-/// A straight approach over a point of a ball.
+/// A straight approach through a point of a ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
     /// The point, in `W`.

@@ -180,9 +180,9 @@ impl Task {
         directions(of).filter(is_missed).collect()
     }
 
-    /// Returns the approach of `target`: along the zone's axis for a place, straight over the point
-    /// for an aim. Returns `None` if the target does not match the region's kind, or cannot be
-    /// reached.
+    /// Returns the approach of `target`: along the zone's axis for a place, straight through the
+    /// point for an aim. Returns `None` if the target does not match the region's kind, or cannot
+    /// be reached.
     pub fn approach(&self, target: &Target) -> Option<Approach> {
         match (&self.region, target) {
             (Region::Zone(zone), Target::Place(place)) => {

@@ -24,21 +24,21 @@ struct SweptPath {
     end: Aim,
     length_m: f64,
     radius_m: f64,
-    /// Number of balls along it that are observed.
+    /// Number of balls along the path that are observed.
     places: u32,
     /// Whether there is a contact at its end.
     is_met: bool,
 }
 
 impl SweptPath {
-    /// Distance of `p_w` from its hull.
+    /// Distance of `p_w` from the hull of the swept path, m; negative inside.
     fn distance_m(&self, p_w: &Point3<f64>) -> f64 {
         let start_w = self.end.p_w - self.end.direction_w.scale(self.length_m);
         (nearest_on_segment(p_w, &start_w, &self.end.p_w) - p_w).norm() - self.radius_m
     }
 
-    /// Returns the centres of its balls, from its end backwards: those inside `ball`, and at least
-    /// the one at a contact.
+    /// Returns the centres of the observed balls, from the end of the path backwards: those inside
+    /// `ball`, and at least the one at a contact.
     fn places_w(&self, ball: &Ball) -> impl Iterator<Item = Point3<f64>> {
         let [near_m, far_m] = ball.chord_m(&self.end);
         let first_m = if self.is_met { 0.0 } else { (-far_m).max(0.0) };

@@ -24,7 +24,7 @@ pub struct ExplorationSetup {
 }
 
 impl ExplorationSetup {
-    /// Creates the scope of the `ball` of a task, with `finger`; a soft finger is marked so.
+    /// Creates the scope of the `ball` of a task, with `finger`; the flag marks a soft finger.
     pub fn new(ball: Ball, task: &Task, (finger, is_soft): (&Finger, bool)) -> Self {
         let offset_m = if is_soft { SOFT_OFFSET_M } else { 0.0 };
         Self { ball, radius_m: finger.radius_m, offset_m, task: Arc::new(task.clone()) }

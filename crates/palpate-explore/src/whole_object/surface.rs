@@ -28,7 +28,7 @@ pub struct Surface {
 /// them; a heuristic.
 const BEYOND: f64 = 0.15;
 
-/// Smallest gradient that is used as that of a distance; a heuristic.
+/// Lower bound on the gradient's norm that converts field values into distances; a heuristic.
 const FLAT: f64 = 0.3;
 
 /// Returns the slope of a field with this gradient along the outward normal, which converts a

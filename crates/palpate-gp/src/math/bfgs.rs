@@ -12,9 +12,9 @@ use super::optimize::{Bounds, Optimum, Stop};
 pub struct BfgsOptions {
     /// Length of the first step while the curvature is unknown, in units of the box's sides.
     pub first_step: f64,
-    /// Absolute predicted gain below which it has converged.
+    /// Absolute predicted gain below which the climb has converged.
     pub gain: f64,
-    /// Predicted gain, as a fraction of the value, below which it has converged.
+    /// Predicted gain, as a fraction of the value, below which the climb has converged.
     pub relative_gain: f64,
     /// Largest number of evaluations.
     pub budget: u32,
@@ -23,7 +23,7 @@ pub struct BfgsOptions {
 /// Smallest gain of a step, as a fraction of that predicted by the gradient (Nocedal & Wright 2006,
 /// section 3.1).
 const ARMIJO: f64 = 1e-4;
-/// Steps shorter than this fraction of the box's sides are rounding; a heuristic.
+/// Smallest step above rounding error, as a fraction of the box's sides; a heuristic.
 const STEP_MIN: f64 = 1e-9;
 /// Initial curvature of an axis, in units of the negligible gain, over its whole side; a heuristic:
 /// so low that no climb stops because of it.

@@ -97,8 +97,8 @@ mod tests {
     use std::convert::Infallible;
 
     proptest! {
-        /// The maximum of a concave paraboloid is found to the shortest step, or the bound before
-        /// it; no place is outside, and the additional result belongs to the place returned.
+        /// The maximum of a concave paraboloid is found to within the shortest step, or the bound
+        /// before it; no place is outside, and the additional result belongs to the place returned.
         #[test]
         fn it_climbs_to_the_top_within_its_box(
             top in prop::array::uniform3(-2f64..2.0),
@@ -123,7 +123,7 @@ mod tests {
             }
         }
 
-        /// It evaluates at most one place more than the budget, and keeps the best.
+        /// The search evaluates at most one place more than the budget, and keeps the best.
         #[test]
         fn it_keeps_to_its_budget(budget in 1u32..20) {
             let mut best = f64::NEG_INFINITY;

@@ -122,11 +122,11 @@ mod x86 {
         work.call::<Narrow>()
     }
 
-    /// Created only in [`with_512_bits`].
+    /// A 512-bit vector, created only in [`with_512_bits`].
     #[derive(Clone, Copy)]
     struct Wide(__m512d);
 
-    /// Created only in [`with_256_bits`].
+    /// A 256-bit vector, created only in [`with_256_bits`].
     #[derive(Clone, Copy)]
     struct Narrow(__m256d);
 

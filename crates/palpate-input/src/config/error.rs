@@ -38,7 +38,7 @@ pub struct ConfigError {
     pub origin: Option<Box<Origin>>,
     /// The key.
     pub key: Option<String>,
-    /// The value found there.
+    /// Value of the key, as found.
     pub value: Option<String>,
     /// Allowed values.
     pub allowed: Option<String>,

@@ -36,7 +36,7 @@ impl Rules {
         }
     }
 
-    /// Requires `key` to be a number in `allowed`; NaN never is.
+    /// Requires `key` to be a number in `allowed`; NaN is never allowed.
     pub fn number(&mut self, key: &str, value: f64, allowed: RangeInclusive<f64>) {
         let described = || format!("{} to {}", allowed.start(), allowed.end());
         self.note(key, described);
@@ -72,8 +72,8 @@ impl Rules {
         self.require(key, format!("\"{value}\""), known, || format!("one of {}", names.join(", ")));
     }
 
-    /// Requires `condition` of `key` with `value`; `allowed` describes the allowed values
-    /// otherwise.
+    /// Requires `condition` for `key` with `value`; if violated, `allowed` describes the
+    /// allowed values.
     pub fn require(
         &mut self,
         key: &str,

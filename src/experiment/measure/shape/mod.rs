@@ -267,7 +267,7 @@ fn intersection_over_union(a: &MeshBvh, b: &MeshBvh, lines: usize) -> Option<f64
     (either_m > 0.0).then(|| both_m / either_m)
 }
 
-/// Length in spans of both `a` and `b`, which are sorted.
+/// Length of the intersection of the sorted spans `a` with the sorted spans `b`.
 fn common_m(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     let (mut i, mut j, mut sum_m) = (0, 0, 0.0);
     while let (Some([from_a, to_a]), Some([from_b, to_b])) = (a.get(i), b.get(j)) {

@@ -57,9 +57,9 @@ impl FingerConstants {
 pub struct Constant {
     /// Key of the constant in a scene's `[effects]`.
     pub key: &'static str,
-    /// Bounds; at either bound, the recordings do not determine the constant.
+    /// Bounds of the fit; a constant that reaches one is not determined by the recordings.
     pub bounds: [f64; 2],
-    /// Plausible standard deviation, as a logarithm.
+    /// Plausible standard deviation of the constant's logarithm.
     pub plausible: f64,
     of: fn(&mut FingerConstants) -> &mut f64,
 }

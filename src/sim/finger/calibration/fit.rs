@@ -29,7 +29,7 @@ pub struct ConstantEstimate {
     pub key: &'static str,
     /// Estimated value.
     pub value: f64,
-    /// Factor of one standard deviation; the errors of electrodes in one session are correlated.
+    /// Standard deviation as a factor; the errors of electrodes in one session are correlated.
     pub factor: f64,
 }
 
@@ -38,7 +38,7 @@ pub struct ConstantEstimate {
 pub struct UndeterminedConstant {
     /// Key of the constant in a scene's `[effects]`.
     pub key: &'static str,
-    /// Bound that it reached.
+    /// Bound that the constant reached.
     pub bound: f64,
     /// Value after the reset.
     pub kept: f64,

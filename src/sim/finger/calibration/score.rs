@@ -9,7 +9,7 @@ use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::FitError;
 use rayon::prelude::*;
 
-/// Smallest measured change whose sign counts.
+/// Smallest measured change whose predicted sign is scored, counts.
 const SIGNED_COUNTS: f64 = 100.0;
 
 // heuristic: range and number of offsets tried in a fit of the offset alone, as factors of
@@ -32,7 +32,7 @@ pub struct Score {
     pub mean_change_counts: Option<f64>,
     /// Number of entries with a measured change of more than 100 counts.
     pub signed: usize,
-    /// Number of these whose predicted change has the right sign.
+    /// Number of those entries whose predicted change has the right sign.
     pub right: usize,
 }
 
@@ -66,7 +66,7 @@ impl Score {
 pub struct HeldOutResult {
     /// Name of the held-out sensor.
     pub sensor: String,
-    /// Sensors that the constants are fitted to; empty if the constants are those of the start.
+    /// Sensors to which the constants are fitted; empty if the constants are the initial ones.
     pub others: Vec<String>,
     /// Fit: constants from the other sensors, session from this sensor.
     pub fit: Fit,
@@ -117,7 +117,7 @@ pub fn leave_one_out(
     held.collect()
 }
 
-/// Returns the factor of one standard deviation of the constant `key` between sensors, from the
+/// Returns the standard deviation of the constant `key` between sensors as a factor, from the
 /// leave-one-out fits (jackknife); `None` for fewer than two of them.
 pub fn jackknife_factor(held_out: &[HeldOutResult], key: &str) -> Option<f64> {
     let found =
@@ -163,12 +163,12 @@ pub fn loads(
     Some(scored.collect())
 }
 
-/// Returns the counts at rest if the fluid conducts `factor` times as well.
+/// Returns the counts at rest if the conductivity of the fluid is multiplied by `factor`.
 fn conducting(rest: f64, factor: f64) -> f64 {
     counts(impedance_ohm(rest) / factor)
 }
 
-/// Returns the factor of conductivity that best explains the counts alone.
+/// Returns the factor on the conductivity that fits the counts best without any other change.
 fn offset(bins: &[Bin], rest: &[f64; ELECTRODES]) -> f64 {
     let (least, most, count) = OFFSETS;
     let error = |factor: f64| -> f64 {

@@ -27,7 +27,7 @@ pub struct Session {
     pub gain: f64,
     /// Pitch, from the pad towards the tip.
     pub pitch_rad: f64,
-    /// Roll, from the pad towards +y, at each load, because these are different presses.
+    /// Roll, from the pad towards +y: one value per load, because each load is another press.
     pub roll_rad: Vec<f64>,
 }
 
@@ -68,9 +68,9 @@ impl Session {
         }
     }
 
-    /// Returns the mean counts over manual presses with a normal force about a roll. `carry`
-    /// changes the closed fraction of each gap, given the direction that faces the plate. Returns
-    /// `None` if a pose has no solution.
+    /// Returns the mean counts of manual presses at one normal force, with rolls about one roll.
+    /// `carry` changes the closed fraction of each gap, given the direction that faces the plate.
+    /// Returns `None` if a pose has no solution.
     pub(super) fn mean_counts(
         &self,
         [force_n, roll_rad]: [f64; 2],
@@ -90,7 +90,7 @@ impl Session {
         Some(mean)
     }
 
-    /// Returns the rise of pressure per newton from 4 to 8 N, relative to the first newton; `None`
+    /// Returns the rise of pressure per newton from 4 to 8 N over that from 0 to 1 N; `None`
     /// if a pose has no solution.
     pub fn saturation(&self, model: &FingerConstants, bench: &mut PlateRig) -> Option<f64> {
         bench.set_skin(model)?;

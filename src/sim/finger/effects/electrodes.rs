@@ -25,13 +25,13 @@ effect! {
     constants {
         /// Counts of E1 to E19 without contact.
         baseline_counts: [f64; ELECTRODES], 1.0..=FULL_SCALE_COUNTS - 1.0;
-        /// Standard deviation of the patch of fluid that an electrode senses.
+        /// Standard deviation of the Gaussian patch of fluid that an electrode senses.
         spread_m: f64, 1e-5..=1e-1;
         /// Power p in Z = Z0 (g0/g)^p.
         exponent: f64, 0.1..=10.0;
-        /// Factor of white noise on the recorded standard deviations; 0 for none.
+        /// White noise, as a multiple of the recorded standard deviations; 0 for none.
         noise: f64, 0.0..=1e3;
-        /// Correlation of that noise between any two electrodes, which share their excitation.
+        /// Correlation of the white noise between any two electrodes, which share their excitation.
         noise_correlation: f64, 0.0..=1.0;
         /// Random walk shared by all electrodes, in counts per root second; 0 for none.
         drift_counts: f64, 0.0..=1e3;
@@ -180,7 +180,7 @@ pub struct ShearCoupling {
 }
 
 impl ShearCoupling {
-    /// Computes the effect of the skin at `samples` on `electrodes`.
+    /// Computes the coupling of the skin at `samples` to `electrodes`.
     pub fn new(electrodes: &Electrodes, samples: &[SkinSample]) -> Self {
         let is_wet = |sample: &&SkinSample| sample.layers.has_fluid;
         let follows = |sample: &SkinSample| 1.0 - sample.direction.x.max(0.0).powi(2);

@@ -19,7 +19,7 @@ pub struct Compliance {
     symmetric: usize,
     /// Unknowns of each node's three directions, with their shares.
     parts: Vec<[Part; 2]>,
-    /// Inverse at nodes p and q ≤ p, in m/N, by rows of p.
+    /// Blocks of the inverse for nodes p and q ≤ p, in m/N, by rows of p.
     blocks: Vec<[[f32; 3]; 3]>,
 }
 
@@ -129,8 +129,8 @@ fn parts(mirror: &[usize]) -> (Vec<[Part; 2]>, usize) {
     (parts, count)
 }
 
-/// Passes the entries of the stiffness between `unknowns`, counted from the first of them; those of
-/// one place add up.
+/// Passes the stiffness entries between `unknowns` to `add`, with indices from the first of them;
+/// entries with the same indices add up.
 fn each(
     sheet: &Sheet,
     place: &[Option<usize>],

@@ -43,13 +43,13 @@ struct Edge {
     turns: [f64; 2],
     rest_m2: f64,
     rest_slope: f64,
-    /// Derivative of the slope by each corner's motion along `normal`.
+    /// Derivative of the slope with respect to each corner's motion along `normal`.
     slopes_m: Quad,
     normal: Quad,
-    /// Edges with which it shares a triangle; if there is only one triangle, itself with zeros in
+    /// Edges that share a triangle with this one; with one triangle only, this edge with zeros in
     /// `laws`.
     near: [usize; 4],
-    /// Entries of C and Q for itself and for `near`, in J/m⁴ and J.
+    /// Entries of C and Q for this edge and for `near`, in J/m⁴ and J.
     laws: [[f64; 2]; 5],
 }
 
@@ -74,7 +74,7 @@ pub struct SheetState {
     /// Gradient of the displaced volume at each node, in m².
     pub volume_m2: Vec<Quad>,
     points: Vec<Quad>,
-    /// Growth of each edge's squared length, in m², and change of slope.
+    /// Increase of each edge's squared length, in m², and change of its slope.
     grown: Vec<[f64; 2]>,
 }
 

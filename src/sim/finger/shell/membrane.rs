@@ -305,8 +305,8 @@ impl MotionHistory {
             + numbers.iter().sum::<usize>() * size_of::<f64>()
     }
 
-    /// Returns by how much the object's last displacement repeats (least squares over the nodes),
-    /// given each node's overlap with it, and stores the overlaps.
+    /// Returns the ratio of the object's displacement to its last (least squares over the nodes),
+    /// given each node's overlap with the object, and stores the overlaps.
     pub fn times(&mut self, overlaps: impl Iterator<Item = (usize, f64)>) -> f64 {
         let (mut along_m2, mut last_m2) = (0.0, 0.0);
         std::mem::swap(&mut self.overlap_m, &mut self.before_m);

@@ -17,13 +17,14 @@ const SWEEPS: usize = 100;
 /// Springs, with the workspace to solve for their forces.
 #[derive(Clone, Debug, Default)]
 pub struct UnilateralSprings {
-    /// k, in N/m.
+    /// Stiffnesses k, in N/m.
     pub stiffness_n_m: Vec<f64>,
-    /// b, in m.
+    /// Compressions b without forces, in m.
     pub free_m: Vec<f64>,
-    /// W by rows, in m/N.
+    /// Compliance W of the body, by rows, in m/N.
     pub softness_m_n: Vec<f64>,
-    /// f, in N: before [`solve`](Self::solve) a guess of the loaded springs, then the solution.
+    /// Forces f, in N: before [`solve`](Self::solve) a guess, positive if loaded; then the
+    /// solution.
     pub force_n: Vec<f64>,
     loaded: Vec<usize>,
     factor: Vec<f64>,
@@ -58,7 +59,7 @@ impl UnilateralSprings {
         numbers * size_of::<f64>() + self.loaded.capacity() * size_of::<usize>()
     }
 
-    /// Returns the compression of spring `i` by everything but its own stiffness.
+    /// Returns the compression of spring `i` under the forces of all loaded springs.
     fn compression_m(&self, i: usize) -> f64 {
         let row = &self.softness_m_n[i * self.len()..(i + 1) * self.len()];
         let yielded = self.loaded.iter().map(|&j| row[j] * self.force_n[j]);

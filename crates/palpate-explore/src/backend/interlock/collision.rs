@@ -22,14 +22,14 @@ pub const CLEARANCE: InterlockEntry = InterlockEntry {
 /// Checks the capsules of the links along the stopping path.
 struct CollisionMonitor {
     links: Vec<LinkCapsule>,
-    /// Each link with an obstacle that it must avoid.
+    /// Pairs of a link and an obstacle that the link must avoid.
     pairs: Vec<(usize, Other)>,
     clearance_m: f64,
     reaction_s: f64,
     /// The links in `W` at the last posture checked.
     placed: Vec<Capsule>,
-    /// The last posture checked and its clearance; it is computed again when a point may have moved
-    /// by that much.
+    /// The last posture checked and its clearance, m; the clearance is recomputed once a point may
+    /// have moved that far.
     looked: Option<(Joints, f64)>,
 }
 

@@ -31,15 +31,15 @@ pub const RETRACT_M_S: f64 = 0.02;
 // heuristic: well above the sensor's noise, far below a fault.
 pub const RETRACT_RISE_N: f64 = 2.0;
 
-/// Length added to the finger's own for its lever.
+/// Length added to the finger's length and radius for the lever of the default torque limit, m.
 // heuristic: allowance for adapter and skin.
 const SPARE_M: f64 = 0.01;
 
 /// Consecutive readings above a limit; a single one may be a disturbance.
 const SAMPLES: u32 = 2;
 
-/// Time over which the rate is measured: long enough to average the noise of single readings, and
-/// shorter than a finger at 0.1 m/s needs for a millimetre.
+/// Time over which the force rate is measured, s: long enough to average the noise of readings, and
+/// shorter than the time in which a finger at 0.1 m/s travels a millimetre.
 // heuristic: between the two.
 const RISE_S: f64 = 0.01;
 

@@ -181,8 +181,8 @@ impl InterlockedBackend {
         self.latch(fault)
     }
 
-    /// Brakes the joints to rest together, along a straight line. Returns whether excessive force
-    /// was the only trip meanwhile.
+    /// Brakes all joints to rest together, along a straight line in joint space. Returns whether
+    /// excessive force was the only trip meanwhile.
     fn brake(&mut self) -> bool {
         let mut is_sound = true;
         let ticks = (stopping_s(&self.now, &self.now.sent) / self.now.period_s).ceil() as usize + 1;
@@ -233,7 +233,7 @@ impl InterlockedBackend {
 // heuristic: 30 ms at 250 Hz.
 const HELD_TICKS: f64 = 8.0;
 
-/// Ticks in addition to twice those of a retraction at full speed, to start and to stop.
+/// Ticks added to the retract timeout of twice a retraction at full speed, to start and to stop.
 const RETRACT_TIMEOUT_TICKS: usize = 100;
 
 impl Backend for InterlockedBackend {

@@ -21,7 +21,7 @@ pub const TIP_SPEED: InterlockEntry = InterlockEntry {
 pub const JOINT_POSITION: InterlockEntry =
     InterlockEntry { name: "joint position", make: |_, _, _| Some(Box::new(JointLimits)) };
 
-/// The reduced speed of EN ISO 10218-1.
+/// Reduced speed of EN ISO 10218-1, m/s.
 const REDUCED_M_S: f64 = 0.25;
 
 /// Ratio of measured tip speed to its limit above which the robot is stopped.

@@ -30,7 +30,7 @@ const ARRIVED_M: f64 = 5e-5;
 /// than the height of any object.
 const DEEPER_M: f64 = 5e-3;
 
-/// Tolerance of each joint at home; a heuristic, the same as for a finger that is turned.
+/// Tolerance of each joint at home, rad; a heuristic: equal to the attitude tolerance of a path.
 const HOME_RAD: f64 = 2e-3;
 
 /// Carries out touches with any [`Backend`]. The same code drives simulators, recordings and the

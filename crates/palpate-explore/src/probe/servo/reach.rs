@@ -100,7 +100,7 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), InputError> {
     }
 }
 
-/// Fractions of an approach at which the return is checked, since contact may occur at any of them:
+/// Fractions of an approach from which the path home is checked, since contact may occur anywhere:
 /// the length of the approach decides the side of the elbow; a heuristic.
 const TURNS: [f64; 2] = [0.0, 1.0];
 
@@ -246,7 +246,8 @@ impl ArmReach {
     }
 }
 
-/// Tick of the check; a heuristic: coarse, for the controller's gain of 5 per second.
+/// Control period of the simulated check, s; a heuristic: coarse, for the controller's gain of 5
+/// per second.
 const PERIOD_S: f64 = 0.05;
 
 /// Largest lag of tip position and attitude behind their path before the arm counts as stuck; a
@@ -290,11 +291,11 @@ struct ClearanceConstraints {
     slack: f64,
 }
 
-/// Fraction for a path home from the current joints; a heuristic: the path was checked from nearby
-/// joints, and must be found again.
+/// Fraction of the margins for a path home from the current joints; a heuristic: it was checked
+/// from nearby joints, and must be found again.
 const MARGIN_CURRENT: f64 = 0.4;
 
-/// Fraction for all other paths.
+/// Fraction of the margins for all other paths.
 const MARGIN_PLANNED: f64 = 1.0;
 
 impl ClearanceConstraints {
@@ -356,7 +357,7 @@ impl ArmReach {
         }
     }
 
-    /// Whether all of `line` is clear; braking joints stay on it.
+    /// Whether the whole `line` is clear; joints that brake together stay on the line.
     fn allows(&self, line: &JointLine, clear: &ClearanceConstraints) -> bool {
         line.postures(GRAIN_M).all(|q| {
             self.is_clear(&q, clear, false)
@@ -421,7 +422,7 @@ impl ArmReach {
     }
 }
 
-/// Distance and angle between two poses.
+/// Returns the distance, m, and the angle, rad, between two poses.
 fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     let away_m = (a.translation.vector - b.translation.vector).norm();
     (away_m, a.rotation.angle_to(&b.rotation))

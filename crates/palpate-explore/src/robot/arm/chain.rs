@@ -84,17 +84,17 @@ pub enum RobotPart {
 pub struct LinkCapsule {
     /// Name in messages: that of its link, `tool` or `finger`.
     pub name: Arc<str>,
-    /// Part of the robot that it covers.
+    /// Part of the robot that the capsule covers.
     pub part: RobotPart,
-    /// Number of joints that move it: the index of its frame in [`Chain::frames`].
+    /// Number of joints that move the capsule: the index of its link's frame in [`Chain::frames`].
     pub link: usize,
-    /// Ends of its axis in that frame.
+    /// Ends of the capsule's axis in that frame, m.
     pub ends: [Point3<f64>; 2],
     /// Radius.
     pub radius_m: f64,
     /// Whether its link is too close to the base to reach the object or the table.
     pub near_base: bool,
-    /// Whether the tool or finger can fold back onto it.
+    /// Whether the tool or finger can fold back onto the link.
     pub folds: bool,
 }
 
@@ -113,7 +113,7 @@ impl LinkCapsule {
         far.link >= near.link + 3 || (near.folds && far.is_carried())
     }
 
-    /// Whether it lies beyond the flange: the tool or the finger.
+    /// Whether the capsule lies beyond the flange: on the tool or the finger.
     pub fn is_carried(&self) -> bool {
         self.part != RobotPart::Link
     }
@@ -241,9 +241,9 @@ pub enum ArmError {
     /// No posture within the joint limits reaches the pose of the tip.
     #[error("out of reach: the closest pose of the tip is {distance_m} m and {angle_rad} rad away")]
     OutOfReach {
-        /// Smallest distance found, m.
+        /// Position error of the closest pose found, m.
         distance_m: f64,
-        /// Angle at that distance, rad.
+        /// Orientation error of that pose, rad.
         angle_rad: f64,
     },
 }

@@ -153,8 +153,8 @@ impl Detector {
 /// one second, so that an increase of a channel's noise is followed within twenty touches.
 const MEMORY: f64 = 100.0;
 
-/// Number of frames required for a channel's scatter; a heuristic: from here on the rate of false
-/// alarms is that of many frames (`tests/suite/detection.rs`).
+/// Number of frames required for a channel's scatter; a heuristic: from here on the false-alarm
+/// rate equals that with many frames (`tests/suite/detection.rs`).
 const LEARNT: usize = 20;
 
 /// Smallest standard deviation of an electrode, counts: rounding; no recorded one has less than 1.5
@@ -179,9 +179,9 @@ const LEAST_PDC_COUNTS: f64 = 0.5;
 pub struct RestState {
     electrodes: Option<[Channel; ELECTRODES]>,
     pdc: Option<Channel>,
-    /// Number of frames of the means.
+    /// Number of frames averaged in the means.
     mean_of: f64,
-    /// Number of frames of the variances, minus one per tare.
+    /// Degrees of freedom of the variances: number of frames minus one per tare.
     variance_of: f64,
 }
 
@@ -192,7 +192,7 @@ struct Channel {
 }
 
 impl RestState {
-    /// Number of frames that the next tare needs for a valid evidence.
+    /// Number of frames that the next tare needs for valid evidence.
     pub fn tare_frame_count(&self) -> usize {
         LEARNT.saturating_sub(self.variance_of as usize)
     }
@@ -274,7 +274,7 @@ impl RestState {
         [pressure, electrodes]
     }
 
-    /// Variance of one more frame about the mean, in units of that of one frame about the true
+    /// Variance of a new frame about the mean, in units of the variance of one frame about the true
     /// value.
     fn alone(&self) -> f64 {
         1.0 + 1.0 / self.mean_of
