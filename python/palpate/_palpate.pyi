@@ -131,7 +131,7 @@ class Belief:
         `gp.inducing_touches` only the selected contacts."""
     @property
     def heights_m(self) -> _Array:
-        """Heights of these contacts above the datum, shape (m,), metres."""
+        """Heights of the contacts in `places` above the datum, shape (m,), metres."""
     @property
     def hyperparameters(self) -> _Hyperparameters | None:
         """Hyperparameters of the last fit; None before the first fit."""

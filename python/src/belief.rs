@@ -1,4 +1,4 @@
-//! Belief that planners and users of a run get.
+//! Belief of a trial, for Python planners and for users of a run.
 
 use crate::ball::Ball;
 use crate::errors;
@@ -164,7 +164,7 @@ impl Belief {
         rows(py, &seen.map_or(Vec::new(), seen_at), belief.zone().dimension())
     }
 
-    /// Heights of these contacts above the datum, shape (m,), metres.
+    /// Heights of the contacts in `places` above the datum, shape (m,), metres.
     #[getter]
     fn heights_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let surface = self.over_zone("heights_m")?.surface();

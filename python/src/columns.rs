@@ -39,7 +39,7 @@ fn words<'a>(
     table.set_item(name, values.collect::<Vec<_>>())
 }
 
-/// Returns a record per trial.
+/// Returns the columns of a table with a row per trial.
 pub(crate) fn trials<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let table = PyDict::new(py);
     let rows = || run.rows.iter();
@@ -50,7 +50,8 @@ pub(crate) fn trials<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyD
     Ok(table)
 }
 
-/// Returns a record per touch: its part of the row, and every measure after it.
+/// Returns the columns of a table with a row per touch: its part of the trial's row, and every
+/// measure after it.
 pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let table = PyDict::new(py);
     let all: Vec<(&TrialRow, usize, &TouchRow)> = (run.rows.iter())

@@ -70,7 +70,7 @@ impl ParallelExplorations {
         Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
     }
 
-    /// Sizes of an action, of a touch's row, and number of axes of the belief's grid.
+    /// Numbers of values of an action and of a touch's row, and of axes of the belief's grid.
     #[getter]
     fn sizes(&self) -> (usize, usize, usize) {
         let world = &self.worlds[0];

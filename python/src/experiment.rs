@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Interval between two checks of Ctrl-C and two progress reports of a run.
+/// Interval of the checks for Ctrl-C and of the progress reports of a run.
 // heuristic: short enough to feel immediate.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 

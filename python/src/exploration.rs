@@ -77,12 +77,12 @@ impl ExplorationScene {
         self.task().zone().map_or(3, Zone::dimension)
     }
 
-    /// Size of an action.
+    /// Number of values of an action.
     pub(crate) fn action(&self) -> usize {
         self.task().zone().map_or(AIM, Zone::dimension)
     }
 
-    /// Size of a touch's row.
+    /// Number of values of a touch's row.
     pub(crate) fn row(&self) -> usize {
         self.task().zone().map_or(AIM + 7, |zone| 2 * zone.dimension() + 2)
     }

@@ -8,7 +8,7 @@ use palpate::gp::{Fit, Kernel, MeanModel, Observations, Posterior, SearchBox, To
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// A fitted process.
+/// A fitted Gaussian process.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct Fitted {
     kernel: String,
@@ -22,7 +22,7 @@ type PickleState<'py> =
 
 #[pymethods]
 impl Fitted {
-    /// Fits the process of maximum likelihood within ranges (low, high): `lengths` of each length
+    /// Fits the process by maximum likelihood within ranges (low, high): `lengths` of each length
     /// scale, `signal` of the signal's standard deviation, `noise` of the noise's standard
     /// deviation relative to the signal's.
     #[new]

@@ -14,11 +14,11 @@ use rand_chacha::ChaCha8Rng;
 pub(crate) struct PythonFactory {
     /// Name, `MODULE:CLASS`.
     pub(crate) name: String,
-    /// Called with the zone (None around an object) and the seed. The result has `close()`, and
-    /// either `desk` with `abandon()` or `plan(belief) -> sequence of float`, whose exception is
-    /// the reason for a missing target.
+    /// Function that starts a planner from the zone (None around an object) and the seed. The
+    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> sequence of
+    /// float`, whose exception is the reason for a missing target.
     pub(crate) start: Py<PyAny>,
-    /// Source code that decides its plans.
+    /// Source code that determines the plans.
     pub(crate) source: String,
 }
 

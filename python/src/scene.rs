@@ -25,7 +25,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Scene {
     simulator: Simulator,
-    /// Created with the first touch.
+    /// Probe, created with the first touch.
     probe: Mutex<Option<Box<dyn probe::Probe>>>,
     seed: u64,
 }
@@ -90,7 +90,7 @@ impl Scene {
     }
 }
 
-/// Information about a touch for a belief.
+/// Data of a touch that a belief is updated with.
 pub(crate) struct TouchData {
     /// Approach of the finger.
     pub(crate) approach: Approach,

@@ -62,7 +62,7 @@ pub(super) struct Args {
     /// Seed of the targets.
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u16,
-    /// Number of paired touches that time each effect.
+    /// Number of paired touches for the timing of each effect.
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     pairs: u16,
     /// Trials per planner and effect; 0 runs none [default: 10; 0 with a tolerance in mm, N or
@@ -101,7 +101,7 @@ const EFFECT_TOUCHES: u16 = 120;
 // heuristic: 5 touches beyond the tolerance still pass.
 const HELD_OUT_TARGETS: u16 = 200;
 
-/// Explains what the printed intervals cover.
+/// Note on the coverage of the printed intervals.
 const INTERVAL_NOTE: &str = "\
 intervals: 95 %, over touches, trials and timings of this build; code placement in another build can change
 times by some percent";

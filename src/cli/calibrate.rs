@@ -35,7 +35,7 @@ pub struct Args {
     /// constants.
     #[arg(long)]
     attitude_only: bool,
-    /// Compare the skin under tangential force with the slopes in this file, in the format of
+    /// Compare the response to tangential force with the slopes in this file, in the format of
     /// tests/data/biotac_shear.json; uses the default constants.
     #[arg(long, value_name = "FILE", conflicts_with = "attitude_only")]
     shear: Option<PathBuf>,

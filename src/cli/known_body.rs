@@ -18,7 +18,7 @@ pub(super) struct KnownBodyArgs {
     pub(super) at: Option<[f64; 3]>,
 }
 
-/// Radii that a finger can touch all around.
+/// Allowed radii of a ball, m; a finger can touch it all around.
 const RADII_M: std::ops::RangeInclusive<f64> = 2e-3..=0.2;
 
 fn radius(text: &str) -> Result<f64, String> {

@@ -90,7 +90,7 @@ enum Command {
     Register(register::Args),
     /// Replay a recorded trial and compare commands and results.
     Replay(replay::Args),
-    /// Fit the finger's constants to recordings of it on a flat plate.
+    /// Fit the finger's constants to recordings on a flat plate.
     Calibrate(calibrate::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),

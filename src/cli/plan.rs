@@ -13,7 +13,7 @@ use std::time::Instant;
 // heuristic: the first and last trials of a batch leave threads idle; more trials reduce that bias.
 const ESTIMATION_TRIALS: usize = 3;
 
-/// Bytes per unit of `/proc`.
+/// Bytes per unit of the memory sizes in `/proc`.
 const KIB: f64 = 1024.0;
 
 /// Runs a few trials of every planner on `threads` threads (0: all cores) and prints the estimated

@@ -16,7 +16,7 @@ pub(super) fn set_thread_count(threads: u16) -> anyhow::Result<()> {
     pool.build_global().with_context(|| format!("cannot start {threads} threads"))
 }
 
-/// Prepares an experiment to run.
+/// Prepares the simulation of an experiment.
 pub(super) fn prepare_simulation(
     experiment: Experiment,
     talk: Verbosity,

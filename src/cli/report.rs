@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// Merge the run folders of these shards first.
     #[arg(long, value_name = "SHARD", num_args = 1..)]
     merge: Vec<PathBuf>,
-    /// Change a `report.…` setting or `question` for good: a dotted key and a TOML value; may be
+    /// Change a `report.…` setting or `question` permanently: a dotted key and a TOML value; may be
     /// repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,

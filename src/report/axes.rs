@@ -25,7 +25,7 @@ impl Length {
         }
     }
 
-    /// Returns a name with the symbol behind it.
+    /// Returns `name` with the unit's symbol in parentheses.
     pub fn named(&self, name: &str) -> String {
         format!("{name} ({})", self.symbol)
     }
@@ -61,7 +61,7 @@ impl Axis {
         Some(Self::linear(low - margin, high + margin, aim))
     }
 
-    /// Creates a logarithmic axis around the positive ones of `values`.
+    /// Creates a logarithmic axis around the positive `values`.
     pub fn log(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (low, high) = range(values.into_iter().filter(|&value| value > 0.0))?;
         let [low, high] = [low / 1.25, high * 1.25];
@@ -154,7 +154,7 @@ fn label_px(words: &str) -> f64 {
     0.57 * SMALL_PX * words.chars().count() as f64
 }
 
-/// Formats a number without trailing decimals, for a label.
+/// Formats a number for a label, rounded to at most three decimals.
 pub fn rounded(value: f64) -> String {
     // Adding 0.0 turns −0 into 0.
     let value = (value * 1e3).round() / 1e3 + 0.0;
@@ -173,7 +173,7 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// Creates a panel at the top left of `most` and no larger, with the same scale on both axes. A
+    /// Creates a panel that fits into the top left of `most`, with the same scale on both axes. A
     /// side that would be too short for a label shows a larger range of its axis.
     pub fn equal(most: Area, x: Axis, y: Axis) -> Self {
         const LEAST_PX: f64 = 90.0;
@@ -262,7 +262,7 @@ impl Panel {
     }
 }
 
-/// Draws a [`colour_bar`] of heights above the datum, in a unit.
+/// Draws a [`colour_bar`] of heights above the datum, labelled in `unit`.
 pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64; 2]) {
     let [low, high] = heights_m.map(|height_m| height_m * unit.per_m);
     let (axis, words) = (Axis::linear(low, high, 6.0), unit.named("height above the datum"));

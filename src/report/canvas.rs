@@ -65,7 +65,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Creates an empty drawing of whole pixels.
+    /// Creates an empty drawing; its size is rounded up to whole pixels.
     pub fn new(width: f64, height: f64) -> Self {
         let [width, height] = [width, height].map(f64::ceil);
         Self { width, height, body: String::new(), titles: Vec::new() }
@@ -122,13 +122,13 @@ impl Canvas {
         self.outline(&data, &stroke(colour, 1.9));
     }
 
-    /// Draws a small square on its corner.
+    /// Draws a small square that stands on a corner.
     pub fn diamond(&mut self, [x, y]: PointPx, attributes: &str) {
         const ARM: f64 = 4.0;
         self.polygon([[x - ARM, y], [x, y - ARM], [x + ARM, y], [x, y + ARM]], attributes);
     }
 
-    /// Draws a text in ink.
+    /// Draws a text in the colour [`INK`].
     pub fn text(&mut self, at: PointPx, words: &str, size_px: f64, anchor: Anchor) {
         self.coloured_text(at, words, size_px, anchor, INK);
     }
@@ -146,7 +146,7 @@ impl Canvas {
         self.words(words, size_px, anchor, colour, &attributes);
     }
 
-    /// Draws a text in a colour that reads upwards, centred at a point.
+    /// Draws a coloured text that is rotated to read upwards and centred at a point.
     pub fn upward_text(&mut self, at: PointPx, words: &str, size_px: f64, colour: &str) {
         let attributes = format!(r#"transform="translate({}) rotate(-90)""#, pair(at));
         self.words(words, size_px, Anchor::Middle, colour, &attributes);

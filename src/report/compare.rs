@@ -249,7 +249,7 @@ pub fn profiles(compared: &SuiteComparison) -> Option<String> {
 /// Draws the reliability over all objects: the fraction of places with a surface, over its
 /// predicted probability; `None` if every object fills its zone.
 fn reliability(compared: &SuiteComparison) -> Option<String> {
-    /// Smallest number of places of a point, over all objects and trials, a heuristic: 50 determine
+    /// Smallest number of places behind a point of the curve, a heuristic: 50 determine
     /// a fraction to 7 %.
     const PLACES_MIN: u32 = 50;
     // Middle of each tenth, and the fraction of its places that have a surface.

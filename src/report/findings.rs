@@ -43,7 +43,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
     verified.into_iter().chain(found.into_iter().flatten()).collect()
 }
 
-/// Returns the touch count from which each planner has found the surface, by the mean of Eq. 5.
+/// Returns the touch count from which each planner has found the surface, by its mean R (Eq. 5).
 fn r_needed(run: &Run, curves: &[Curve]) -> Option<String> {
     let constant = constant_r(run.truth.heights_m.iter().flatten())
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));

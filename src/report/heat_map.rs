@@ -16,12 +16,12 @@ pub type MapValue = (Vec<f64>, f64, bool);
 pub struct HeatMap {
     columns: usize,
     rows: usize,
-    /// Readings at the middles of the cells.
+    /// Values at the centres of the cells.
     pub readings: Vec<MapValue>,
 }
 
 impl HeatMap {
-    /// Creates a map of the size of `area`; `read` gets the middles of its cells.
+    /// Creates a map of the size of `area`; `read` returns the values at the centres of its cells.
     pub fn new(zone: &Zone, area: Area, read: impl FnOnce(Vec<Vec<f64>>) -> Vec<MapValue>) -> Self {
         let cells = |side_px: f64| (side_px / CELL_PX).round().max(1.0) as usize;
         let (columns, rows) = (cells(area.width), cells(area.height));

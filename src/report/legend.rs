@@ -18,7 +18,7 @@ pub struct Legend<'a> {
 }
 
 impl<'a> Legend<'a> {
-    /// Lays entries out in rows of a width; one that is wider gets its own row.
+    /// Arranges the entries in rows of width `width_px`; a wider entry gets its own row.
     pub fn new(width_px: f64, entries: impl IntoIterator<Item = (Swatch, &'a str)>) -> Self {
         let [mut x, mut y] = [0.0; 2];
         let mut placed = Vec::new();

@@ -114,7 +114,7 @@ fn kind(schema: &Value, entries: &Value) -> String {
     }
 }
 
-/// Returns the names of a choice.
+/// Returns the allowed values of a setting with named values; `None` for other settings.
 fn names(schema: &Value) -> Option<String> {
     let options = schema["oneOf"].as_array()?;
     let names = options.iter().flat_map(|option| match &option["const"] {

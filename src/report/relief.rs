@@ -93,7 +93,7 @@ pub struct Space {
     pub x_m: [f64; 2],
     /// Range of z.
     pub z_m: [f64; 2],
-    /// Range of the heights; values beyond are drawn at the end.
+    /// Range of the heights; values beyond it are drawn at its ends.
     pub height_m: [f64; 2],
 }
 

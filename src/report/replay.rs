@@ -163,7 +163,7 @@ impl<'a> Grid<'a> {
         Ok(Self { side: picked.len(), places: indices.map(at).collect() })
     }
 
-    /// Returns the places alone.
+    /// Returns the places without their heights.
     pub fn places(&self) -> impl Iterator<Item = &'a [f64]> {
         self.places.iter().map(|(place, _)| *place)
     }
@@ -201,7 +201,7 @@ pub fn heights_m<'a>(
     run.truth.heights_m.iter().flatten().copied().chain(touched)
 }
 
-/// Returns a recorded touch as it was observed; `normal_w` is the normal of a contact without one.
+/// Returns a recorded touch as it was observed; `normal_w` replaces a missing normal of a contact.
 ///
 /// # Errors
 /// If there is a contact without a normal.

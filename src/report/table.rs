@@ -277,7 +277,7 @@ impl Table {
     }
 }
 
-/// Returns the verdict of an interval that excludes `even`, where both are equal; `direction` is
+/// Returns the verdict of an interval that excludes `even`, the value of equality; `direction` is
 /// better.
 pub fn verdict(
     interval: Option<[f64; 2]>,

@@ -24,7 +24,7 @@ pub struct RosArm {
     mailbox: Arc<TopicReceiver>,
     /// First fault; it is latched until the operator clears it.
     latched: Mutex<Option<LinkFault>>,
-    /// Receiver of forces over UDP, while it exists.
+    /// Receiver of the force/torque sensor over UDP, if one is configured.
     _net_ft: Option<NetFt>,
 }
 
@@ -35,7 +35,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(1);
 // heuristic: ten times the duration of discovery and an answer on a local network.
 const REPEAT_S: f64 = 0.5;
 
-/// Topics that must be received from an arm.
+/// Topics on which messages of the arm are required.
 const REQUIRED_TOPICS: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
 
 impl RosArm {
@@ -143,7 +143,7 @@ impl RosArm {
         Err(InputError::new(format!("service {name}: {words}")).into())
     }
 
-    /// Clears faults, here and on the arm; only an operator may request it.
+    /// Clears the faults latched here and on the arm; only an operator may request it.
     ///
     /// # Errors
     /// If the arm refuses.
@@ -275,7 +275,7 @@ fn silent(topic: &str, age_s: f64, state: &TopicState) -> InputError {
 }
 
 impl Drop for RosArm {
-    /// Ends commanding with a hold on the arm, so that it raises no alarm.
+    /// Calls the hold service before commands cease, so that the arm raises no alarm.
     fn drop(&mut self) {
         let was_engaged = {
             let mut heard = self.mailbox.latest();
@@ -303,7 +303,7 @@ impl RosBackend {
         self.since.elapsed().as_secs_f64()
     }
 
-    /// Latches a fault.
+    /// Commands zero velocity, latches a fault and returns the latched one.
     fn fault(&self, cause: LinkFault) -> Fault {
         // Otherwise the last command would remain valid until it expires.
         self.lab.command(&self.still.qdot);
@@ -363,11 +363,11 @@ impl RosBackend {
     }
 }
 
-/// Tolerance of a joint's position besides motion, for the detection of jumps; a heuristic: a tick
+/// Tolerance of the jump detection beyond motion at a joint's speed limit, rad; a heuristic: a tick
 /// at half the fastest joint's speed.
 const JUMP_RAD: f64 = 0.02;
 
-/// Duration of zero velocity commands before the arm moves; a heuristic.
+/// Duration of zero velocity commands before the arm moves, s; a heuristic.
 const HANDSHAKE_S: f64 = 0.1;
 
 impl Backend for RosBackend {

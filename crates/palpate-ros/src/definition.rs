@@ -7,7 +7,7 @@ pub struct Definition {
     pub name: &'static str,
     /// Fields, one line each, in the syntax of `.msg` files.
     pub fields: &'static str,
-    /// Definitions of the types that it uses.
+    /// Definitions of the message types of the fields.
     pub parts: &'static [&'static Definition],
 }
 
@@ -29,7 +29,7 @@ const ROS1: &[(&str, &str)] = &[
     ("builtin_interfaces/Duration", "duration"),
 ];
 
-/// Separator of the definitions of parts.
+/// Separator before the definition of each part.
 const RULE: &str =
     "================================================================================\nMSG: ";
 
@@ -90,7 +90,7 @@ impl Text {
         }
     }
 
-    /// Whether the text from `start` on also occurs before it.
+    /// Whether the text from `start` on also occurs before `start`.
     const fn has_before(&self, start: usize) -> bool {
         let (before, found) = self.bytes.split_at(start);
         let (found, _) = found.split_at(self.length - start);

@@ -12,7 +12,7 @@ use palpate_input::error::InputError;
 pub struct JointNames(Vec<String>);
 
 impl JointNames {
-    /// Creates the mapping from names in the arm's order.
+    /// Creates the joint names from `names` in the arm's order.
     pub fn new(names: Vec<String>) -> Self {
         Self(names)
     }
@@ -83,7 +83,7 @@ impl JointNames {
         }
     }
 
-    /// Returns a velocity command over `topic` with the stamp `stamp_s`.
+    /// Returns a velocity command for `topic` with the stamp `stamp_s`.
     pub fn command(&self, stamp_s: f64, qdot: &[f64], topic: &CommandTopic) -> Packet {
         if topic.message == CommandMessage::Velocities {
             let data = qdot.into();

@@ -1,5 +1,5 @@
-//! Thread for one side's topics: passes on received messages immediately, and sends without
-//! blocking the control loop.
+//! Thread that serves the topics of one side: passes on received messages immediately, and sends
+//! without blocking the control loop.
 
 use super::message::TriggerResponse;
 use super::topics::{Service, Topic};
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Interval for counting publishers; a heuristic: discovery takes longer.
+/// Interval for counting publishers, s; a heuristic: discovery takes longer.
 const COUNTED_S: f64 = 0.1;
 
 /// A send operation, run by the thread.
@@ -73,7 +73,8 @@ impl Link {
         self.add(Box::new(move |transport| transport.send(&packet)));
     }
 
-    /// Calls a service of the other side as soon as its server is found; the answer is a delivery.
+    /// Calls a service of the other side as soon as its server is found; the answer arrives as a
+    /// [`Delivery`].
     pub fn call(&self, service: Service) {
         let mut waiting = lock(&self.shared.waiting);
         if !waiting.contains(&service) {

@@ -313,9 +313,9 @@ messages! {
         string ns,
         /// Identifier within its `ns`.
         int32 id,
-        /// Number of a [`Shape`].
+        /// Number of the [`Shape`] of the marker.
         int32 r#type,
-        /// Action; 0: shown.
+        /// Action; 0: add or replace the marker.
         int32 action,
         /// Pose of the points' frame in the header's frame.
         geometry_msgs/Pose pose,
@@ -325,7 +325,7 @@ messages! {
         std_msgs/ColorRGBA color,
         /// Lifetime; zero: forever.
         builtin_interfaces/Duration lifetime,
-        /// Whether it moves with its frame.
+        /// Whether the marker moves with its frame.
         bool frame_locked,
         /// Points.
         geometry_msgs/Point[] points,

@@ -38,7 +38,7 @@ impl Validate for NetFtSettings {
     }
 }
 
-/// Length of a record: three counters, three forces, three torques.
+/// Length of a record, bytes: three counters, three forces, three torques.
 const RECORD: usize = 36;
 
 /// Requests: a header, a command, and the number of samples (0: unlimited).
@@ -48,7 +48,7 @@ const STOP: [u8; 8] = [0x12, 0x34, 0x00, 0x00, 0, 0, 0, 0];
 /// Timeout after which the stream is requested again; a heuristic.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Contents of a record.
+/// Record of the sensor's stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
     /// Sequence number in the stream.

@@ -31,13 +31,13 @@ pub struct LatestMessages {
     pub qdot: Vec<f64>,
     /// Reading of the force/torque sensor, in its own frame.
     pub wrench: Option<Wrench>,
-    /// Unread tactile frames, oldest first; their time is that of receipt, since `since`.
+    /// Unread tactile frames, oldest first, with the time of receipt since `since`, s.
     pub frames: VecDeque<Frame>,
     /// State of the arm.
     pub status: Option<ArmStatus>,
     /// Reception state of each topic.
     pub topics: [TopicState; Topic::ALL.len()],
-    /// First message that ends the run.
+    /// Fault of the first refused message; it ends the run.
     pub refused: Option<LinkFault>,
     /// Answers of services.
     pub answers: Vec<(Service, TriggerResponse)>,
@@ -48,7 +48,7 @@ pub struct LatestMessages {
     /// Whether the arm has been ready to move since it was engaged; from then on any status that
     /// forbids motion is a fault, however short.
     pub is_ready: bool,
-    /// Time origin.
+    /// Time origin of the tactile frames.
     pub since: Option<Instant>,
 }
 
@@ -57,9 +57,9 @@ pub struct LatestMessages {
 pub struct TopicState {
     /// Time of receipt of the last message.
     pub at: Option<Instant>,
-    /// Age by its stamp of the last message, if it was too old.
+    /// Age of the last message by its stamp, s, if the message was too old.
     pub late_s: Option<f64>,
-    /// Largest stamp so far.
+    /// Largest stamp so far, s.
     pub stamp_s: f64,
     /// Number of messages dropped because their stamp was smaller than an earlier one.
     pub backward: u64,
@@ -116,7 +116,7 @@ impl TopicReceiver {
         (heard.is_engaged && is_silent).then(still)
     }
 
-    /// Returns the packet that commands velocities, and records the time.
+    /// Returns the packet that commands joint velocities, stamped with the current time.
     pub fn command(&self, qdot: &[f64]) -> Packet {
         self.names.command(pace::now_s(), qdot, &self.settings.topics.command)
     }

@@ -198,7 +198,7 @@ impl BackendSettings {
         topic == Topic::Status && self.status_on_change
     }
 
-    /// Returns the joints of `chain` with their names in messages.
+    /// Returns the names that the joints of `chain` have in messages.
     pub fn joint_names(&self, chain: &Chain) -> JointNames {
         JointNames::new(match self.joints.as_slice() {
             [] => chain.joints.iter().map(|joint| joint.name.to_string()).collect(),

@@ -24,7 +24,7 @@ pub enum Topic {
     Command,
 }
 
-/// Side of the topics.
+/// Side of the topics: explorer or arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Endpoint {
     /// The explorer, which sends commands and receives readings.
@@ -38,7 +38,7 @@ impl Topic {
     pub const ALL: [Self; 5] =
         [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command];
 
-    /// Returns the side that publishes it.
+    /// Returns the side that publishes the topic.
     pub fn publisher(self) -> Endpoint {
         if self == Self::Command { Endpoint::Explorer } else { Endpoint::Arm }
     }
@@ -91,7 +91,7 @@ macro_rules! topic_settings {
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
-            /// Name; in the namespace unless it begins with a slash.
+            /// Name, relative to the namespace unless it begins with a slash.
             pub name: String,
             $(
                 /// Message type.

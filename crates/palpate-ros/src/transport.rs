@@ -16,7 +16,7 @@ pub trait PacketMessage: Into<Packet> {
 
 macro_rules! packets {
     ($($(#[$doc:meta])* $kind:ident($held:ty): $message:ident on $topic:ident,)*) => {
-        /// A message of any topic of the table, in the layout of ROS 2.
+        /// A message of any [`Topic`], in the layout of ROS 2.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Packet {
             $($(#[$doc])* $kind($held),)*
@@ -66,7 +66,7 @@ packets! {
 }
 
 impl Packet {
-    /// Returns the stamp of its header, if the message type has one.
+    /// Returns the stamp in the message's header, if the message type has one.
     pub fn stamp_mut(&mut self) -> Option<&mut Time> {
         let header = match self {
             Self::Joints(message) => &mut message.header,
@@ -150,7 +150,7 @@ pub trait Transport {
     /// Whether a server of `service` has been found, so that a call reaches it.
     fn is_served(&mut self, service: &Service) -> bool;
 
-    /// Calls a service of the other side; its answer is a delivery.
+    /// Calls a service of the other side; its answer arrives as a [`Delivery`].
     ///
     /// # Errors
     /// If the call cannot be sent.

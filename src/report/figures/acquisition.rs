@@ -74,7 +74,7 @@ const TOP_PX: f64 = 66.0;
 
 /// Places at which the standard deviation of a curve is computed.
 const STEPS: usize = 300;
-/// Width of a panel, heights of those of beliefs and of standard deviations.
+/// Width of a panel, height of a panel of beliefs, height of a panel of standard deviations.
 const CURVE_PX: (f64, f64, f64) = (420.0, 210.0, 130.0);
 /// Largest height of a panel of beliefs with equal axes.
 const EQUAL_HEIGHT_PX: f64 = 420.0;

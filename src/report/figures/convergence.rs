@@ -13,7 +13,7 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "convergence", caption, draw };
 
-/// Returns Eq. 5 of any positive constant.
+/// Returns the score R (Eq. 5) of any positive constant.
 fn constant_r(run: &Run) -> Option<f64> {
     metrics::constant_r(run.truth.heights_m.iter().flatten())
 }

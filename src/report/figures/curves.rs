@@ -84,7 +84,7 @@ pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f6
     }
 }
 
-/// Returns an axis for the truth and every drawn touch, and nearly as much again for the bands.
+/// Returns a height axis around the truth and all drawn touches, with a margin for the bands.
 pub(super) fn height_axis(run: &Run, unit: Length) -> Option<Axis> {
     let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
     Axis::around(heights_m.map(|height_m| height_m * unit.per_m), 0.4, 5.0)

@@ -19,7 +19,7 @@ const FOOT_PX: f64 = 56.0;
 const BAR_LEFT_MIN_PX: f64 = 380.0;
 const BAR_PX: f64 = 300.0;
 const WIDTH_MIN_PX: f64 = BAR_LEFT_MIN_PX + BAR_PX;
-/// Radius of a touch, and of the last one.
+/// Radius of the mark of a touch, and of the mark of the last touch.
 const RADII_PX: [f64; 2] = [3.1, 4.6];
 /// Colour of a surface where its value is not known.
 const UNKNOWN: [u32; 2] = [0xcdcdcd; 2];

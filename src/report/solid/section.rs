@@ -75,7 +75,7 @@ const ALIKE_SHARE: f64 = 0.1;
 // heuristic: range of standard deviations if there are none.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
-/// Returns the data of beliefs in an object and of its true surface; `None` if there is nothing to
+/// Returns the beliefs and the true surface as a JSON object; `None` if there is nothing to
 /// draw.
 ///
 /// # Errors
@@ -158,7 +158,7 @@ fn coded<'a>(
     }))
 }
 
-/// Returns a touch, relative to the middle of everything.
+/// Returns a touch as JSON, with positions relative to the middle of `cube`, mm.
 fn marked(touch: &SolidTouch, cube: Cube) -> Value {
     let from_middle = |p_w| <[f64; 3]>::from((p_w - cube.middle()) * MM.per_m).map(short);
     json!({

@@ -49,7 +49,7 @@ pub fn note(run: &Run) -> String {
     format!("n = {} trials; ± is one standard error of the mean.", run.experiment.trials)
 }
 
-/// Returns the table for the terminal, followed by the other events.
+/// Returns the table for the terminal, followed by the events of the trials and the notices.
 pub fn text(run: &Run) -> String {
     let mut text = format!("{}\n{}", run.experiment.name, table(run).text());
     event_lines(run).iter().for_each(|line| text += &format!("{line}\n"));

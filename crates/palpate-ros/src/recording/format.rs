@@ -16,7 +16,7 @@ use std::str::FromStr;
 /// Metadata of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordingMetadata {
-    /// Version of the program that wrote it.
+    /// Version of the program that wrote the recording.
     pub version: String,
     /// Experiment with all defaults written out, as TOML.
     pub experiment: String,
@@ -33,9 +33,9 @@ pub struct RecordingMetadata {
 /// End of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TrialEnd {
-    /// Reason why it ended before its last touch, if so.
+    /// Reason why the trial ended before its last touch, if it did.
     pub failure: Option<String>,
-    /// Whether it was interrupted externally after a touch, so that it can be continued.
+    /// Whether the trial was interrupted externally after a touch, so that it can be continued.
     pub is_interrupted: bool,
 }
 
@@ -145,13 +145,13 @@ pub struct TickMessage<'a> {
     pub q: Cow<'a, [f64]>,
     /// Joint velocities, rad/s or m/s.
     pub qdot: Cow<'a, [f64]>,
-    /// Command as applied.
+    /// Applied velocities, rad/s or m/s.
     pub applied: Cow<'a, [f64]>,
-    /// Force, then torque, in `T`; or empty.
+    /// Force, N, then torque, N·m, in `T`; or empty.
     pub wrench: Cow<'a, [f64]>,
-    /// Point and normal in `T`, and force, of an ideal contact; or empty.
+    /// Point, m, and unit normal in `T`, and force, N, of an ideal contact; or empty.
     pub ideal: Cow<'a, [f64]>,
-    /// Tactile frames that arrived.
+    /// Tactile frames of the reading.
     #[serde(with = "frames")]
     pub frames: Cow<'a, [Frame]>,
     /// Slip state of each of the same frames. It is the last field, so that recordings without it
@@ -213,7 +213,7 @@ pub(super) struct LoadBuffer {
 }
 
 impl LoadBuffer {
-    /// Copies those of `reading`, without allocating.
+    /// Copies the loads and frames of `reading`, without allocating.
     pub(super) fn take(&mut self, reading: &Reading) {
         self.wrench = reading
             .wrench
@@ -268,7 +268,7 @@ impl<'a> TickMessage<'a> {
         };
     }
 
-    /// Whether it is a reset.
+    /// Whether the message is a reset.
     pub fn is_reset(&self) -> bool {
         self.tick == 0
     }
@@ -359,9 +359,9 @@ mod slips {
 /// `palpate_msgs/Touch`: target and result of a touch, written at its end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TouchMessage<'a> {
-    /// Number, from 1.
+    /// Number of the touch, from 1.
     pub touch: u32,
-    /// The backend's time at its end.
+    /// The backend's time at the end of the touch, s.
     pub time_s: f64,
     /// Target: (x) or (x, z) of the zone.
     pub target: Cow<'a, [f64]>,

@@ -156,15 +156,15 @@ enum Entry {
 /// Decodes a message.
 type Decode = fn(&[u8]) -> Option<Entry>;
 
-/// Messages that are read. The slips of a tick are its last field, so that a tick without them is
-/// the prefix of one with an empty list of them.
+/// Definitions of the messages that are read, with their decoders. The slips of a tick are its last
+/// field, so that a tick without them is the prefix of one with an empty list of them.
 const DECODERS: [(Definition, Decode); 3] = [
     (TickMessage::DEFINITION, |data| decoded(data).map(Entry::Tick)),
     (TickMessage::WITHOUT_SLIPS, |data| decoded(&[data, &EMPTY_LIST].concat()).map(Entry::Tick)),
     (TouchMessage::DEFINITION, |data| decoded(data).map(Entry::Touch)),
 ];
 
-/// An empty list: its length, after lists that keep it aligned.
+/// Encoding of an empty list: its length; the lists before it keep it aligned.
 const EMPTY_LIST: [u8; 4] = [0; 4];
 
 /// Entries of a file up to its end, even if that is within a record.
@@ -272,7 +272,7 @@ fn entry(
     }
 }
 
-/// Returns the error of a file of which `at` bytes were read.
+/// Returns the error of a file that is damaged within its first `at` bytes.
 fn damaged(at: usize, error: impl fmt::Display) -> InputError {
     InputError::new(format!("damaged before byte {at}: {error}"))
 }
@@ -287,7 +287,7 @@ fn unreadable(at: usize, error: McapError) -> InputError {
     }
 }
 
-/// Returns the next tick among `entries`; an error ends them, since the file was already read once
+/// Returns the next tick among `entries`; an error counts as the end: the file was read before
 /// without errors.
 fn next_tick(entries: &mut Entries) -> Option<TickMessage<'static>> {
     loop {

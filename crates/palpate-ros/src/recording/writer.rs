@@ -25,14 +25,14 @@ use std::time::SystemTime;
 /// Clock in nanoseconds since 1970.
 pub type Clock = fn() -> u64;
 
-/// Returns the time of day.
+/// Returns the wall-clock time, ns since 1970.
 pub fn wall_clock() -> u64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Chunk size at which a chunk is written before its touch ends; a heuristic: a minute of the
-/// PA-10. The address space is reserved in advance, so that ticks do not allocate.
+/// Chunk size, in bytes, at which a chunk is written before its touch ends; a heuristic: a minute
+/// of the PA-10. The address space is reserved in advance, so that ticks do not allocate.
 const CHUNK_MAX: u64 = 16 << 20;
 
 /// A recording, shared by the recorded backend and the program that runs its trial.
@@ -48,7 +48,7 @@ pub struct Recording(Arc<Mutex<McapWriter>>);
 
 /// State of the writer.
 struct McapWriter {
-    /// `None` after the end.
+    /// Writer of the file; `None` after its end.
     writer: Option<Writer<NoSeek<Box<dyn Write + Send>>>>,
     channels: [u16; TOPICS.len()],
     message: Vec<u8>,

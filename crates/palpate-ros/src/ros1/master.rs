@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_millis(200);
 /// Interval of queries; a heuristic: the master answers within milliseconds.
 const EVERY: Duration = Duration::from_millis(250);
 
-/// Count of known publishers of each topic, in its own thread, so that no caller waits for the
+/// Counter of known publishers of each topic, in its own thread, so that no caller waits for the
 /// master; the thread also configures new connections.
 pub struct PublisherCounter {
     counts: Arc<[AtomicUsize; Topic::ALL.len()]>,
@@ -25,7 +25,7 @@ pub struct PublisherCounter {
 }
 
 impl PublisherCounter {
-    /// Creates the census of `topics` at the master `uri`.
+    /// Creates a counter of the publishers of `topics` known to the master at `uri`.
     pub fn new(uri: &str, topics: &Topics) -> Self {
         let counts: Arc<[AtomicUsize; Topic::ALL.len()]> = Arc::default();
         let (uri, topics, shared) = (uri.to_owned(), topics.clone(), Arc::clone(&counts));
@@ -47,7 +47,7 @@ impl PublisherCounter {
         Self { counts, stop: Some(stop), thread: Some(thread) }
     }
 
-    /// Returns the number of nodes that publish `topic`; `None` if the master does not answer.
+    /// Returns the number of nodes that publish `topic`; 0 if the master does not answer.
     pub fn publishers(&self, topic: Topic) -> usize {
         self.counts[topic as usize].load(Ordering::Relaxed)
     }

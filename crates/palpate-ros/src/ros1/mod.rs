@@ -42,7 +42,7 @@ pub struct Ros1 {
     inlet: Sender<Option<Delivery>>,
     outlet: Receiver<Option<Delivery>>,
     writers: Vec<Writer>,
-    /// Kept alive, since a service ends when it is dropped.
+    /// Servers of the services; dropping a server ends its service.
     _servers: Vec<ServiceServer>,
     /// Incoming calls that wait for their answer.
     waiting: Arc<Mutex<HashMap<u64, Sender<TriggerResponse>>>>,
@@ -179,7 +179,8 @@ impl Ros1 {
         Ok(())
     }
 
-    /// Registers a service; the link's loop answers it, and the caller's task waits for that.
+    /// Registers a service; the link's loop answers each call, and the caller's task waits for the
+    /// answer.
     fn serve(&mut self, number: usize, service: Service) -> Result<(), InputError> {
         let name = service.name(self.topics.namespace());
         let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));

@@ -6,29 +6,29 @@ use crate::settings::CLOCK_AHEAD_S;
 use crate::status::ArmStatus;
 use crate::transport::Packet;
 
-/// Time after the expiry of the last command at which the arm stops; a heuristic: two periods at
+/// Time from the expiry of the last command to the stop of the arm, s; a heuristic: two periods at
 /// 250 Hz.
 const GRACE_S: f64 = 0.008;
 
-/// Duration of a stop; a heuristic: the servos' own lag of 0.02 s smooths it, and the arm is at
+/// Duration of a stop, s; a heuristic: the servos' own lag of 0.02 s smooths it, and the arm is at
 /// rest 0.1 s later.
 const RAMP_S: f64 = 0.01;
 
 /// Relative tolerance of a limit for rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Time within which commands from two publishers count as simultaneous.
+/// Time within which commands from two publishers count as simultaneous, s.
 const TOGETHER_S: f64 = 0.5;
 
-/// State between network and servos. Times are seconds of a monotonic clock.
+/// Simulated arm computer between network and servos. Times are seconds of a monotonic clock.
 pub struct SimulatedArmComputer {
     names: JointNames,
     /// Speed limit of each joint, rad/s or m/s.
     qdot_limits: Vec<f64>,
-    /// Time without a command after which the arm stops.
+    /// Time without a command after which the arm stops, s.
     silence_s: f64,
     status: ArmStatus,
-    /// Last command.
+    /// Velocities of the last command, rad/s or m/s.
     wanted: Vec<f64>,
     incoming: Vec<f64>,
     applied: Vec<f64>,
@@ -63,7 +63,7 @@ impl SimulatedArmComputer {
         }
     }
 
-    /// Returns the status that it reports.
+    /// Returns the reported status.
     pub fn status(&self) -> &ArmStatus {
         &self.status
     }

@@ -60,16 +60,16 @@ impl FailureState {
 /// Fraction of packets that are lost.
 const LOST: f64 = 0.2;
 
-/// Force of a spike; a heuristic: beyond every threshold.
+/// Force of a spike, N; a heuristic: beyond every threshold.
 const SPIKE_N: f64 = 60.0;
 
-/// Standard deviation of the noise on a force; a heuristic.
+/// Standard deviation of the noise on a force, N; a heuristic.
 const NOISE_N: f64 = 0.3;
 
-/// Lead of a wrong clock; a heuristic.
+/// Lead of a wrong clock, s; a heuristic.
 const AHEAD_S: i32 = 1;
 
-/// Decrement of the stamps per message if they run backwards.
+/// Decrement of the stamps per message, s, if the stamps run backwards.
 // heuristic: hundreds of messages stay within the age limit of 50 ms.
 const BACKWARD_S: f64 = 1e-4;
 
@@ -244,7 +244,7 @@ fn write_flags(packet: &mut Packet, key: Option<&str>, texts: [&str; 2]) {
     }
 }
 
-/// Sends packets through the active failures.
+/// Sender that applies the active failures to packets.
 pub struct FailureInjector {
     is_on: Vec<bool>,
     memory: FailureState,

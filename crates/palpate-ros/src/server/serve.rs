@@ -23,10 +23,10 @@ use std::time::{Duration, Instant};
 /// Largest joint speed at rest, rad/s or m/s; a heuristic: above the sag of the servos.
 const REST: f64 = 2e-3;
 
-/// Largest delay that the simulated robot catches up, ticks; beyond it, it skips time.
+/// Largest delay that the simulated robot catches up with, ticks; a longer one is skipped.
 const SLACK_TICKS: u32 = 10;
 
-/// Rate at which the arm's state, joints and force are published, as by drivers.
+/// Rate at which the arm's state, joints and force are published, Hz, as by drivers.
 const STATUS_HZ: f64 = 50.0;
 const JOINTS_HZ: f64 = 250.0;
 const WRENCH_HZ: f64 = 500.0;
@@ -54,7 +54,7 @@ pub enum Event {
     Called(Service),
 }
 
-/// A failure that starts by itself.
+/// A scheduled failure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
     /// Index in the table of failures.
@@ -85,7 +85,7 @@ pub struct SimulatedRobotServer {
     /// Pose of `T` in the sensor's frame.
     x_mt: Isometry3<f64>,
     bias: Wrench,
-    /// Whether the next sensor reading becomes its zero.
+    /// Whether the next reading of the force/torque sensor becomes its zero.
     wants_bias: bool,
     since: Instant,
     moved_s: Option<f64>,
@@ -308,7 +308,7 @@ impl SimulatedRobotServer {
         self.sender.send(&self.link, packet, now_s);
     }
 
-    /// Whether something sent `rate_hz` times a second is due in this tick.
+    /// Whether a message that is sent at `rate_hz` is due in this tick.
     fn is_due(&self, rate_hz: f64) -> bool {
         let every = (1.0 / (rate_hz * self.period_s)).round().max(1.0) as u64;
         self.tick.is_multiple_of(every)
