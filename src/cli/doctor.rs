@@ -96,9 +96,11 @@ fn working_folder() -> Line {
     let written = fs::File::create_new(&path).and_then(|_| fs::remove_file(&path));
     match written {
         Ok(()) => ("working folder", State::Ok, "runs/ can be written".into()),
-        Err(error) => {
-            ("working folder", State::Wrong, format!("{error}; change to another, or use --out"))
-        }
+        Err(error) => (
+            "working folder",
+            State::Wrong,
+            format!("{error}; change to another folder, or use --out"),
+        ),
     }
 }
 

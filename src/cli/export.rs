@@ -107,7 +107,7 @@ fn belief(args: &Args) -> anyhow::Result<Outcome> {
     let is_around = run.experiment.scene.whole_object.is_some();
     ensure!(
         run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
-        "{} explored a curve, which has no mesh; its figures show it",
+        "{} explored a curve, which has no mesh; see the figures of the run",
         args.path.display()
     );
     let touches = checked_touches(&run, args)?;

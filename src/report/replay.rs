@@ -128,7 +128,7 @@ impl<'a> BeliefReplay<'a> {
 pub fn drawn_caption(run: &Run) -> &'static str {
     match run.truth.surface_count() < run.truth.places.len() {
         true => {
-            " A belief is drawn where a surface is more probable than none; all of it as long as every \
+            " A belief is drawn where a surface is more probable than none, or everywhere while every \
              touch has made contact."
         }
         false => "",

@@ -379,7 +379,7 @@ fn bounding_ball(around: &mut WholeObject, mesh: &Mesh) -> Result<Ball, InputErr
         true => Ok(Ball { centre_w: centre_m.into(), radius_m, ..own }),
         false => Err(InputError::new(format!(
             "the object's size is {:.3e} m, and the ball around it has a radius of {radius_m:.3e} m; \
-             allowed is {} to {} m: are object.unit and object.scale right?",
+             allowed is {} to {} m; check object.unit and object.scale",
             (high - low).norm(),
             RADIUS_M.start(),
             RADIUS_M.end()

@@ -312,7 +312,7 @@ impl Validate for Scene {
             let met = self.collides() || self.effects.collision.is_some();
             rules.require("solver.collision", value, met, || {
                 "no collision: only a finger without skin of simulator = \"dynamic\", or a scene with \
-                 [effects.collision], collides in MuJoCo; any other meets the exact mesh"
+                 [effects.collision], collides in MuJoCo; any other finger touches the exact mesh"
                     .into()
             });
         }

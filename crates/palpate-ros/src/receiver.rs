@@ -200,7 +200,9 @@ impl TopicReceiver {
                 let time_s = heard.since.map_or(0.0, since_s);
                 let finger = self.settings.finger;
                 let Some(frame) = tactile::frame(packet, finger.into(), time_s) else {
-                    return Err(refuse(format!("it has no finger {finger} with 19 electrodes")));
+                    return Err(refuse(format!(
+                        "the message has no finger {finger} with 19 electrodes"
+                    )));
                 };
                 if heard.frames.len() == FRAMES_MAX {
                     heard.frames.pop_front();

@@ -128,7 +128,7 @@ impl Display for StepLimit {
         write!(
             f,
             "up to {force_n} N (touch.force_limit_n) the skin's stiffness is {stiffness_n_m:.0} N/m and the \
-             fingertip as light as {mass_kg:.3} kg, which needs at most {limit_s:.2e} s"
+             fingertip as light as {mass_kg:.3} kg, which needs a step of at most {limit_s:.2e} s"
         )
     }
 }

@@ -76,8 +76,9 @@ impl FromStr for Criterion {
         let criterion = match text.trim().strip_prefix("verdict") {
             Some("") => Ok(Self::Verdict(None)),
             Some(margin) => {
-                let margin =
-                    margin.strip_prefix(':').ok_or_else(|| "a margin follows a colon".into());
+                let margin = margin
+                    .strip_prefix(':')
+                    .ok_or_else(|| "a colon must precede the margin".into());
                 margin.and_then(str::parse).and_then(length)
             }
             None => text.parse().map(Self::Touches),
