@@ -142,7 +142,7 @@ class Experiment:
         folder = None if out is None else os.fspath(out)
         how = (folder, fresh, threads, on_error == "raise")
         run = Run(core.run(list(workers.items()), how, (look, stop)))
-        rows = run._core.trials()
+        rows: dict[str, Any] = run._core.trials()
         failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
         if failed:
             first = failed[0]
