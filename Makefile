@@ -203,9 +203,8 @@ PYTHON_HOME := python/palpate/home
 MATURIN = LD_LIBRARY_PATH=$(abspath $(DEPS)/lib) PATH=$(abspath $(DEPS)/python/bin):$$PATH \
 	maturin build --quiet --locked -m python/Cargo.toml
 
-# Zig links against the C library of manylinux_2_28, so that the wheel runs on every Linux since 2018.
 wheel: setup $(PYTHON_READY) $(PYTHON_HOME)
-	$(MATURIN) --release --zig --compatibility manylinux_2_28 --out target/wheels
+	$(MATURIN) --release --out target/wheels
 
 # Installs a development build into the test environment; otherwise equal to the release wheel.
 install-python: setup $(PYTHON_READY) $(PYTHON_HOME)
