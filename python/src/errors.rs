@@ -64,14 +64,14 @@ pub(crate) fn other(error: impl std::fmt::Display) -> PyErr {
 /// Error of an attribute for zones that is used around an object; `there` lists the alternatives.
 pub(crate) fn not_around(name: &str, there: &str) -> PyErr {
     PyAttributeError::new_err(format!(
-        "`{name}` exists only for a zone; for a whole object use {there}"
+        "`{name}` exists only for a zone; this explores a whole object: use {there}"
     ))
 }
 
 /// Error of an attribute for objects that is used over a zone; `there` lists the alternatives.
 pub(crate) fn not_over_zone(name: &str, there: &str) -> PyErr {
     PyAttributeError::new_err(format!(
-        "`{name}` exists only for a whole object; for a zone use {there}"
+        "`{name}` exists only for a whole object; this explores a zone: use {there}"
     ))
 }
 
