@@ -4,6 +4,7 @@ use crate::common::program::{EXPERIMENT, MESH, SCENE, fails, folder, palpate, st
 use palpate::experiment::Experiment;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::explore::planner::Fallback;
+use palpate::sim::Scene;
 use std::fs;
 
 const FORMER: &str = "
@@ -27,26 +28,23 @@ frozen_s = 0.5
 age_s = 0.3
 ";
 
-const PRESENT: &str = "
-[planning.ucb]
-kappa = 3.0
+/// Keys of [`FORMER`], and the present ones.
+const PAIRS: [[&str; 2]; 7] = [
+    ["sds =", "kappa ="],
+    ["touch_way_m =", "travel_cost_m ="],
+    ["place =", "source ="],
+    ["says =", "text ="],
+    ["patience_s =", "connect_timeout_s ="],
+    ["frozen_s =", "stuck_s ="],
+    ["age_s =", "max_age_s ="],
+];
 
-[planning.silhouette]
-travel_cost_m = 0.2
-
-[[report.claims]]
-source = \"Fig. 1\"
-text = \"it works\"
-touches = 3
-measures = [\"rmse_m\"]
-
-[backend]
-connect_timeout_s = 7.0
-[backend.interlocks]
-stuck_s = 0.5
-[backend.topics.joints]
-max_age_s = 0.3
-";
+fn present() -> String {
+    PAIRS.iter().fold(FORMER.to_owned(), |text, [former, present]| {
+        assert!(text.contains(former), "{former}");
+        text.replace(former, present)
+    })
+}
 
 fn former_scene() -> String {
     SCENE
@@ -60,7 +58,7 @@ fn former_settings_are_read_with_a_note() {
     let path = folder.path();
     assert!(!MESH.is_empty() && EXPERIMENT.ends_with("]\n"));
     fs::write(path.join("scene.toml"), former_scene()).unwrap();
-    let [former, present] = [FORMER, PRESENT].map(|more| {
+    let [former, present] = [FORMER, &present()].map(|more| {
         fs::write(path.join("small.toml"), EXPERIMENT.to_owned() + more).unwrap();
         let mut experiment = Experiment::load(&path.join("small.toml"), &[]).unwrap();
         let names = std::mem::take(&mut experiment.scene.former_names);
@@ -93,7 +91,23 @@ fn wrong_values_of_former_settings_are_reported_as_given() {
     let sets = ["planning.ucb.sds=1.5".to_owned(), "scene.body=\"kinematic\"".to_owned()];
     let set = Experiment::load(&path.join("small.toml"), &sets).unwrap();
     assert_eq!(set.planning.ucb.kappa, 1.5);
-    fs::write(path.join("scene.toml"), former_scene() + "[zone.unknown]\n").unwrap();
+    // A former table of --set changes single values of the present table.
+    fs::write(
+        path.join("scene.toml"),
+        SCENE.split("[zone]").next().unwrap().to_owned()
+            + "[whole_object]\ncentre_m = [0.3, 0.3, 0.3]\n",
+    )
+    .unwrap();
+    for text in ["around.radius_m=2.0", "whole_object.radius_m=2.0"] {
+        let scene = Scene::load(&path.join("scene.toml"), &[text.into()]).unwrap();
+        let ball = scene.whole_object.unwrap();
+        assert_eq!((ball.centre_m, ball.radius_m), (Some([0.3; 3]), Some(2.0)), "{text}");
+    }
+    fails(
+        path,
+        &["show", "scene.toml", "--set", "around.radius_m=-1"],
+        &["--set around.radius_m=-1", "`around.radius_m`"],
+    );
     fs::write(path.join("scene.toml"), format!("simulator = \"swept\"\n{}", former_scene()))
         .unwrap();
     fails(path, &["show", "scene.toml"], &["scene.toml:2", "`body`", "`simulator`", "keep one"]);

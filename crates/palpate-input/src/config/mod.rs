@@ -73,21 +73,27 @@ impl Loader {
     /// Reads the dotted key `given` as `present`, if it has a value; messages name it as given.
     ///
     /// # Errors
-    /// If both have a value, and `given` is not from `--set`, which replaces it.
+    /// If both have a value, unless `--set` gives `given`: it then replaces the other value, or
+    /// values of the table.
     pub fn read_as(&mut self, given: &str, present: &str) -> Result<(), ConfigError> {
         if !self.has_value(given) {
             return Ok(());
         }
-        if self.has_value(present) && !matches!(self.origin(given), Origin::Set(_)) {
-            let message = format!("also given by its present name `{present}`; keep one");
-            return Err(ConfigError::invalid(self.origin(given), given.into(), None, message));
+        let set: Vec<[String; 2]> = (self.sets.iter())
+            .filter_map(|(key, _)| Some([key.clone(), format!("{present}{}", below(key, given)?)]))
+            .collect();
+        match self.has_value(present) {
+            true if set.is_empty() => {
+                let message = format!("also given by its present name `{present}`; keep one");
+                return Err(ConfigError::invalid(self.origin(given), given.into(), None, message));
+            }
+            true => self.read_as.extend(set),
+            false => self.read_as.push([given.into(), present.into()]),
         }
-        let (tables, last) = present.rsplit_once('.').unwrap_or(("", present));
-        if let Some(value) = self.take(given)
-            && let Some(table) = self.table_mut(tables)
-        {
-            table.insert(last.into(), value);
-            self.read_as.push([given.into(), present.into()]);
+        match (self.take(given), self.table_mut(present)) {
+            (Some(Value::Table(values)), Some(table)) => table.extend(values),
+            (Some(value), _) => self.insert(present, value),
+            (None, _) => {}
         }
         Ok(())
     }
@@ -115,12 +121,8 @@ impl Loader {
     /// `key`.
     pub fn read_former_values(&mut self, key: &str, values: &[[&str; 2]]) {
         let value = self.value(key).and_then(Value::as_str);
-        let names = values.iter().find(|[former, _]| value == Some(former));
-        if let (Some([former, present]), Some((tables, last))) =
-            (names, key.rsplit_once('.').or(Some(("", key))))
-            && let Some(table) = self.table_mut(tables)
-        {
-            table.insert(last.into(), Value::String((*present).into()));
+        if let Some([former, present]) = values.iter().find(|[former, _]| value == Some(former)) {
+            self.insert(key, Value::String((*present).into()));
             self.former_names.push(format!("\"{former}\" is now \"{present}\""));
         }
     }
@@ -133,12 +135,7 @@ impl Loader {
     /// Returns the key under which `key` was given.
     fn given(&self, key: &str) -> String {
         self.read_as.iter().rev().fold(key.to_owned(), |key, [given, present]| {
-            match key.strip_prefix(present.as_str()) {
-                Some(rest) if rest.is_empty() || rest.starts_with(['.', '[']) => {
-                    format!("{given}{rest}")
-                }
-                _ => key,
-            }
+            below(&key, present).map(|rest| format!("{given}{rest}")).unwrap_or(key)
         })
     }
 
@@ -154,12 +151,16 @@ impl Loader {
 
     /// Removes the dotted key from the table and returns its value.
     pub fn take(&mut self, key: &str) -> Option<Value> {
-        let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
-        let mut table = &mut self.table;
-        for part in steps(tables) {
-            table = table.get_mut(part)?.as_table_mut()?;
+        let (tables, last) = split(key);
+        self.table_mut(tables)?.remove(last)
+    }
+
+    /// Inserts `value` under the dotted key, whose table exists.
+    fn insert(&mut self, key: &str, value: Value) {
+        let (tables, last) = split(key);
+        if let Some(table) = self.table_mut(tables) {
+            table.insert(last.into(), value);
         }
-        table.remove(last)
     }
 
     /// Returns the error that `key` may not have this value.
@@ -236,10 +237,7 @@ impl Loader {
         let path = self.beside(key, Path::new(name));
         let path = std::path::absolute(&path).unwrap_or(path);
         let text = tidy(&path).to_string_lossy().into_owned();
-        let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
-        if let Some(table) = self.table_mut(tables) {
-            table.insert(last.into(), Value::String(text));
-        }
+        self.insert(key, Value::String(text));
     }
 
     /// Returns the table under the dotted `key`, the outermost if it is empty.
@@ -349,10 +347,7 @@ impl Loader {
 
     fn origin(&self, key: &str) -> Origin {
         let key = &*self.given(key);
-        let under = |set: &str| {
-            key.strip_prefix(set)
-                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-        };
+        let under = |set: &str| below(key, set).is_some();
         let over = |set: &str| set.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'));
         let unknown = |set: &str| over(set) && self.in_no_file(key);
         if let Some((_, text)) = self.sets.iter().rev().find(|(set, _)| under(set) || unknown(set))
@@ -372,6 +367,16 @@ impl Loader {
 /// Joins `name` to the table at `path`, where `.` is the outermost.
 fn join(path: &str, name: &str) -> String {
     if path == "." { name.into() } else { format!("{path}.{name}") }
+}
+
+/// Splits a dotted key into its table and its last part.
+fn split(key: &str) -> (&str, &str) {
+    key.rsplit_once('.').unwrap_or(("", key))
+}
+
+/// Returns the rest of `key` if it is `table` or lies below it.
+fn below<'a>(key: &'a str, table: &str) -> Option<&'a str> {
+    key.strip_prefix(table).filter(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
 /// Splits a dotted key into its parts; an index in brackets is a separate part.
