@@ -60,7 +60,8 @@ def check(
     Args:
         experiment: an experiment, its file, or the name of an experiment of the package.
         baseline: file of the baseline; `accept` writes it.
-        planners: as for `Experiment.run`; default: the experiment's planners.
+        planners: as for `Experiment.run`; the baseline's other planners are then left alone. Default: the
+            experiment's planners; a planner that only the baseline has is then missing.
         accept: reason to write the current results to the baseline; the function then returns None.
         tolerance: largest relative increase in error that still passes.
         max_trials: maximum number of trials per planner.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -134,14 +135,10 @@ class Experiment:
             raise ValueError(f'on_error = {on_error!r}: allowed are "record", "raise"')
         core, workers = self._prepared(planners, trials, threads, limit_s, isolate)
 
-        def stop() -> None:
-            for started in workers.values():
-                started.stop()
-
         look = Progress(self.name, progress)
         folder = None if out is None else os.fspath(out)
         how = (folder, fresh, threads, on_error == "raise")
-        run = Run(core.run(list(workers.items()), how, (look, stop)))
+        run = Run(core.run(list(workers.items()), how, (look, partial(_stop, workers))))
         rows: dict[str, Any] = run._core.trials()
         failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
         if failed:
@@ -165,12 +162,8 @@ class Experiment:
     ) -> dict[str, Any] | None:
         core, workers = self._prepared(planners, max_trials, threads, LIMIT_S, False)
 
-        def stop() -> None:
-            for started in workers.values():
-                started.stop()
-
-        how = (baseline, accept, tolerance, threads)
-        return core.check(list(workers.items()), how, (Progress(self.name, False), stop))
+        how = (baseline, accept, tolerance, threads, planners is not None)
+        return core.check(list(workers.items()), how, (Progress(self.name, False), partial(_stop, workers)))
 
     def _prepared(
         self,
@@ -206,3 +199,9 @@ class Experiment:
 
     def __repr__(self) -> str:
         return f"Experiment({self.name}: {self.trials} trials of {', '.join(self.planners)})"
+
+
+def _stop(workers: dict[str, Any]) -> None:
+    """Stops waiting for the planners of all factories."""
+    for factory in workers.values():
+        factory.stop()

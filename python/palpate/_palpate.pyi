@@ -372,7 +372,7 @@ class Experiment:
     def check(
         self,
         own: Sequence[tuple[str, Callable[[Zone | None, int], Any]]],
-        how: tuple[str, str | None, float, int],
+        how: tuple[str, str | None, float, int, bool],
         callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
     ) -> dict[str, Any] | None: ...
 

@@ -108,20 +108,20 @@ impl Experiment {
     /// Tests the planners for regressions against the baseline file `path`, as the command
     /// `palpate check` does: returns verdict, remarks, and the columns of a table. With a reason to
     /// `accept`, writes the file instead; returns `None`. `how` has the file, the reason, the
-    /// tolerance and the number of threads; `own` and `callbacks` are those of `run`.
+    /// tolerance, the number of threads, and whether the baseline's other planners are left alone; `own` and `callbacks` are those of `run`.
     fn check<'py>(
         &self,
         py: Python<'py>,
         own: Vec<(String, Py<PyAny>)>,
-        how: (PathBuf, Option<String>, f64, usize),
+        how: (PathBuf, Option<String>, f64, usize, bool),
         callbacks: (Py<PyAny>, Py<PyAny>),
     ) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let (path, accept, tolerance, threads) = how;
-        let mut old = match accept.is_some() && !path.exists() {
+        let (path, accept, tolerance, threads, is_partial) = how;
+        let old = match accept.is_some() && !path.exists() {
             true => None,
             false => Some(StoredBaseline::read(&path).map_err(errors::other)?),
         };
-        if let Some(old) = &mut old {
+        if let Some(old) = &old {
             old.check_pairs(&path, &self.0).map_err(errors::other)?;
         }
         let simulation = self.simulation(py, own)?;
@@ -132,7 +132,9 @@ impl Experiment {
         let rules = CheckOptions { tolerance, ..CheckOptions::default() };
         let Some(why) = accept else {
             let mut old = old.ok_or_else(|| errors::other("no baseline"))?;
-            old.keep_planners(&self.0.planners);
+            if is_partial {
+                old.keep_planners(&self.0.planners);
+            }
             let run = || run_check(&simulation, &old, &rules, threads, stop, &tick);
             let result = callbacks.watched(py, jobs.len(), run)?.map_err(errors::other)?;
             return check_table(py, &result, &rules, self.0.trials).map(Some);
@@ -140,7 +142,7 @@ impl Experiment {
         let total = jobs.len();
         let run = || runner::run_in_memory(&simulation, jobs, threads, stop, &tick);
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
-        let new = accepted(&simulation, &rows, &why, (old.as_ref(), true), &rules);
+        let new = accepted(&simulation, &rows, &why, (old.as_ref(), is_partial), &rules);
         let text = new.map_err(errors::other)?.text().map_err(errors::other)?;
         write_whole(&path, &text).map_err(errors::other)?;
         Ok(None)
@@ -176,18 +178,14 @@ fn check_table<'py>(
     rules: &CheckOptions,
     most: u32,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mut rows = Vec::new();
-    for planner in &result.planners {
-        let (name, trials) = (planner.name.as_str(), planner.trials);
-        if planner.judgements.is_empty() {
-            rows.push((name, "", [f64::NAN; 3], check::word(planner.verdict), trials));
-        }
-        for it in &planner.judgements {
-            let [low, high] = it.sequence.interval;
-            let percent = [it.sequence.mean, low, high].map(|at| it.judged.percent(at));
-            rows.push((name, it.judged.title, percent, check::word(it.verdict), trials));
-        }
-    }
+    let rows = result.planners.iter().flat_map(|planner| {
+        let line = |(title, change, verdict): (_, Option<_>, _)| {
+            let change = change.unwrap_or([f64::NAN; 3]);
+            (planner.name.as_str(), title, change, check::word(verdict), planner.trials)
+        };
+        planner.lines().into_iter().map(line)
+    });
+    let rows: Vec<_> = rows.collect();
     let table = PyDict::new(py);
     table.set_item("planner", rows.iter().map(|row| row.0).collect::<Vec<_>>())?;
     table.set_item("measure", rows.iter().map(|row| row.1).collect::<Vec<_>>())?;

@@ -34,6 +34,8 @@ def test_a_planner_is_checked_against_its_baseline(experiment, tmp_path):
     # Another planner is added to the file, and the first one is kept.
     palpate.check(experiment, baseline, ["sobol"], accept="sobol too", max_trials=6)
     assert palpate.check(experiment, baseline, [own.Middle, "sobol"], max_trials=6).verdict == "identical"
+    # All planners of the experiment: those that only the baseline has are missing.
+    assert palpate.check(experiment, baseline, max_trials=6).verdict == "missing"
     missing = palpate.check(experiment, baseline, ["random"], max_trials=6)
     assert missing.verdict == "missing" and not missing.passed
     with pytest.raises(PalpateError):
