@@ -7,6 +7,7 @@ use crate::experiment::measure::{
     VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
 use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
 
@@ -185,11 +186,12 @@ fn band_coverage(curves: &[Curve]) -> Option<String> {
 pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
     let baselines = run.experiment.baselines();
     let baseline = baselines.first().copied().unwrap_or_default();
-    error_verdict(run, analysis, baseline)
-        .into_iter()
-        .chain(touches_verdict(run, analysis, baseline))
-        .chain(calibration(run))
-        .collect()
+    let trials = final_errors(run, analysis, baseline).map(|it| it.paired.trials).max();
+    let compared = match trials.and_then(too_few) {
+        Some(too_few) => [Some(too_few), None],
+        None => [error_verdict(run, analysis, baseline), touches_verdict(run, analysis, baseline)],
+    };
+    compared.into_iter().flatten().chain(calibration(run)).collect()
 }
 
 /// Ratio of the trials that detect a difference with a probability of 80 % to those whose 95 %
@@ -211,15 +213,11 @@ const PROPOSED_MAX: f64 = 10_000.0;
 pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
     let baseline = *run.experiment.baselines().first()?;
     let error = run.experiment.error_measure();
-    let found = analysis.comparisons.iter();
-    let found = found.filter(|it| it.baseline == baseline && it.measure.id == error.id);
+    let found = final_errors(run, analysis, baseline);
     let best = found.min_by(|a, b| a.paired.mean.total_cmp(&b.paired.mean))?;
     let (planner, paired) = (best.planner, &best.paired);
-    if paired.trials < TRIALS_MIN {
-        return Some(format!(
-            "{} paired trials are too few to compare planners; use --set trials={TRIALS_MIN} or more.",
-            paired.trials
-        ));
+    if let Some(too_few) = too_few(paired.trials) {
+        return Some(too_few);
     }
     let [low, high] = paired.interval?;
     let shown = |value: f64| digits(error.unit.per_si * value);
@@ -251,11 +249,29 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
     })
 }
 
-/// Returns which planners have a smaller error after the last touch than the first baseline.
-fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+/// Returns a sentence instead of a comparison if there are too few paired trials.
+fn too_few(trials: usize) -> Option<String> {
+    (trials < TRIALS_MIN).then(|| {
+        format!(
+            "{trials} paired trials are too few to compare planners; use --set trials={TRIALS_MIN} or more."
+        )
+    })
+}
+
+/// Returns the comparisons of the planners' errors after the last touch with those of `baseline`.
+fn final_errors<'a>(
+    run: &Run,
+    analysis: &'a Analysis<'a>,
+    baseline: &'a str,
+) -> impl Iterator<Item = &'a PairedComparison<'a>> + Clone + use<'a> {
     let id = run.experiment.error_measure().id;
     let found = analysis.comparisons.iter();
-    let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
+    found.filter(move |it| it.baseline == baseline && it.measure.id == id)
+}
+
+/// Returns which planners have a smaller error after the last touch than the first baseline.
+fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let found = final_errors(run, analysis, baseline);
     let trials = found.clone().map(|it| it.paired.trials).max()?;
     let verdicts =
         found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));

@@ -346,7 +346,12 @@ fn a_run_ends_with_one_conclusion() {
             let metrics = row.touches.last_mut().unwrap().metrics.as_mut().unwrap();
             metrics.rmse_m = 1e-3 * (mm + 0.1 * f64::from(row.trial % 3));
         }
-        report::findings::conclusion(&run, &Analysis::new(&run)).unwrap()
+        let analysis = Analysis::new(&run);
+        let conclusion = report::findings::conclusion(&run, &analysis).unwrap();
+        // The page compares exactly the runs that the terminal compares.
+        let verdict = report::findings::verdicts(&run, &analysis).swap_remove(0);
+        assert_eq!(verdict == conclusion, conclusion.contains("too few"), "{verdict} {conclusion}");
+        conclusion
     };
     let better = say(|_| 1.0, 12);
     let size = "active is better: 1.00 mm [1.00, 1.00] less RMSE than random after 12 touches";
