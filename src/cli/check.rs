@@ -3,7 +3,7 @@
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::output::Overwrite;
-use super::prepare::{prepare_simulation, set_thread_count};
+use super::prepare::{planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::runner::{self, Progress};
@@ -79,8 +79,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     let path = find(&args.experiment, EXPERIMENTS)?;
     let mut sets = args.set.clone();
     if !args.planner.is_empty() {
-        let names: Vec<String> = args.planner.iter().map(|name| format!("{name:?}")).collect();
-        sets.push(format!("planners=[{}]", names.join(",")));
+        sets.push(planners_setting(args.planner.iter()));
     }
     let mut experiment = Experiment::load(&path, &sets)?;
     experiment.trials = args.max_trials;

@@ -25,11 +25,12 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
         return Ok(found);
     }
     let word = name.to_string_lossy();
-    let known = format::nearest(&word, &file_stems(folder));
-    let home = || format!("; set {HOME} to the folder that has {EXPERIMENTS}/ and {SCENES}/");
-    let meant = match known {
-        Some(known) => format!(", did you mean `{known}`?"),
-        None if file_stems(folder).is_empty() => home(),
+    let known = file_stems(folder);
+    let meant = match format::nearest(&word, &known) {
+        Some(meant) => format!(", did you mean `{meant}`?"),
+        None if known.is_empty() => {
+            format!("; set {HOME} to the folder that has {EXPERIMENTS}/ and {SCENES}/")
+        }
         None => String::new(),
     };
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())

@@ -4,7 +4,7 @@ use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::plan::plan;
-use super::prepare::{prepare_arm, prepare_simulation, set_thread_count};
+use super::prepare::{planners_setting, prepare_arm, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Outcome, Verbosity, error, print};
 use crate::experiment::experiment::Experiment;
@@ -172,9 +172,8 @@ fn with_planners(
     }
     let listed = |name: &&String| experiment.planners.contains(name);
     let too = args.planner.iter().filter(|name| !listed(name));
-    let names: Vec<String> =
-        experiment.planners.iter().chain(too).map(|name| format!("{name:?}")).collect();
-    load(&[&args.set[..], &[format!("planners=[{}]", names.join(","))]].concat())
+    let planners = planners_setting(experiment.planners.iter().chain(too));
+    load(&[&args.set[..], &[planners]].concat())
 }
 
 /// Result of a run.

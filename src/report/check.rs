@@ -4,7 +4,7 @@
 use super::canvas::{Anchor, Area, Canvas};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use super::table::{Cell, Column, Table};
-use crate::study::check::{CheckOptions, CheckResult, MeasureResult, PlannerResult, Verdict};
+use crate::study::check::{CheckOptions, CheckResult, PlannerResult, Verdict};
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 /// Returns the name of a verdict.
@@ -31,24 +31,18 @@ pub fn table(held: &CheckResult) -> Table {
 
 fn rows(planner: &PlannerResult) -> Vec<[String; 6]> {
     let trials = planner.trials.to_string();
-    let row = |judgement: &MeasureResult| {
-        let [low, high] = judgement.sequence.interval.map(|end| percent(judgement, end));
-        let change = percent(judgement, judgement.sequence.mean);
-        let interval = format!("{low} to {high}");
-        let (title, verdict) = (judgement.judged.title, word(judgement.verdict));
-        [&planner.name, title, &change, &interval, verdict, &trials].map(String::from)
+    let row = |(title, change, verdict): (&str, Option<[f64; 3]>, Verdict)| {
+        let [change, interval] = change.map_or_else(Default::default, |values| {
+            let [change, low, high] = values.map(percent);
+            [change, format!("{low} to {high}")]
+        });
+        [&planner.name, title, &change, &interval, word(verdict), &trials].map(String::from)
     };
-    match planner.judgements.is_empty() {
-        true => {
-            vec![[&planner.name, "", "", "", word(planner.verdict), &trials].map(String::from)]
-        }
-        false => planner.judgements.iter().map(row).collect(),
-    }
+    planner.lines().into_iter().map(row).collect()
 }
 
-fn percent(judgement: &MeasureResult, difference: f64) -> String {
-    let percent = judgement.judged.percent(difference);
-    if percent.is_finite() { format!("{percent:+.1} %") } else { "–".into() }
+fn percent(value: f64) -> String {
+    if value.is_finite() { format!("{value:+.1} %") } else { "–".into() }
 }
 
 /// Returns remarks on a check, a sentence each.

@@ -46,7 +46,7 @@ impl<'a> BeliefReplay<'a> {
     /// Replays the belief of a trial's `row` after `count` touches, as [`BeliefReplay::new`].
     ///
     /// # Errors
-    /// As [`BeliefReplay::new`].
+    /// If the recorded touches do not belong to the zone or cannot be conditioned on.
     pub fn of(
         experiment: &Experiment,
         row: &'a TrialRow,

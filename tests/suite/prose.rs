@@ -53,7 +53,6 @@ impl Texts {
         let mut is_after_doc = false;
         while let Some(token) = tokens.next() {
             match token {
-                TokenTree::Punct(mark) if mark.as_char() == '!' && is_after_doc => {}
                 TokenTree::Punct(mark) if mark.as_char() == '#' => {
                     tokens.next_if(|next| matches!(next, TokenTree::Punct(_)));
                     let Some(TokenTree::Group(attribute)) = tokens.next() else { continue };

@@ -37,6 +37,22 @@ pub struct PlannerResult {
     pub judgements: Vec<MeasureResult>,
 }
 
+impl PlannerResult {
+    /// Returns a line per measure: title, change in percent with the ends of its 95 % interval, and
+    /// verdict. A planner without measures has one line, without a title and a change.
+    pub fn lines(&self) -> Vec<(&'static str, Option<[f64; 3]>, Verdict)> {
+        let line = |it: &MeasureResult| {
+            let [low, high] = it.sequence.interval;
+            let percent = [it.sequence.mean, low, high].map(|at| it.judged.percent(at));
+            (it.judged.title, Some(percent), it.verdict)
+        };
+        match self.judgements.is_empty() {
+            true => vec![("", None, self.verdict)],
+            false => self.judgements.iter().map(line).collect(),
+        }
+    }
+}
+
 impl CheckResult {
     /// Worst verdict of all planners.
     pub fn verdict(&self) -> Verdict {
