@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel release install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
 
@@ -67,8 +67,10 @@ check-planners: setup
 	done
 
 # Compares instruction counts with experiments/baselines/cost.toml; skipped without valgrind.
+check-cost: export CARGO_INCREMENTAL := 0
 check-cost: setup
-	tests/cost.py
+	cargo test --quiet --locked --features ros2 --no-run
+	tests/cost.py --program target/debug/palpate
 
 # All hard cases at all severities, periods and time steps, ten minutes of processor time: writes
 # docs/hard-cases.md and fails on an unexplained outcome.
@@ -201,10 +203,28 @@ PYTHON_READY := $(DEPS)/python/ready
 PYTHON_HOME := python/palpate/home
 # The wheel contains MuJoCo's library, which maturin finds by LD_LIBRARY_PATH.
 MATURIN = LD_LIBRARY_PATH=$(abspath $(DEPS)/lib) PATH=$(abspath $(DEPS)/python/bin):$$PATH \
-	maturin build --quiet --locked -m python/Cargo.toml
+	maturin build --quiet --locked
 
 wheel: setup $(PYTHON_READY) $(PYTHON_HOME)
 	$(MATURIN) --release --out target/wheels
+
+# Files of a release, checked: a wheel for all Linux distributions with glibc 2.28 or later, the source distribution,
+# the archive, the crates. TAG, if given, must be the version.
+RELEASE := target/release-files
+
+release: dist $(PYTHON_READY) $(PYTHON_HOME)
+	cargo test --locked --features ros2 -p palpate --test suite release::
+	@test -z "$(TAG)" || test "$(TAG)" = "v$(VERSION)" || { echo "tag $(TAG): allowed is v$(VERSION)" >&2; exit 2; }
+	rm -rf $(RELEASE) && mkdir -p $(RELEASE)
+	$(PYTHON) -m pip install --quiet --only-binary=:all: -r python/release.txt
+	$(MATURIN) --release --zig --compatibility manylinux_2_28 --out $(RELEASE)
+	$(PYTHON) -m auditwheel show $(RELEASE)/*.whl | tee /dev/stderr | grep -q '"manylinux_2_28_x86_64"'
+	$(PYTHON) -m maturin sdist --out $(RELEASE)
+	$(PYTHON) tests/wheel.py $(RELEASE)
+	rm -rf target/from-sdist && $(PYTHON) -m pip wheel --quiet --no-deps --wheel-dir target/from-sdist $(RELEASE)/palpate-*.tar.gz
+	$(PYTHON) tests/wheel.py target/from-sdist
+	cargo publish --workspace --locked --dry-run
+	cp target/dist/$(DIST).tar.gz $(RELEASE)
 
 # Installs a development build into the test environment; otherwise equal to the release wheel.
 install-python: setup $(PYTHON_READY) $(PYTHON_HOME)
@@ -238,11 +258,7 @@ $(PYTHON_READY): python/requirements.txt
 
 # Data files of the package, read at run time.
 $(PYTHON_HOME): FORCE
-	rm -rf $@ && mkdir -p $@
-	cp -r experiments scenes models $@
-	mkdir $@/licences && cp LICENSE-* $@/licences && cp -r $(MUJOCO_LICENCES) $@/licences/mujoco
-	python3 .cargo/licences.py --package palpate-python > $@/licences/packages.txt
-	rm -r $@/models/*.rs $@/experiments/ci $@/experiments/slurm $@/experiments/kubernetes $@/experiments/baselines
+	python3 python/backend.py
 
 FORCE:
 

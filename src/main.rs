@@ -1,10 +1,25 @@
 //! The `palpate` program.
 
+mod shipped;
+
+use std::path::Path;
 use std::process::ExitCode;
+
+/// Environment variable: the folder with the shipped experiments and scenes.
+const HOME: &str = "PALPATE_HOME";
 
 fn main() -> ExitCode {
     #[cfg(feature = "ros1")]
     palpate_ros::disable_tls_certificates();
+    let is_here =
+        ["experiments/toy.toml", "scenes/toy.toml"].iter().all(|it| Path::new(it).is_file());
+    if std::env::var_os(HOME).is_none()
+        && !is_here
+        && let Some(folder) = shipped::folder()
+    {
+        // SAFETY: the process has one thread.
+        unsafe { std::env::set_var(HOME, folder) };
+    }
     // Set by `make`; a commit alone compiles nothing else again.
     palpate::cli::main(option_env!("PALPATE_COMMIT").unwrap_or("unknown"))
 }

@@ -13,19 +13,19 @@ HOME = Path(__file__).parent / "home"
 
 
 def find_file(name: str | os.PathLike[str], folder: str) -> Path:
-    """Returns the file for `name`: a path, or the name of a file in `folder`, here or in the package.
+    """Returns the file for `name`: a path, or a path in `folder` without its ending; also of the package.
 
     Raises:
         ConfigError: if there is no such file.
     """
     path = Path(name)
-    is_plain = not path.suffix and path.name == str(path)
-    if is_plain and not path.is_file():
-        for beside in (Path(folder), HOME / folder):
-            file = beside / f"{path}.toml"
-            if file.is_file():
-                return file
-    if is_plain and not path.exists():
+    if path.is_file() or path.is_absolute():
+        return path
+    in_places = (HOME / path,) if path.suffix else (Path(folder, f"{path}.toml"), HOME / folder / f"{path}.toml")
+    for file in in_places:
+        if file.is_file():
+            return file
+    if not path.suffix:
         names = sorted({file.stem for one in (Path(folder), HOME / folder) for file in one.glob("*.toml")})
         near = get_close_matches(str(path), names, n=1)
         meant = f", did you mean {near[0]!r}?" if near else ""

@@ -9,19 +9,23 @@ pub(super) const EXPERIMENTS: &str = "experiments";
 /// Folder of the shipped scenes.
 pub(super) const SCENES: &str = "scenes";
 
-/// Finds the file for `name`: a path, or the name of a file in `folder`, in the working directory,
-/// beside the program or in `PALPATE_HOME`.
+/// Finds the file for `name`: a path, or a path in `folder` without its ending. A relative path is
+/// also searched beside the program and in `PALPATE_HOME`.
 ///
 /// # Errors
 /// If no file matches; the message suggests the most similar name.
 pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
-    let is_plain = name.extension().is_none() && name.components().count() == 1;
-    if !is_plain || name.exists() && !name.is_dir() {
+    if name.is_file() || name.is_absolute() {
         return Ok(name.into());
     }
+    let in_places = |folder, file: &Path| -> Option<PathBuf> {
+        folders(folder).map(|folder| folder.join(file)).find(|path| path.is_file())
+    };
+    if name.extension().is_some() {
+        return Ok(in_places("", name).unwrap_or_else(|| name.into()));
+    }
     let file = name.with_extension("toml");
-    let found = folders(folder).map(|folder| folder.join(&file)).find(|path| path.is_file());
-    if let Some(found) = found {
+    if let Some(found) = in_places(folder, &file) {
         return Ok(found);
     }
     let word = name.to_string_lossy();
@@ -45,16 +49,17 @@ pub(super) fn is_experiment(path: &Path) -> bool {
         .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
 }
 
-/// Sorted names of the files in the first `folder` that [`find`] searches.
+/// Sorted names of the files in all places where [`find`] searches `folder`.
 pub(super) fn file_stems(folder: &str) -> Vec<String> {
-    let files = folders(folder).find_map(|folder| std::fs::read_dir(folder).ok());
+    let files = folders(folder).filter_map(|folder| std::fs::read_dir(folder).ok());
     let stem = |path: PathBuf| -> Option<String> {
         let is_toml = path.extension().is_some_and(|extension| extension == "toml");
         Some(path.file_stem()?.to_str()?.to_owned()).filter(|_| is_toml)
     };
     let mut names: Vec<String> =
-        files.into_iter().flatten().flatten().filter_map(|entry| stem(entry.path())).collect();
+        files.flatten().flatten().filter_map(|entry| stem(entry.path())).collect();
     names.sort();
+    names.dedup();
     names
 }
 

@@ -3,6 +3,7 @@
 use crate::common::program::{command, fails, folder, palpate, run_to_end, stderr, succeeds};
 use std::fs;
 use std::path::Path;
+use tempfile::TempDir;
 
 #[test]
 fn what_has_a_name_is_listed() {
@@ -29,6 +30,42 @@ fn experiments_and_scenes_are_found_by_name() {
     assert!(text.contains("small"), "{text}");
     succeeds(folder.path(), &["run", "small", "--no-report"]);
     assert!(folder.path().join("runs/small/trials.jsonl").is_file());
+}
+
+/// Outside a checkout the program has its experiments, scenes and models in the user's cache.
+#[test]
+fn shipped_files_are_found_in_an_empty_folder() {
+    let (folder, cache) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let run = |arguments: &[&str]| {
+        let mut command = command(folder.path(), arguments);
+        let output = run_to_end(command.env("XDG_CACHE_HOME", cache.path()), "in an empty folder");
+        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let listed = run(&["list"]);
+    assert!(["bird_thin", "container_pa10"].iter().all(|name| listed.contains(name)), "{listed}");
+    let homes = || fs::read_dir(cache.path().join("palpate")).unwrap().flatten();
+    let home = homes().next().unwrap().path();
+    for name in ["experiments/toy.toml", "scenes/suite/mug.toml", "models/bird.glb"] {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+        assert_eq!(fs::read(home.join(name)).unwrap(), fs::read(source).unwrap(), "{name}");
+    }
+    let few = [
+        "--set",
+        "trials=1",
+        "--set",
+        "touches=6",
+        "--set",
+        "initial_touches=4",
+        "--set",
+        "planners=[\"random\"]",
+    ];
+    run(&[&["run", "bird", "--no-report"], &few[..]].concat());
+    assert!(folder.path().join("runs/bird/trials.jsonl").is_file());
+    for path in ["suite/six", "experiments/suite/six.toml"] {
+        run(&["run", path, "--plan", "2"]);
+    }
+    assert_eq!(homes().count(), 1, "nothing else is written");
 }
 
 /// Deprecated command names still work, with a note of the new name.

@@ -66,6 +66,7 @@ mod reach;
 mod recording;
 mod reference;
 mod registration;
+mod release;
 mod relevance;
 mod report;
 mod reproducible;

@@ -11,20 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// Built-in arms by name: model and MJCF.
 pub const MODELS: [(&str, [&str; 2]); 2] = [
-    (
-        "pa10",
-        [
-            include_str!("../../../../../models/pa10/c.toml"),
-            include_str!("../../../../../models/pa10/c.xml"),
-        ],
-    ),
-    (
-        "pa10_a",
-        [
-            include_str!("../../../../../models/pa10/a.toml"),
-            include_str!("../../../../../models/pa10/a.xml"),
-        ],
-    ),
+    ("pa10", [include_str!("../../../pa10/c.toml"), include_str!("../../../pa10/c.xml")]),
+    ("pa10_a", [include_str!("../../../pa10/a.toml"), include_str!("../../../pa10/a.xml")]),
 ];
 
 /// Model of an arm as described by its file. Frames of all links are parallel at q = 0.
