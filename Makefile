@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel release install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
 
@@ -225,6 +225,10 @@ release: dist $(PYTHON_READY) $(PYTHON_HOME)
 	$(PYTHON) tests/wheel.py target/from-sdist
 	cargo publish --workspace --locked --dry-run
 	cp target/dist/$(DIST).tar.gz $(RELEASE)
+
+# The wheel of a release in bare systems with Python 3.10 to 3.13; needs root and debootstrap.
+test-wheel-systems:
+	tests/wheel_systems.sh $(RELEASE)
 
 # Installs a development build into the test environment; otherwise equal to the release wheel.
 install-python: setup $(PYTHON_READY) $(PYTHON_HOME)
