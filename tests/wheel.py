@@ -60,7 +60,7 @@ def main():
         succeed(python, "-m", "pip", "install", "--quiet", "--find-links", wheels, "palpate")
         succeed("palpate", "new", "part.stl", "--unit", "mm")
         succeed("palpate", "run", "part.toml", "--set", "trials=2", "--set", "touches=12")
-        page = work / "runs/part/index.html"
+        page = work / "runs/part/report.html"
         assert "<svg" in page.read_text(), page
         print(f"{time.monotonic() - begun:6.1f} s  from an empty environment to {page.name} of part.stl")
 
