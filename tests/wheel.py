@@ -30,7 +30,7 @@ TRIANGLES = [
 IN_PYTHON = """
 import palpate
 run = palpate.Experiment.load("toy", touches=8).run(["active", "random"], trials=2)
-assert len(run.trials()) == 4 and run.summary()["rmse_m_median"].notna().any(), run
+assert len(run.trials()) == 4 and len(run.summary()) == 2 * 6, run.summary()
 print(palpate.__version__)
 """
 
