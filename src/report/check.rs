@@ -78,7 +78,7 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
 
 /// Formats the whole check as Markdown.
 pub fn markdown(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) -> String {
-    let mut text = format!("### {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
+    let mut text = format!("### palpate check {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
     remarks(held, rules, most).iter().for_each(|remark| text += &format!("\n* {remark}"));
     text + "\n"
 }

@@ -154,8 +154,9 @@ fn a_check_says_by_its_exit_code() {
     let texts = reports.each_ref().map(|path| fs::read_to_string(path).unwrap());
     assert!(texts[0].contains("<testcase name=\"active\"") && texts[0].contains("failures=\"0\""));
     assert!(texts[1].contains("| active |") && texts[2].starts_with("<svg"));
-    // Four trials decide for a planner with small differences.
-    let (code, said) = check(&["--set", "gp.noise_sd_m=0.3", "--junit", junit]);
+    // Four trials decide for a planner with small differences. Earlier reports are replaced.
+    let reports = ["--junit", junit, "--markdown", markdown, "--svg", svg];
+    let (code, said) = check(&[&["--set", "gp.noise_sd_m=0.3"], &reports[..]].concat());
     assert!([Some(1), Some(3)].contains(&code), "{code:?} {said}");
     assert!(said.contains("settings or the object's file"), "{said}");
     let results = fs::read_to_string(junit).unwrap();
