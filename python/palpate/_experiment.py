@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from . import _palpate
+from ._executor import Executor
+from ._executor import run as run_on
 from ._home import find_file
 from ._palpate import Zone
 from ._planners import LIMIT_S, Factory, ThreadPlannerFactory, by_name, name_of
@@ -98,6 +100,8 @@ class Experiment:
         limit_s: float | None = LIMIT_S,
         isolate: bool = False,
         on_error: str = "record",
+        executor: Executor | None = None,
+        trials_per_job: int = 1,
     ) -> Run:
         """Runs the missing trials.
 
@@ -112,18 +116,23 @@ class Experiment:
             trials: trials per planner; default: the experiment's number.
             out: folder of the run, whose existing trials are kept; by default the run is kept in memory.
             fresh: delete the existing trials.
-            threads: number of threads, 0 for all cores; results do not depend on it.
+            threads: number of threads, 0 for all cores; with an executor the threads of each job, 0 for one. Results
+                do not depend on it.
             progress: print progress to stderr.
             limit_s: time limit for a target of your own planners, seconds; None means no limit, which also avoids the
                 overhead of a thread.
             isolate: run each of your own planners in its own process, which can be killed.
             on_error: "record" stores an error of your own planner as the reason of its failed trial, continues, and
                 warns at the end; "raise" stops the run and raises PlannerError with the traceback.
+            executor: runs the trials elsewhere: a `concurrent.futures.Executor`, Dask's `Client`, an executor of
+                submitit. Its workers need the same version of Palpate and the same files.
+            trials_per_job: number of trials in a job of the executor; raise it if a job takes long to start.
 
         Raises:
+            PalpateError: if jobs of the executor were lost; with `out` the other trials are kept.
             PlannerError: if a planner is invalid; with on_error="raise", also at its first failed trial.
             TypeError: if `planners` is not a list.
-            ValueError: if `limit_s` or `threads` is negative.
+            ValueError: if `limit_s` or `threads` is negative, or `trials_per_job` is below 1.
             KeyboardInterrupt: after Ctrl-C, when the running trials have finished; with `out` they are kept, and the
                 same call continues.
             SimulationError: if the scene cannot be simulated.
@@ -138,7 +147,10 @@ class Experiment:
         look = Progress(self.name, progress)
         folder = None if out is None else os.fspath(out)
         how = (folder, fresh, threads, on_error == "raise")
-        run = Run(core.run(list(workers.items()), how, (look, partial(_stop, workers))))
+        if executor is None:
+            run = Run(core.run(list(workers.items()), how, (look, partial(_stop, workers))))
+        else:
+            run = Run(run_on(core, workers, executor, trials_per_job, how, look))
         rows: dict[str, Any] = run._core.trials()
         failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
         if failed:

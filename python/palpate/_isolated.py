@@ -36,6 +36,11 @@ class ProcessPlannerFactory:
     def __call__(self, zone: Any, seed: int) -> ProcessPlanner:
         return ProcessPlanner(self, zone, seed)
 
+    @property
+    def parts(self) -> tuple[Factory, float | None]:
+        """Class of the planners, and their time limit."""
+        return self.factory, self.limit_s
+
     def take(self) -> PlannerProcess:
         """Returns an idle process."""
         with self._lock:

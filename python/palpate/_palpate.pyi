@@ -8,15 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 __version__: str
+COMMIT: str
 
 __all__ = [
     "Ball",
     "Belief",
+    "COMMIT",
+    "JobRunner",
     "PlannerChannel",
     "ParallelExplorations",
     "Experiment",
     "Exploration",
     "Fitted",
+    "RowCollector",
     "Run",
     "Scene",
     "Touch",
@@ -339,6 +343,7 @@ class ParallelExplorations:
     def sizes(self) -> tuple[int, int, int]: ...
     @property
     def measures(self) -> list[str]: ...
+    def belief(self, index: int) -> Belief: ...
     def reset(self, seeds: Sequence[int]) -> dict[str, Any]: ...
     def step(self, actions: npt.NDArray[np.float32]) -> dict[str, Any]: ...
 
@@ -377,11 +382,41 @@ class Experiment:
     ) -> dict[str, Any] | None: ...
 
 @final
+class JobRunner:
+    def __new__(cls, text: str, own: Sequence[tuple[str, Any]]) -> JobRunner: ...
+    @property
+    def inputs(self) -> dict[str, str]: ...
+    def run(
+        self,
+        trials: Sequence[tuple[int, str]],
+        how: tuple[int, bool],
+        callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
+    ) -> tuple[bytes, BaseException | None]: ...
+
+@final
+class RowCollector:
+    def __new__(
+        cls, experiment: Experiment, own: Sequence[tuple[str, Any]], out: str | None, fresh: bool
+    ) -> RowCollector: ...
+    @property
+    def inputs(self) -> dict[str, str]: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def missing(self) -> list[tuple[int, str]]: ...
+    @property
+    def done(self) -> int: ...
+    def add(self, lines: bytes) -> list[tuple[int, str, str]]: ...
+    def close(self) -> None: ...
+    def run(self) -> Run: ...
+
+@final
 class Run:
     @staticmethod
     def open(folder: str) -> Run: ...
     @property
     def name(self) -> str: ...
+    def to_toml(self) -> str: ...
     @property
     def planners(self) -> list[str]: ...
     @property

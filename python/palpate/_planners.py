@@ -189,6 +189,11 @@ class ThreadPlannerFactory:
         self._live.add(worker)
         return worker
 
+    @property
+    def parts(self) -> tuple[Factory, float | None]:
+        """Class of the planners, and their time limit."""
+        return self._factory, self._limit_s
+
     def stop(self) -> None:
         """Stops waiting for all planners."""
         for worker in list(self._live):

@@ -83,6 +83,37 @@ class Run:
         """
         return self._core.truth()
 
+    def to_toml(self) -> str:
+        """Returns all settings of the run, including defaults, as TOML."""
+        return self._core.to_toml()
+
+    def to_parquet(self, folder: str | os.PathLike[str]) -> None:
+        """Writes the data frames of `trials` and `touches` to `trials.parquet` and `touches.parquet` in `folder`.
+
+        The files' metadata have the run's settings (`palpate.settings`, TOML) and Palpate's version.
+
+        Raises:
+            ImportError: if pyarrow is not installed.
+        """
+        from ._datasets import to_parquet
+
+        to_parquet(self, folder)
+
+    def to_lerobot(self, folder: str | os.PathLike[str]) -> None:
+        """Writes a LeRobotDataset v3.0 to a new folder: an episode per trial, a frame per touch.
+
+        A frame has the previous contact (`observation.state`), the target (`action`), the decrease of the log error
+        (`next.reward`) and the contact (`next.contact`). Positions are in metres; the fourth number of a contact is
+        1, or 0 without contact. `fps` is 1: it counts touches, not seconds. The task of an episode names the planner.
+
+        Raises:
+            ImportError: if pyarrow is not installed.
+            PalpateError: if the folder is not empty, or no trial has a touch.
+        """
+        from ._datasets import to_lerobot
+
+        to_lerobot(self, folder)
+
     def rows(self) -> bytes:
         """Returns the trials as JSON lines: the bytes of the program's `trials.jsonl`."""
         return self._core.rows()

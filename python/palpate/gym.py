@@ -55,6 +55,7 @@ from gymnasium.vector.utils import batch_space
 
 from . import _palpate
 from ._home import HOME, find_file
+from ._render import Renderer
 from ._settings import assignments
 
 __all__ = ["TouchEnv", "TouchVectorEnv"]
@@ -87,18 +88,22 @@ class _Explorations:
             files = [find_file(one, "scenes") for one in scene]
         sets = assignments(settings)
         scenes = [(os.fspath(file), sets) for file in files]
+        #: Whether a belief is fitted.
+        self.has_belief = bool(grid) or reward != "none"
         self.core = _palpate.ParallelExplorations(scenes, count, touches, initial_touches, grid, reward, threads)
         action, row, axes = self.core.sizes
         self.action = spaces.Box(-1.0, 1.0, (action,), np.float32)
+        # Heights, and contacts beyond the zone, are finite but unbounded.
+        largest = float(np.finfo(np.float32).max)
         seen: dict[str, spaces.Space[Any]] = {
-            "touches": spaces.Box(-np.inf, np.inf, (touches, row), np.float32),
+            "touches": spaces.Box(-largest, largest, (touches, row), np.float32),
             "count": spaces.Discrete(touches + 1),
         }
         if grid:
             shape = (2,) + (grid,) * axes
-            seen["belief"] = spaces.Box(-np.inf, np.inf, shape, np.float32)
+            seen["belief"] = spaces.Box(-largest, largest, shape, np.float32)
         self.observation = spaces.Dict(seen)
-        self.measures = self.core.measures if grid or reward != "none" else []
+        self.measures = self.core.measures if self.has_belief else []
 
     def observations(self, step: dict[str, Any]) -> _Observation:
         """Returns the observations of all environments."""
@@ -116,10 +121,12 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
         grid: points along each side of the zone, or of the cube around the ball, on which the belief is observed; 0 for
             no belief. Around an object 8 gives 512 points and is cheap, 16 gives 4096.
         reward: "error", "information" or "none".
+        render_mode: "rgb_array" returns a picture of the belief from `render()`, shape (height, width, 3); "human"
+            shows it in a window after each touch. Both need matplotlib.
         settings: any setting of a scene.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 4}
 
     def __init__(
         self,
@@ -129,13 +136,19 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
         initial_touches: int = 5,
         grid: int = 16,
         reward: str = "error",
-        render_mode: None = None,
+        render_mode: str | None = None,
         **settings: Any,
     ) -> None:
+        modes = self.metadata["render_modes"]
+        if render_mode is not None and render_mode not in modes:
+            raise ValueError(f"render_mode = {render_mode!r}: allowed are {', '.join(modes)}, or None")
+        # Created with the first picture: Stable-Baselines3 asks for "rgb_array" and may never draw.
+        self._renderer: Renderer | None = None
         self._all = _Explorations(1, scene, touches, initial_touches, grid, reward, 1, settings)
         self.action_space = self._all.action
         self.observation_space = self._all.observation
         self.render_mode = render_mode
+        self._title = ""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -143,6 +156,7 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
         """Starts an episode with its initial touches."""
         super().reset(seed=seed)
         step = self._all.core.reset([int(self.np_random.integers(2**63))])
+        self._finish(step)
         return self._observation(step), self._info(step)
 
     def step(
@@ -150,7 +164,34 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
     ) -> tuple[_Observation, float, bool, bool, dict[str, Any]]:
         """Makes a touch; an episode terminates with its last touch."""
         step = self._all.core.step(np.asarray(action, dtype=np.float32)[None])
+        self._finish(step)
         return self._observation(step), float(step["reward"][0]), bool(step["over"][0]), False, self._info(step)
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Returns a picture of the belief with `render_mode="rgb_array"`, shape (height, width, 3)."""
+        return self._draw() if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Closes the window."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _finish(self, step: dict[str, Any]) -> None:
+        """Describes a touch, and shows it in the window."""
+        count = f"{int(step['count'][0])} touches"
+        measure = self._all.measures[0] if self._all.measures else None
+        value = "" if measure is None else f", {measure.removesuffix('_m')} {1e3 * float(step[measure][0]):.2f} mm"
+        self._title = count + value
+        if self.render_mode == "human":
+            self._draw()
+
+    def _draw(self) -> npt.NDArray[np.uint8]:
+        if not self._all.has_belief:
+            raise ValueError(f"render_mode = {self.render_mode!r} draws the belief: allowed is grid above 0")
+        if self._renderer is None:
+            self._renderer = Renderer(str(self.render_mode), self.metadata["render_fps"])
+        return self._renderer.draw(self._all.core.belief(0), self._title)
 
     def _observation(self, step: dict[str, Any]) -> _Observation:
         seen = {name: values[0] for name, values in self._all.observations(step).items()}

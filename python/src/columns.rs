@@ -1,5 +1,6 @@
 //! Rows and curves as columns of data frames.
 
+use crate::fork;
 use numpy::PyArray1;
 use palpate::experiment::measure::measures_with_columns;
 use palpate::experiment::statistics::curve_table::{columns, curve_table};
@@ -87,7 +88,7 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
 /// Returns a record per planner and number of touches, with the table of `summary.csv`.
 pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let table = PyDict::new(py);
-    let records = py.detach(|| curve_table(&run.experiment, &run.rows, |_| true));
+    let records = fork::detach(py, || curve_table(&run.experiment, &run.rows, |_| true))?;
     words(&table, "planner", records.iter().map(|(point, _)| Some(point.planner.as_str())))?;
     counts(&table, "touches", records.iter().map(|(point, _)| point.touches as usize))?;
     counts(&table, "trials", records.iter().map(|(point, _)| point.trials))?;

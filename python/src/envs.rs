@@ -1,7 +1,9 @@
 //! Parallel explorations that are stepped by actions, the core of the Gymnasium environments.
 
+use crate::belief::Belief;
 use crate::errors;
 use crate::exploration::{Episode, EpisodeOptions, ExplorationScene, Reward};
+use crate::fork::ProcessPool;
 use numpy::ndarray::{ArrayView2, Axis};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -19,7 +21,7 @@ pub(crate) struct ParallelExplorations {
     worlds: Arc<[Arc<ExplorationScene>]>,
     how: EpisodeOptions,
     each: Mutex<Vec<Episode>>,
-    pool: rayon::ThreadPool,
+    pool: ProcessPool,
 }
 
 #[pymethods]
@@ -61,12 +63,11 @@ impl ParallelExplorations {
             let words = format!("initial_touches = {initial}: allowed are 1 to {touches}");
             return Err(PyValueError::new_err(words));
         }
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let how = EpisodeOptions { touches, initial, reward, believes: grid > 0 };
         let each = (0..count)
             .map(|_| Episode::new(&worlds[0], how).map_err(errors::scene))
             .collect::<PyResult<Vec<_>>>()?;
-        let pool = pool.map_err(errors::other)?;
+        let pool = ProcessPool::new(threads);
         Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
     }
 
@@ -83,8 +84,16 @@ impl ParallelExplorations {
         self.worlds[0].measured().to_vec()
     }
 
+    /// Belief of an exploration.
+    fn belief(&self, index: usize) -> PyResult<Belief> {
+        let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = each.get(index).map(|env| Belief(env.known.clone()));
+        found.ok_or_else(|| errors::other(format!("no exploration {index}")))
+    }
+
     /// Resets all explorations, each with its seed.
     fn reset<'py>(&self, py: Python<'py>, seeds: Vec<u64>) -> PyResult<Bound<'py, PyDict>> {
+        let pool = self.pool.get()?;
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
             let begin = |(env, seed): (&mut Episode, u64)| {
@@ -92,7 +101,7 @@ impl ParallelExplorations {
                 env.begin(&self.worlds);
             };
             let seeded: Vec<_> = each.iter_mut().zip(seeds).collect();
-            self.pool.install(|| seeded.into_par_iter().for_each(begin));
+            pool.install(|| seeded.into_par_iter().for_each(begin));
         });
         self.observations(py)
     }
@@ -108,6 +117,7 @@ impl ParallelExplorations {
         let actions = actions.as_array();
         self.check(&actions)?;
         let actions: Vec<Vec<f32>> = actions.axis_iter(Axis(0)).map(|row| row.to_vec()).collect();
+        let pool = self.pool.get()?;
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
             let each = each.as_mut_slice();
@@ -115,7 +125,7 @@ impl ParallelExplorations {
                 true => env.begin(&self.worlds),
                 false => env.touch(action),
             };
-            self.pool.install(|| each.par_iter_mut().zip(&actions).for_each(go));
+            pool.install(|| each.par_iter_mut().zip(&actions).for_each(go));
         });
         self.observations(py)
     }

@@ -1,6 +1,7 @@
 //! An experiment, and its run with the interpreter lock released.
 
 use crate::errors;
+use crate::fork;
 use crate::planner::PythonFactory;
 use crate::program::COMMIT;
 use crate::run::Run;
@@ -25,7 +26,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// An experiment: planners × trials on one scene.
 #[pyclass(frozen, module = "palpate._palpate")]
-pub(crate) struct Experiment(experiment::Experiment);
+pub(crate) struct Experiment(pub(crate) experiment::Experiment);
 
 #[pymethods]
 impl Experiment {
@@ -151,7 +152,11 @@ impl Experiment {
 
 impl Experiment {
     /// Builds the simulation, with the Python planners `own`.
-    fn simulation(&self, py: Python<'_>, own: Vec<(String, Py<PyAny>)>) -> PyResult<Simulation> {
+    pub(crate) fn simulation(
+        &self,
+        py: Python<'_>,
+        own: Vec<(String, Py<PyAny>)>,
+    ) -> PyResult<Simulation> {
         let makers = own
             .into_iter()
             .map(|(name, start)| -> PyResult<Box<dyn PlannerFactory>> {
@@ -159,7 +164,8 @@ impl Experiment {
             })
             .collect::<PyResult<_>>()?;
         let experiment = self.0.clone();
-        let simulation = py.detach(|| Simulation::new(experiment)).map_err(errors::scene)?;
+        let simulation =
+            fork::detach(py, || Simulation::new(experiment))?.map_err(errors::scene)?;
         simulation.simulator().check_reach().map_err(errors::scene)?;
         if simulation.is_real() {
             return Err(errors::scene(
@@ -204,25 +210,26 @@ fn check_table<'py>(
 }
 
 /// A run with its callbacks.
-struct RunCallbacks {
+pub(crate) struct RunCallbacks {
     look: Py<PyAny>,
     stop: Py<PyAny>,
     done: AtomicUsize,
-    is_stopped: AtomicBool,
+    /// Whether no further trials are started.
+    pub(crate) is_stopped: AtomicBool,
     /// Whether the first failed trial of a Python planner ends the run.
-    raises: bool,
+    pub(crate) raises: bool,
     /// First failed trial and its reason.
     failure: Mutex<Option<String>>,
 }
 
 impl RunCallbacks {
-    fn new((look, stop): (Py<PyAny>, Py<PyAny>)) -> Self {
+    pub(crate) fn new((look, stop): (Py<PyAny>, Py<PyAny>)) -> Self {
         let (done, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         Self { look, stop, done, is_stopped, raises: false, failure: Mutex::default() }
     }
 
     /// Counts a finished trial; stops the run if it failed and errors are raised.
-    fn count(&self, progress: &Progress) {
+    pub(crate) fn count(&self, progress: &Progress) {
         let Progress::Trial(row) = progress else { return };
         self.done.fetch_add(1, Ordering::Relaxed);
         if let (true, Some(reason)) = (self.raises && is_external(&row.planner), &row.failure)
@@ -232,6 +239,11 @@ impl RunCallbacks {
             failure.get_or_insert_with(text);
             self.is_stopped.store(true, Ordering::Relaxed);
         }
+    }
+
+    /// Whether a failed trial has ended the run.
+    pub(crate) fn has_failure(&self) -> bool {
+        self.failure.lock().is_ok_and(|failure| failure.is_some())
     }
 
     fn kept(
@@ -275,7 +287,7 @@ impl RunCallbacks {
     ///
     /// # Errors
     /// `KeyboardInterrupt`, or the exception that `look` raises.
-    fn watched<T: Send>(
+    pub(crate) fn watched<T: Send>(
         &self,
         py: Python<'_>,
         total: usize,
@@ -286,7 +298,7 @@ impl RunCallbacks {
             std::thread::scope(|scope| {
                 let (ended, end) = channel::<()>();
                 let working = scope.spawn(move || {
-                    let result = work();
+                    let result = fork::install(work);
                     drop(ended);
                     result
                 });
@@ -309,7 +321,7 @@ impl RunCallbacks {
         self.look.call1(py, (self.done.load(Ordering::Relaxed), total))?;
         match (raised, result) {
             (Some(error), _) => Err(error),
-            (None, Ok(result)) => Ok(result),
+            (None, Ok(result)) => result,
             (None, Err(_)) => Err(errors::other("a thread of the run panicked")),
         }
     }

@@ -1,6 +1,7 @@
 //! One exploration: an episode of touches with observations and rewards.
 
 use crate::errors;
+use crate::fork;
 use crate::known::{self, AIM, BeliefErrors, GroundTruth, Known};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
@@ -49,7 +50,7 @@ impl ExplorationScene {
         grid: usize,
     ) -> PyResult<Arc<Self>> {
         let scene = Scene::load(path, sets).map_err(errors::config)?;
-        py.detach(|| {
+        fork::detach(py, || {
             let environment = Arc::new(Environment::build(scene).map_err(errors::scene)?);
             let truth = GroundTruth::of(&environment, TRUTH_PER_SIDE);
             let grid = match (grid, environment.task().region()) {
@@ -60,7 +61,7 @@ impl ExplorationScene {
             let simulator = Simulator::new(environment).map_err(errors::scene)?;
             simulator.check_reach().map_err(errors::scene)?;
             Ok(Arc::new(Self { simulator, truth, grid }))
-        })
+        })?
     }
 
     fn task(&self) -> &Task {
@@ -191,7 +192,8 @@ pub(crate) struct Episode {
     how: EpisodeOptions,
     world: Arc<ExplorationScene>,
     probe: Box<dyn Probe>,
-    known: Known,
+    /// Belief after the touches so far.
+    pub(crate) known: Known,
     random: ChaCha8Rng,
     score: f64,
     /// Number of touches made.

@@ -3,7 +3,7 @@
 use crate::belief::Belief;
 use crate::known::{self, BeliefErrors, GroundTruth, Known};
 use crate::scene::{Scene, Touch};
-use crate::{errors, exploration};
+use crate::{errors, exploration, fork};
 use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -24,15 +24,15 @@ const CELLS: u32 = 64;
 #[pymethods]
 impl Exploration {
     #[new]
-    fn new(py: Python<'_>, scene: Py<Scene>) -> Self {
+    fn new(py: Python<'_>, scene: Py<Scene>) -> PyResult<Self> {
         let environment = scene.get().environment();
-        let (known, truth) = py.detach(|| {
+        let (known, truth) = fork::detach(py, || {
             (
                 known::empty_belief(environment),
                 GroundTruth::of(environment, exploration::TRUTH_PER_SIDE),
             )
-        });
-        Self { known: Mutex::new(known), truth, scene }
+        })?;
+        Ok(Self { known: Mutex::new(known), truth, scene })
     }
 
     /// Makes a touch at a target and fits the belief.

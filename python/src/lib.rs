@@ -9,9 +9,11 @@ mod columns;
 mod desk;
 mod envs;
 mod errors;
+mod executor;
 mod experiment;
 mod exploration;
 mod explorer;
+mod fork;
 mod gaussian_process;
 mod known;
 mod mesh;
@@ -26,12 +28,16 @@ use pyo3::prelude::*;
 
 #[pymodule]
 fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    fork::remember_process();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("COMMIT", program::COMMIT)?;
     module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
     module.add_class::<desk::PlannerChannel>()?;
     module.add_class::<envs::ParallelExplorations>()?;
     module.add_class::<experiment::Experiment>()?;
+    module.add_class::<executor::JobRunner>()?;
+    module.add_class::<executor::RowCollector>()?;
     module.add_class::<explorer::Exploration>()?;
     module.add_class::<gaussian_process::Fitted>()?;
     module.add_class::<run::Run>()?;

@@ -1,5 +1,6 @@
 //! Command `palpate` of the Python package, with Python planners.
 
+use crate::fork;
 use crate::planner::PythonFactory;
 use palpate::cli::Host;
 use palpate::experiment::trial::planner_names;
@@ -15,7 +16,11 @@ pub(crate) const COMMIT: &str = match option_env!("PALPATE_COMMIT") {
 /// Runs the program on `arguments`, the first of which is its name; returns its exit code.
 /// `load_planner` returns the factory of a planner named `MODULE:CLASS`.
 #[pyfunction]
-pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, load_planner: Py<PyAny>) -> u8 {
+pub(crate) fn main(
+    py: Python<'_>,
+    arguments: Vec<String>,
+    load_planner: Py<PyAny>,
+) -> PyResult<u8> {
     let loaded = |name: &str| {
         let start = Python::attach(|py| {
             let start = load_planner.call1(py, (name,));
@@ -24,7 +29,7 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, load_planner: Py<PyAn
         });
         Some(start.map(|made| -> Box<dyn PlannerFactory> { Box::new(made) }))
     };
-    py.detach(|| {
+    fork::detach(py, || {
         let host = Host { commit: COMMIT, load_planner: &loaded };
         palpate::cli::main_with(arguments.into_iter().map(Into::into), &host)
     })

@@ -4,6 +4,7 @@ use crate::ball::Ball;
 use crate::belief::Belief;
 use crate::columns;
 use crate::errors;
+use crate::fork;
 use crate::known::Known;
 use crate::places::rows;
 use crate::zone::Zone;
@@ -46,6 +47,11 @@ impl Run {
     #[getter]
     fn name(&self) -> &str {
         &self.0.experiment.name
+    }
+
+    /// Settings of the run, with all defaults.
+    fn to_toml(&self) -> String {
+        store::resolved(&self.0.experiment)
     }
 
     #[getter]
@@ -117,7 +123,7 @@ impl Run {
         known.map(Belief).ok_or_else(none)
     }
 
-    fn __str__(&self) -> String {
-        tables::summary::text(&self.0)
+    fn __str__(&self) -> PyResult<String> {
+        fork::install(|| tables::summary::text(&self.0))
     }
 }

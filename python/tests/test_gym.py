@@ -1,5 +1,7 @@
 """Tests of the Gymnasium environments."""
 
+import subprocess
+import sys
 import warnings
 
 import gymnasium
@@ -8,21 +10,83 @@ import palpate
 import palpate.gym
 import pytest
 from gymnasium.utils.env_checker import check_env
+from palpate._home import HOME
 
 ID = "Palpate/Touch-v0"
+
+MUG = str(HOME / "scenes/suite/around/mug.toml")
 
 
 @pytest.mark.parametrize(
     "settings",
-    [{"scene": "bird"}, {"scene": "toy"}, {"scene": "suite", "grid": 0, "reward": "none"}],
+    [{"scene": "bird"}, {"scene": "toy"}, {"scene": MUG, "grid": 3, "initial_touches": 1, "touches": 3}],
 )
 def test_the_environment_keeps_to_the_rules(settings):
-    env = gymnasium.make(ID, touches=8, **settings)
+    env = gymnasium.make(ID, **{"touches": 7, **settings})
+    assert env.spec.id == ID and env.spec.max_episode_steps is None
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # Contacts beyond the zone and heights are unbounded.
-        warnings.filterwarnings("ignore", message=".*(infinity|-infinity).*")
+        # The machine of the tests may have no display.
+        warnings.filterwarnings("ignore", message=".*human.* shows nothing.*")
         check_env(env.unwrapped)
+
+
+def test_an_environment_without_a_belief_keeps_to_the_rules():
+    env = gymnasium.make(ID, touches=7, scene="suite", grid=0, reward="none")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    env = gymnasium.make(ID, scene="toy", touches=7, grid=0, reward="none", render_mode="rgb_array")
+    env.reset()
+    with pytest.raises(ValueError, match="grid above 0"):
+        env.render()
+
+
+def test_the_name_of_the_module_registers_the_environment(tmp_path):
+    code = "import gymnasium; print(gymnasium.make('palpate.gym:Palpate/Touch-v0', scene='toy').spec.id)"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert result.stdout.strip() == ID
+
+
+@pytest.mark.parametrize("scene", ["toy", "bird", MUG])
+def test_a_picture_shows_the_belief(scene):
+    env = gymnasium.make(ID, scene=scene, touches=7, initial_touches=6, grid=4, render_mode="rgb_array")
+    env.reset(seed=2)
+    first = env.render()
+    height, width = first.shape[:2]
+    assert first.dtype == np.uint8 and first.shape[2] == 3 and width > height > 100
+    assert (first == env.render()).all()
+    # Contacts have their colour.
+    red = np.array([0xD0, 0, 0])
+    assert (np.abs(first.astype(int) - red).max(axis=2) < 8).sum() > 20
+    env.step(env.action_space.sample())
+    second = env.render()
+    assert second.shape == first.shape and (first != second).any()
+    env.close()
+    env.close()
+
+
+def test_a_window_is_drawn_after_each_touch(monkeypatch):
+    from matplotlib import pyplot
+
+    shown = []
+    monkeypatch.setattr("matplotlib.get_backend", lambda: "a_window")
+    monkeypatch.setattr(pyplot, "pause", lambda s: shown.append((s, pyplot.gcf()._suptitle.get_text())))
+    env = gymnasium.make(ID, scene="toy", touches=7, initial_touches=5, render_mode="human")
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    assert [title.split(",")[0] for _, title in shown] == ["5 touches", "6 touches"]
+    assert shown[0][0] == 1 / env.metadata["render_fps"]
+    env.close()
+    assert not pyplot.get_fignums()
+
+
+def test_without_matplotlib_the_error_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    env = palpate.gym.TouchEnv("toy", touches=7, render_mode="rgb_array")
+    env.reset()
+    with pytest.raises(ImportError, match="pip install matplotlib"):
+        env.render()
 
 
 def test_the_vector_environment_keeps_to_the_rules():
@@ -97,6 +161,6 @@ def test_what_is_wrong_is_said():
     env.reset(seed=0)
     with pytest.raises(ValueError, match="finite"):
         env.step(np.array([np.nan], dtype=np.float32))
-    for wrong in ({"reward": "luck"}, {"initial_touches": 0}, {"scene": ["toy", "bird"]}, {"scene": []}):
+    for wrong in ({"reward": "luck"}, {"render_mode": "ansi"}, {"initial_touches": 0}, {"scene": ["toy", "bird"]}, {"scene": []}):
         with pytest.raises(ValueError):
             palpate.gym.TouchEnv(**wrong)

@@ -34,6 +34,7 @@ use crate::experiment::notice;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
+use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -50,6 +51,15 @@ pub struct RunFolder {
     trials: File,
     /// Entry of this program for `manifest.json`, written with the first row.
     pending_manifest: Option<serde_json::Value>,
+}
+
+/// Returns the SHA-256 of a simulation's input files and external planners, by key as in
+/// `content.json`.
+///
+/// # Errors
+/// If a file cannot be read.
+pub fn input_hashes(simulation: &Simulation) -> Result<BTreeMap<String, String>, RunError> {
+    Ok(InputHashes::of(simulation)?.into_hashes())
 }
 
 /// Contents of a run folder.

@@ -64,6 +64,11 @@ impl InputHashes {
         Ok(content)
     }
 
+    /// SHA-256 by key.
+    pub(super) fn into_hashes(self) -> BTreeMap<String, String> {
+        self.hashes
+    }
+
     fn add(&mut self, key: &str, hash: String, file: Option<&Path>) {
         self.hashes.insert(key.into(), hash);
         if let Some(file) = file {
