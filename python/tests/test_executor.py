@@ -15,6 +15,7 @@ import own
 import palpate
 import pytest
 import submitit
+from palpate._home import HOME
 from palpate.errors import ConfigError, PalpateError, PlannerError
 
 PLANNERS = [own.Middle, "random"]
@@ -106,6 +107,25 @@ def test_only_missing_trials_are_sent(toy, rows, tmp_path):
     again = Inline()
     assert toy.run(PLANNERS, out=tmp_path / "run", executor=again).rows() == rows
     assert again.jobs == []
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [("bird", {"initial_touches": 4, "grid": 5}), ("container_pa10", {"initial_touches": 4, "grid": 5}), ("around", {})],
+)
+def test_objects_and_arms_are_sent(name, settings, tmp_path, monkeypatch):
+    # A job has absolute paths, so its working folder may differ.
+    monkeypatch.chdir(HOME)
+    experiment = palpate.Experiment.load(f"experiments/{name}.toml", touches=6, **settings)
+    rows = experiment.run(["random"], 1).rows()
+
+    class Elsewhere(Inline):
+        def submit(self, fn, /, *args):
+            with monkeypatch.context() as inside:
+                inside.chdir(tmp_path)
+                return super().submit(fn, *args)
+
+    assert experiment.run(["random"], 1, executor=Elsewhere()).rows() == rows
 
 
 def test_a_lost_job_is_submitted_again(toy, rows):
