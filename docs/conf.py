@@ -27,6 +27,8 @@ html_copy_source = False
 html_show_sphinx = False
 # index.html, which leads to the guide.
 html_extra_path = ["site"]
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 
 myst_heading_anchors = 4
 # Guides abbreviate: `key = […]` is no TOML.
