@@ -118,9 +118,20 @@ test-ros1: setup
 install-ros1:
 	apt-get install --yes --no-install-recommends $(ROS1)
 
-# Tests the report page in a browser; fails without Chromium.
+# Tests the report page in a browser, and the accessibility of report and built site with axe-core; fails without
+# Chromium. Accessibility is skipped if axe-core cannot be fetched.
+AXE := $(DEPS)/axe/axe_playwright_python/axe.min.js
+
 page-test: setup
-	PALPATE_PAGE_TEST=1 cargo test --locked -p palpate --test suite page
+	@$(MAKE) --no-print-directory $(AXE) || echo "accessibility is not tested: the package of tests/axe.txt cannot be fetched"
+	PALPATE_PAGE_TEST=1 PALPATE_AXE=$(abspath $(AXE)) cargo test --locked -p palpate --test suite -- page accessibility
+
+# The package is fetched for the script in it.
+$(AXE): tests/axe.txt
+	rm -rf $(DEPS)/axe && mkdir -p $(DEPS)/axe
+	$(FETCH) -r tests/axe.txt -d $(DEPS)/axe
+	cd $(DEPS)/axe && python3 -m zipfile -e axe_playwright_python-*.whl .
+	touch $@
 
 # Reads a recording with an independent reader; skipped if the Python packages cannot be fetched.
 READER := $(DEPS)/mcap/bin/python

@@ -27,6 +27,8 @@ html_copy_source = False
 html_show_sphinx = False
 # index.html, which leads to the guide.
 html_extra_path = ["site"]
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 
 myst_heading_anchors = 4
 # Guides abbreviate: `key = […]` is no TOML.
@@ -115,8 +117,36 @@ def restore_attribute(app, what, name, obj, options, lines):
         lines[:] = WRITTEN[name]
 
 
+# HTML of Sphinx and the theme, and its replacement with roles and names that screen readers need, and with code and
+# tables that the keyboard scrolls.
+ACCESSIBLE = {
+    'class="caption" role="heading"': 'class="caption" role="heading" aria-level="2"',
+    '<aside class="sidebar-drawer"': '<aside class="sidebar-drawer" aria-label="Site"',
+    '<aside class="toc-drawer"': '<aside class="toc-drawer" aria-label="This page"',
+    '<aside class="toc-drawer no-toc"': '<aside class="toc-drawer no-toc" aria-label="This page"',
+    '<div id="search-results">': '<h1>Search</h1><div id="search-results">',
+    "<pre>": '<pre tabindex="0">',
+    '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
+}
+
+
+def make_accessible(app, exception):
+    """Applies `ACCESSIBLE` to all pages; one that no page needs is an error."""
+    unused = set(ACCESSIBLE)
+    for path in Path(app.outdir).rglob("*.html") if exception is None else ():
+        page = path.read_text()
+        for old, new in ACCESSIBLE.items():
+            if old in page or new in page:
+                unused.discard(old)
+                page = page.replace(new, old).replace(old, new)
+        path.write_text(page)
+    if exception is None and unused:
+        raise ExtensionError(f"no page contains {sorted(unused)}; correct ACCESSIBLE in docs/conf.py")
+
+
 def setup(app):
     """Called by Sphinx."""
+    app.connect("build-finished", make_accessible)
     app.connect("source-read", add_contents)
     app.connect("autodoc-process-docstring", keep_attribute, priority=400)  # napoleon has 500
     app.connect("autodoc-process-docstring", restore_attribute, priority=600)

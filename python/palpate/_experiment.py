@@ -155,8 +155,9 @@ class Experiment:
         failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
         if failed:
             first = failed[0]
+            count = "1 trial" if len(failed) == 1 else f"{len(failed)} trials"
             warnings.warn(
-                f"{len(failed)} trials failed; the first, trial {rows['trial'][first]} of {rows['planner'][first]}: "
+                f"{count} failed; the first, trial {rows['trial'][first]} of {rows['planner'][first]}: "
                 f"{rows['failure'][first]}",
                 RuntimeWarning,
                 stacklevel=2,

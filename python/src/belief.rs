@@ -10,6 +10,7 @@ use nalgebra::Point3;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use palpate::explore::belief::HeightField;
 use palpate::explore::whole_object::ImplicitSurface;
+use palpate::format::counted;
 use palpate::gp::Posterior;
 use palpate::task::Target;
 use pyo3::prelude::*;
@@ -245,7 +246,7 @@ impl Belief {
 
     fn __repr__(&self) -> String {
         let targets = self.0.targets();
-        format!("Belief({} touches)", targets.len())
+        format!("Belief({})", counted(targets.len(), "touch"))
     }
 }
 

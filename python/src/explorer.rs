@@ -4,6 +4,7 @@ use crate::belief::Belief;
 use crate::known::{self, BeliefErrors, GroundTruth, Known};
 use crate::scene::{Scene, Touch};
 use crate::{errors, exploration, fork};
+use palpate::format::counted;
 use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -76,6 +77,6 @@ impl Exploration {
 
     fn __repr__(&self) -> String {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        format!("Exploration({} touches)", known.targets().len())
+        format!("Exploration({})", counted(known.targets().len(), "touch"))
     }
 }

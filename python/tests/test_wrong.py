@@ -34,7 +34,7 @@ def test_a_setting_that_is_wrong():
     with pytest.raises(ConfigError) as result:
         palpate.Experiment.load("toy", touches="many")
     assert (result.value.key, result.value.value) == ("touches", '"many"')
-    assert result.value.allowed == "a whole number from 0 to 4294967295"
+    assert result.value.allowed == "a whole number from 1 to 20000"
 
 
 @pytest.mark.parametrize(

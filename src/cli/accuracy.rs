@@ -17,6 +17,7 @@ use crate::study::accuracy::switches::with_all_effects;
 use crate::study::accuracy::tolerance::{Criterion, Origin};
 use crate::study::accuracy::variant::Variant;
 use anyhow::{bail, ensure};
+use palpate_input::format::counted;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -35,8 +36,8 @@ Examples:
 
 Variants of the scene touch the same targets without sensor noise, so that only the model differs. A
 level is a coarser or finer simulation, compared with the reference, the finest level, and with the
-object's true surface. Each effect is switched alone and compared with the unchanged scene; touches are
-timed in interleaved pairs.
+object's true surface. Each effect is switched on or off alone and compared with the unchanged scene;
+touches are timed in interleaved pairs.
 
 A tolerance holds for 95 % of the touches. Its unit is mm or um (contact point), N (force) or counts
 (electrodes). An effect is needed if switching it alone puts more than 5 % of the touches beyond the
@@ -54,7 +55,7 @@ pub(super) struct Args {
     set: Vec<String>,
     /// Reference of the errors: `scene` (effects), `reference` (finest level) or `truth` (levels)
     /// [default: levels and effects; with --tolerance verdict: scene].
-    #[arg(long, value_name = "ORIGIN")]
+    #[arg(long, value_name = "REFERENCE")]
     against: Option<Origin>,
     /// Touches per variant [default: 24 per level, 120 per effect].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=1000))]
@@ -303,7 +304,8 @@ fn cheapest_text(cheapest: &CheapestScene, criterion: Criterion, origin: Origin)
             let [verdict, change] = [variant.verdict_m, variant.verdict_change_m];
             let trials = change.map_or(0, |change| change.trials);
             let [verdict, change] = [verdict, change].map(paired);
-            format!("active - random is {verdict} mm in {trials} trials, a change of {change}")
+            let trials = counted(trials, "trial");
+            format!("active - random is {verdict} mm in {trials}, a change of {change}")
         }
     };
     let CheapestScene { selected, held_out, is_confirmed, .. } = cheapest;

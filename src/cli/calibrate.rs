@@ -31,8 +31,8 @@ Examples:
 pub struct Args {
     /// Recordings; the format is that of tests/data/biotac_flat_plate.json.
     recordings: PathBuf,
-    /// Keep the constants and fit only the offset, gain and attitude of each session, to test the
-    /// constants.
+    /// Test the default constants: fit only the offset, gain and attitude (the finger's orientation
+    /// on the plate) of each session.
     #[arg(long)]
     attitude_only: bool,
     /// Compare the response to tangential force with the slopes in this file, in the format of

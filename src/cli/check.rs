@@ -14,6 +14,7 @@ use crate::study::check::{
     CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, run_check,
 };
 use anyhow::{Context, bail};
+use palpate_input::format::counted;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -183,7 +184,7 @@ fn accept_baseline(
     }
     let new = accepted(simulation, &rows, why, (old, !args.planner.is_empty()), rules)?;
     write_whole(&args.baseline, &new.text()?)?;
-    let mut text = format!("{} trials in {}", rows.len(), args.baseline.display());
+    let mut text = format!("{} in {}", counted(rows.len(), "trial"), args.baseline.display());
     new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
     print(&text)?;
     Ok(Outcome::Done)

@@ -15,7 +15,7 @@ Examples:
   palpate compare runs/bird runs/bird-before --against random --svg profiles.svg
   palpate compare runs/six/*/ --against active --out runs/six
 
-The unit of error is a trial's exp(mean log RMSE over its touches), divided by that of one planner in the same trial. \
+The error of a trial is exp(mean log RMSE over its touches), divided by that of the reference planner in the same trial. \
 The tables give its interquartile and geometric means (bootstrap within each object), the number of objects on which a \
 planner is better or worse, the share of the gap from random to the oracle that it closes, its cost, and the probability \
 that a trial beats that planner's. The folder's name distinguishes runs of the same experiment.")]

@@ -14,6 +14,7 @@ use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
 use palpate_gp::posterior::Scratch;
+use palpate_input::format::counted;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -157,14 +158,15 @@ fn closed_surface(
         run.experiment.space.cells = u32::try_from(cells)?;
     }
     let planner = args.planner();
-    let of = || format!("{planner} has no fit after {touches} touches");
+    let of = || format!("{planner} has no fit after {}", counted(touches, "touch"));
     let row = replay::row(run, planner).with_context(of)?;
     let truth = whole_object::truth(run);
     let frame = whole_object::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
     let frame = frame.with_context(of)?;
     ensure!(
         !frame.mesh.1.is_empty(),
-        "the belief of {planner} contains no surface after {touches} touches"
+        "the belief of {planner} contains no surface after {}",
+        counted(touches, "touch")
     );
     let mut comments = vec![
         title(run, args, touches),
@@ -180,7 +182,7 @@ fn closed_surface(
 fn zone_surface(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(PointCloud, String)> {
     let planner = args.planner();
     let replay = BeliefReplay::new(run, planner, touches)?
-        .with_context(|| format!("{planner} has no fit after {touches} touches"))?;
+        .with_context(|| format!("{planner} has no fit after {}", counted(touches, "touch")))?;
     let grid = args.side()?.unwrap_or(run.experiment.grid as usize);
     Ok((mesh(run, args, &replay, grid), replay.score()))
 }
@@ -188,11 +190,12 @@ fn zone_surface(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(PointCl
 /// First comment line of an exported file.
 fn title(run: &Run, args: &Args, touches: u32) -> String {
     format!(
-        "Palpate {}: belief of {} in trial {} of {} after {touches} touches",
+        "Palpate {}: belief of {} in trial {} of {} after {}",
         env!("CARGO_PKG_VERSION"),
         args.planner(),
         args.trial,
         run.experiment.name,
+        counted(touches, "touch"),
     )
 }
 

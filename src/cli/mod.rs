@@ -26,6 +26,7 @@ mod report;
 mod run;
 mod scan;
 mod serve;
+mod setting_tip;
 mod show;
 mod slow_steps;
 mod terminal;
@@ -34,6 +35,7 @@ mod watch;
 pub use host::Host;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use setting_tip::with_setting_tip;
 use std::ffi::OsString;
 use std::process::ExitCode;
 use terminal::{Outcome, Verbosity, print};
@@ -63,8 +65,8 @@ Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
 
-Exit codes: 0 done, 1 a test failed, 2 error (the message gives the reason), 3 undecided, 130 interrupted; repeat the \
-command to continue.";
+Exit codes: 0 done, 1 a test failed, 2 error (the message gives the reason), 3 undecided, 130 interrupted \
+(repeat the command to continue).";
 
 #[derive(Subcommand)]
 enum Command {
@@ -72,11 +74,12 @@ enum Command {
     New(new::Args),
     /// Run an experiment (planners × trials) and write its report.
     Run(run::Args),
-    /// Redraw a run's figures and page from its rows; merge shards.
+    /// Redraw a run's figures and report from its stored trials; merge shards.
     Report(report::Args),
     /// Describe a mesh, scene, experiment or run folder; watch a trial in a window.
     Show(show::Args),
-    /// Export a run's belief as a mesh, or a scene's contacts as a point cloud.
+    /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts as a point
+    /// cloud.
     Export(export::Args),
     /// Compare planners over several runs.
     Compare(compare::Args),
@@ -145,8 +148,10 @@ pub fn main(commit: &str) -> ExitCode {
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
     let outcome = deprecated_commands::translate(arguments.into_iter().collect()).and_then(
         |(arguments, note)| {
-            let cli = Cli::from_arg_matches(&command().get_matches_from(arguments))
-                .unwrap_or_else(|error| error.exit());
+            let parser = command();
+            let cli = (parser.clone().try_get_matches_from(&arguments))
+                .and_then(|found| Cli::from_arg_matches(&found))
+                .unwrap_or_else(|error| with_setting_tip(error, &parser, &arguments).exit());
             if let Some(note) = note {
                 cli.talk.note(note);
             }

@@ -6,6 +6,7 @@ use super::progress::stop_on_interrupt;
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::runner::{self, Shard};
+use palpate_input::format::counted;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -52,8 +53,10 @@ pub(super) fn plan(
         lines.push([shard, own.len().to_string(), duration(time_s), memory.clone()]);
     }
     print(&format!(
-        "{}estimated from {tried} trials on {threads} threads: {} per trial, {} set-up",
+        "{}estimated from {} on {}: {} per trial, {} set-up",
         aligned(&lines),
+        counted(tried, "trial"),
+        counted(threads, "thread"),
         duration(each_s),
         duration(set_up_s)
     ))?;

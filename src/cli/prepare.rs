@@ -6,6 +6,7 @@ use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, bail, ensure};
+use palpate_input::format::counted;
 use palpate_ros::arm::RosArm;
 use std::path::Path;
 use std::sync::Arc;
@@ -19,7 +20,7 @@ pub(super) fn planners_setting<'a>(names: impl Iterator<Item = &'a String>) -> S
 /// Limits the number of threads of the process; 0 means all cores.
 pub(super) fn set_thread_count(threads: u16) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-    pool.build_global().with_context(|| format!("cannot start {threads} threads"))
+    pool.build_global().with_context(|| format!("cannot start {}", counted(threads, "thread")))
 }
 
 /// Prepares the simulation of an experiment.

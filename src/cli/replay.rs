@@ -5,6 +5,7 @@ use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::trial::recorded_trial::parts;
 use crate::experiment::trial::replay::{self, Difference, ReplayResult};
 use anyhow::Context;
+use palpate_input::format::counted;
 use palpate_input::format::shorten;
 use palpate_ros::recording::RecordedTrial;
 use serde_json::json;
@@ -95,9 +96,9 @@ fn text(recorded: &RecordedTrial, replay: &ReplayResult) -> String {
         0 => String::new(),
         made => format!(", {made} of them from earlier parts"),
     };
-    let same = format!("{touches} touches identical in decisions and belief{before}");
+    let same = format!("{} identical in decisions and belief{before}", counted(touches, "touch"));
     match difference {
-        None => format!("{head}\n{same}, over {} ticks{cut}", recorded.tick_count),
+        None => format!("{head}\n{same}, over {}{cut}", counted(recorded.tick_count, "tick")),
         Some(difference) => format!("{head}\n{same}{cut}\n{}", words(difference)),
     }
 }
@@ -129,8 +130,8 @@ fn words(difference: &Difference) -> String {
             )
         }
         Difference::End { recorded_touches, recorded, now_touches, now } => format!(
-            "the trial's end differs: recorded after {recorded_touches} touches {}, now after \
-             {now_touches} {}",
+            "the trial's end differs: recorded after {} {}, now after {now_touches} {}",
+            counted(recorded_touches, "touch"),
             reason(recorded),
             reason(now)
         ),

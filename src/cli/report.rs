@@ -5,6 +5,7 @@ use super::terminal::{Outcome, print};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;
+use palpate_input::format::counted;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -31,7 +32,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
     if !args.merge.is_empty() {
         let count = store::merge(&args.folder, &args.merge, host.commit)?;
-        print(&format!("{count} trials in {}", args.folder.display()))?;
+        print(&format!("{} in {}", counted(count, "trial"), args.folder.display()))?;
     }
     if !args.set.is_empty() {
         store::set_report(&args.folder, &args.set)?;

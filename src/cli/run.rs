@@ -6,7 +6,7 @@ use super::host::Host;
 use super::plan::plan;
 use super::prepare::{planners_setting, prepare_arm, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
-use super::terminal::{Outcome, Verbosity, error, print};
+use super::terminal::{Outcome, Verbosity, error, print, quoted};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
@@ -19,6 +19,7 @@ use anyhow::{Context, bail, ensure};
 use palpate_input::config::ConfigError;
 use palpate_input::error::InputError;
 use palpate_input::files;
+use palpate_input::format::counted;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,13 +71,14 @@ pub(super) struct Args {
     /// nothing else.
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     plan: Option<u32>,
-    /// Record every tick of every trial to recordings/PLANNER-TRIAL.mcap in the run's folder.
+    /// Record every control tick of every trial to recordings/PLANNER-TRIAL.mcap in the run's
+    /// folder.
     #[arg(long)]
     record: bool,
     /// Clear latched faults on the robot before moving (operator only).
     #[arg(long)]
     clear_fault: bool,
-    /// Write rows and summary only, no figures.
+    /// Write only trials and summary, no figures and no report page.
     #[arg(long)]
     no_report: bool,
     /// Print the summary as JSON instead of a table.
@@ -88,6 +90,20 @@ impl Args {
     /// Suffix of a shard's folder name.
     fn suffix(&self) -> String {
         self.shard.map(|it| format!("-{}-of-{}", it.index, it.count)).unwrap_or_default()
+    }
+
+    /// Returns the command that continues this run of a real arm after a fault.
+    fn command_after_fault(&self) -> String {
+        let mut command = format!("palpate run {}", quoted(&self.experiment.to_string_lossy()));
+        let out = self.out.as_ref().map(|out| out.to_string_lossy().into_owned());
+        let valued = (self.set.iter().map(|set| ("set", set)))
+            .chain(out.iter().map(|out| ("out", out)))
+            .chain(self.planner.iter().map(|planner| ("planner", planner)));
+        valued.for_each(|(name, value)| command += &format!(" --{name} {}", quoted(value)));
+        let flags = [("record", self.record), ("no-report", self.no_report), ("json", self.json)];
+        let given = flags.iter().filter(|(_, is_given)| *is_given);
+        given.for_each(|(name, _)| command += &format!(" --{name}"));
+        command + " --clear-fault"
     }
 }
 
@@ -246,9 +262,10 @@ fn run_missing(
     if simulation.is_real() {
         if let Some(reason) = Journal::open(&path)?.halt_reason().filter(|_| !args.clear_fault) {
             bail!(
-                "{}: a fault halted the run: {reason}\ncheck the arm, then use --clear-fault to continue, \
-                 or --fresh to start again",
-                path.display()
+                "{}: a fault halted the run: {reason}\ncheck the arm, then continue with: {}\n(or use --fresh to \
+                 start again)",
+                path.display(),
+                args.command_after_fault()
             );
         }
         if let Some(lab) = simulation.connect()? {
@@ -290,7 +307,8 @@ fn run_missing(
     };
     bar.finish_and_clear();
     let tally = folder.sort(experiment)?;
-    let mut words = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
+    let mut words =
+        format!("{} in {:.1} s", counted(count, "trial"), begun.elapsed().as_secs_f64());
     if !done.is_empty() {
         words += &format!(", {} already done", done.len());
     }
@@ -315,16 +333,17 @@ fn run_one(
     let run = Run::read(path)?;
     let mut text = format!("{}\n{words}", report::tables::summary::text(&run));
     let analysis = Analysis::new(&run);
+    let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
     if let Some(conclusion) = report::findings::conclusion(&run, &analysis) {
         text += &format!("\n{conclusion}");
     }
     report::write_tables(&run, &analysis, path)?;
     if !made.is_finished() {
-        text += &format!(
-            "\nstopped with {} of {total} trials in {}; repeat the command to continue",
-            run.rows.len(),
-            path.display()
-        );
+        text +=
+            &format!("\nstopped with {} of {total} trials in {}", run.rows.len(), path.display());
+        if halt.is_none() || is_asked {
+            text += "; repeat the command to continue";
+        }
     } else if args.no_report {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
@@ -337,15 +356,27 @@ fn run_one(
         false => print(&text)?,
     }
     if let Some(halt) = halt {
-        let kept = format!(
-            "{halt}; fix the cause, then repeat the command to continue (--clear-fault clears faults \
-             latched on the robot)"
-        );
-        let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
         if !is_asked {
-            bail!(kept);
+            bail!("{halt}\nfix the cause, then continue with: {}", args.command_after_fault());
         }
-        talk.note(kept);
+        talk.note(format!("{halt}; repeat the command to continue"));
     }
     Ok(made.outcome(talk))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Args;
+    use clap::{Args as _, FromArgMatches};
+
+    #[test]
+    fn the_command_after_a_fault_repeats_the_options_without_starting_again() {
+        let given = "run real_arm --set trials=2 --out runs/x --planner active --fresh --record";
+        let parser = Args::augment_args(clap::Command::new("run"));
+        let mut found = parser.get_matches_from(given.split(' '));
+        let command = Args::from_arg_matches_mut(&mut found).unwrap().command_after_fault();
+        let expected = "palpate run real_arm --set trials=2 --out runs/x --planner active --record \
+                        --clear-fault";
+        assert_eq!(command, expected);
+    }
 }

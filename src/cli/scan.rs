@@ -12,6 +12,7 @@ use crate::sim::Scene;
 use anyhow::Context;
 use palpate_explore::backend::Fault;
 use palpate_explore::probe::Touch;
+use palpate_input::format::counted;
 use std::path::Path;
 
 /// Options of a scan.
@@ -92,9 +93,10 @@ pub(super) fn scan(
     }
     let faults = touches.iter().filter(|touch| touch.is_err()).count();
     print(&format!(
-        "{name}: {} points of contact, {} misses, {faults} faults\nfolder: {}",
-        cloud.points.len(),
-        touches.len() - cloud.points.len() - faults,
+        "{name}: {} of contact, {}, {}\nfolder: {}",
+        counted(cloud.points.len(), "point"),
+        counted(touches.len() - cloud.points.len() - faults, "miss"),
+        counted(faults, "fault"),
         folder.display()
     ))?;
     Ok(Outcome::Done)

@@ -29,7 +29,8 @@ In another terminal: palpate run real_arm
 
 Serves a simulated robot over the topics of the experiment's [backend] in real time, with the checks of a robot \
 controller: a late or invalid command, or one of a second publisher, stops the arm. Events are printed as JSON lines. \
-Ctrl-C ends it. Use --inject or the service /twin/NAME to begin a failure.";
+Ctrl-C ends it. Use --inject or the service /twin/NAME to begin a failure. A scene without [effects.wrench] has its \
+default force/torque sensor.";
 
 /// Lists the failures, one per line.
 fn failures() -> String {
@@ -85,10 +86,8 @@ fn injection(text: &str) -> Result<Injection, String> {
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut experiment = experiment(args)?;
     let scene = &mut experiment.scene;
-    if scene.effects.wrench.is_none() {
-        scene.effects.wrench = Some(WrenchEffect::default());
-        talk.note("the scene has no [effects.wrench]; the default is used");
-    }
+    // The robot always publishes forces; a trial in simulation may need none.
+    scene.effects.wrench.get_or_insert_with(WrenchEffect::default);
     let settings = experiment.backend.clone();
     let scene = experiment.scene;
     let environment = match args.body.body()? {

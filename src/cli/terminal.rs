@@ -54,7 +54,30 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
+/// Quotes a word for a shell, if it needs quotes.
+pub(super) fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./,:=+@%".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 /// Prints to stderr; write errors are ignored.
 pub(super) fn print_stderr(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn only_words_with_special_characters_are_quoted() {
+        assert_eq!(quoted("--set"), "--set");
+        assert_eq!(quoted("runs/a-1.toml"), "runs/a-1.toml");
+        assert_eq!(quoted(""), "''");
+        assert_eq!(quoted("planners=[\"a\"]"), "'planners=[\"a\"]'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
 }

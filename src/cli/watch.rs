@@ -15,6 +15,7 @@ use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::servo::Servo;
 use palpate_explore::probe::{Probe, SweptVolume, Touch};
 use palpate_explore::task::Approach;
+use palpate_input::format::{counted, did_you_mean};
 use std::path::Path;
 
 /// Options of the displayed trial.
@@ -99,8 +100,9 @@ fn planner(
 ) -> anyhow::Result<&'static planner::PlannerEntry> {
     let name = args.planner.as_ref().or(experiment.planners.first()).map_or("", String::as_str);
     planner::by_name(name).with_context(|| {
-        let known: Vec<_> = PLANNERS.iter().map(|planner| planner.name).collect();
-        format!("--planner {name}: allowed are {}", known.join(", "))
+        let known: Vec<String> = PLANNERS.iter().map(|planner| planner.name.into()).collect();
+        let hint = did_you_mean(name, &known);
+        format!("--planner {name}: allowed are {}{hint}", known.join(", "))
     })
 }
 
@@ -146,9 +148,10 @@ fn ending(row: &TrialRow) -> String {
         |measure: Measure| Some((measure.title, measure.value(row, row.touches.len() as u32)?));
     let error = of(RMSE).or_else(|| of(CHAMFER));
     let error = error.map_or(String::new(), |(name, m)| format!(", {name} {:.2} mm", 1e3 * m));
+    let touches = counted(row.touches.len(), "touch");
     match &row.failure {
-        Some(failure) => format!("{} touches{error}; {failure}", row.touches.len()),
-        None => format!("{} touches{error}; close the window to end", row.touches.len()),
+        Some(failure) => format!("{touches}{error}; {failure}"),
+        None => format!("{touches}{error}; close the window to end"),
     }
 }
 

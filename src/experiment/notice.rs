@@ -7,6 +7,7 @@ use crate::experiment::statistics::summary;
 use crate::experiment::trial::row::{TrialRow, planner_rows};
 use crate::experiment::truth::Truth;
 use palpate_explore::task::Zone;
+use palpate_input::format::counted;
 
 /// Share of points or touches below which a notice is given.
 // heuristic: a quarter.
@@ -64,7 +65,7 @@ pub fn scan_notice(contacts: usize, rmse_m: Option<f64>) -> String {
         ),
         None => ", too few to estimate its error".into(),
     };
-    format!("the truth is a scan of {contacts} contacts{off}")
+    format!("the truth is a scan of {}{off}", counted(contacts, "contact"))
 }
 
 /// Notice about a whole object with an unreachable part.

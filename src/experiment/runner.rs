@@ -9,6 +9,7 @@ use palpate_explore::backend::Fault;
 use palpate_explore::backend::pace;
 use palpate_explore::planner::PlannerFactory;
 use palpate_input::error::InputError;
+use palpate_input::format::counted;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };
@@ -153,10 +154,9 @@ pub fn run_in_memory(
 /// # Errors
 /// If the threads cannot be started.
 pub(super) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, InputError> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| InputError::new(format!("cannot start {threads} threads: {error}")))
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
+        InputError::new(format!("cannot start {}: {error}", counted(threads, "thread")))
+    })
 }
 
 /// Runs one trial. A panic of a planner or probe becomes the trial's failure, so that it does not
@@ -248,7 +248,8 @@ pub fn run_real(
         }
         let touches = journal.touches(trial, name).len();
         let kept = folder.path().join(JOURNAL);
-        let kept = format!("{touches} touches are stored in {}", kept.display());
+        let verb = if touches == 1 { "is" } else { "are" };
+        let kept = format!("{} {verb} stored in {}", counted(touches, "touch"), kept.display());
         return Ok((finished, Some(format!("{name}, trial {trial}: {reason}\n{kept}"))));
     }
     Ok((finished, None))

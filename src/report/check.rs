@@ -5,6 +5,7 @@ use super::canvas::{Anchor, Area, Canvas};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use super::table::{Cell, Column, Table};
 use crate::study::check::{CheckOptions, CheckResult, PlannerResult, Verdict};
+use palpate_input::format::counted;
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 /// Returns the name of a verdict.
@@ -54,7 +55,8 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
         let name = &planner.name;
         remarks.extend(planner.failed.as_ref().map(|(count, reason)| {
             format!(
-                "{name}: {count} trials failed that passed in the baseline; the first: {reason}"
+                "{name}: {} failed that passed in the baseline; the first: {reason}",
+                counted(count, "trial")
             )
         }));
         remarks.extend(planner.judgements.first().map(|first| {
@@ -78,7 +80,8 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
 
 /// Formats the whole check as Markdown.
 pub fn markdown(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) -> String {
-    let mut text = format!("### palpate check {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
+    let mut text =
+        format!("### palpate check {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
     remarks(held, rules, most).iter().for_each(|remark| text += &format!("\n* {remark}"));
     text + "\n"
 }
@@ -152,7 +155,8 @@ pub fn draw(name: &str, held: &CheckResult, rules: &CheckOptions) -> String {
         };
         let Some(judgement) = judgement else {
             text(LEFT_PX - 10.0, &planner.name, Anchor::End, INK);
-            let words = format!("{}, {} trials", word(planner.verdict), planner.trials);
+            let trials = counted(planner.trials, "trial");
+            let words = format!("{}, {trials}", word(planner.verdict));
             text(at(0.0) + 8.0, &words, Anchor::Start, INK);
             continue;
         };

@@ -18,6 +18,7 @@ use crate::study::compare::{
     BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric_mean,
     interquartile_mean_interval, profile, win_probability,
 };
+use palpate_input::format::counted;
 
 /// Seed of all bootstraps.
 const SEED: u64 = 0;
@@ -150,7 +151,8 @@ fn sentence(compared: &SuiteComparison) -> Option<String> {
         format!("no established difference from {against}"),
     ];
     let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
-    Some(format!("Over {} objects, {clauses} (95 % intervals).", compared.objects.len()))
+    let objects = counted(compared.objects.len(), "object");
+    Some(format!("Over {objects}, {clauses} (95 % intervals)."))
 }
 
 /// Returns the page: the verdict, the table over all objects, the figures, then each object.
@@ -159,15 +161,15 @@ pub fn html(name: &str, question: &str, compared: &SuiteComparison) -> String {
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
     let each = tables("", &[per_object_table(compared)], "named", "");
     let each = fold("Object by object", &each);
-    let objects = compared.objects.len();
+    let objects = counted(compared.objects.len(), "object");
     let trials = compared.contenders.iter().flat_map(Entrant::scores).map(<[f64]>::len).max();
     let profiles = format!(
         "Performance profiles: fraction of the trials whose error is at most the value on the x axis, \
-         averaged over {objects} objects with up to {} trials each. A curve farther left is better.",
-        trials.unwrap_or_default()
+         averaged over {objects} with up to {} each. A curve farther left is better.",
+        counted(trials.unwrap_or_default(), "trial")
     );
     let reliability = format!(
-        "Reliability diagram over {objects} objects: fraction of the places with a surface, against its \
+        "Reliability diagram over {objects}: fraction of the places with a surface, against its \
          predicted probability. A calibrated belief lies on the diagonal."
     );
     let figures = [

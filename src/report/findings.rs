@@ -10,6 +10,7 @@ use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
+use palpate_input::format::counted;
 
 /// Mean R (Eq. 5) from which a surface counts as found, for the paper's "almost 1".
 const R_FOUND: f64 = 0.99;
@@ -102,7 +103,7 @@ fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
         Some(format!("{r} (centred {centred}, median RMSE {rmse} mm{edge})"))
     };
     let found = each(curves, words)?.join("; ");
-    Some(format!("After {count} touches the mean R (Eq. 5) is: {found}."))
+    Some(format!("After {} the mean R (Eq. 5) is: {found}.", counted(count, "touch")))
 }
 
 /// Returns the accuracy of the estimated surfaces of whole objects after the last drawn touch.
@@ -118,7 +119,7 @@ fn shapes(run: &Run, curves: &[Curve]) -> Option<String> {
         ))
     };
     let found = each(curves, words)?.join("; ");
-    Some(format!("After {count} touches the mean Chamfer distance is: {found}."))
+    Some(format!("After {} the mean Chamfer distance is: {found}.", counted(count, "touch")))
 }
 
 /// Returns the point of a curve after `count` touches.
@@ -157,9 +158,9 @@ fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     let last = baseline.first()?.1.last()?;
     let error_m = last.of(error)?.median;
     let goal = format!(
-        "the median {} that {name} has after {} touches ({} mm)",
+        "the median {} that {name} has after {} ({} mm)",
         error.title,
-        last.touches,
+        counted(last.touches, "touch"),
         median(last, error)?
     );
     let is_met = |point: &CurvePoint| point.of(error).is_some_and(|it| it.median <= error_m);
@@ -226,8 +227,10 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
         format!("{} {unit} [{}, {}]", shown(paired.mean.abs()), shown(low), shown(high))
     };
     let after = format!(
-        "{} than {baseline} after {} touches (mean of {} trials, 95 % interval)",
-        error.title, run.experiment.touches, paired.trials
+        "{} than {baseline} after {} (mean of {}, 95 % interval)",
+        error.title,
+        counted(run.experiment.touches, "touch"),
+        counted(paired.trials, "trial")
     );
     Some(if high < 0.0 {
         format!("{planner} is better: {} less {after}.", size([-high, -low]))
@@ -252,8 +255,10 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
 /// Returns a sentence instead of a comparison if there are too few paired trials.
 fn too_few(trials: usize) -> Option<String> {
     (trials < TRIALS_MIN).then(|| {
+        let verb = if trials == 1 { "is" } else { "are" };
         format!(
-            "{trials} paired trials are too few to compare planners; use --set trials={TRIALS_MIN} or more."
+            "{} {verb} too few to compare planners; use --set trials={TRIALS_MIN} or more.",
+            counted(trials, "paired trial")
         )
     })
 }
@@ -282,8 +287,8 @@ fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Strin
         format!("no established difference in {error} from {baseline}"),
     ];
     let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
-    let touches = run.experiment.touches;
-    Some(format!("After {touches} touches, {clauses} ({trials} trials, 95 % intervals)."))
+    let touches = counted(run.experiment.touches, "touch");
+    Some(format!("After {touches}, {clauses} ({trials} trials, 95 % intervals)."))
 }
 
 /// Returns which planners need fewer touches than the first baseline for its final error.

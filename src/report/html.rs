@@ -16,8 +16,8 @@ pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{name} – Palpate</title>\n<style>{STYLE}{}</style>\n</head>\n<body>\n\
-         <p class=\"kind\">{kind}</p>\n<h1>{name}</h1>\n{question}{body}</body>\n</html>\n",
+         <title>{name} – Palpate</title>\n<style>{STYLE}{}</style>\n</head>\n<body>\n<main>\n\
+         <p class=\"kind\">{kind}</p>\n<h1>{name}</h1>\n{question}{body}</main>\n</body>\n</html>\n",
         figures_on_dark(),
     )
 }

@@ -85,8 +85,12 @@ fn verdict(run: &Run, analysis: &Analysis) -> String {
 
 fn events(run: &Run) -> String {
     let mut items = summary::event_lines(run);
+    // The marks of a Python traceback need a font of fixed width.
+    let is_marked = |line: &&str| line.trim().chars().all(|c| "^~".contains(c));
     let failures = run.rows.iter().filter_map(|row| {
-        Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
+        let reason: Vec<&str> =
+            row.failure.as_ref()?.lines().filter(|line| !is_marked(line)).collect();
+        Some(format!("{}, trial {}: {}", row.planner, row.trial, reason.join("\n")))
     });
     items.extend(failures.take(FAILURES_LISTED));
     list("", &items)
@@ -102,7 +106,7 @@ fn figure(run: &Run, figure: &ReportFigure, svg: &str) -> String {
 }
 
 fn preformatted(text: Option<&str>) -> String {
-    text.map_or(String::new(), |text| format!("<pre>{}</pre>\n", escape(text)))
+    text.map_or(String::new(), |text| format!("<pre tabindex=\"0\">{}</pre>\n", escape(text)))
 }
 
 fn raw_files(drawings: &[(&ReportFigure, String)]) -> String {

@@ -23,6 +23,13 @@ pub fn settings() -> String {
     text
 }
 
+/// Whether an experiment has a setting with this dotted key.
+pub fn is_setting(key: &str) -> bool {
+    let root = schema_for!(Experiment).to_value();
+    let found = key.split('.').fold(&root, |at, name| &resolved(&root, at)["properties"][name]);
+    !found.is_null() && resolved(&root, found)["properties"].is_null()
+}
+
 /// Field of the experiment for the table `[gp]` of a whole object.
 const AROUND: &str = "space";
 

@@ -8,6 +8,7 @@ use super::style::{self, PLANNED};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
 use palpate_geometry::mesh::Mesh;
+use palpate_input::format::counted;
 
 /// Size of a panel of a scene and of a scan.
 const ZONE_PX: [f64; 2] = [560.0, 560.0];
@@ -55,7 +56,7 @@ fn draw(
     draw_object(&mut canvas, first, object, axis);
     if let Some(contacts) = contacts {
         let panel = ReliefPanel::new(unit, Area { left: width, ..first }, space);
-        panel.frame(&mut canvas, &format!("{} points of contact", contacts.len()), "");
+        panel.frame(&mut canvas, &format!("{} of contact", counted(contacts.len(), "point")), "");
         let (camera, x_zw) = (&panel.camera, zone.x_wz().inverse());
         let in_zone = |(p_w, normal_w): &Contact| {
             let p_z = (x_zw * p_w).coords - zone.datum_y_m() * Vector3::y();

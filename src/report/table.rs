@@ -249,7 +249,10 @@ impl Table {
             let title = if i == 0 { title(tooltip(&words)) } else { String::new() };
             let words = escape(&words);
             match verdict {
-                _ if i == 0 => format!("<th scope=\"row\"{title}>{words}</th>"),
+                // A row that continues the one above has no head.
+                _ if i == 0 && !words.is_empty() => {
+                    format!("<th scope=\"row\"{title}>{words}</th>")
+                }
                 Some(word) => format!("<td class=\"{word}\">{words}: {word}</td>"),
                 None => format!("<td>{words}</td>"),
             }
@@ -321,7 +324,7 @@ pub fn aligned(lines: &[impl AsRef<[String]>]) -> String {
 /// Returns a box that scrolls if the page is narrower than its content, also by keyboard.
 pub(super) fn wide(content: &str, what: &str) -> String {
     format!(
-        "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
+        "<div class=\"wide\" role=\"group\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
     )
 }
 

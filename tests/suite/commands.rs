@@ -68,6 +68,34 @@ fn shipped_files_are_found_in_an_empty_folder() {
     assert_eq!(homes().count(), 1, "nothing else is written");
 }
 
+/// An option that is named like a setting is answered with the `--set` that changes it.
+#[test]
+fn a_setting_given_as_an_option_is_answered_with_its_assignment() {
+    let folder = folder();
+    let cases: [(&[&str], &str); 6] = [
+        (&["run", "small.toml", "--trials", "24"], "`--set trials=24`"),
+        (&["run", "small.toml", "--touches=9"], "`--set touches=9`"),
+        (&["run", "small.toml", "--initial-touches"], "`--set initial_touches=VALUE`"),
+        (&["check", "toy", "--seed", "7", "--baseline", "x"], "`--set seed=7`"),
+        (&["run", "small.toml", "--planners", "[\"active\"]"], "`--set 'planners=[\"active\"]'`"),
+        (&["run", "small.toml", "--gp.noise", "[1e-4, 1]"], "`--set 'gp.noise=[1e-4, 1]'`"),
+    ];
+    for (arguments, says) in cases {
+        let message = stderr(&palpate(folder.path(), arguments));
+        assert!(message.contains(says) && !message.contains("similar"), "{message}");
+    }
+    // Other unknown options keep their own tips; a table is no setting; a command may have none.
+    for arguments in [
+        &["run", "small.toml", "--thread", "2"][..],
+        &["run", "small.toml", "--gp", "2"],
+        &["compare", "runs/a", "--trials", "2"],
+    ] {
+        let message = stderr(&palpate(folder.path(), arguments));
+        assert!(message.contains("unexpected argument"), "{message}");
+        assert!(!message.contains("--set"), "{message}");
+    }
+}
+
 /// Deprecated command names still work, with a note of the new name.
 #[test]
 fn commands_answer_to_their_old_names() {
@@ -76,7 +104,7 @@ fn commands_answer_to_their_old_names() {
         (&["plan", "small.toml", "--shards", "2"], &["run EXPERIMENT --plan", "2/2"]),
         (&["-q", "run", "small.toml", "--shard=1/2", "--out", "1"], &["rows in 1"]),
         (&["-q", "run", "small.toml", "--shard=2/2", "--out", "2"], &["rows in 2"]),
-        (&["merge", "whole", "1", "2"], &["report FOLDER --merge", "1 trials in whole"]),
+        (&["merge", "whole", "1", "2"], &["report FOLDER --merge", "1 trial in whole"]),
         (&["scan", "scene.toml", "--grid=4x4", "--out=scan"], &["export SCENE", "of contact"]),
         (
             &["align", "scan/cloud.ply", "mesh.obj", "--position=0,0,0"],

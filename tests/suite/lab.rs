@@ -5,6 +5,7 @@ use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row};
 use palpate::backend::pace;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::probe::Touch;
+use palpate::format::counted;
 use palpate::robot::arm::ArmSettings;
 use palpate::ros::arm::RosArm;
 use palpate::ros::connect;
@@ -215,12 +216,15 @@ fn a_run_that_was_halted_goes_on() {
     let first = network.run("random", 6, &out).arg("--record").output().unwrap();
     let said = String::from_utf8_lossy(&first.stderr).into_owned();
     assert_eq!(first.status.code(), Some(2), "{said}");
-    assert!(said.contains("emergency stop") && said.contains("touches are stored"), "{said}");
+    assert!(
+        said.contains("emergency stop") && said.contains("continue with: palpate run"),
+        "{said}"
+    );
     let lines = |text: &str| text.lines().filter(|line| line.contains("\"touch\"")).count();
     let journal = fs::read_to_string(out.join("touches.jsonl")).unwrap();
     let kept = lines(&journal);
     assert!((1..6).contains(&kept), "{journal}");
-    assert!(said.contains(&format!("{kept} touches are stored")), "{said}");
+    assert!(said.contains(&counted(kept, "touch")), "{said}");
     sleep(Duration::from_millis(1500));
     let unseen = network.run("random", 6, &out).output().unwrap();
     let said = String::from_utf8_lossy(&unseen.stderr).into_owned();

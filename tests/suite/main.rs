@@ -2,6 +2,7 @@
 
 mod common;
 
+mod accessibility;
 mod accuracy;
 mod all_around;
 mod allocation;

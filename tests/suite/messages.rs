@@ -33,9 +33,10 @@ fn clean(message: &str) {
 #[test]
 fn values_of_a_wrong_type_are_told_what_is_allowed() {
     let cases: &[(&str, &[&str])] = &[
-        ("touches=sixty", &["`touches` = \"sixty\"", "allowed is a whole number from 0"]),
+        ("touches=sixty", &["`touches` = \"sixty\"", "allowed is a whole number from 1 to 20000"]),
+        ("trials=4294967296", &["`trials`", "allowed is a whole number from 1 to 1000000"]),
         ("touches=3.5", &["`touches` = 3.5", "allowed is a whole number"]),
-        ("touches=-1", &["`touches` = -1", "allowed is a whole number from 0"]),
+        ("touches=-1", &["`touches` = -1", "allowed is a whole number from 1 to 20000"]),
         ("seed=-1", &["`seed` = -1", "allowed is a whole number, 0 or more"]),
         ("gp.noise=7", &["`gp.noise` = 7", "allowed is a list"]),
         ("gp.noise=[1,2,3]", &["`gp.noise`", "allowed is a"]),
@@ -45,6 +46,7 @@ fn values_of_a_wrong_type_are_told_what_is_allowed() {
         ("gp=3", &["`gp` = 3", "allowed is a table"]),
         ("name=3", &["`name` = 3", "allowed is text in quotes"]),
         ("planners=active", &["`planners`", "allowed is a list"]),
+        ("planners=[\"slop\"]", &["`planners[0]` = \"slop\"", "; did you mean `slope`?"]),
         (
             "scene.simulator=3",
             &["`scene.simulator` = 3", "allowed is analytic, swept, kinematic, dynamic"],
@@ -63,6 +65,7 @@ fn values_of_a_wrong_type_are_told_what_is_allowed() {
         ),
         ("scene.simulator={cast=1}", &["scene.simulator"]),
         ("scene.simulator=cats", &["`scene.simulator` = \"cats\"", "allowed is analytic, swept"]),
+        ("scene.simulator=dynamik", &["`scene.simulator`", "; did you mean `dynamic`?"]),
         ("scene.object.unit={}", &["`scene.object.unit`", "allowed is m, cm, mm, um, in"]),
         ("scene.zone=3", &["`scene.zone` = 3", "allowed is a table"]),
         ("scene.object.mesh=3", &["`scene.object.mesh` = 3", "allowed is text in quotes"]),

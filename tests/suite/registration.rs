@@ -217,6 +217,22 @@ fn a_stage_is_refused_before_it_touches() {
     assert!(refused.contains("required are 20; a finger must be turned"), "{refused}");
 }
 
+/// The robot cannot make some of the first selected touches of this ball; others replace them.
+#[test]
+fn touches_that_the_robot_cannot_make_are_replaced() {
+    let scene = Scene::load("scenes/container_pa10.toml".as_ref(), &[]).unwrap();
+    let ball = CalibrationBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
+    let environment = known_body::environment(&scene, &ball).unwrap();
+    let robot = environment.robot().unwrap();
+    for count in [12, 40, 60] {
+        let mut random = seed::stream(0, 0, "design");
+        let design = RegistrationDesign::new(&robot, &scene.touch, &ball, count, &mut random);
+        let design = design.unwrap();
+        assert_eq!(design.approaches.len(), count);
+        design.check().unwrap();
+    }
+}
+
 /// An error of 2 mm and 2° in the mount of a soft finger on a PA-10 (kinematic body) is found to
 /// the accuracy in docs/your-robot.md, with a ball 4 mm from its stated position.
 #[test]

@@ -41,7 +41,7 @@ const ENDED: &[(&[&str], &str)] = &[
 ];
 
 /// Part of the message about messages dropped for their stamps.
-const BACKWARD: &str = "were dropped because their stamps ran backwards";
+const BACKWARD: &str = "because their stamps ran backwards";
 
 /// Repeated joint states are detected by the faster of two interlocks.
 const STANDSTILL: &str = "joint standstill of ";

@@ -1,5 +1,7 @@
 //! Formatting of values and of parser errors for messages to users.
 
+use std::fmt::Display;
+
 /// Largest number of characters of a value in a message; a heuristic.
 const SHOWN_MAX: usize = 60;
 
@@ -51,6 +53,22 @@ pub fn nearest(word: &str, names: &[String]) -> Option<String> {
     names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= most).cloned()
 }
 
+/// Returns the end of a message that suggests the name most similar to `word`, or nothing.
+pub fn did_you_mean(word: &str, names: &[String]) -> String {
+    nearest(word, names).map_or(String::new(), |name| format!("; did you mean `{name}`?"))
+}
+
+/// Formats a count with its regular `noun`, which is given in the singular.
+pub fn counted(count: impl Display, noun: &str) -> String {
+    let count = count.to_string();
+    let ending = match noun {
+        _ if count == "1" => "",
+        noun if noun.ends_with("ch") || noun.ends_with('s') => "es",
+        _ => "s",
+    };
+    format!("{count} {noun}{ending}")
+}
+
 /// Describes the problem of a JSON text, without its place.
 pub fn json(error: &serde_json::Error) -> String {
     let text = error.to_string();
@@ -67,4 +85,25 @@ pub fn json(error: &serde_json::Error) -> String {
 /// Returns bytes in hexadecimal, as for hashes.
 pub fn hex(bytes: impl AsRef<[u8]>) -> String {
     bytes.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_noun_agrees_with_its_count() {
+        let touches = [0, 1, 2, 11].map(|count| counted(count, "touch"));
+        assert_eq!(touches, ["0 touches", "1 touch", "2 touches", "11 touches"]);
+        let others = ["trial", "miss", "initial touch"].map(|noun| counted(2, noun));
+        assert_eq!(others, ["2 trials", "2 misses", "2 initial touches"]);
+        assert_eq!(counted(1, "miss"), "1 miss");
+    }
+
+    #[test]
+    fn the_nearest_name_is_suggested_if_it_is_near() {
+        let names = ["slope", "sobol", "active"].map(String::from);
+        assert_eq!(did_you_mean("slop", &names), "; did you mean `slope`?");
+        assert_eq!(did_you_mean("entropy", &names), "");
+    }
 }

@@ -13,6 +13,7 @@ use palpate_explore::backend::pace::RealTimePacer;
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading, Sample};
 use palpate_explore::robot::arm::Chain;
 use palpate_input::error::InputError;
+use palpate_input::format::counted;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -268,8 +269,8 @@ fn silent(topic: &str, age_s: f64, state: &TopicState) -> InputError {
         );
     }
     if state.backward > 0 {
-        let count = state.backward;
-        words += &format!("; {count} messages were dropped because their stamps ran backwards");
+        let count = counted(state.backward, "message");
+        words += &format!("; dropped {count} because their stamps ran backwards");
     }
     InputError::new(words)
 }

@@ -5,6 +5,7 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{FAR_M, MEASURES};
 use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
 use crate::{files, format};
+use palpate_input::format::counted;
 use std::cmp::Ordering;
 use std::collections::HashSet;
 use std::fs::File;
@@ -69,10 +70,10 @@ fn line_error(error: &serde_json::Error) -> String {
 fn check_row(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     let (found, wanted) = (row.touches.len(), experiment.touches as usize);
     if row.failure.is_none() && found != wanted {
-        return Err(format!("{found} touches of {wanted}, but no failure is recorded"));
+        return Err(format!("{} of {wanted}, but no failure is recorded", counted(found, "touch")));
     }
     if found > wanted {
-        return Err(format!("{found} touches of {wanted}"));
+        return Err(format!("{} of {wanted}", counted(found, "touch")));
     }
     // Coordinates of a target, and length scales of a fit.
     let dimensions = experiment.scene.zone.as_ref().map_or([6, 3], |zone| [zone.dimension(); 2]);

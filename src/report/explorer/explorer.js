@@ -76,7 +76,7 @@ function show(touches) {
   slider.max = frames.length - 1;
   slider.value = state.frame;
   const frame = frames[state.frame];
-  const words = `${name} after ${frame.touches} touches`;
+  const words = `${name} after ${frame.touches} ${frame.touches === 1 ? "touch" : "touches"}`;
   slider.setAttribute("aria-valuetext", words);
   explorer.querySelector("output").textContent = `${words}: ${frame.score}`;
   canvas.setAttribute("aria-label", `The belief of ${words}`);

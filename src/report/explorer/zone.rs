@@ -8,6 +8,7 @@ use crate::report::relief::Space;
 use crate::report::replay::{self, BeliefReplay, Grid, drawn_caption};
 use crate::report::style;
 use palpate_explore::task::Zone;
+use palpate_input::format::counted;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
 
@@ -29,10 +30,10 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
         false => ("surface", &COLOURS[..], false, HELP),
     };
     let note = format!(
-        "Trial {}. Blue: the {} initial touches; red: those of the planner; the last one is larger.{} \
+        "Trial {}. Blue: the {}; red: those of the planner; the last one is larger.{} \
          {help}",
         run.experiment.report.trial,
-        run.experiment.initial_touches,
+        counted(run.experiment.initial_touches, "initial touch"),
         drawn_caption(run)
     );
     Ok(InteractiveView { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }

@@ -12,6 +12,7 @@ use crate::report::style::{self, INITIAL, PLANNED};
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
+use palpate_input::format::counted;
 
 pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "acquisition", caption, draw };
 
@@ -62,7 +63,7 @@ fn maximum<'a>(replay: &'a BeliefReplay, read: &'a [MapValue]) -> Option<&'a [f6
 }
 
 fn title(planner: &str, replay: &BeliefReplay) -> String {
-    format!("{planner}, after {} touches", replay.touches.len())
+    format!("{planner}, after {}", counted(replay.touches.len(), "touch"))
 }
 
 fn ring(colour: &str) -> String {

@@ -9,6 +9,7 @@ use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, Swatch};
 use crate::report::style::{self, FAINT_INK};
+use palpate_input::format::counted;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "convergence", caption, draw };
@@ -26,10 +27,11 @@ fn caption(run: &Run) -> String {
         )
     });
     format!(
-        "Accuracy of the belief against the number of touches, n = {} trials of each planner; all \
-         planners share the {} initial touches. Bands: one standard error of a mean, 95 % bootstrap \
+        "Accuracy of the belief against the number of touches, n = {} of each planner; all planners share \
+         the {}. Bands: one standard error of a mean, 95 % bootstrap \
          interval of a median.{score} Corresponds to Fig. 4 of the paper.",
-        run.experiment.trials, run.experiment.initial_touches
+        counted(run.experiment.trials, "trial"),
+        counted(run.experiment.initial_touches, "initial touch")
     )
 }
 

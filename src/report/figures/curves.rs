@@ -9,16 +9,17 @@ use crate::report::replay::{self, BeliefReplay, NO_BELIEF, drawn_caption};
 use crate::report::style::{self, FAINT_INK, INITIAL, INK, PLANNED, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
+use palpate_input::format::counted;
 
 pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "curves", caption, draw };
 
 fn caption(run: &Run) -> String {
     format!(
         "Beliefs of trial {} by number of touches: posterior mean, its 95 % band, and the true \
-         surface. Blue crosses: the {} initial touches; red: those of the planner.{} Corresponds to \
+         surface. Blue crosses: the {}; red: those of the planner.{} Corresponds to \
          Fig. 3 of the paper.",
         run.experiment.report.trial,
-        run.experiment.initial_touches,
+        counted(run.experiment.initial_touches, "initial touch"),
         drawn_caption(run)
     )
 }
@@ -59,7 +60,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let x_label = if is_last_row { unit.named("x") } else { String::new() };
             let y_label = unit.named(&format!("{planner}: height"));
             let middle = area.left + 0.5 * PANEL.0;
-            canvas.title([middle, area.top - 24.0], &format!("{count} touches"));
+            canvas.title([middle, area.top - 24.0], &counted(count, "touch"));
             let above = [middle, area.top - 8.0];
             canvas.coloured_text(above, &score, SMALL_PX, Anchor::Middle, FAINT_INK);
             panel.name_axes(canvas, &x_label, if column == 0 { &y_label } else { "" });

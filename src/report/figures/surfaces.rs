@@ -11,6 +11,7 @@ use crate::report::style;
 use nalgebra::Vector3;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
+use palpate_input::format::counted;
 
 /// Figure of beliefs next to the true surface.
 pub const FIGURE: ReportFigure = ReportFigure { name: "surfaces", caption, draw };
@@ -24,10 +25,10 @@ fn caption(run: &Run) -> String {
     };
     format!(
         "Posterior mean over the zone in trial {} by number of touches, and the true object on the \
-         right, with the same view, scale and colours. Blue points: the {} initial touches; red: those \
+         right, with the same view, scale and colours. Blue points: the {}; red: those \
          of the planner.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
         run.experiment.report.trial,
-        run.experiment.initial_touches,
+        counted(run.experiment.initial_touches, "initial touch"),
         drawn_caption(run)
     )
 }
@@ -67,7 +68,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let canvas = &mut sheet.canvas;
             let replay = BeliefReplay::new(run, planner, count)?;
             let score = replay.as_ref().map_or(NO_BELIEF.into(), BeliefReplay::score);
-            panel.frame(canvas, &format!("{planner}, {count} touches"), &score);
+            panel.frame(canvas, &format!("{planner}, {}", counted(count, "touch")), &score);
             if let Some(replay) = replay {
                 let mut scratch = Scratch::default();
                 let drawn = replay.is_drawn(grid.places());

@@ -11,6 +11,7 @@ use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
+use palpate_input::format::counted;
 
 const PANEL: (f64, f64) = (236.0, 258.0);
 const MARGIN: (f64, f64) = (20.0, 40.0);
@@ -82,7 +83,7 @@ fn belief(
     (sequence, count): (&PlannerSurfaces, u32),
     axis: &Axis,
 ) {
-    let title = format!("{}, {count} touches", sequence.planner);
+    let title = format!("{}, {}", sequence.planner, counted(count, "touch"));
     let Some(frame) = sequence.frames.iter().find(|frame| frame.touches == count) else {
         return view.title(canvas, &title, "no belief at this count");
     };

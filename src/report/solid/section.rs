@@ -15,6 +15,7 @@ use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::solids::Triangles;
+use palpate_input::format::counted;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -57,8 +58,9 @@ pub fn section(
         truth: truth.as_ref().map(|_| false),
         class: "surface",
         note: format!(
-            "Trial {trial}. Blue: the {initial} initial touches; red: those of the planner; the last \
-             one is larger, with an arrow along the approach.{green} {HELP}"
+            "Trial {trial}. Blue: the {}; red: those of the planner; the last one is larger, with an \
+             arrow along the approach.{green} {HELP}",
+            counted(initial, "initial touch")
         ),
         scripts: &SCRIPTS,
     };

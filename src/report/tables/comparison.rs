@@ -6,6 +6,7 @@ use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::equal_error::{EqualError, IntervalEstimate, errors};
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, digits, title_with_unit, with_interval};
+use palpate_input::format::counted;
 
 /// Returns the table of `comparison.csv`, with a row per planner, baseline and measure after the
 /// last touch.
@@ -52,10 +53,10 @@ pub fn comparisons_note(run: &Run) -> String {
         .map(|measure| measure.title)
         .collect();
     format!(
-        "Differences after {} touches in the same trial: mean, its 95 % bootstrap interval, and the \
+        "Differences after {} in the same trial: mean, its 95 % bootstrap interval, and the \
          percentage of trials in which the planner is better. For {} more is better, for all others \
          less. Bold values with a verdict: the interval excludes 0.",
-        run.experiment.touches,
+        counted(run.experiment.touches, "touch"),
         more.join(", ")
     )
 }
@@ -127,11 +128,11 @@ pub fn equal_errors(run: &Run, found: &[EqualError]) -> Vec<Table> {
 pub fn equal_errors_note(run: &Run) -> String {
     format!(
         "Touches, including the initial ones, after which a planner\u{2019}s median error stays at or \
-         below the goal in the column\u{2019}s head, the baseline\u{2019}s error after {} touches. After \
+         below the goal in the column\u{2019}s head, the baseline\u{2019}s error after {}. After \
          \u{d7}: their ratio to the baseline\u{2019}s own count; then the ratio of the lateral travel \
          after the initial touches. All with the 95 % interval of a bootstrap over trials. Bold values \
          with a verdict: the interval of the touches\u{2019} ratio excludes 1.",
-        run.experiment.goal_touches()
+        counted(run.experiment.goal_touches(), "touch")
     )
 }
 

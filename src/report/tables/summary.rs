@@ -6,6 +6,7 @@ use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
+use palpate_input::format::counted;
 use serde_json::{Value, json};
 
 /// Returns a table with a row for each planner and tabled touch count; columns without a value are
@@ -46,7 +47,8 @@ pub fn table(run: &Run) -> Table {
 
 /// Returns the note that explains the cells of [`table`].
 pub fn note(run: &Run) -> String {
-    format!("n = {} trials; ± is one standard error of the mean.", run.experiment.trials)
+    let trials = counted(run.experiment.trials, "trial");
+    format!("n = {trials}; ± is one standard error of the mean.")
 }
 
 /// Returns the table for the terminal, followed by the events of the trials and the notices.
@@ -108,7 +110,7 @@ pub fn claims(run: &Run) -> Table {
             let start = [
                 once(&claim.source),
                 once(&claim.text),
-                format!("{} touches", claim.touches).into(),
+                counted(claim.touches, "touch").into(),
                 format!("{kind} {}", title_with_unit(measure)).into(),
             ];
             let value = |planner: &String| {
@@ -129,7 +131,9 @@ pub const CLAIMS_NOTE: &str =
 pub fn event_lines(run: &Run) -> Vec<String> {
     let of = |planner: &String| event_line(planner, &summary::events(&run.rows, planner));
     let unlisted = (run.unlisted > 0).then(|| {
-        format!("{} stored trials are not shown: the experiment does not list them", run.unlisted)
+        let verb = if run.unlisted == 1 { "is" } else { "are" };
+        let trials = counted(run.unlisted, "stored trial");
+        format!("{trials} {verb} not shown: the experiment does not list them")
     });
     run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
 }
@@ -137,19 +141,23 @@ pub fn event_lines(run: &Run) -> Vec<String> {
 /// Returns the events in a planner's trials, in a line; `None` without events.
 fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
     let counts = [
-        (events.failures, "failed trials"),
-        (events.misses, "touches without contact"),
-        (events.overloads, "touches aborted: force limit, or no contact location"),
+        (events.failures, "failed trial", ""),
+        (events.misses, "touch", " without contact"),
+        (events.overloads, "touch", " aborted: force limit, or no contact location"),
         (
             events.no_variance,
-            "random targets instead of planned ones: no variance left at the best one",
+            "random target",
+            " instead of planned ones: no variance left at the best one",
         ),
-        (events.duplicate_target, "random targets instead of planned ones: repeated target"),
+        (events.duplicate_target, "random target", " instead of planned ones: repeated target"),
     ];
     let found: Vec<String> = counts
         .iter()
-        .filter(|(count, _)| *count > 0)
-        .map(|(count, what)| format!("{count} {what}"))
+        .filter(|(count, ..)| *count > 0)
+        .map(|(count, what, rest)| match count {
+            1 => counted(count, what) + &rest.replace("planned ones", "a planned one"),
+            _ => counted(count, what) + rest,
+        })
         .collect();
     (!found.is_empty()).then(|| format!("{planner}: {}", found.join("; ")))
 }

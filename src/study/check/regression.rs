@@ -7,6 +7,7 @@ use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Progress};
 use crate::experiment::trial::row::TrialRow;
 use palpate_input::error::InputError;
+use palpate_input::format::counted;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Result of a regression test.
@@ -143,7 +144,8 @@ fn differences(old: &StoredBaseline, new: &StoredBaseline, rules: &CheckOptions)
         let planner = planner_of(old, rules, &new.lines, name);
         let first = planner.judgements.first()?;
         let percent = first.judged.percent(first.sequence.mean);
-        Some(format!("{name}: {} {percent:+.2} % in {} trials", first.judged.title, planner.trials))
+        let trials = counted(planner.trials, "trial");
+        Some(format!("{name}: {} {percent:+.2} % in {trials}", first.judged.title))
     });
     let gone = known.iter().filter(|name| !names.contains(name));
     results.chain(gone.map(|name| format!("{name}: removed"))).collect()

@@ -115,7 +115,8 @@ impl Candidate {
 impl RegistrationDesign {
     /// Selects the `count` most informative touches of `body` that `robot` reaches, greedily by the
     /// volume of the parameters' ellipsoid (D-optimal design). Then they are simulated in the order
-    /// of execution, and those that cannot follow their predecessor are dropped.
+    /// of execution, and those that cannot follow their predecessor are replaced by others, as long
+    /// as there are candidates.
     ///
     /// # Errors
     /// If the robot reaches too few, or they would determine too little.
@@ -136,33 +137,44 @@ impl RegistrationDesign {
         // Prior of plausible values; it keeps the first selections finite.
         let mut information = SMatrix::<f64, PARAMETERS, PARAMETERS>::identity();
         let mut chosen: Vec<Candidate> = Vec::new();
-        while chosen.len() < count + count / SPARE && !all.is_empty() {
-            let Some(covariance) = information.try_inverse() else { break };
-            let results = |candidate: &Candidate| {
-                let rows = &candidate.rows;
-                let inner = DMatrix::identity(rows.nrows(), rows.nrows())
-                    + rows * covariance * rows.transpose();
-                inner.determinant()
-            };
-            let values: Vec<f64> = all.iter().map(results).collect();
-            let best = (0..all.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
-            let candidate = all.swap_remove(best.unwrap_or_default());
-            if is_reached(robot, &candidate.approach) {
+        loop {
+            while chosen.len() < count + count / SPARE && !all.is_empty() {
+                let Some(covariance) = information.try_inverse() else { break };
+                let results = |candidate: &Candidate| {
+                    let rows = &candidate.rows;
+                    let inner = DMatrix::identity(rows.nrows(), rows.nrows())
+                        + rows * covariance * rows.transpose();
+                    inner.determinant()
+                };
+                let values: Vec<f64> = all.iter().map(results).collect();
+                let best = (0..all.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
+                let candidate = all.swap_remove(best.unwrap_or_default());
+                if is_reached(robot, &candidate.approach) {
+                    information += candidate.rows.transpose() * &candidate.rows;
+                    chosen.push(candidate);
+                }
+            }
+            let simulated = chosen.len();
+            chosen = in_order(robot, chosen);
+            let ways: Vec<Approach> = chosen.iter().map(Candidate::expected).collect();
+            let made = simulate_touches(robot, &touch_settings(touch), &ways)
+                .map_err(|fault| InputError::new(fault.to_string()))?;
+            chosen = (chosen.into_iter().enumerate())
+                .filter_map(|(i, candidate)| made.contains(&i).then_some(candidate))
+                .collect();
+            if chosen.len() >= count {
+                break;
+            }
+            // Without further candidates, another round would give the same touches.
+            if all.is_empty() || simulated == chosen.len() {
+                return Err(unreachable(chosen.len(), tried, count));
+            }
+            information = SMatrix::identity();
+            for candidate in &chosen {
                 information += candidate.rows.transpose() * &candidate.rows;
-                chosen.push(candidate);
             }
         }
-        let chosen = in_order(robot, chosen);
-        let ways: Vec<Approach> = chosen.iter().map(Candidate::expected).collect();
-        let mut made = simulate_touches(robot, &touch_settings(touch), &ways)
-            .map_err(|fault| InputError::new(fault.to_string()))?;
-        if made.len() < count {
-            return Err(unreachable(made.len(), tried, count));
-        }
-        made.truncate(count);
-        let chosen: Vec<Candidate> = (chosen.into_iter().enumerate())
-            .filter_map(|(i, candidate)| made.contains(&i).then_some(candidate))
-            .collect();
+        chosen.truncate(count);
         let touches: Vec<_> = chosen.iter().map(|candidate| candidate.touch).collect();
         let fit = HandEyeFit::new(&outline, &touches);
         let foreseen = predict_information(&fit, &HandEyeFit::start(*body))

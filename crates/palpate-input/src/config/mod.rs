@@ -265,7 +265,7 @@ impl Loader {
         }
     }
 
-    fn explain<T: DeserializeOwned>(&self, path: &str, message: &str) -> ConfigError {
+    fn explain<T: DeserializeOwned + Validate>(&self, path: &str, message: &str) -> ConfigError {
         let mut names = message.split('`').skip(1).step_by(2).map(String::from);
         if message.starts_with("unknown field") {
             let unknown = names.next().unwrap_or_default();
@@ -291,15 +291,46 @@ impl Loader {
         }
         let key = String::from(path);
         let value = self.value(&key).map(|value| value.to_string());
-        let allowed = format::allowed(message).or_else(|| self.choices::<T>(&key));
-        let message =
-            allowed.map_or_else(|| message.to_owned(), |allowed| format!("allowed is {allowed}"));
+        let allowed = self.range::<T>(&key, message).or_else(|| format::allowed(message));
+        let choices = match message.starts_with("unknown variant") {
+            true => allowed.clone(),
+            false if allowed.is_none() => self.choices::<T>(&key),
+            false => None,
+        };
+        let word = self.value(&key).and_then(Value::as_str).unwrap_or_default();
+        let names: Vec<String> =
+            choices.iter().flat_map(|names| names.split(", ")).map(String::from).collect();
+        let hint = format::did_you_mean(word, &names);
+        let text = match allowed.or(choices) {
+            Some(allowed) => format!("allowed is {allowed}{hint}"),
+            None => message.to_owned(),
+        };
         let key = self.given(&key);
-        ConfigError::invalid(self.origin(&key), key, value, message)
+        ConfigError::invalid(self.origin(&key), key, value, text)
     }
 
     /// Returns the allowed names of `key`, found by parsing an invalid one.
     fn choices<T: DeserializeOwned>(&self, key: &str) -> Option<String> {
+        let table = self.with_value(key, Value::String(UNKNOWN.into()))?;
+        let error = serde_path_to_error::deserialize::<_, T>(table).err()?;
+        format::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
+    }
+
+    /// Returns the allowed numbers of `key` by its rule, if its parser's error `message` is about a
+    /// number; found by checking a valid one.
+    fn range<T: DeserializeOwned + Validate>(&self, key: &str, message: &str) -> Option<String> {
+        let (kind, number) = match message.rsplit_once("expected ")?.1 {
+            "u8" | "u16" | "u32" | "u64" | "usize" => ("a whole number", Value::Integer(1)),
+            "f32" | "f64" => ("a number", Value::Float(1.0)),
+            _ => return None,
+        };
+        let config = T::deserialize(self.with_value(key, number)?).ok()?;
+        let range = Rules::allowed_values(&config).remove(key)?;
+        Some(format!("{kind} from {range}"))
+    }
+
+    /// Returns the table with another value under the dotted `key`.
+    fn with_value(&self, key: &str, other: Value) -> Option<Table> {
         let mut table = self.table.clone();
         let mut parts = steps(key);
         let mut value = table.get_mut(parts.next()?)?;
@@ -309,9 +340,8 @@ impl Loader {
                 Err(_) => value.as_table_mut()?.get_mut(part)?,
             };
         }
-        *value = Value::String(UNKNOWN.into());
-        let error = serde_path_to_error::deserialize::<_, T>(table).err()?;
-        format::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
+        *value = other;
+        Some(table)
     }
 
     /// Returns the value under the dotted `key`.

@@ -1,5 +1,6 @@
 //! Validation rules: defined once, used for the check and for the message.
 
+use crate::format;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -69,7 +70,10 @@ impl Rules {
     pub fn one_of(&mut self, key: &str, value: &str, names: &[&str]) {
         self.note(key, || names.join(", "));
         let known = names.contains(&value);
-        self.require(key, format!("\"{value}\""), known, || format!("one of {}", names.join(", ")));
+        self.require(key, format!("\"{value}\""), known, || {
+            let known: Vec<String> = names.iter().map(|name| (*name).into()).collect();
+            format!("one of {}{}", names.join(", "), format::did_you_mean(value, &known))
+        });
     }
 
     /// Requires `condition` for `key` with `value`; if violated, `allowed` describes the

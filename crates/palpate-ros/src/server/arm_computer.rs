@@ -17,9 +17,6 @@ const RAMP_S: f64 = 0.01;
 /// Relative tolerance of a limit for rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Time within which commands from two publishers count as simultaneous, s.
-const TOGETHER_S: f64 = 0.5;
-
 /// Simulated arm computer between network and servos. Times are seconds of a monotonic clock.
 pub struct SimulatedArmComputer {
     names: JointNames,
@@ -33,8 +30,8 @@ pub struct SimulatedArmComputer {
     incoming: Vec<f64>,
     applied: Vec<f64>,
     commanded_s: Option<f64>,
-    /// Last publisher and the time of its command.
-    sender: Option<(u64, f64)>,
+    /// Publisher whose command turned the servos on.
+    sender: Option<u64>,
     /// Start time and initial velocities of a stop.
     stop: Option<(f64, Vec<f64>)>,
     refused: u64,
@@ -110,7 +107,6 @@ impl SimulatedArmComputer {
     pub fn clear(&mut self) {
         self.status.alarm.clear();
         self.refusal.clear();
-        self.sender = None;
     }
 
     /// Processes a command that arrived at `now_s`, at `wall_s` since 1970.
@@ -136,14 +132,11 @@ impl SimulatedArmComputer {
                 return self.refuse(format!("its stamp is {:.0} ms old", 1e3 * age_s));
             }
         }
-        if let Some((other, at_s)) = self.sender
-            && other != sender
-            && now_s - at_s < TOGETHER_S
-        {
+        // Servos turn off when commands cease, so another publisher may command afterwards.
+        if self.status.servo_on && self.sender != Some(sender) {
             self.refuse("two publishers command".into());
             return self.alarm("two publishers command", now_s);
         }
-        self.sender = Some((sender, now_s));
         if self.status.hold || self.status.needs_operator() {
             return;
         }
@@ -153,6 +146,7 @@ impl SimulatedArmComputer {
                 return self.refuse("the first command is not a zero velocity".into());
             }
             (self.status.servo_on, self.status.brake) = (true, false);
+            self.sender = Some(sender);
         }
         self.stop = None;
         self.wanted.clone_from(&self.incoming);

@@ -104,6 +104,32 @@ fn a_second_publisher_stops_it() {
     assert_eq!(speeds(&mut pc, 50).last(), Some(&0.0));
 }
 
+/// An explorer that ended is followed at once by the next one, without an alarm; while the arm is
+/// on hold, commands of both are ignored.
+#[test]
+fn a_publisher_may_follow_another_after_a_stop() {
+    let still = |now_s| names().command(now_s, &[0.0; 3], &topic());
+    let mut held = moving();
+    held.set_hold(true, 0.1);
+    let mut released = moving();
+    released.set_deadman(false);
+    for mut pc in [held, released] {
+        speeds(&mut pc, 10);
+        for (sender, now_s) in [(1, 0.12), (2, 0.121), (1, 0.122)] {
+            pc.receive(&still(now_s), sender, now_s, now_s);
+        }
+        assert!(!pc.status().servo_on && pc.status().alarm.is_empty());
+        pc.set_hold(false, 0.123);
+        pc.set_deadman(true);
+        pc.receive(&still(0.124), 2, 0.124, 0.124);
+        assert!(pc.status().servo_on);
+        assert_eq!(pc.status().refusal(), None);
+        // The first one is now the second publisher.
+        pc.receive(&still(0.126), 1, 0.126, 0.126);
+        assert_eq!(pc.status().refusal(), Some("alarm: two publishers command".into()));
+    }
+}
+
 #[test]
 fn emergency_stop_and_dead_man_switch_stop_at_once_and_hold_softly() {
     let mut pc = moving();
