@@ -1,6 +1,7 @@
 //! Lookup of experiments and scenes by name: `bird` finds `experiments/bird.toml`.
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
+use palpate_geometry::import::is_mesh_file;
 use palpate_input::{files, format};
 use std::path::{Path, PathBuf};
 
@@ -13,20 +14,33 @@ pub(super) const SCENES: &str = "scenes";
 /// beside the program or in `PALPATE_HOME`.
 ///
 /// # Errors
-/// If no file matches; the message suggests the most similar name.
+/// If no file matches, with the most similar name, or if it is a mesh.
 pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
+    let what = if folder == SCENES { "a scene" } else { "an experiment" };
+    ensure!(
+        !(is_mesh_file(name) && name.is_file()),
+        "{0} is a mesh, and this command needs {what} (.toml): palpate new {0} writes one",
+        name.display()
+    );
     let is_plain = name.extension().is_none() && name.components().count() == 1;
+    let file = name.with_extension("toml");
     if !is_plain || name.exists() && !name.is_dir() {
+        ensure!(
+            name.exists() || name.extension().is_some() || !file.is_file(),
+            "{}: no such file, did you mean `{}`?",
+            name.display(),
+            file.display()
+        );
         return Ok(name.into());
     }
-    let file = name.with_extension("toml");
     let found = folders(folder).map(|folder| folder.join(&file)).find(|path| path.is_file());
     if let Some(found) = found {
         return Ok(found);
     }
     let word = name.to_string_lossy();
     let known = file_stems(folder);
-    let meant = match format::nearest(&word, &known) {
+    let here = file.is_file().then(|| file.to_string_lossy().into_owned());
+    let meant = match here.or_else(|| format::nearest(&word, &known)) {
         Some(meant) => format!(", did you mean `{meant}`?"),
         None if known.is_empty() => {
             format!("; set {HOME} to the folder that has {EXPERIMENTS}/ and {SCENES}/")
