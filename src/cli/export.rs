@@ -13,6 +13,7 @@ use crate::report::{figures, files, style, whole_object};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
+use palpate_geometry::import::is_mesh_file;
 use palpate_gp::posterior::Scratch;
 use palpate_input::format::counted;
 use std::path::PathBuf;
@@ -77,6 +78,11 @@ impl Args {
 /// Exports a run's belief as a mesh, or the contacts of a grid of touches on a scene.
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let is_run = args.path.is_dir();
+    ensure!(
+        !is_mesh_file(&args.path),
+        "{0} is a mesh, and export takes a run's folder or a scene (.toml): palpate new {0} writes a scene",
+        args.path.display()
+    );
     let path = if is_run { args.path.clone() } else { find(&args.path, SCENES)? };
     let options = [
         ("--planner", args.planner.is_some(), is_run, "a run's folder"),

@@ -1,6 +1,7 @@
 //! Lookup of experiments and scenes by name: `bird` finds `experiments/bird.toml`.
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
+use palpate_geometry::import::is_mesh_file;
 use palpate_input::{files, format};
 use std::path::{Path, PathBuf};
 
@@ -13,8 +14,14 @@ pub(super) const SCENES: &str = "scenes";
 /// also searched beside the program and in `PALPATE_HOME`.
 ///
 /// # Errors
-/// If no file matches; the message suggests the most similar name.
+/// If no file matches, with the most similar name, or if it is a mesh.
 pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
+    let what = if folder == SCENES { "a scene" } else { "an experiment" };
+    ensure!(
+        !(is_mesh_file(name) && name.is_file()),
+        "{0} is a mesh, and this command needs {what} (.toml): palpate new {0} writes one",
+        name.display()
+    );
     if name.is_file() || name.is_absolute() {
         return Ok(name.into());
     }
@@ -30,7 +37,8 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     }
     let word = name.to_string_lossy();
     let known = file_stems(folder);
-    let meant = match format::nearest(&word, &known) {
+    let here = file.is_file().then(|| file.to_string_lossy().into_owned());
+    let meant = match here.or_else(|| format::nearest(&word, &known)) {
         Some(meant) => format!(", did you mean `{meant}`?"),
         None if known.is_empty() => {
             format!("; set {HOME} to the folder that has {EXPERIMENTS}/ and {SCENES}/")

@@ -3,6 +3,7 @@
 mod accuracy;
 mod calibrate;
 mod check;
+mod choices;
 mod columns;
 mod compare;
 mod completions;
@@ -15,6 +16,7 @@ mod known_body;
 mod list;
 mod new;
 mod output;
+mod picture;
 mod plan;
 mod prepare;
 mod progress;
@@ -172,7 +174,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
 
 fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcome> {
     match command {
-        Command::New(args) => new::run(&args),
+        Command::New(args) => new::run(&args, talk),
         Command::Run(args) => run::run(&args, talk, host),
         Command::Report(args) => report::run(&args, host),
         Command::Show(args) => show::run(&args, talk),

@@ -1,6 +1,9 @@
 //! Output files and folders: Palpate replaces files of other programs only with `--force`.
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
+use palpate_input::files;
+use palpate_input::format::hex;
+use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -49,15 +52,23 @@ impl Overwrite {
         extensions.iter().try_for_each(|extension| self.check_file(&path.with_extension(extension)))
     }
 
-    /// Checks that `path`, a file for the user to edit, does not exist or may be replaced.
+    /// Checks that `path`, a file for the user to edit, does not exist, is as [`sealed`] wrote it, or
+    /// may be replaced.
     ///
     /// # Errors
-    /// If it exists without `--force`, or is not a file.
-    pub(super) fn check_new_file(self, path: &Path) -> anyhow::Result<()> {
-        if path.is_file() && !self.force {
-            bail!("{} exists; use --force to replace it", path.display());
+    /// If it was edited or written otherwise, without `--force`, or is not a file.
+    pub(super) fn check_editable_file(self, path: &Path) -> anyhow::Result<()> {
+        if !path.is_file() || self.force {
+            return self.check_file(path);
         }
-        self.check_file(path)
+        let text = files::text(path, files::TEXT_MAX).unwrap_or_default();
+        ensure!(
+            is_sealed(&text),
+            "{} exists and is not as `palpate new` wrote it: use --force to replace it, or --out FOLDER to \
+             write beside it",
+            path.display()
+        );
+        Ok(())
     }
 
     /// Checks that `path` may be a folder of results that contain `own`: it does not exist, is
@@ -79,6 +90,23 @@ impl Overwrite {
         }
         Ok(())
     }
+}
+
+/// Comment before the checksum of the rest of a file.
+const SEAL: &str = "# Replaced by the next `palpate new` unless edited; checksum ";
+
+/// Returns a TOML text with a first line that tells whether it was edited later.
+pub(super) fn sealed(text: &str) -> String {
+    format!("{SEAL}{}\n{text}", checksum(text))
+}
+
+fn is_sealed(text: &str) -> bool {
+    let lines = text.split_once('\n');
+    lines.is_some_and(|(first, rest)| first.strip_prefix(SEAL) == Some(checksum(rest).as_str()))
+}
+
+fn checksum(text: &str) -> String {
+    hex(&Sha256::digest(text.as_bytes())[..6])
 }
 
 /// Existing file at an output path.

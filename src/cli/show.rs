@@ -2,6 +2,7 @@
 
 use super::find::{SCENES, find, is_experiment};
 use super::output::Overwrite;
+use super::picture::picture;
 use super::prepare::{check_applicable, prepare_environment, prepare_simulator};
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Outcome, Verbosity, print};
@@ -14,15 +15,12 @@ use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
 use crate::report;
 use crate::report::files::png;
-use crate::report::solid;
 use crate::sim::environment::ObjectShape;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
 use anyhow::{Context, bail, ensure};
-use nalgebra::{Point3, UnitVector3};
-use palpate_explore::task::{Ball, DIRECTIONS};
+use palpate_explore::task::Ball;
 use palpate_geometry::import::import_with;
-use palpate_geometry::low_discrepancy::directions;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -148,14 +146,9 @@ fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
         text += &format!("{report}\n");
     }
     if let Some(path) = &args.png {
-        let svg = match &whole_object {
-            Some((ball, shape)) => reachability_picture(ball, shape.as_ref(), &environment),
-            None => environment.mesh().and_then(|mesh| {
-                let height_m = |place: &[f64]| environment.true_height_m(place);
-                report::scan::zone_picture(environment.task().zone()?, mesh, &height_m)
-            }),
-        };
-        let svg = svg.context("--png: this scene has no object to draw")?;
+        let shape = whole_object.as_ref().and_then(|(_, shape)| shape.as_ref());
+        let svg =
+            picture(&environment, shape).context("--png: this scene has no object to draw")?;
         store::write_whole(path, png(&svg)?)?;
         text += &format!("picture: {}\n", path.display());
     }
@@ -218,21 +211,6 @@ fn whole_object_summary(ball: &Ball, shape: Option<&TrueShape>, talk: Verbosity)
     }
     shape.and_then(notice::shape_notice).iter().for_each(|notice| talk.note(notice));
     text + "\n"
-}
-
-/// Picture of a whole object with its reachable surface; `None` without a mesh or a true surface.
-fn reachability_picture(
-    ball: &Ball,
-    shape: Option<&TrueShape>,
-    environment: &Environment,
-) -> Option<String> {
-    let missed = environment.task().unreached(DIRECTIONS);
-    let side = |outward_w: UnitVector3<f64>| {
-        (ball.centre_w + outward_w.scale(ball.radius_m), !missed.contains(&outward_w))
-    };
-    let sides: Vec<(Point3<f64>, bool)> = directions(DIRECTIONS).map(side).collect();
-    let spots = shape?.reachable_samples();
-    Some(solid::picture(environment.mesh()?, &spots, &sides))
 }
 
 #[cfg(feature = "mujoco")]

@@ -13,6 +13,7 @@ mod glossary;
 pub mod heat_map;
 mod html;
 pub mod legend;
+pub mod orientation;
 pub mod page;
 pub mod points;
 pub mod reference;

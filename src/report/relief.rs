@@ -80,6 +80,17 @@ impl Camera {
         ]
     }
 
+    /// Returns the direction of a vector in the drawing; of length 1 for a unit vector parallel to the
+    /// drawing, and shorter for others.
+    pub fn direction(&self, v: &Vector3<f64>) -> PointPx {
+        [v.dot(&self.right), -v.dot(&self.up)]
+    }
+
+    /// Returns the pixels per metre of a line that is parallel to the drawing.
+    pub fn px_per_m(&self) -> f64 {
+        self.scale
+    }
+
     /// Returns the distance of a point towards the viewer, in pixels.
     pub fn nearness(&self, p: &Vector3<f64>) -> f64 {
         self.scale * self.stretched(p).dot(&self.toward)

@@ -1,9 +1,10 @@
 //! Picture of a scene (the object with the zone on it) and of a scan (Fig. 2 of Yi et al. 2016,
 //! with its points of contact).
 
-use super::axes::{Axis, Length, height_bar};
+use super::axes::{Axis, Length, height_bar, rounded};
 use super::canvas::{Area, Canvas};
-use super::relief::{Relief, ReliefPanel, Space, height_colour};
+use super::orientation::{draw_axes, draw_finger, draw_scale_bar};
+use super::relief::{Camera, Relief, ReliefPanel, Space, height_colour};
 use super::style::{self, PLANNED};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
@@ -14,6 +15,8 @@ use palpate_input::format::counted;
 const ZONE_PX: [f64; 2] = [560.0, 560.0];
 const SCAN_PX: [f64; 2] = [430.0, 480.0];
 const FOOT_PX: f64 = 64.0;
+/// Height of the row with axes and scale bar below a scene.
+const AXES_PX: f64 = 66.0;
 // heuristic: samples along each side of the zone for its heights, as many as in a report.
 const GRID: usize = 41;
 
@@ -51,9 +54,15 @@ fn draw(
         None => (ZONE_PX, 1.0, 210.0),
         Some(_) => (SCAN_PX, 2.0, SCAN_PX[0] - 60.0),
     };
-    let mut canvas = Canvas::new(columns * width, height + FOOT_PX);
+    let axes_px = if contacts.is_none() { AXES_PX } else { 0.0 };
+    let mut canvas = Canvas::new(columns * width, height + FOOT_PX + axes_px);
     let first = Area { left: 0.0, top: 8.0, width, height };
-    draw_object(&mut canvas, first, object, axis);
+    let camera = draw_object(&mut canvas, first, object, axis);
+    if contacts.is_none() {
+        let top = height + FOOT_PX + 0.6 * AXES_PX;
+        draw_axes(&mut canvas, &camera, [80.0, top], &zone.x_wz().rotation.inverse());
+        draw_scale_bar(&mut canvas, camera.px_per_m(), [bar_px - 50.0, top - 6.0]);
+    }
     if let Some(contacts) = contacts {
         let panel = ReliefPanel::new(unit, Area { left: width, ..first }, space);
         panel.frame(&mut canvas, &format!("{} of contact", counted(contacts.len(), "point")), "");
@@ -80,14 +89,14 @@ const LEFT_PX: f64 = 20.0;
 /// Points along each side of the zone's outline; more would not be visible.
 const PLACES: usize = 90;
 
-/// Draws the object in the zone's frame, with the zone's outline on it, into `area`; its heights
-/// above the datum are coloured along `axis`.
+/// Draws the object in the zone's frame, with the zone's outline and the finger's path on it, into
+/// `area`, and returns the camera; heights above the datum are coloured along `axis`.
 fn draw_object(
     canvas: &mut Canvas,
     area: Area,
     (zone, mesh, height_m): (&Zone, &Mesh, Heights),
     axis: &Axis,
-) {
+) -> Camera {
     let unit = Length::of(zone);
     let mesh = &mesh.transformed(&zone.x_wz().inverse());
     let (low, high) = mesh.bounds();
@@ -103,7 +112,7 @@ fn draw_object(
     // The coordinates of an object have longer numbers than those of a zone.
     let area = Area { left: area.left + LEFT_PX, width: area.width - LEFT_PX, ..area };
     let panel = ReliefPanel::new(unit, area, space);
-    panel.frame(canvas, "object and zone", "");
+    panel.frame(canvas, "object and zone", &size_words(&(high - low)));
     let at = |x_m, height_m, z_m| panel.camera.at(&Vector3::new(x_m, height_m, z_m));
     let datum = zone.datum_y_m() * Vector3::y();
     let triangles = mesh.iter_corners().map(|corners| corners.map(|p_z| p_z.coords - datum));
@@ -119,6 +128,16 @@ fn draw_object(
             canvas.line(part.iter().flatten().copied(), &style::stroke(PLANNED, 2.0));
         }
     }
+    let middle = zone.at(&[0.5, 0.5]);
+    let to = at(middle[0], height_m(&middle).unwrap_or(0.0), middle[1]);
+    draw_finger(canvas, &panel.camera, to, &Vector3::y());
+    panel.camera
+}
+
+/// Formats the size of an object along x, y and z of its picture.
+pub fn size_words(size_m: &Vector3<f64>) -> String {
+    let [x, y, z] = [size_m.x, size_m.y, size_m.z].map(|side_m| rounded(1e3 * side_m));
+    format!("{x} x {y} x {z} mm along x, y and z")
 }
 
 /// Returns the zone's four sides as places.

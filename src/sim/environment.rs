@@ -11,6 +11,7 @@ use palpate_explore::robot::arm::{ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
 use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::holes::{Hole, find_holes};
 use palpate_geometry::implicit::ImplicitSolid;
 use palpate_geometry::import::import_with;
 use palpate_geometry::mesh::Mesh;
@@ -90,6 +91,7 @@ impl Environment {
     /// If the shape lies wholly outside the zone.
     pub fn with_shape(mut scene: Scene, shape: ObjectShape) -> Result<Self, InputError> {
         let mut notices = Vec::new();
+        let (shape, holes) = with_patches(&scene, shape);
         let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
         if let Cow::Owned(effects) = scene.effective_effects() {
             scene.effects = effects;
@@ -109,6 +111,7 @@ impl Environment {
             (&mut scene.whole_object, &shape)
         {
             let ball = bounding_ball(around, bvh.mesh())?;
+            notices.extend(notice::holes_of_object(bvh.mesh(), &holes));
             whole_object_task(&scene, arm.as_ref(), ball, bvh.mesh())?
         } else {
             let zone = scene.zone.as_mut().ok_or_else(|| missing_part("zone"))?;
@@ -120,6 +123,7 @@ impl Environment {
                 check_overlap(zone, depth_m, &extent, size.as_deref())?;
                 check_front(zone, bvh, depth_m[0], -extent[1].y)?;
                 notices.extend(size);
+                notices.extend(zone_holes(zone, bvh, depth_m, &holes));
                 if zone.datum_y_m.is_none() {
                     zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
                 }
@@ -209,7 +213,7 @@ impl Environment {
     }
 
     /// Returns the true height above the datum at `place`, at the first surface along the approach;
-    /// `None` if there is no surface.
+    /// `None` if there is no surface or it is unknown: see [`is_hole`](Self::is_hole).
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
             ObjectShape::Function(function) => place.first().map(|&x| function.height_m(x)),
@@ -225,6 +229,7 @@ impl Environment {
                             Some(distance * object.scale)
                         })
                     }
+                    None if self.is_hole(place) => None,
                     None => self.mesh_y_m(place),
                 };
                 y_m.map(|y_m| y_m - datum_y_m)
@@ -239,6 +244,19 @@ impl Environment {
         self.first_surface_y_m(place, |start_w, ahead_w, reach_m| {
             Some(bvh.ray(&start_w, &ahead_w, reach_m)?.distance_m)
         })
+    }
+
+    /// Returns whether the mesh has a hole at `place`, so that its true height is unknown.
+    pub fn is_hole(&self, place: &[f64]) -> bool {
+        let ObjectShape::Mesh { bvh, .. } = &self.shape else { return false };
+        if self.analytic().is_some() || !bvh.mesh().has_patches() {
+            return false;
+        }
+        let is_patch = |start_w: Point3<f64>, ahead_w: UnitVector3<f64>, reach_m: f64| {
+            let hit = bvh.ray(&start_w, &ahead_w, reach_m)?;
+            bvh.mesh().is_patch(hit.triangle).then_some(hit.distance_m)
+        };
+        self.first_surface_y_m(place, is_patch).is_some()
     }
 
     /// Returns y, in the zone's frame, of the first surface along the approach to `place`; `ray`
@@ -269,6 +287,53 @@ impl Environment {
         let surface = surfaces::by_name(object.truth.as_deref()?)?;
         Some((surface, object))
     }
+}
+
+/// Patches the holes of an open mesh unless the scene says that they are the object's; returns the
+/// holes too.
+fn with_patches(scene: &Scene, shape: ObjectShape) -> (ObjectShape, Vec<Hole>) {
+    let ObjectShape::Mesh { bvh, report } = shape else { return (shape, Vec::new()) };
+    let is_filled = scene.object.as_ref().is_none_or(|object| object.fill_holes);
+    let holes = match is_filled && report.border_edges.count > 0 {
+        true => find_holes(bvh.mesh()),
+        false => Vec::new(),
+    };
+    let bvh = match holes.is_empty() {
+        true => bvh,
+        false => MeshBvh::new(bvh.mesh().with_patches(&holes)),
+    };
+    (ObjectShape::Mesh { bvh, report }, holes)
+}
+
+/// Returns a notice of the holes that the finger meets in a zone.
+fn zone_holes(
+    zone: &Zone,
+    bvh: &MeshBvh,
+    [near_m, far_m]: [f64; 2],
+    holes: &[Hole],
+) -> Option<String> {
+    if holes.is_empty() {
+        return None;
+    }
+    let (from_m, to_m) = (near_m - CLEARANCE_M, far_m + CLEARANCE_M);
+    let ends = holes.iter().scan(0, |end, hole| {
+        *end += hole.patch.len();
+        Some(*end)
+    });
+    let ends: Vec<usize> = ends.collect();
+    let own = bvh.mesh().triangles().len() - ends.last().copied().unwrap_or_default();
+    let mut counts = vec![0; holes.len()];
+    let places = zone.grid(SAMPLES_PER_SIDE);
+    for place in &places {
+        let start_w = zone.x_wz() * zone.local(place, -from_m);
+        let hit = bvh.ray(&start_w, &zone.ahead_w(), to_m - from_m);
+        if let Some(patch) = hit.and_then(|hit| (hit.triangle as usize).checked_sub(own)) {
+            counts[ends.partition_point(|end| *end <= patch)] += 1;
+        }
+    }
+    let share = counts.iter().sum::<usize>() as f64 / places.len() as f64;
+    let met = holes.iter().zip(&counts).filter(|(_, count)| **count > 0).map(|(hole, _)| hole);
+    (share > 0.0).then(|| notice::holes("zone", share, met))
 }
 
 /// Returns the smallest and largest coordinates of a shape in the frame of `zone`.

@@ -48,6 +48,7 @@ pub fn environment(scene: &Scene, body: &CalibrationBody) -> Result<Environment,
         scale: 1.0,
         position_m,
         rotation_deg,
+        fill_holes: true,
         truth: None,
     };
     let touch = design::touch_settings(&scene.touch);

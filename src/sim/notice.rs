@@ -6,7 +6,9 @@ use clap::ValueEnum;
 use nalgebra::{Point3, UnitVector3, Vector2};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{DIRECTIONS, Task, Zone};
+use palpate_geometry::holes::{Hole, description};
 use palpate_geometry::low_discrepancy::directions;
+use palpate_geometry::mesh::Mesh;
 
 /// Notice that a soft finger without tables gets those of a BioTac.
 pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger gets the default \
@@ -35,6 +37,27 @@ pub(super) fn scaled_finger(radius_m: f64) -> String {
          0.007, 0.46 at 0.008 and 0.79 at 0.010, so gp.noise_sd_m of the shipped experiments may be too \
          small (docs/finger.md)"
     )
+}
+
+/// Notice that a share of a region, 0 to 1, lies over holes of the mesh.
+pub(super) fn holes<'a>(
+    region: &str,
+    share: f64,
+    holes: impl IntoIterator<Item = &'a Hole>,
+) -> String {
+    format!(
+        "{:.1} % of the {region} has no surface: the mesh has {}; a simulated finger meets a flat patch \
+         there, and errors are not computed there; if the object itself has these holes, set \
+         object.fill_holes = false",
+        100.0 * share,
+        description(holes)
+    )
+}
+
+/// Notice of the holes in the mesh of a whole object.
+pub(super) fn holes_of_object(mesh: &Mesh, holes: &[Hole]) -> Option<String> {
+    let area_m2: f64 = holes.iter().map(|hole| hole.area_m2).sum();
+    (!holes.is_empty()).then(|| self::holes("object", area_m2 / mesh.area_m2(), holes))
 }
 
 /// Sides of an object, seen from the middle of the robot's foot or from the home of a stage.

@@ -2,7 +2,7 @@
 
 use super::scene::Unit;
 use clap::ValueEnum;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use palpate_explore::task::Zone;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::mesh::Mesh;
@@ -25,38 +25,116 @@ pub enum ObjectSide {
     Bottom,
 }
 
-/// Axis of a mesh file that points up.
+/// Direction in a mesh file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum UpAxis {
+    /// The x axis.
+    X,
     /// The y axis: the rule of glTF, and usual in OBJ files.
     Y,
     /// The z axis, usual in CAD.
     Z,
+    /// Opposite to the x axis.
+    #[value(name = "-x")]
+    MinusX,
+    /// Opposite to the y axis.
+    #[value(name = "-y")]
+    MinusY,
+    /// Opposite to the z axis.
+    #[value(name = "-z")]
+    MinusZ,
 }
 
-// heuristic: range of the largest extent, in m, that a finger can explore: from a mouse to a
-// bucket.
-const EXPLORABLE_M: [f64; 2] = [0.03, 0.4];
+impl UpAxis {
+    /// Returns the axis, 0 to 2 for x to z, and its sign.
+    fn parts(self) -> (usize, f64) {
+        match self {
+            Self::X => (0, 1.0),
+            Self::Y => (1, 1.0),
+            Self::Z => (2, 1.0),
+            Self::MinusX => (0, -1.0),
+            Self::MinusY => (1, -1.0),
+            Self::MinusZ => (2, -1.0),
+        }
+    }
+
+    /// Returns the unit vector in the frame of the file.
+    pub fn direction(self) -> Vector3<f64> {
+        let (axis, sign) = self.parts();
+        Vector3::ith(axis, sign)
+    }
+}
+
+/// Range of the largest extent of an object that a finger can explore.
+// heuristic: from a mouse to a bucket.
+pub const EXPLORABLE_M: [f64; 2] = [0.03, 0.4];
 
 // heuristic: largest extent that an object of another size is scaled to.
 const SIZE_M: f64 = 0.15;
 
-/// Returns the unit and scale factor that give a mesh a size that a finger can explore. `extent` is
-/// the largest in the file's numbers. Without a `unit` it is the first of mm, m and cm that fits
-/// with a scale of 1; if none fits, metres with another scale.
-pub fn propose_size(extent: f64, unit: Option<Unit>) -> (Unit, f64) {
-    let fits = |unit: &Unit| {
-        let size_m = extent * unit.metres_per_unit();
-        (EXPLORABLE_M[0]..=EXPLORABLE_M[1]).contains(&size_m)
+/// Units that mesh files without a stated unit use.
+pub const USUAL_UNITS: [Unit; 4] = [Unit::Mm, Unit::Cm, Unit::M, Unit::In];
+
+fn is_explorable(size_m: f64) -> bool {
+    (EXPLORABLE_M[0]..=EXPLORABLE_M[1]).contains(&size_m)
+}
+
+/// Returns the usual units in which an object has a size that a finger can explore, the most
+/// plausible first: millimetres, then by the ratio to the size of a hand. `extent` is the largest in
+/// the file's numbers.
+pub fn plausible_units(extent: f64) -> Vec<Unit> {
+    let size_m = |unit: &Unit| extent * unit.metres_per_unit();
+    let mut units: Vec<Unit> =
+        USUAL_UNITS.into_iter().filter(|unit| is_explorable(size_m(unit))).collect();
+    let off = |unit: &Unit| match unit {
+        Unit::Mm => 0.0,
+        unit => (size_m(unit) / SIZE_M).ln().abs(),
     };
-    let usual = [Unit::Mm, Unit::M, Unit::Cm];
-    match unit.or_else(|| usual.into_iter().find(fits)) {
-        Some(unit) if fits(&unit) => (unit, 1.0),
-        unit => {
-            let unit = unit.unwrap_or_default();
-            (unit, two_digits(SIZE_M / (extent * unit.metres_per_unit())))
-        }
-    }
+    units.sort_by(|a, b| off(a).total_cmp(&off(b)));
+    units
+}
+
+/// Returns the factor that gives an object of this size one that a finger can explore: 1 if it has
+/// one, otherwise a readable number that makes it 0.15 m.
+pub fn explorable_scale(size_m: f64) -> f64 {
+    if is_explorable(size_m) { 1.0 } else { two_digits(SIZE_M / size_m) }
+}
+
+/// Smallest share of an object's underside that is flat if it stands on it.
+// heuristic: the foot of a mug has half of its square.
+const FLAT_SHARE: f64 = 0.3;
+
+/// Ratio of the areas of the largest base and the largest base along another axis, above which the
+/// object rests on the first.
+// heuristic: a box may stand on its narrow side, a plate does not.
+const REST_RATIO: f64 = 2.5;
+
+/// Returns the up axis of a mesh that clearly rests on a flat base, with the share of its underside
+/// that is flat; `None` if it has no flat base, or several.
+pub fn resting_axis(mesh: &Mesh) -> Option<(UpAxis, f64)> {
+    let (low, high) = mesh.bounds();
+    let size_m = high - low;
+    let near_m = 0.01 * size_m.max();
+    let base = |up: UpAxis| {
+        let (axis, sign) = up.parts();
+        let floor_m = if sign > 0.0 { low[axis] } else { high[axis] };
+        let is_floor = |corners: &[Point3<f64>; 3]| {
+            corners.iter().all(|p| (p[axis] - floor_m).abs() <= near_m)
+        };
+        let on_floor = mesh.iter_corners().filter(is_floor);
+        let area_m2: f64 =
+            on_floor.map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a))[axis].abs()).sum();
+        let side_m2 = size_m[(axis + 1) % 3] * size_m[(axis + 2) % 3];
+        // Both faces of a thin plate lie near its floor.
+        (up, area_m2.min(side_m2), area_m2 / side_m2)
+    };
+    let mut bases: Vec<_> = UpAxis::value_variants().iter().map(|up| base(*up)).collect();
+    // Stable, so that of two equal ends the first variant is up.
+    bases.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (up, area_m2, share) = *bases.first()?;
+    let other = bases.iter().find(|(other, ..)| other.parts().0 != up.parts().0);
+    let is_clear = other.is_none_or(|(_, other_m2, _)| area_m2 >= REST_RATIO * other_m2);
+    (share >= FLAT_SHARE && is_clear).then_some((up, share.min(1.0)))
 }
 
 /// Returns the value rounded to two significant digits, for readability.
@@ -80,13 +158,14 @@ pub struct ObjectAxes {
 }
 
 impl ObjectAxes {
-    /// Returns the directions for a file whose axis `up` is up, by the usual convention: the front
-    /// is towards +z if y is up, towards −y if z is up.
+    /// Returns the directions for a file in which `up` points up, by the usual convention: the front
+    /// is towards −y if z is up or down, otherwise towards +z.
     pub fn of(up: UpAxis) -> Self {
-        match up {
-            UpAxis::Y => Self { front_o: Vector3::z(), up_o: Vector3::y() },
-            UpAxis::Z => Self { front_o: -Vector3::y(), up_o: Vector3::z() },
-        }
+        let front_o = match up {
+            UpAxis::Z | UpAxis::MinusZ => -Vector3::y(),
+            _ => Vector3::z(),
+        };
+        Self { front_o, up_o: up.direction() }
     }
 
     /// Returns the directions for a glTF file, whose y axis became z, and z became y, on import.
@@ -123,6 +202,20 @@ pub fn position_m(turned: &Mesh) -> [f64; 3] {
     let (low, high) = turned.bounds();
     let middle = |axis: usize| 0.5 * (low[axis] + high[axis]);
     [-middle(0), FRONT_Y_M - high.y, MIDDLE_Z_M - middle(2)].map(tenth_mm)
+}
+
+/// Centre in `W` of a whole object that a stage explores.
+pub const STAGE_CENTRE_M: [f64; 3] = [0.0, -0.65, 0.5];
+
+/// Centre in `W` of a whole object that a PA-10 explores.
+// heuristic: the place of the bird in scenes/bird_around_pa10.toml, reached from most sides.
+pub const ARM_CENTRE_M: [f64; 3] = [0.0, -0.6, 0.6];
+
+/// Returns the position in `W` of the origin of a mesh, already rotated, that puts the middle of its
+/// bounds at `centre_m`, rounded to 0.1 mm.
+pub fn centred_m(turned: &Mesh, centre_m: [f64; 3]) -> [f64; 3] {
+    let (low, high) = turned.bounds();
+    std::array::from_fn(|i| tenth_mm(centre_m[i] - 0.5 * (low[i] + high[i])))
 }
 
 fn tenth_mm(length_m: f64) -> f64 {

@@ -167,6 +167,10 @@ pub struct ObjectSettings {
     /// Rotation about the fixed axes x, then y, then z of `W`.
     #[serde(default)]
     pub rotation_deg: [f64; 3],
+    /// Whether a flat patch, over which no errors are computed, closes each hole of the mesh. Use
+    /// `false` if the object itself has the holes.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub fill_holes: bool,
     /// Name of the analytic surface behind the mesh; errors are computed against it instead of the
     /// mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -175,6 +179,14 @@ pub struct ObjectSettings {
 
 fn one() -> f64 {
     1.0
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_yes(value: &bool) -> bool {
+    *value
 }
 
 /// Unit of length in a mesh file.
@@ -193,6 +205,8 @@ pub enum Unit {
     /// Micrometres.
     Um,
     /// Inches.
+    #[serde(alias = "inch")]
+    #[value(alias = "inch")]
     In,
 }
 

@@ -54,6 +54,7 @@ mod memory;
 mod meshes;
 mod messages;
 mod models;
+mod new_choices;
 mod newcomer;
 mod no_truth;
 mod notices;

@@ -2,13 +2,13 @@
 
 use crate::common::program::{fails, palpate, stderr, succeeds};
 use crate::common::shapes::sphere_mesh;
+use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::pose::pose;
 use palpate::sim::Scene;
-use palpate::sim::placement::{ObjectAxes, ObjectSide, UpAxis, propose_size, rotation_deg};
-use palpate::sim::scene::Unit;
+use palpate::sim::placement::{ObjectAxes, ObjectSide, UpAxis, rotation_deg};
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -127,12 +127,10 @@ fn the_side_that_is_named_faces_the_finger() {
 fn turns_are_those_that_are_named() {
     let gltf = |v: Vector3<f64>| Vector3::new(-v.x, v.z, v.y);
     let file = |v: Vector3<f64>| v;
-    for up in [UpAxis::Y, UpAxis::Z] {
-        let (above, front) = match up {
-            UpAxis::Y => (Vector3::y(), Vector3::z()),
-            UpAxis::Z => (Vector3::z(), -Vector3::y()),
-        };
-        let right = Vector3::x();
+    for &up in UpAxis::value_variants() {
+        let above = up.direction();
+        let front = if above.z == 0.0 { Vector3::z() } else { -Vector3::y() };
+        let right = above.cross(&front);
         type Read = fn(Vector3<f64>) -> Vector3<f64>;
         for (facing, read) in
             [(ObjectAxes::of(up), file as Read), (ObjectAxes::of_gltf(up), gltf as Read)]
@@ -155,27 +153,12 @@ fn turns_are_those_that_are_named() {
 }
 
 #[test]
-fn sizes_are_guessed_from_what_a_finger_can_explore() {
-    assert_eq!(propose_size(200.0, None), (Unit::Mm, 1.0));
-    assert_eq!(propose_size(0.2, None), (Unit::M, 1.0));
-    assert_eq!(propose_size(20.0, None), (Unit::Cm, 1.0));
-    assert_eq!(propose_size(8.0, Some(Unit::In)), (Unit::In, 1.0));
-    // Without a plausible unit the mesh is scaled to the size of a hand, in readable numbers.
-    for (extent, unit) in [(2.0, None), (4000.0, None), (1e-5, None), (30.0, Some(Unit::M))] {
-        let (unit, scale) = propose_size(extent, unit);
-        let size_m = extent * unit.metres_per_unit() * scale;
-        assert!((0.14..0.16).contains(&size_m), "{extent} {unit} {scale}");
-        assert!(format!("{scale:e}").len() < 8, "{scale:e}");
-    }
-}
-
-#[test]
 fn what_cannot_be_made_an_experiment_is_refused_and_nothing_replaced() {
     let folder = folder();
     fails(folder.path(), &["new", "none.obj"], &["none.obj"]);
     fails(folder.path(), &["new", "egg.ply", "--side", "inside"], &["inside", "front"]);
     fs::write(folder.path().join("egg.toml"), "mine").unwrap();
-    fails(folder.path(), &["new", "egg.ply"], &["egg.toml exists", "--force"]);
+    fails(folder.path(), &["new", "egg.ply"], &["egg.toml exists", "--force", "--out"]);
     assert_eq!(fs::read_to_string(folder.path().join("egg.toml")).unwrap(), "mine");
     assert!(!folder.path().join("egg-scene.toml").exists());
     succeeds(folder.path(), &["new", "egg.ply", "--out", "deep/er"]);

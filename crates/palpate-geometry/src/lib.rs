@@ -40,6 +40,7 @@ mod bounds;
 pub mod bvh;
 pub mod decimate;
 pub mod distance;
+pub mod holes;
 pub mod implicit;
 pub mod import;
 pub mod low_discrepancy;

@@ -15,6 +15,8 @@ use sha2::{Digest, Sha256};
 pub struct Mesh {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
+    /// Number of triangles that are the object's; the others are patches over its holes.
+    own: usize,
     bounds: (Point3<f64>, Point3<f64>),
 }
 
@@ -22,7 +24,23 @@ impl Mesh {
     /// Creates a mesh from parts that must satisfy the invariants of the type.
     pub(super) fn from_sound_parts(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
         let bounds = extent(&vertices).map_or_else(Default::default, |[low, high]| (low, high));
-        Self { vertices, triangles, bounds }
+        Self { vertices, own: triangles.len(), triangles, bounds }
+    }
+
+    /// Returns the mesh with more triangles over its vertices, marked as patches.
+    pub(super) fn with_marked_triangles(&self, patches: impl Iterator<Item = [u32; 3]>) -> Self {
+        let triangles = self.triangles.iter().copied().chain(patches).collect();
+        Self { triangles, ..self.clone() }
+    }
+
+    /// Whether a triangle is a patch over a [hole](super::holes), where the surface is unknown.
+    pub fn is_patch(&self, triangle: u32) -> bool {
+        triangle as usize >= self.own
+    }
+
+    /// Whether the mesh has patches over holes.
+    pub fn has_patches(&self) -> bool {
+        self.own < self.triangles.len()
     }
 
     /// Vertex positions, in metres.
@@ -88,12 +106,12 @@ impl Mesh {
     /// Returns the mesh scaled by a positive, finite `factor` about its origin.
     pub fn scaled(&self, factor: f64) -> Self {
         let vertices = self.vertices.iter().map(|vertex| vertex * factor).collect();
-        Self::from_sound_parts(vertices, self.triangles.clone())
+        Self { own: self.own, ..Self::from_sound_parts(vertices, self.triangles.clone()) }
     }
 
     /// Returns the mesh moved by the finite pose `x_wm`: a vertex p in M becomes `x_wm` p in W.
     pub fn transformed(&self, x_wm: &Isometry3<f64>) -> Self {
         let vertices = self.vertices.iter().map(|vertex| x_wm * vertex).collect();
-        Self::from_sound_parts(vertices, self.triangles.clone())
+        Self { own: self.own, ..Self::from_sound_parts(vertices, self.triangles.clone()) }
     }
 }

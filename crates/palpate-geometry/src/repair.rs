@@ -3,6 +3,7 @@
 use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 use nalgebra::Point3;
 
+use super::holes::find_holes;
 use super::mesh::Mesh;
 use super::raw::{Element, RawMesh};
 use super::report::{DefectCount, MeshReport};
@@ -64,6 +65,9 @@ pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), InputError> {
     report.unorientable = topology.unorientable;
     let mesh = compact(vertices, triangles);
     report.measure(&mesh, topology.closed);
+    if report.border_edges.count > 0 {
+        report.holes = find_holes(&mesh);
+    }
     Ok((mesh, report))
 }
 

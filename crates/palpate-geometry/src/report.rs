@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::{Point3, Vector3};
 
+use super::holes::{Hole, description};
 use super::mesh::Mesh;
 use super::raw::Element;
 
@@ -65,6 +66,8 @@ pub struct MeshReport {
     pub flipped: DefectCount,
     /// Edges with one triangle.
     pub border_edges: DefectCount,
+    /// Holes, the largest first: borders around which the surface continues.
+    pub holes: Vec<Hole>,
     /// Edges with three or more triangles.
     pub non_manifold_edges: DefectCount,
     /// Components, connected over edges with two triangles.
@@ -123,6 +126,12 @@ impl fmt::Display for MeshReport {
         row("components", format_args!("{}", self.components))?;
         row("one-sided", format_args!("{}", self.unorientable))?;
         row("border edges", format_args!("{}", self.border_edges))?;
+        if !self.holes.is_empty() {
+            let area_m2: f64 = self.holes.iter().map(|hole| hole.area_m2).sum();
+            let percent = 100.0 * area_m2 / (self.area_m2 + area_m2);
+            let words = description(&self.holes);
+            row("holes", format_args!("{words}; {percent:.2} % of the surface"))?;
+        }
         row("non-manifold edges", format_args!("{}", self.non_manifold_edges))?;
         row("welded vertices", format_args!("{}", self.welded))?;
         row("degenerate removed", format_args!("{}", self.degenerate_removed))?;

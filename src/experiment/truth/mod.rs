@@ -56,7 +56,8 @@ use std::sync::Arc;
 pub struct Truth {
     /// Test points.
     pub places: Vec<Vec<f64>>,
-    /// True height at each point above the zone's datum; `None` outside the object.
+    /// True height at each point above the zone's datum; `None` outside the object, and over a hole
+    /// of its mesh.
     pub heights_m: Vec<Option<f64>>,
     /// Whether each point lies in the outer tenth of the zone.
     pub is_edge: Vec<bool>,
@@ -88,7 +89,8 @@ impl Truth {
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
         let is_reachable = reach::reachable(environment, &places, &heights_m, tell);
-        Self { is_complete: true, ..Self::new(zone, places, heights_m, is_reachable) }
+        let is_complete = !places.iter().any(|place| environment.is_hole(place));
+        Self { is_complete, ..Self::new(zone, places, heights_m, is_reachable) }
     }
 
     /// Ground truth of a whole object with the surface `mesh`, simplified if it is large; it has no

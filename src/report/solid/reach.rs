@@ -4,9 +4,11 @@ use super::panel::{View, scale};
 use super::section::TRUTH_TRIANGLES;
 use crate::report::canvas::Area;
 use crate::report::legend::{FigureLayout, Swatch};
+use crate::report::orientation::{draw_axes, draw_scale_bar};
 use crate::report::relief::ON_RELIEF;
+use crate::report::scan::size_words;
 use crate::report::style;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::solids::Triangles;
@@ -24,17 +26,26 @@ const LEGEND: [&str; 2] = ["#b2becd", "#d55e00"];
 
 /// Draws an object from the front and from behind, as SVG. `spots` are points spread over it, each
 /// with whether the finger can touch it; empty if not known. `sides` are starting points of
-/// straight approaches to the middle, each with whether the finger can reach it. Everything is in
-/// `W` and metres.
+/// straight approaches to the middle, each with whether the finger can reach it. `ball` is the
+/// middle and radius of the ball that is explored. Everything is in `W` and metres.
 pub fn picture(
     mesh: &Mesh,
     spots: &[(Point3<f64>, bool)],
     sides: &[(Point3<f64>, bool)],
+    ball: Option<(Point3<f64>, f64)>,
 ) -> String {
     let drawn = decimate(mesh, TRUTH_TRIANGLES);
     let is_reached = triangles_reached(&drawn, spots);
     let marks = sides.iter().map(|(p_w, _)| p_w.coords);
-    let points: Vec<Vector3<f64>> = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).collect();
+    // The corners of a box around the ball leave room for its outline.
+    let rim = ball.iter().flat_map(|(centre_w, radius_m)| {
+        let to = [-*radius_m, *radius_m];
+        let corners = to.map(|x| to.map(|y| to.map(|z| 0.8 * Vector3::new(x, y, z))));
+        corners.into_iter().flatten().flatten().map(|corner| centre_w.coords + corner)
+    });
+    let points = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).chain(rim);
+    let points: Vec<Vector3<f64>> = points.collect();
+    let (low, high) = mesh.bounds();
     let width = 2.0 * PANEL.0;
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + PANEL.1 + FOOT_PX];
     let entries = [
@@ -51,7 +62,8 @@ pub fn picture(
     for (column, is_behind) in [false, true].into_iter().enumerate() {
         let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);
         let canvas = &mut sheet.canvas;
-        view.title(canvas, "reachable surface", "");
+        let title = if spots.is_empty() { "object and ball" } else { "reachable surface" };
+        view.title(canvas, title, &size_words(&(high - low)));
         let relief = view.relief(canvas, &drawn, |triangle, light| {
             style::shaded_colour(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
         });
@@ -68,9 +80,15 @@ pub fn picture(
                 }
             }
         });
+        if let Some((centre_w, radius_m)) = ball {
+            let outline = style::dashed(style::FAINT_INK, 1.0, "4 3");
+            canvas.circle(view.camera.at(&centre_w.coords), radius_m * px_per_m, &outline);
+        }
+        let at = [view.area.left + 60.0, view.area.bottom() - 24.0];
+        draw_axes(canvas, &view.camera, at, &UnitQuaternion::identity());
     }
     let top = sheet.bottom - FOOT_PX + 8.0;
-    View::draw_scale(&mut sheet.canvas, px_per_m, [MARGIN.0, top]);
+    draw_scale_bar(&mut sheet.canvas, px_per_m, [0.5 * width, top]);
     sheet.canvas.finish()
 }
 
@@ -111,9 +129,9 @@ mod tests {
         assert_eq!(triangles_reached(&(vertices.clone(), triangles.clone()), &[]), [true; 4]);
         let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
         let sides = [(corner(2.0, 0.0, 0.0), true), (corner(-2.0, 0.0, 0.0), false)];
-        let svg = picture(&mesh, &spots, &sides);
+        let svg = picture(&mesh, &spots, &sides, None);
         assert!(svg.contains("impossible direction") && svg.contains("not reachable by"));
-        let svg = picture(&mesh, &[], &[]);
+        let svg = picture(&mesh, &[], &[], None);
         assert!(!svg.contains("direction of") && !svg.contains("reachable by"));
     }
 }

@@ -15,9 +15,11 @@ mod gltf;
 mod obj;
 pub mod ply;
 mod source;
+mod statement;
 mod stl;
 
 use source::{BYTES_MAX, Source};
+pub use statement::{FileStatements, Statement, statements};
 
 /// Reader of a format.
 type Read = fn(&Source) -> Result<RawMesh, InputError>;
@@ -30,6 +32,12 @@ const FORMATS: &[(&str, Read)] = &[
     ("stl", stl::read),
     ("ply", ply::read),
 ];
+
+/// Whether the extension of a path is that of a mesh format.
+pub fn is_mesh_file(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    FORMATS.iter().any(|(known, _)| *known == extension)
+}
 
 /// Reads a mesh file, scales it by `metres_per_unit` and repairs it. Buffers that a glTF document
 /// refers to must lie in its folder or below.

@@ -140,8 +140,11 @@ impl TrueShape {
     pub fn new(bvh: MeshBvh, is_closed: bool) -> Self {
         let mesh = bvh.mesh();
         let (low, high) = mesh.bounds();
+        // The surface is unknown over a hole.
+        let mut samples = over_surface(mesh, SAMPLES);
+        samples.retain(|spot| !mesh.is_patch(spot.triangle));
         Self {
-            samples: over_surface(mesh, SAMPLES),
+            samples,
             volume_m3: is_closed.then(|| mesh.volume_m3()),
             area_m2: mesh.area_m2(),
             diagonal_m: (high - low).norm(),
@@ -228,8 +231,11 @@ impl TrueShape {
     }
 }
 
+/// Distances of points from the nearest point of a surface; left out where that is a hole's patch.
 fn distances_m(from: &[SurfacePoint], to: &MeshBvh) -> Vec<f64> {
-    from.iter().map(|spot| to.closest_point(&spot.point).distance_m).collect()
+    let nearest = from.iter().map(|spot| to.closest_point(&spot.point));
+    let known = nearest.filter(|nearest| !to.mesh().is_patch(nearest.triangle));
+    known.map(|nearest| nearest.distance_m).collect()
 }
 
 /// Volume inside both meshes over the volume inside either, from the lengths inside them of `lines`

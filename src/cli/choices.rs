@@ -1,0 +1,254 @@
+//! Unit and up axis of a mesh, each with the evidence for it. If the evidence is ambiguous, the
+//! user is asked on a terminal; elsewhere the most plausible value is taken and named as a guess.
+
+use super::terminal::{Verbosity, print_stderr};
+use crate::sim::placement::{self, USUAL_UNITS, UpAxis};
+use crate::sim::scene::Unit;
+use clap::ValueEnum;
+use palpate_geometry::import::FileStatements;
+use palpate_geometry::mesh::Mesh;
+use std::io::{self, BufRead, IsTerminal};
+
+/// Value with the evidence for it.
+pub(super) struct Choice<T> {
+    pub(super) value: T,
+    pub(super) evidence: String,
+}
+
+/// Way to settle an ambiguous value.
+#[derive(Clone, Copy)]
+pub(super) struct Asker {
+    can_ask: bool,
+    talk: Verbosity,
+}
+
+/// Number of times that an invalid answer is asked for again.
+const TRIES: usize = 3;
+
+impl Asker {
+    /// Creates an asker, which asks if input and output are a terminal and `take_defaults` is not
+    /// set.
+    pub(super) fn new(take_defaults: bool, talk: Verbosity) -> Self {
+        let is_terminal = io::stdin().is_terminal() && io::stderr().is_terminal();
+        Self { can_ask: is_terminal && !take_defaults, talk }
+    }
+
+    /// Returns the chosen one of `choices` (a value and its description), and whether the user chose
+    /// it; the first is the default. A default that is not confirmed is a guess: the note `why` says
+    /// so.
+    fn choose<T: Copy>(self, what: &str, choices: &[(T, String)], why: &str) -> Option<(T, bool)> {
+        let default = choices.first()?.0;
+        if !self.can_ask {
+            self.talk.note(why);
+            return Some((default, false));
+        }
+        let lines =
+            choices.iter().enumerate().map(|(i, (_, words))| format!("  {} {words}", i + 1));
+        print_stderr(&format!("{what}?\n{}", lines.collect::<Vec<_>>().join("\n")));
+        for _ in 0..TRIES {
+            print_stderr(&format!("number, 1 to {} [1]:", choices.len()));
+            let mut answer = String::new();
+            if !matches!(io::stdin().lock().read_line(&mut answer), Ok(1..)) {
+                break;
+            }
+            let chosen = match answer.trim() {
+                "" => Some(0),
+                number => number.parse().ok().and_then(|number: usize| number.checked_sub(1)),
+            };
+            match chosen.and_then(|chosen| choices.get(chosen)) {
+                Some((value, _)) => return Some((*value, true)),
+                None => continue,
+            }
+        }
+        self.talk.note(why);
+        Some((default, false))
+    }
+}
+
+/// Formats a length with a suitable unit.
+fn length(length_m: f64) -> String {
+    let digits = |value: f64| {
+        let decimals = (2.0 - value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
+        let text = format!("{value:.decimals$}");
+        match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+            false => text,
+        }
+    };
+    match length_m {
+        length_m if length_m >= 1.0 => format!("{} m", digits(length_m)),
+        length_m => format!("{} mm", digits(1e3 * length_m)),
+    }
+}
+
+/// Returns the name of a unit in a sentence, where "in" would be read as a word.
+fn label(unit: Unit) -> String {
+    if unit == Unit::In { "inch".into() } else { unit.to_string() }
+}
+
+/// Describes the size in each unit: "as mm 80 mm, as inch 2.03 m".
+fn sizes(extent: f64, units: impl IntoIterator<Item = Unit>) -> String {
+    let sizes = units
+        .into_iter()
+        .map(|unit| format!("as {} {}", label(unit), length(extent * unit.metres_per_unit())));
+    sizes.collect::<Vec<_>>().join(", ")
+}
+
+/// Returns the unit of a mesh and the factor that makes it explorable. `extent` is the largest in
+/// the file's numbers.
+pub(super) fn unit(
+    extent: f64,
+    given: Option<Unit>,
+    stated: &FileStatements,
+    asker: Asker,
+) -> Choice<(Unit, f64)> {
+    let all = || sizes(extent, USUAL_UNITS);
+    let named = stated.metres_per_unit.as_ref().and_then(|stated| {
+        let is_same = |unit: &&Unit| unit.metres_per_unit() == stated.value;
+        let unit = Unit::value_variants().iter().find(is_same)?;
+        Some((*unit, stated.words.clone()))
+    });
+    let known = given.map(|unit| (unit, format!("--unit {}", label(unit)))).or(named);
+    if let Some((unit, evidence)) = known {
+        let size_m = extent * unit.metres_per_unit();
+        let scale = placement::explorable_scale(size_m);
+        if scale != 1.0 {
+            asker.talk.note(format!(
+                "in {} ({evidence}) the object measures {}, but a finger explores {}: it is scaled by \
+                 {scale}; if the unit is wrong, use another --unit: {}",
+                label(unit),
+                length(size_m),
+                explorable(),
+                all()
+            ));
+        }
+        return Choice { value: (unit, scale), evidence };
+    }
+    let plausible = placement::plausible_units(extent);
+    match plausible[..] {
+        [] => {
+            let unit = Unit::M;
+            let scale = placement::explorable_scale(extent * unit.metres_per_unit());
+            asker.talk.note(format!(
+                "the unit is unknown: no usual one gives a size of {} ({}); the mesh is scaled to {}; if \
+                 you know the unit, name it, as in --unit mm",
+                explorable(),
+                all(),
+                length(extent * scale)
+            ));
+            Choice { value: (unit, scale), evidence: "unknown, scaled".into() }
+        }
+        [unit] => Choice {
+            value: (unit, 1.0),
+            evidence: format!("the only usual one for an object of {} ({})", explorable(), all()),
+        },
+        [unit, other, ..] => {
+            let both = sizes(extent, plausible.iter().copied());
+            let why = format!(
+                "the unit is a guess: the file states none, and several are plausible ({both}); {} is \
+                 taken; if that is wrong, use for example --unit {}",
+                label(unit),
+                label(other)
+            );
+            let size = |unit: &Unit| length(extent * unit.metres_per_unit());
+            let choices =
+                plausible.iter().map(|unit| (*unit, format!("{}: {}", label(*unit), size(unit))));
+            let choices: Vec<_> = choices.collect();
+            let (unit, is_confirmed) = asker
+                .choose("Unit of the file, and largest side of the object", &choices, &why)
+                .unwrap_or((unit, false));
+            Choice { value: (unit, 1.0), evidence: evidence(is_confirmed, &both) }
+        }
+    }
+}
+
+/// Describes the evidence for a value among several.
+fn evidence(is_confirmed: bool, all: &str) -> String {
+    match is_confirmed {
+        true => "your answer".into(),
+        false => format!("a guess ({all})"),
+    }
+}
+
+fn explorable() -> String {
+    let [low, high] = placement::EXPLORABLE_M;
+    format!("{} to {}", length(low), length(high))
+}
+
+/// Returns the up axis of a mesh in the frame of its file; `is_y_usual` for a format in which y is
+/// usually up.
+pub(super) fn up(
+    mesh: &Mesh,
+    given: Option<UpAxis>,
+    stated: &FileStatements,
+    is_y_usual: bool,
+    asker: Asker,
+) -> Choice<UpAxis> {
+    if let Some(up) = given {
+        return Choice { value: up, evidence: format!("--up {}", name(&up)) };
+    }
+    let all = UpAxis::value_variants();
+    let named = stated.up.as_ref().and_then(|stated| {
+        let is_same = |up: &&UpAxis| up.direction() == stated.value;
+        Some((*all.iter().find(is_same)?, stated.words.clone()))
+    });
+    if let Some((value, evidence)) = named {
+        return Choice { value, evidence };
+    }
+    if let Some((value, share)) = placement::resting_axis(mesh) {
+        let percent = 100.0 * share;
+        let evidence = format!("it rests on a flat base ({percent:.0} % of its underside)");
+        return Choice { value, evidence };
+    }
+    let (usual, other) = match is_y_usual {
+        true => (UpAxis::Y, UpAxis::Z),
+        false => (UpAxis::Z, UpAxis::Y),
+    };
+    let format = if is_y_usual { "OBJ" } else { "STL and PLY" };
+    let why = format!(
+        "the up axis is a guess: the file states none, and no flat base decides; {} is taken, as usual in \
+         {format} files; if the object lies on its side in the picture, use for example --up {}",
+        name(&usual),
+        name(&other)
+    );
+    let size_m = mesh.bounds().1 - mesh.bounds().0;
+    let rest = all.iter().copied().filter(|up| *up != usual && *up != other);
+    let choices: Vec<(UpAxis, String)> = [usual, other]
+        .into_iter()
+        .chain(rest)
+        .map(|up| {
+            let share = size_m.dot(&up.direction()).abs() / size_m.max();
+            let height =
+                format!("{} up: {:.0} % of its longest side high", name(&up), 100.0 * share);
+            (up, height)
+        })
+        .collect();
+    let (value, is_confirmed) =
+        asker.choose("Up axis of the file", &choices, &why).unwrap_or((usual, false));
+    Choice { value, evidence: evidence(is_confirmed, &format!("usual in {format} files")) }
+}
+
+/// Returns the command-line name of a value.
+pub(super) fn name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or(String::new(), |value| value.get_name().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_three_digits_and_a_suitable_unit() {
+        for (length_m, words) in [
+            (0.08, "80 mm"),
+            (2.032, "2.03 m"),
+            (0.0004, "0.4 mm"),
+            (1234.0, "1234 m"),
+            (0.12345, "123 mm"),
+            (1.0, "1 m"),
+            (2e-9, "0.000002 mm"),
+        ] {
+            assert_eq!(length(length_m), words);
+        }
+    }
+}
