@@ -182,13 +182,11 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
         count = f"{int(step['count'][0])} touches"
         measure = self._all.measures[0] if self._all.measures else None
         value = "" if measure is None else f", {measure.removesuffix('_m')} {1e3 * float(step[measure][0]):.2f} mm"
-        self._title = count + value
+        self._title = count + (value if self._all.has_belief else ", no belief")
         if self.render_mode == "human":
             self._draw()
 
     def _draw(self) -> npt.NDArray[np.uint8]:
-        if not self._all.has_belief:
-            raise ValueError(f"render_mode = {self.render_mode!r} draws the belief: allowed is grid above 0")
         if self._renderer is None:
             self._renderer = Renderer(str(self.render_mode), self.metadata["render_fps"])
         return self._renderer.draw(self._all.core.belief(0), self._title)

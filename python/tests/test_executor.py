@@ -281,7 +281,9 @@ def test_dask_gives_the_same_rows_also_if_a_worker_is_killed(toy, rows, marks):
     assert killed.rows() == toy.run([Killer]).rows()
 
 
-def test_submitit_gives_the_same_rows_also_if_a_job_is_killed(toy, rows, marks, tmp_path):
+def test_submitit_gives_the_same_rows_also_if_a_job_is_killed(toy, rows, marks, tmp_path, monkeypatch):
+    # submitit waits this long for the results of a killed job, which may be on a slow file system.
+    monkeypatch.setattr(submitit.core.core.Job, "_results_timeout_s", 0.1)
     executor = submitit.LocalExecutor(tmp_path / "logs")
     assert toy.run(PLANNERS, executor=executor, trials_per_job=5).rows() == rows
     killed = toy.run([Killer], executor=executor, trials_per_job=5)

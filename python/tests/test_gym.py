@@ -19,7 +19,13 @@ MUG = str(HOME / "scenes/suite/around/mug.toml")
 
 @pytest.mark.parametrize(
     "settings",
-    [{"scene": "bird"}, {"scene": "toy"}, {"scene": MUG, "grid": 3, "initial_touches": 1, "touches": 3}],
+    [
+        {"scene": "bird"},
+        {"scene": "toy"},
+        {"scene": MUG, "grid": 3, "initial_touches": 1, "touches": 3},
+        {"scene": "toy", "grid": 0, "reward": "none"},
+        {"scene": "suite", "grid": 0, "reward": "none"},
+    ],
 )
 def test_the_environment_keeps_to_the_rules(settings):
     env = gymnasium.make(ID, **{"touches": 7, **settings})
@@ -29,17 +35,6 @@ def test_the_environment_keeps_to_the_rules(settings):
         # The machine of the tests may have no display.
         warnings.filterwarnings("ignore", message=".*human.* shows nothing.*")
         check_env(env.unwrapped)
-
-
-def test_an_environment_without_a_belief_keeps_to_the_rules():
-    env = gymnasium.make(ID, touches=7, scene="suite", grid=0, reward="none")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(env.unwrapped, skip_render_check=True)
-    env = gymnasium.make(ID, scene="toy", touches=7, grid=0, reward="none", render_mode="rgb_array")
-    env.reset()
-    with pytest.raises(ValueError, match="grid above 0"):
-        env.render()
 
 
 def test_the_name_of_the_module_registers_the_environment(tmp_path):
