@@ -1,13 +1,12 @@
 //! Lookup of experiments and scenes by name: `bird` finds `experiments/bird.toml`.
 
+pub(super) use crate::experiment::experiment::SCENES;
 use anyhow::bail;
-use palpate_input::{files, format};
+use palpate_input::{files, shipped};
 use std::path::{Path, PathBuf};
 
 /// Folder of the shipped experiments.
 pub(super) const EXPERIMENTS: &str = "experiments";
-/// Folder of the shipped scenes.
-pub(super) const SCENES: &str = "scenes";
 
 /// Finds the file for `name`: a path, or the name of a file in `folder`, in the working directory,
 /// beside the program or in `PALPATE_HOME`.
@@ -15,25 +14,15 @@ pub(super) const SCENES: &str = "scenes";
 /// # Errors
 /// If no file matches; the message suggests the most similar name.
 pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
-    let is_plain = name.extension().is_none() && name.components().count() == 1;
-    if !is_plain || name.exists() && !name.is_dir() {
+    if !shipped::is_plain(name) || name.exists() && !name.is_dir() {
         return Ok(name.into());
     }
-    let file = name.with_extension("toml");
-    let found = folders(folder).map(|folder| folder.join(&file)).find(|path| path.is_file());
-    if let Some(found) = found {
+    if let Some(found) = shipped::find(name, folder, None) {
         return Ok(found);
     }
     let word = name.to_string_lossy();
-    let known = file_stems(folder);
-    let meant = match format::nearest(&word, &known) {
-        Some(meant) => format!(", did you mean `{meant}`?"),
-        None if known.is_empty() => {
-            format!("; set {HOME} to the folder that has {EXPERIMENTS}/ and {SCENES}/")
-        }
-        None => String::new(),
-    };
-    bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
+    let remedy = shipped::remedy(&word, &file_stems(folder));
+    bail!("{word}: no such file, and no {folder}/{word}.toml{remedy}")
 }
 
 /// Whether the file is an experiment: experiments have `planners` or `scene`, scenes do not. An
@@ -45,27 +34,7 @@ pub(super) fn is_experiment(path: &Path) -> bool {
         .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
 }
 
-/// Sorted names of the files in the first `folder` that [`find`] searches.
+/// Sorted names of the files in `folder` that [`find`] finds.
 pub(super) fn file_stems(folder: &str) -> Vec<String> {
-    let files = folders(folder).find_map(|folder| std::fs::read_dir(folder).ok());
-    let stem = |path: PathBuf| -> Option<String> {
-        let is_toml = path.extension().is_some_and(|extension| extension == "toml");
-        Some(path.file_stem()?.to_str()?.to_owned()).filter(|_| is_toml)
-    };
-    let mut names: Vec<String> =
-        files.into_iter().flatten().flatten().filter_map(|entry| stem(entry.path())).collect();
-    names.sort();
-    names
-}
-
-/// Environment variable: the folder that contains `experiments` and `scenes` if they are neither in
-/// the working directory nor beside the program.
-const HOME: &str = "PALPATE_HOME";
-
-/// Candidate locations of `folder`, in search order.
-fn folders(folder: &str) -> impl Iterator<Item = PathBuf> {
-    let program = std::env::current_exe().ok();
-    let beside = program.and_then(|program| Some(program.parent()?.join(folder)));
-    let home = std::env::var_os(HOME).map(|home| Path::new(&home).join(folder));
-    std::iter::once(PathBuf::from(folder)).chain(beside).chain(home)
+    shipped::names(folder, None)
 }
