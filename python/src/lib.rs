@@ -15,6 +15,7 @@ mod explorer;
 mod gaussian_process;
 mod known;
 mod mesh;
+mod pickle;
 mod places;
 mod planner;
 mod program;
