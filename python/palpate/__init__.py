@@ -4,8 +4,8 @@ A robot finger explores an object without vision; a Gaussian process estimates t
 next touch. All quantities are in SI units, and names end with the unit.
 
     >>> import palpate
-    >>> run = palpate.Experiment.load("toy").run(["active", "random"], trials=10)
-    >>> frame = run.summary()
+    >>> run = palpate.Experiment(scene="toy", touches=30).run(["active", "random"], trials=10)
+    >>> frame, comparison = run.summary(), run.compare()
 """
 
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from ._check import Check, check
 from ._experiment import Experiment
 from ._palpate import Ball, Belief, Exploration, Scene, Touch, Zone, __version__
 from ._palpate import planners as _planners
-from ._run import Run
+from ._run import Comparison, Run
 from ._scene import read_mesh, write_mesh
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ __all__ = [
     "Ball",
     "Belief",
     "Check",
+    "Comparison",
     "Experiment",
     "Exploration",
     "GaussianProcess",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._experiment import Experiment
@@ -46,7 +46,7 @@ class Check:
 def check(
     experiment: Experiment | str | os.PathLike[str],
     baseline: str | os.PathLike[str],
-    planners: Sequence[Any] | None = None,
+    planners: Sequence[Any] | Mapping[str, Any] | None = None,
     *,
     accept: str | None = None,
     tolerance: float = 0.05,

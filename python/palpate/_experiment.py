@@ -3,32 +3,68 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _palpate
 from ._executor import Executor
 from ._executor import run as run_on
-from ._home import find_file
+from ._home import HOME, find_file
 from ._palpate import Zone
-from ._planners import LIMIT_S, Factory, ThreadPlannerFactory, by_name, name_of
+from ._planners import LIMIT_S, Factory, ThreadPlannerFactory, named
 from ._progress import Progress
 from ._run import Run
-from ._settings import assignments
+from ._settings import ExperimentSettings, assignments
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = ["Experiment"]
 
 
 class Experiment:
-    """An experiment: planners and trials on one scene."""
+    """An experiment: planners and trials on one scene.
 
-    def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._path = path
-        self._settings = settings
-        self._core = _palpate.Experiment.load(os.fspath(path), assignments(settings))
+        palpate.Experiment(scene="bird", touches=60, gp={"noise": [0.001, 0.1]}).run([Widest, "active"], trials=20)
+
+    The keyword arguments are the settings of `docs/reference.md`; a table is a mapping. A pickled experiment contains
+    all settings, but of meshes and other files only the paths.
+
+    Args:
+        scene: name of a scene of the package, path of a file, relative to the working folder, table, or `Scene`.
+        planners: as for `run`; default: "active" and "random".
+        touches: default: 40.
+        trials: default: 12.
+        initial_touches: default: 5.
+        name: default: that of the scene.
+
+    Raises:
+        ConfigError: if a setting is missing or invalid; with key, value and allowed values.
+    """
+
+    def __init__(self, **settings: Unpack[ExperimentSettings]) -> None:
+        touches = settings.get("touches", 40)
+        usual = {
+            "name": _name(settings.get("scene")),
+            "planners": ["active", "random"],
+            "trials": 12,
+            "touches": touches,
+            "initial_touches": min(5, touches) if isinstance(touches, int) else 5,
+        }
+        self._load(None, {**usual, **settings})
+
+    def _load(self, path: Path | None, settings: dict[str, Any]) -> None:
+        #: Factories of the planners that are not named by strings.
+        self._own: dict[str, Factory] = {}
+        if "planners" in settings and not isinstance(settings["planners"], str):
+            names, self._own = named(settings["planners"], {}, is_run=False)
+            settings = {**settings, "planners": names}
+        file = None if path is None else os.fspath(path)
+        self._core = _palpate.Experiment.load(file, assignments(settings), os.fspath(HOME))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], **settings: Any) -> Experiment:
@@ -37,12 +73,14 @@ class Experiment:
         Args:
             path: path of the file, or name.
             settings: any setting of `docs/reference.md`, in the form of the program's `--set`: `touches=30`,
-                `gp__noise=[0.01, 1]` or `**{"gp.noise": [0.01, 1]}`.
+                `gp__noise=[0.01, 1]` or `**{"gp.noise": [0.01, 1]}`; paths are relative to the working folder.
 
         Raises:
             ConfigError: if a setting is invalid; with file, line, key, value and allowed values.
         """
-        return cls(find_file(path, "experiments"), settings)
+        experiment = cls.__new__(cls)
+        experiment._load(find_file(path, "experiments"), settings)
+        return experiment
 
     @property
     def name(self) -> str:
@@ -90,7 +128,7 @@ class Experiment:
 
     def run(
         self,
-        planners: Sequence[str | Factory] | None = None,
+        planners: Sequence[Any] | Mapping[str, Any] | None = None,
         trials: int | None = None,
         *,
         out: str | os.PathLike[str] | None = None,
@@ -110,9 +148,13 @@ class Experiment:
         (a seeded numpy generator) and `seed`. If it raises an exception, returns an invalid target or exceeds the time
         limit, its trial fails with the reason, and the run continues.
 
+        A planner may also be a function or a `functools.partial` that returns such an object, or the object itself,
+        of which each trial gets a copy. Names contain the arguments of a partial, as in `MODULE:CLASS(margin=0.1)`.
+        A pair `("NAME", planner)` is named `MODULE:NAME`.
+
         Args:
-            planners: names of built-in planners (`palpate.PLANNERS`), classes, or `"MODULE:CLASS"`; default: the
-                experiment's planners.
+            planners: names of built-in planners (`palpate.PLANNERS`), planners, pairs, or `"MODULE:CLASS"`; or a
+                mapping from names to planners; default: the experiment's planners.
             trials: trials per planner; default: the experiment's number.
             out: folder of the run, whose existing trials are kept; by default the run is kept in memory.
             fresh: delete the existing trials.
@@ -121,7 +163,7 @@ class Experiment:
             progress: print progress to stderr.
             limit_s: time limit for a target of your own planners, seconds; None means no limit, which also avoids the
                 overhead of a thread.
-            isolate: run each of your own planners in its own process, which can be killed.
+            isolate: run each of your own planners in its own process, which can be killed; they must be picklable.
             on_error: "record" stores an error of your own planner as the reason of its failed trial, continues, and
                 warns at the end; "raise" stops the run and raises PlannerError with the traceback.
             executor: runs the trials elsewhere: a `concurrent.futures.Executor`, Dask's `Client`, an executor of
@@ -167,7 +209,7 @@ class Experiment:
     def _check(
         self,
         baseline: str,
-        planners: Sequence[Any] | None,
+        planners: Sequence[Any] | Mapping[str, Any] | None,
         accept: str | None,
         tolerance: float,
         max_trials: int,
@@ -180,30 +222,20 @@ class Experiment:
 
     def _prepared(
         self,
-        planners: Sequence[Any] | None,
+        planners: Sequence[Any] | Mapping[str, Any] | None,
         trials: int | None,
         threads: int,
         limit_s: float | None,
         isolate: bool,
     ) -> tuple[_palpate.Experiment, dict[str, Any]]:
         """Returns the experiment with these planners and trials, and factories of the Python planners."""
-        if isinstance(planners, (str, type)):
-            raise TypeError(f"planners = {planners!r}: allowed is a list, [{planners!r}]")
         if threads < 0:
             raise ValueError(f"threads = {threads}: allowed is 0 (all cores) or more")
-        own: dict[str, Factory] = {}
-        names = []
-        for planner in self.planners if planners is None else planners:
-            name = planner if isinstance(planner, str) else name_of(planner)
-            names.append(name)
-            if not isinstance(planner, str):
-                own[name] = planner
-            elif ":" in name:
-                own[name] = by_name(name)
-        settings = dict(self._settings, planners=names)
+        names, own = named(self.planners if planners is None else planners, self._own)
+        settings: dict[str, Any] = {"planners": names}
         if trials is not None:
             settings["trials"] = trials
-        core = _palpate.Experiment.load(os.fspath(self._path), assignments(settings))
+        core = self._core.with_settings(assignments(settings))
         if isolate:
             from ._isolated import ProcessPlannerFactory
 
@@ -218,3 +250,9 @@ def _stop(workers: dict[str, Any]) -> None:
     """Stops waiting for the planners of all factories."""
     for factory in workers.values():
         factory.stop()
+
+
+def _name(scene: Any) -> str:
+    """Returns the name of an experiment on a scene: that of its file, if it is a folder's name."""
+    stem = Path(scene).stem if isinstance(scene, (str, os.PathLike)) else ""
+    return stem if re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}", stem) else "experiment"

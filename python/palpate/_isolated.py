@@ -11,9 +11,10 @@ import threading
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-from ._planners import Factory, make, source_of, target_of, format_exception
+from ._planners import Factory, format_exception, make, source, target_of
 from .errors import PlannerError
 
 #: Minimum time limit for a process to start and create a planner, seconds.
@@ -26,12 +27,20 @@ class ProcessPlannerFactory:
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
         self.factory = factory
-        self.source = source_of(factory)
+        self.source = source(factory)
         self.limit_s = limit_s
         self._lock = threading.Lock()
         self._idle: list[PlannerProcess] = []
         self._all: list[PlannerProcess] = []
         self.is_stopped = False
+        try:
+            ForkingPickler.dumps(factory)
+        except Exception as error:
+            planner = getattr(factory, "planner", factory)
+            raise PlannerError(
+                f"{planner!r} cannot be sent to its own process (isolate=True): {type(error).__name__}: {error}; "
+                "pass a class or a function of a module, or a partial of one"
+            ) from error
 
     def __call__(self, zone: Any, seed: int) -> ProcessPlanner:
         return ProcessPlanner(self, zone, seed)

@@ -6,6 +6,9 @@ from typing import Any, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import Unpack
+
+from ._settings import SceneSettings
 
 __version__: str
 COMMIT: str
@@ -63,6 +66,8 @@ class Zone:
         """Places on an even grid, shape (per_side ** d, d), metres."""
     def to_world(self, places: npt.ArrayLike, heights_m: npt.ArrayLike) -> _Array:
         """Points (..., 3) in the world frame of places (..., d) and heights (...) above the datum, metres."""
+    def __copy__(self) -> Zone: ...
+    def __deepcopy__(self, _memo: Any) -> Zone: ...
 
 @final
 class Ball:
@@ -94,6 +99,8 @@ class Ball:
             outward: vector of any length in the world frame, from the point towards the finger.
             at: point in the world frame, shape (3,), metres.
         """
+    def __copy__(self) -> Ball: ...
+    def __deepcopy__(self, _memo: Any) -> Ball: ...
 
 @final
 class Belief:
@@ -164,6 +171,8 @@ class Belief:
             Vertices (n, 3), metres; triangles (m, 3), counter-clockwise from outside; and the standard deviation of the
             surface along the normal at each vertex, shape (n,), metres.
         """
+    def __copy__(self) -> Belief: ...
+    def __deepcopy__(self, _memo: Any) -> Belief: ...
 
 @final
 class Touch:
@@ -191,11 +200,27 @@ class Touch:
     @property
     def time_s(self) -> float | None:
         """Simulator or robot time since its start, seconds; None without motion."""
+    def __copy__(self) -> Touch: ...
+    def __deepcopy__(self, _memo: Any) -> Touch: ...
 
 @final
 class Scene:
-    """An object in its zone, or a whole object, with the finger that touches it; from a scene's file or a mesh."""
+    """An object in its zone, or a whole object, with the finger that touches it.
 
+        palpate.Scene(object={"mesh": "part.stl", "unit": "mm"}, zone={"x_m": [-0.03, 0.03], "z_m": [0.45, 0.5]})
+
+    The keyword arguments are the settings of a scene; a table is a mapping, paths are relative to the working folder,
+    and `simulator` is "swept" by default.
+
+    A copy or an unpickled scene is built again from its settings (from the file of its mesh, unless it is from
+    arrays): its robot starts anew, as after the first `load`, with the same seed.
+
+    Raises:
+        ConfigError: if a setting is missing or invalid; with key, value and allowed values.
+        SimulationError: if the scene cannot be built.
+    """
+
+    def __new__(cls, *, seed: int = 0, **settings: Unpack[SceneSettings]) -> Scene: ...
     @staticmethod
     def load(path: str | os.PathLike[str], *, seed: int = 0, **settings: Any) -> Scene:
         """Loads a scene's file, or a scene of the package by its name (`"bird"`).
@@ -236,15 +261,15 @@ class Scene:
     def of_mesh(*arguments: Any, **settings: Any) -> Scene:
         """Former name of `from_mesh`, with `body` in place of `simulator`."""
     @staticmethod
-    def _load(path: str, sets: Sequence[str], seed: int) -> Scene: ...
-    @staticmethod
-    def _from_mesh(
-        path: str,
+    def _load(
+        path: str | None,
         sets: Sequence[str],
         seed: int,
-        vertices: _Array,
-        triangles: npt.NDArray[np.int64],
+        mesh: tuple[_Array, npt.NDArray[np.int64]] | None = None,
     ) -> Scene: ...
+    def _value(self) -> str: ...
+    def to_toml(self) -> str:
+        """Returns all settings, including defaults, as TOML."""
     @property
     def zone(self) -> Zone:
         """Explored zone of one side; AttributeError around an object."""
@@ -350,7 +375,8 @@ class ParallelExplorations:
 @final
 class Experiment:
     @staticmethod
-    def load(path: str, sets: Sequence[str]) -> Experiment: ...
+    def load(path: str | None, sets: Sequence[str], home: str) -> Experiment: ...
+    def with_settings(self, sets: Sequence[str]) -> Experiment: ...
     @property
     def name(self) -> str: ...
     @property
@@ -380,6 +406,8 @@ class Experiment:
         how: tuple[str, str | None, float, int, bool],
         callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
     ) -> dict[str, Any] | None: ...
+    def __copy__(self) -> Experiment: ...
+    def __deepcopy__(self, _memo: Any) -> Experiment: ...
 
 @final
 class JobRunner:
@@ -428,7 +456,12 @@ class Run:
     def trials(self) -> dict[str, object]: ...
     def touches(self) -> dict[str, object]: ...
     def summary(self) -> dict[str, object]: ...
+    def compare(self) -> dict[str, Any]: ...
+    def curves(self, measure: str | None = None) -> dict[str, Any]: ...
+    def html(self) -> str: ...
     def belief(self, trial: int, planner: str, touch: int) -> Belief: ...
+    def __copy__(self) -> Run: ...
+    def __deepcopy__(self, _memo: Any) -> Run: ...
 
 def read_mesh(
     path: str, metres_per_unit: float = 1.0

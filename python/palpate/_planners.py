@@ -1,4 +1,4 @@
-"""Python planners: lookup by name, time limit, and isolation from the run.
+"""Python planners: names, source code, time limit, and isolation from the run.
 
 A planner runs on its own thread, one per trial, which is abandoned if it exceeds the time limit; or, isolated, in its
 own process, which can be killed (`_isolated`).
@@ -6,48 +6,167 @@ own process, which can be killed (`_isolated`).
 
 from __future__ import annotations
 
-import ast
+import copy
 import ctypes
 import importlib
-import importlib.util
 import inspect
 import os
+import re
 import sys
 import threading
 import traceback
-import uuid
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from . import _palpate
+from ._source import source_of
 from .errors import PlannerError
 
 #: Default time limit for a target, seconds.
 # heuristic: far longer than the built-in planners need.
 LIMIT_S = 60.0
 
-#: Factory of a planner: its class, or any callable with a module and a name.
+#: Factory of a planner: its class, or a function that returns it.
 Factory = Callable[..., Any]
 
+#: Form of a planner's name, as the program allows it.
+NAME = re.compile(r"[\w.<>-]+:[\w.<>-]+(\([^\x00-\x1f\x7f-\x9f]*\))?")
 
-def name_of(factory: Factory) -> str:
-    """Returns `MODULE:NAME`, the name in tables and rows.
+#: Largest length of an argument, and of a planner's `repr`, in a name.
+# heuristic: names are column heads.
+_ARGUMENT_MAX = 30
+_REPR_MAX = 80
+
+
+class InstanceFactory:
+    """Factory of copies of a planner, one for each trial."""
+
+    def __init__(self, planner: Any) -> None:
+        self.planner = _copied(planner)
+
+    def __call__(self) -> Any:
+        return copy.deepcopy(self.planner)
+
+
+def _copied(planner: Any) -> Any:
+    """Returns a copy of an instance or a partial, as each trial gets one.
 
     Raises:
-        PlannerError: if it has no name, as a partial or an object.
+        PlannerError: if it cannot be copied.
     """
-    module = getattr(factory, "__module__", None)
-    name = getattr(factory, "__qualname__", None)
-    if not callable(factory) or module is None or name is None:
-        meant = f"; pass the class {type(factory).__name__}, not an object of it" if _plans(factory) else ""
+    try:
+        return copy.deepcopy(planner)
+    except Exception as error:
         raise PlannerError(
-            f"{factory!r} is not a planner: allowed are names, classes with plan(belief), and functions "
-            f"that return an object with plan(belief){meant}"
+            f"{planner!r} cannot be copied for each trial: {type(error).__name__}: {error}; pass a class, or a "
+            "function that returns the planner"
+        ) from error
+
+
+def source(factory: Factory) -> str:
+    """Returns the source of a factory's planner; see `source_of`."""
+    return source_of(factory.planner if isinstance(factory, InstanceFactory) else factory)
+
+
+def named(
+    planners: Sequence[Any] | Mapping[str, Any], known: Mapping[str, Factory], is_run: bool = True
+) -> tuple[list[str], dict[str, Factory]]:
+    """Returns the names of planners, and the factories of those that are not built in.
+
+    Args:
+        planners: names, classes, functions, partials, instances, and pairs of a name and one of these.
+        known: factories of names that need no import.
+        is_run: whether planners that are only named are imported.
+
+    Raises:
+        TypeError: if it is not a list or a mapping.
+        PlannerError: if one is not a planner, or two have the same name.
+    """
+    if isinstance(planners, (str, type)) or not isinstance(planners, (Sequence, Mapping)):
+        raise TypeError(f"planners = {planners!r}: allowed is a list, [{planners!r}]")
+    names: list[str] = []
+    own: dict[str, Factory] = {}
+    for planner in planners.items() if isinstance(planners, Mapping) else planners:
+        name, factory = _named(planner, known, is_run)
+        if factory is not None and name in own:
+            raise PlannerError(f'two planners have the name {name}: give each a name, ("NAME", planner)')
+        if factory is not None:
+            own[name] = factory
+        names.append(name)
+    return names, own
+
+
+def _named(planner: Any, known: Mapping[str, Factory], is_run: bool) -> tuple[str, Factory | None]:
+    given = None
+    if isinstance(planner, tuple):
+        if len(planner) != 2 or not isinstance(planner[0], str):
+            raise PlannerError(f'{planner!r} is not a planner: allowed is a pair ("NAME", planner)')
+        given, planner = planner
+    if isinstance(planner, str) and given is None and not is_run:
+        return planner, None
+    if isinstance(planner, str) and ":" not in planner:
+        if given is not None and given != planner:
+            raise PlannerError(f"planner {given!r}: the built-in planner {planner} keeps its name")
+        return planner, None
+    name = planner if isinstance(planner, str) else name_of(planner)
+    if isinstance(planner, str):
+        planner = known[planner] if planner in known else by_name(planner)
+    if given is not None:
+        name = given if ":" in given else f"{name.partition(':')[0]}:{given}"
+    if not NAME.fullmatch(name):
+        raise PlannerError(f"planner name {given or name!r}: allowed are letters, digits and _ . < > -")
+    _check_class(name, planner)
+    if isinstance(planner, partial):
+        planner = _copied(planner)
+    return name, InstanceFactory(planner) if _is_instance(planner) else planner
+
+
+def _check_class(name: str, factory: Any) -> None:
+    """Raises PlannerError if a class, or that of a partial, has no method plan."""
+    kind = factory.func if isinstance(factory, partial) else factory
+    if isinstance(kind, type) and not _plans(kind):
+        raise PlannerError(f"planner {name}: the class {kind.__qualname__} has no method plan(belief)")
+
+
+def name_of(planner: Any) -> str:
+    """Returns `MODULE:NAME`, the name in tables and rows; with the arguments of a partial, and those that a planner's
+    own `repr` shows.
+
+    Raises:
+        PlannerError: if it is not a planner.
+    """
+    if isinstance(planner, partial):
+        shown = [_shown(value) for value in planner.args]
+        shown += [f"{name}={_shown(value)}" for name, value in planner.keywords.items()]
+        return f"{name_of(planner.func)}({', '.join(shown)})"
+    kind = type(planner) if _is_instance(planner) else planner
+    module = getattr(kind, "__module__", None)
+    name = getattr(kind, "__qualname__", None)
+    if not callable(kind) or module is None or name is None:
+        raise PlannerError(
+            f"{planner!r} is not a planner: allowed are names, objects with plan(belief), their classes, functions "
+            'that return them, and pairs ("NAME", planner)'
         )
+    if _is_instance(planner):
+        text = repr(planner)
+        is_name = len(text) <= _REPR_MAX and " at 0x" not in text and NAME.fullmatch(f"{module}:{text}")
+        if is_name and text.startswith(f"{name}("):
+            name = text
     return f"{module}:{name.replace('.<locals>', '')}"
+
+
+def _shown(value: Any) -> str:
+    """Returns an argument for a name: its value if it is short, else its type."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, (bool, int, float, complex, str, bytes, tuple, list, type(None))):
+        text = repr(value)
+        if len(text) <= _ARGUMENT_MAX and " at 0x" not in text:
+            return text
+    return str(getattr(value, "__qualname__", type(value).__name__)).replace(".<locals>", "")
 
 
 def by_name(name: str) -> Factory:
@@ -57,6 +176,8 @@ def by_name(name: str) -> Factory:
         PlannerError: if there is no such planner.
     """
     module_name, _, path = name.partition(":")
+    if "(" in path:
+        raise PlannerError(f"planner {name} cannot be imported by its name: pass the object to Experiment.run")
     if "" not in sys.path and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     try:
@@ -65,93 +186,38 @@ def by_name(name: str) -> Factory:
             found = getattr(found, part)
     except Exception as error:
         raise PlannerError(f"planner {name}: {type(error).__name__}: {error}") from error
-    if not callable(found):
+    if not callable(found) and not _plans(found):
         raise PlannerError(f"planner {name}: {found!r} is not a class")
-    factory: Factory = found
+    _check_class(name, found)
+    factory: Factory = InstanceFactory(found) if _is_instance(found) else found
     return factory
-
-
-def source_of(factory: Factory) -> str:
-    """Returns the source code that decides a planner's plans, so that a run detects an edited planner.
-
-    It consists of the planner's module and of the modules in its folder that it imports, directly or indirectly;
-    installed packages do not count. For a planner of a script or notebook (`__main__`) it is the planner's definition
-    and those of its bases there. A planner without source code is unique each time.
-    """
-    module = sys.modules.get(factory.__module__)
-    if module is None or module.__name__ == "__main__" or not getattr(module, "__file__", None):
-        known = [it for it in getattr(factory, "__mro__", (factory,)) if it.__module__ == factory.__module__]
-        try:
-            return "".join(inspect.getsource(it) for it in known)
-        except (OSError, TypeError):
-            return f"unknown {uuid.uuid4()}"
-    folder = Path(str(module.__file__)).parent
-    sources: dict[str, str] = {}
-    waiting = [(module.__name__, Path(str(module.__file__)))]
-    while waiting:
-        module_name, file = waiting.pop()
-        name = file.relative_to(folder).as_posix()
-        if name in sources:
-            continue
-        sources[name] = file.read_bytes().decode(errors="replace")
-        for used in _imported(module_name, sources[name]):
-            origin = _file_of(used)
-            if origin is not None and origin.is_relative_to(folder) and not _is_installed(origin):
-                waiting.append((used, origin))
-    return "\n".join(f"# {name}\n{sources[name]}" for name in sorted(sources))
-
-
-def _imported(module: str, text: str) -> list[str]:
-    """Returns the full names of the modules that a module's source may import."""
-    found = []
-    try:
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError):
-        return []
-    known = sys.modules.get(module)
-    package = getattr(known, "__package__", None) or ""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            parents = package.split(".")[: -(node.level - 1) or None] if node.level else []
-            base = ".".join([*parents, *([node.module] if node.module else [])])
-            found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
-    return [name for name in found if name]
-
-
-def _file_of(module: str) -> Path | None:
-    """Returns the path of a module's source; None if there is none."""
-    try:
-        known = sys.modules.get(module)
-        origin = known.__file__ if known is not None else importlib.util.find_spec(module).origin  # type: ignore[union-attr]
-    except (ImportError, AttributeError, ValueError):
-        return None
-    file = Path(origin) if origin else None
-    return file if file is not None and file.suffix == ".py" and file.is_file() else None
-
-
-def _is_installed(file: Path) -> bool:
-    return "site-packages" in file.parts or "dist-packages" in file.parts
 
 
 def _plans(planner: Any) -> bool:
     return callable(getattr(planner, "plan", None))
 
 
+def _is_instance(planner: Any) -> bool:
+    return _plans(planner) and not isinstance(planner, type)
+
+
 def make(factory: Factory, zone: Any, seed: int) -> Any:
     """Creates a planner for one trial with the parameters of its constructor: `zone` (not around an object), `rng`
-    and `seed`."""
+    and `seed`. Arguments of a partial are copied, so that trials share no state."""
+    if isinstance(factory, partial):
+        factory = copy.deepcopy(factory)
     offered = {"zone": zone, "rng": np.random.default_rng(seed), "seed": seed}
+    for bound in factory.keywords if isinstance(factory, partial) else ():
+        offered.pop(bound, None)
     try:
         parameters = inspect.signature(factory).parameters
     except ValueError:
         parameters = {}  # type: ignore[assignment]
-    wanted = parameters.get("zone")
+    wanted = parameters.get("zone") if "zone" in offered else None
     if zone is None and wanted is not None and wanted.default is inspect.Parameter.empty:
         raise PlannerError(f"{factory!r} has a parameter zone, but a whole object has none: use belief.ball")
     if zone is None:
-        del offered["zone"]
+        offered.pop("zone", None)
     planner = factory(**{name: value for name, value in offered.items() if name in parameters})
     if not _plans(planner):
         raise PlannerError(f"{planner!r} has no method plan(belief)")
@@ -159,15 +225,22 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
 
 
 def target_of(planned: Any) -> list[float]:
-    """Returns a planner's result as a list of numbers."""
-    return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
+    """Returns a planner's result as a list of numbers.
+
+    Raises:
+        PlannerError: if it is something else.
+    """
+    try:
+        return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
+    except (TypeError, ValueError) as error:
+        raise PlannerError(f"the planner returned {planned!r}, which is not a target: {error}") from None
 
 
 def format_exception(error: BaseException) -> str:
-    """Returns an exception with its traceback, without the lines of this package."""
+    """Returns the message about an exception of a planner, with its traceback in the planner's code."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if os.path.dirname(frame.filename) != os.path.dirname(__file__)]
-    head = "".join(traceback.format_exception_only(error)).strip()
+    head = "planner raised " + "".join(traceback.format_exception_only(error)).strip()
     if not own:
         return head
     return f"{head}\n" + "".join(traceback.format_list(own)).rstrip()
@@ -177,7 +250,7 @@ class ThreadPlannerFactory:
     """Planners of one name in a run, started by the extension."""
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
-        self.source = source_of(factory)
+        self.source = source(factory)
         self._factory = factory
         self._limit_s = limit_s
         self._live: set[ThreadPlanner] = set()

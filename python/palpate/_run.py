@@ -1,20 +1,62 @@
-"""Results of an experiment as data frames."""
+"""Results of an experiment as data frames and figures."""
 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _palpate
+from . import _palpate, colours
 from ._palpate import Ball, Belief, Zone
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
-__all__ = ["Run"]
+__all__ = ["Comparison", "Run"]
+
+
+class Comparison:
+    """Comparison of the planners of a run with its baselines, with the numbers of the report.
+
+    Attributes:
+        conclusion: sentence that `palpate run` prints about the planner with the smallest error; None if the planners
+            cannot be compared.
+        verdicts: sentences of the report's verdict.
+        best: the better of that planner and the first baseline; None if no difference is established.
+        measure: name of the error that decides.
+    """
+
+    def __init__(self, found: dict[str, Any]) -> None:
+        self.conclusion: str | None = found["conclusion"]
+        self.verdicts: list[str] = found["verdicts"]
+        self.best: str | None = found["best"]
+        self.measure: str = found["measure"]
+        self._table = found["table"]
+        self._equal_error = found["equal_error"]
+
+    def table(self) -> pd.DataFrame:
+        """Returns a row per planner, baseline and measure, after the last touch.
+
+        `difference` is the mean of the planner's value minus the baseline's in the same trial, with the ends of its
+        95 % interval; `won` is the fraction of the trials in which the planner is better; `verdict` is "better" or
+        "worse" if the interval excludes 0.
+        """
+        return _frame(self._table)
+
+    def equal_error(self) -> pd.DataFrame:
+        """Returns a row per planner, baseline and error: touches to the baseline's final error, with 95 % intervals.
+
+        `ratio` is that of the planner's touches to the baseline's; an error that is not reached takes infinity.
+        """
+        return _frame(self._equal_error)
+
+    def __repr__(self) -> str:
+        sentences = [*self.verdicts, self.conclusion or "The planners cannot be compared."]
+        return "\n".join(dict.fromkeys(sentences))
 
 
 class Run:
@@ -66,6 +108,45 @@ class Run:
     def summary(self) -> pd.DataFrame:
         """Returns a row per planner and number of touches: the columns of `summary.csv`."""
         return _frame(self._core.summary())
+
+    def compare(self) -> Comparison:
+        """Compares the planners with the baselines: which is better, by how much, and how sure that is."""
+        return Comparison(self._core.compare())
+
+    def plot(self, measure: str | None = None, *, ax: Axes | None = None) -> Axes:
+        """Draws a measure over touches, a line per planner, as in the report; needs matplotlib.
+
+        The line is the median with its 95 % interval, or the mean of a measure without a median with one standard
+        error on each side.
+
+        Args:
+            measure: a measure of `touches()`; default: the error, "rmse_m" over a zone, "chamfer_m" around an object.
+            ax: axes to draw in; default: those of a new figure.
+
+        Raises:
+            ImportError: if matplotlib is not installed.
+            ValueError: if there is no such measure.
+        """
+        found = self._core.curves(measure)
+        if ax is None:
+            try:
+                from matplotlib import pyplot
+            except ImportError as error:
+                raise ImportError("Run.plot needs the package matplotlib: pip install matplotlib") from error
+            style: Any = colours.style()
+            with pyplot.rc_context(style):
+                ax = pyplot.subplots(layout="constrained")[1]
+        scale = found["per_si"]
+        for planner, (touches, values, low, high) in found["planners"].items():
+            colour = colours.planner(planner, self.planners)
+            ax.plot(touches, scale * values, color=colour, label=planner)
+            ax.fill_between(touches, scale * low, scale * high, color=colour, alpha=colours.BAND_OPACITY, linewidth=0)
+        if found["is_log"]:
+            ax.set_yscale("log")
+        unit = f" ({found['unit']})" if found["unit"] else ""
+        ax.set(xlabel="touches", ylabel=f"{found['statistic']} {found['title']}{unit}")
+        ax.legend()
+        return ax
 
     def belief(self, trial: int, planner: str, touch: int) -> Belief:
         """Returns the belief of a trial after `touch` touches.
@@ -120,6 +201,10 @@ class Run:
 
     def __str__(self) -> str:
         return str(self._core)
+
+    def _repr_html_(self) -> str:
+        conclusion = self._core.compare()["conclusion"] or ""
+        return f"<p><b>{escape(self.name)}</b></p>\n{self._core.html()}<p>{escape(conclusion)}</p>"
 
     def __repr__(self) -> str:
         return f"Run({self.name}: {', '.join(self.planners)})"

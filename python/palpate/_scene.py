@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ import numpy.typing as npt
 
 from . import _palpate
 from ._home import find_file
-from ._settings import assignments, toml
+from ._settings import assignments
 
 __all__ = ["read_mesh", "write_mesh"]
 
@@ -44,18 +42,11 @@ def from_mesh(
     **settings: Any,
 ) -> _palpate.Scene:
     """Implements `Scene.from_mesh`."""
-    zone = toml({"x_m": x_m, "z_m": z_m})
-    text = f'simulator = {toml(simulator)}\nzone = {zone}\nobject = {{ mesh = "mesh" }}\n'
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "scene.toml"
-        file.write_text(text)
-        return _palpate.Scene._from_mesh(
-            os.fspath(file),
-            assignments(settings),
-            seed,
-            np.ascontiguousarray(vertices_m, dtype=np.float64),
-            np.ascontiguousarray(triangles, dtype=np.int64),
-        )
+    zone = {"x_m": x_m, "z_m": z_m}
+    parts = {"simulator": simulator, "zone": zone, "object": {"mesh": "mesh"}, **settings}
+    # Copies, which later changes of the caller's arrays do not affect.
+    mesh = (np.array(vertices_m, dtype=np.float64, order="C"), np.array(triangles, dtype=np.int64, order="C"))
+    return _palpate.Scene._load(None, assignments(parts), seed, mesh)
 
 
 def read_mesh(

@@ -1,4 +1,4 @@
-"""Conversion of Python settings to the form of `--set`."""
+"""Settings in Python: their names, and their conversion to the form of `--set`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,50 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict
+
+from . import _palpate
+
+#: File or name of a file.
+_File = str | os.PathLike[str]
+#: Table of settings.
+_Table = Mapping[str, Any]
+
+
+class ExperimentSettings(TypedDict, total=False):
+    """Settings of an experiment; `docs/reference.md` describes them and the keys of the tables."""
+
+    name: str
+    question: str
+    scene: _File | _Table | _palpate.Scene
+    planners: Sequence[Any] | Mapping[str, Any]
+    trials: int
+    seed: int
+    touches: int
+    initial_touches: int
+    verification_touches: int
+    repeat_touches: int
+    grid: int
+    gp: _File | _Table
+    planning: _Table
+    report: _Table
+    backend: _File | _Table
+    truth: _Table
+
+
+class SceneSettings(TypedDict, total=False):
+    """Settings of a scene; `docs/reference.md` describes them and the keys of the tables."""
+
+    simulator: str
+    object: _Table
+    function: str
+    zone: _Table
+    whole_object: _Table
+    finger: _Table
+    arm: _Table
+    effects: _Table
+    solver: _Table
+    touch: _Table
 
 
 def assignments(settings: Mapping[str, Any]) -> list[str]:
@@ -30,6 +73,8 @@ def toml(value: Any) -> str:
         if math.isnan(value):
             return "nan"
         return repr(value) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
+    if isinstance(value, _palpate.Scene):
+        return value._value()
     if isinstance(value, (str, os.PathLike)):
         return json.dumps(os.fspath(value), ensure_ascii=False)
     if isinstance(value, Mapping):

@@ -1,5 +1,6 @@
 //! Exploration region of a whole object: a ball around it.
 
+use crate::pickle::{self, Reduced, Version};
 use nalgebra::Vector3;
 use numpy::PyArray1;
 use palpate::task::{self, Aim, Region, Target};
@@ -62,10 +63,28 @@ impl Ball {
         Ok(PyArray1::from_vec(py, Target::from(Aim::against(p_w, &outward_w)).numbers()))
     }
 
-    /// Supports pickling.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, BallArguments) {
+    #[staticmethod]
+    fn _restore(
+        version: Version,
+        centre_m: [f64; 3],
+        radius_m: f64,
+        lowest_m: Option<f64>,
+    ) -> PyResult<Self> {
+        pickle::check(&version, "Ball")?;
+        Ok(Self::new(centre_m, radius_m, lowest_m))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, BallState>> {
         let task::Ball { centre_w, radius_m, lowest_m } = slf.get().0;
-        (slf.get_type().into_any(), (centre_w.into(), radius_m, lowest_m))
+        pickle::reduced(slf, (pickle::version(), centre_w.into(), radius_m, lowest_m))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     fn __repr__(&self) -> String {
@@ -74,5 +93,5 @@ impl Ball {
     }
 }
 
-/// Constructor arguments of a ball.
-type BallArguments = ([f64; 3], f64, Option<f64>);
+/// Version, centre, radius and lowest z of a ball.
+type BallState = (Version, [f64; 3], f64, Option<f64>);

@@ -4,6 +4,7 @@ use crate::ball::Ball;
 use crate::errors;
 use crate::known::{Known, target_numbers};
 use crate::mesh::triangles_of;
+use crate::pickle::{self, Reduced, Version};
 use crate::places::{Places, rows, seen_at};
 use crate::zone::Zone;
 use nalgebra::Point3;
@@ -242,6 +243,25 @@ impl Belief {
         });
         let (vertices, triangles) = triangles_of(py, &vertices, &triangles)?;
         Ok((vertices, triangles, PyArray1::from_vec(py, sds_m)))
+    }
+
+    #[staticmethod]
+    fn _restore(py: Python<'_>, version: Version, json: &str) -> PyResult<Self> {
+        pickle::check(&version, "Belief")?;
+        py.detach(|| Known::from_json(json)).map(Self).map_err(errors::other)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, (Version, String)>> {
+        let json = slf.get().0.to_json().map_err(errors::other)?;
+        pickle::reduced(slf, (pickle::version(), json))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     fn __repr__(&self) -> String {

@@ -2,11 +2,16 @@
 
 use crate::fork;
 use numpy::PyArray1;
-use palpate::experiment::measure::measures_with_columns;
-use palpate::experiment::statistics::curve_table::{columns, curve_table};
+use palpate::experiment::measure::{Measure, PanelAxis, measures_with_columns};
+use palpate::experiment::statistics::comparison::PairedComparison;
+use palpate::experiment::statistics::curve_table::{columns, curve_table, uncertainty};
+use palpate::experiment::statistics::equal_error::{EqualError, IntervalEstimate};
+use palpate::experiment::statistics::summary::{self, CurvePoint};
 use palpate::experiment::store::Run;
 use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::explore::planner::Fallback;
+use palpate::report::findings;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -96,6 +101,100 @@ pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
         numbers(&table, column, records.iter().map(|(_, values)| values[i]))?;
     }
     Ok(table)
+}
+
+/// Returns the columns of a table with a row per planner, baseline and measure, as in
+/// `comparison.csv`, with the verdict.
+pub(crate) fn comparisons<'py>(
+    py: Python<'py>,
+    found: &[PairedComparison],
+) -> PyResult<Bound<'py, PyDict>> {
+    let table = PyDict::new(py);
+    let paired = || found.iter().map(|it| &it.paired);
+    let end = |i: usize| paired().map(move |it| Some(it.interval?[i]));
+    words(&table, "planner", found.iter().map(|it| Some(it.planner)))?;
+    words(&table, "baseline", found.iter().map(|it| Some(it.baseline)))?;
+    words(&table, "measure", found.iter().map(|it| Some(it.measure.id)))?;
+    counts(&table, "trials", paired().map(|it| it.trials))?;
+    numbers(&table, "difference", paired().map(|it| Some(it.mean)))?;
+    numbers(&table, "difference_low", end(0))?;
+    numbers(&table, "difference_high", end(1))?;
+    numbers(&table, "won", paired().map(|it| Some(it.won)))?;
+    words(&table, "verdict", found.iter().map(findings::established))?;
+    Ok(table)
+}
+
+/// Returns the columns of a table with a row per planner, baseline and error, as in
+/// `equal_error.csv`; infinity if the error is not reached.
+pub(crate) fn equal_errors<'py>(
+    py: Python<'py>,
+    found: &[EqualError],
+) -> PyResult<Bound<'py, PyDict>> {
+    let table = PyDict::new(py);
+    words(&table, "planner", found.iter().map(|it| Some(it.planner)))?;
+    words(&table, "baseline", found.iter().map(|it| Some(it.baseline)))?;
+    words(&table, "measure", found.iter().map(|it| Some(it.measure.id)))?;
+    counts(&table, "trials", found.iter().map(|it| it.trials))?;
+    numbers(&table, "goal", found.iter().map(|it| Some(it.goal)))?;
+    numbers(&table, "baseline_touches", found.iter().map(|it| Some(it.baseline_touches)))?;
+    let estimates: [(&str, for<'a> fn(&'a EqualError<'a>) -> &'a IntervalEstimate); 3] = [
+        ("touches", |it| &it.touches),
+        ("ratio", |it| &it.ratio),
+        ("path_ratio", |it| &it.path_ratio),
+    ];
+    for (name, of) in estimates {
+        let end = |i: usize| found.iter().map(move |it| Some(of(it).interval?[i]));
+        numbers(&table, name, found.iter().map(|it| Some(of(it).value)))?;
+        numbers(&table, &format!("{name}_low"), end(0))?;
+        numbers(&table, &format!("{name}_high"), end(1))?;
+    }
+    Ok(table)
+}
+
+/// Returns the curves of a measure, by default of the error, as in the report's figure: its title,
+/// display unit, scale and statistic; and for each planner touches, values and both ends of bands.
+pub(crate) fn curves<'py>(
+    py: Python<'py>,
+    run: &Run,
+    id: Option<&str>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let id = id.unwrap_or(run.experiment.error_measure().id);
+    let mut measures = measures_with_columns(&run.rows);
+    let Some(measure) = measures.find(|measure| measure.id == id) else {
+        let names = measures_with_columns(&run.rows).map(|measure| measure.id);
+        let names = names.collect::<Vec<_>>().join(", ");
+        return Err(PyValueError::new_err(format!("measure = {id:?}: allowed are {names}")));
+    };
+    let has_median = measure.aggregate.has_median();
+    let found = PyDict::new(py);
+    found.set_item("title", measure.title)?;
+    found.set_item("unit", measure.unit.symbol)?;
+    found.set_item("per_si", measure.unit.per_si)?;
+    let is_log = matches!(measure.scale, PanelAxis::Log | PanelAxis::LogBeside(_));
+    found.set_item("is_log", is_log)?;
+    found.set_item("statistic", if has_median { "median" } else { "mean" })?;
+    let planners = PyDict::new(py);
+    for planner in &run.experiment.planners {
+        let points = py.detach(|| curve(run, planner, measure));
+        let column = |i: usize| PyArray1::from_iter(py, points.iter().map(move |point| point[i]));
+        planners.set_item(planner, [0, 1, 2, 3].map(column))?;
+    }
+    found.set_item("planners", planners)?;
+    Ok(found)
+}
+
+/// Returns touches, value and both ends of the band at each point of a planner's curve.
+fn curve(run: &Run, planner: &str, measure: &Measure) -> Vec<[f64; 4]> {
+    let reading = |point: &CurvePoint| {
+        let summary = point.of(measure)?;
+        let has_median = measure.aggregate.has_median();
+        let value = if has_median { summary.median } else { summary.mean };
+        let band = uncertainty(&run.experiment, &run.rows, point, measure);
+        let [low, high] = band.unwrap_or([f64::NAN; 2]);
+        Some([point.touches.into(), value, low, high])
+    };
+    let points = summary::curve(&run.experiment, &run.rows, planner);
+    points.iter().filter_map(reading).collect()
 }
 
 fn outcome(touch: &TouchRow) -> &'static str {

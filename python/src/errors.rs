@@ -22,6 +22,9 @@ fn exception(class: &str, message: &str, fields: &[(&str, Option<String>)]) -> P
     })
 }
 
+/// Stands for the file of settings that are not from a file.
+pub(crate) const SETTINGS: &str = "settings";
+
 fn shown(path: &Path) -> Option<String> {
     Some(path.display().to_string())
 }
@@ -29,14 +32,17 @@ fn shown(path: &Path) -> Option<String> {
 /// Converts a settings error; attributes are file, line, key, value and the allowed values.
 pub(crate) fn config(error: ConfigError) -> PyErr {
     let message = error.to_string();
+    // Python has keyword arguments in place of `--set`.
+    let message = message.strip_prefix("--set ").unwrap_or(&message);
     let (file, line) = match error.origin.as_deref() {
+        Some(Origin::File { path, .. }) if *path == Path::new(SETTINGS) => (None, None),
         Some(Origin::File { path, line }) => (shown(path), line.map(|line| line.to_string())),
         _ => (None, None),
     };
     let ConfigError { key, value, allowed, .. } = error;
     let fields =
         [("file", file), ("line", line), ("key", key), ("value", value), ("allowed", allowed)];
-    exception("ConfigError", &message, &fields)
+    exception("ConfigError", message, &fields)
 }
 
 /// Converts an error of a scene that cannot be built or simulated.

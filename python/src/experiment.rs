@@ -2,10 +2,12 @@
 
 use crate::errors;
 use crate::fork;
+use crate::pickle::{self, Reduced, Version};
 use crate::planner::PythonFactory;
 use crate::program::COMMIT;
 use crate::run::Run;
 use crate::zone::Zone;
+use palpate::config::Loader;
 use palpate::experiment::runner::{self, Progress};
 use palpate::experiment::store::{self, RunFolder, resolved, write_whole};
 use palpate::experiment::{self, Simulation};
@@ -30,9 +32,43 @@ pub(crate) struct Experiment(pub(crate) experiment::Experiment);
 
 #[pymethods]
 impl Experiment {
+    /// Loads an experiment from its file, or from assignments alone; `home` is the folder of the
+    /// shipped files.
     #[staticmethod]
-    fn load(path: PathBuf, sets: Vec<String>) -> PyResult<Self> {
-        experiment::Experiment::load(&path, &sets).map(Self).map_err(errors::config)
+    fn load(path: Option<PathBuf>, sets: Vec<String>, home: PathBuf) -> PyResult<Self> {
+        let loader = match &path {
+            Some(path) => Loader::read(path),
+            None => Loader::from_text(errors::SETTINGS.as_ref(), String::new()),
+        };
+        let loader = loader.map_err(errors::config)?.with_home(&home);
+        experiment::Experiment::from_loader(loader, &sets).map(Self).map_err(errors::config)
+    }
+
+    /// Returns the experiment after more assignments.
+    fn with_settings(&self, sets: Vec<String>) -> PyResult<Self> {
+        parsed(resolved(&self.0), &sets, self.former_names()).map(Self)
+    }
+
+    #[staticmethod]
+    fn _restore(version: Version, toml: String, former: FormerNames) -> PyResult<Self> {
+        pickle::check(&version, "Experiment")?;
+        parsed(toml, &[], former).map(Self)
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<Reduced<'py, (Version, String, FormerNames)>> {
+        let Self(experiment) = slf.get();
+        let former = slf.get().former_names();
+        pickle::reduced(slf, (pickle::version(), resolved(experiment), former))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     #[getter]
@@ -150,7 +186,31 @@ impl Experiment {
     }
 }
 
+/// Former names of settings and legacy keys of a scene, of which its notices warn.
+pub(crate) type FormerNames = (Vec<String>, Vec<String>);
+
+/// Reads an experiment from the text of all its settings, after assignments.
+///
+/// # Errors
+/// `ConfigError`.
+pub(crate) fn parsed(
+    toml: String,
+    sets: &[String],
+    former: FormerNames,
+) -> PyResult<experiment::Experiment> {
+    let text = Loader::from_text(errors::SETTINGS.as_ref(), toml);
+    let read = text.and_then(|loader| experiment::Experiment::from_loader(loader, sets));
+    let mut experiment = read.map_err(errors::config)?;
+    (experiment.scene.former_names, experiment.scene.effects.legacy_keys) = former;
+    Ok(experiment)
+}
+
 impl Experiment {
+    fn former_names(&self) -> FormerNames {
+        let scene = &self.0.scene;
+        (scene.former_names.clone(), scene.effects.legacy_keys.clone())
+    }
+
     /// Builds the simulation, with the Python planners `own`.
     pub(crate) fn simulation(
         &self,

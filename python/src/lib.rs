@@ -17,6 +17,7 @@ mod fork;
 mod gaussian_process;
 mod known;
 mod mesh;
+mod pickle;
 mod places;
 mod planner;
 mod program;

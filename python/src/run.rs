@@ -4,19 +4,25 @@ use crate::ball::Ball;
 use crate::belief::Belief;
 use crate::columns;
 use crate::errors;
+use crate::experiment::{FormerNames, parsed};
 use crate::fork;
 use crate::known::Known;
+use crate::pickle::{self, Reduced, Version};
 use crate::places::rows;
 use crate::zone::Zone;
 use numpy::{PyArray1, PyArrayDyn};
-use palpate::experiment::store;
+use palpate::experiment::statistics::analysis::Analysis;
+use palpate::experiment::store::{self, resolved};
 use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::truth::Truth;
+use palpate::geometry::mesh::Mesh;
 use palpate::report::replay::BeliefReplay;
-use palpate::report::{tables, whole_object};
+use palpate::report::{findings, tables, whole_object};
 use palpate::task;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Rows of a run, with its experiment and ground truth.
 #[pyclass(frozen, module = "palpate._palpate")]
@@ -123,7 +129,93 @@ impl Run {
         known.map(Belief).ok_or_else(none)
     }
 
+    /// Comparison of the planners with the baselines: sentences, the better planner, the measure
+    /// that decides, and the columns of two tables.
+    fn compare<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let run = &self.0;
+        let analysis = py.detach(|| Analysis::new(run));
+        let found = PyDict::new(py);
+        found.set_item("conclusion", findings::conclusion(run, &analysis))?;
+        found.set_item("verdicts", findings::verdicts(run, &analysis))?;
+        found.set_item("best", findings::best(run, &analysis))?;
+        found.set_item("measure", run.experiment.error_measure().id)?;
+        found.set_item("table", columns::comparisons(py, &analysis.comparisons)?)?;
+        found.set_item("equal_error", columns::equal_errors(py, &analysis.equal_errors)?)?;
+        Ok(found)
+    }
+
+    /// Curves of a measure over touches: its title, unit and scale, and for each planner touches,
+    /// values and both ends of the bands.
+    #[pyo3(signature = (measure = None))]
+    fn curves<'py>(&self, py: Python<'py>, measure: Option<&str>) -> PyResult<Bound<'py, PyDict>> {
+        columns::curves(py, &self.0, measure)
+    }
+
+    /// Summary after the last touch as a table in HTML.
+    fn html(&self) -> String {
+        tables::summary::table_after(&self.0, &[self.0.experiment.touches]).html("palpate")
+    }
+
+    #[staticmethod]
+    fn _restore(
+        version: Version,
+        toml: String,
+        former: FormerNames,
+        truth: &str,
+        rows: &[u8],
+        unlisted: usize,
+    ) -> PyResult<Self> {
+        pickle::check(&version, "Run")?;
+        let experiment = parsed(toml, &[], former)?;
+        let truth: TruthState = serde_json::from_str(truth).map_err(errors::other)?;
+        let (places, heights_m, is_edge, is_reachable, is_complete, mesh) = truth;
+        let mesh = mesh.map(|(vertices, triangles)| {
+            let vertices: Vec<_> = vertices.into_iter().map(Into::into).collect();
+            Mesh::new(&vertices, &triangles).map(|(mesh, _)| Arc::new(mesh))
+        });
+        let mesh = mesh.transpose().map_err(errors::scene)?;
+        let truth = Truth { places, heights_m, is_edge, is_reachable, is_complete, mesh };
+        let rows = serde_json::Deserializer::from_slice(rows)
+            .into_iter::<TrialRow>()
+            .collect::<Result<_, _>>();
+        Ok(Self(store::Run { experiment, truth, rows: rows.map_err(errors::other)?, unlisted }))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, RunState<'py>>> {
+        let store::Run { experiment, truth, unlisted, .. } = &slf.get().0;
+        let scene = &experiment.scene;
+        let former = (scene.former_names.clone(), scene.effects.legacy_keys.clone());
+        let mesh = truth.mesh.as_ref().map(|mesh| {
+            let vertices = mesh.vertices().iter().map(|p_w| <[f64; 3]>::from(*p_w));
+            (vertices.collect::<Vec<_>>(), mesh.triangles())
+        });
+        let Truth { places, heights_m, is_edge, is_reachable, is_complete, .. } = truth;
+        let truth = (places, heights_m, is_edge, is_reachable, is_complete, mesh);
+        let truth = serde_json::to_string(&truth).map_err(errors::other)?;
+        let rows = slf.get().rows(slf.py())?;
+        let state = (pickle::version(), resolved(experiment), former, truth, rows, *unlisted);
+        pickle::reduced(slf, state)
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
     fn __str__(&self) -> PyResult<String> {
         fork::install(|| tables::summary::text(&self.0))
     }
 }
+
+/// Vertices and triangles.
+type Triangles = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
+/// Places, heights, flags and mesh of a ground truth.
+type TruthState = (Vec<Vec<f64>>, Vec<Option<f64>>, Vec<bool>, Vec<bool>, bool, Option<Triangles>);
+
+/// Settings as TOML, former names in them, ground truth as JSON, rows as bytes, and the number of
+/// rows that are not listed.
+type RunState<'py> = (Version, String, FormerNames, String, Bound<'py, PyBytes>, usize);

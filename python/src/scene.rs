@@ -2,11 +2,14 @@
 
 use crate::ball::Ball;
 use crate::errors;
+use crate::experiment::FormerNames;
 use crate::mesh::{Arrays, arrays, mesh_of};
+use crate::pickle::{self, Reduced, Version};
 use crate::places::Places;
 use crate::zone::Zone;
-use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use palpate::backend::Fault;
+use palpate::config::Loader;
 use palpate::explore::probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::sim;
@@ -14,34 +17,68 @@ use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
 use palpate::task::{self, Approach};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// An object in its zone, or a whole object, with the finger that touches it; from a scene's file
-/// or a mesh.
+/// An object in its zone, or a whole object, with the finger that touches it: from the settings of
+/// a scene as keyword arguments, its file, or a mesh.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Scene {
     simulator: Simulator,
+    /// Settings as read.
+    settings: sim::Scene,
+    /// Mesh in place of the object's file.
+    mesh: Option<MeshArrays>,
     /// Probe, created with the first touch.
     probe: Mutex<Option<Box<dyn probe::Probe>>>,
     seed: u64,
 }
 
+/// Vertices (n, 3), metres, and triangles (m, 3).
+type MeshArrays = (Py<PyArray2<f64>>, Py<PyArray2<i64>>);
+
+/// Settings as TOML, former names in them, mesh and seed of a scene.
+type SceneState = (Version, String, FormerNames, Option<MeshArrays>, u64);
+
 impl Scene {
-    fn around(
+    /// Builds a scene, with the mesh, if there is one, in place of its object.
+    fn build(
         py: Python<'_>,
+        settings: sim::Scene,
+        mesh: Option<MeshArrays>,
         seed: u64,
-        make: impl FnOnce() -> PyResult<Environment> + Send,
     ) -> PyResult<Self> {
+        let shape = mesh.as_ref().map(|(vertices, triangles)| {
+            mesh_of(&vertices.bind(py).readonly(), &triangles.bind(py).readonly())
+        });
+        let (shape, scene) = (shape.transpose()?, settings.clone());
         let simulator = py.detach(|| {
-            let environment = Arc::new(make()?);
-            Simulator::new(environment).map_err(errors::scene)
+            let environment = match shape {
+                None => Environment::build(scene),
+                Some((mesh, report)) => {
+                    let x_wo = scene.object.as_ref().map(|object| object.x_wo());
+                    let bvh = MeshBvh::new(mesh.transformed(&x_wo.unwrap_or_default()));
+                    let report = report.into();
+                    Environment::with_shape(scene, ObjectShape::Mesh { bvh, report })
+                }
+            };
+            Simulator::new(Arc::new(environment.map_err(errors::scene)?)).map_err(errors::scene)
         })?;
         simulator.check_reach().map_err(errors::scene)?;
-        Ok(Self { simulator, probe: Mutex::new(None), seed })
+        Ok(Self { simulator, settings, mesh, probe: Mutex::new(None), seed })
+    }
+
+    /// Reads the settings of a scene from its file, or from assignments alone.
+    fn read(path: Option<&Path>, sets: &[String]) -> PyResult<sim::Scene> {
+        let loader = match path {
+            Some(path) => Loader::read(path),
+            None => Loader::from_text(errors::SETTINGS.as_ref(), String::new()),
+        };
+        let read = loader.and_then(|loader| sim::Scene::from_loader(loader, sets));
+        read.map_err(errors::config)
     }
 
     pub(crate) fn environment(&self) -> &Environment {
@@ -78,9 +115,9 @@ impl Scene {
         });
         let (touch, swept, time_s) = touched.map_err(errors::scene)?;
         let (outcome, contact) = match &touch {
-            probe::Touch::Contact(contact) => ("contact", Some(contact.clone())),
-            probe::Touch::Miss => ("miss", None),
-            probe::Touch::Overload => ("overload", None),
+            probe::Touch::Contact(contact) => (OUTCOMES[0], Some(contact.clone())),
+            probe::Touch::Miss => (OUTCOMES[1], None),
+            probe::Touch::Overload => (OUTCOMES[2], None),
         };
         let place = (task.zone())
             .zip(contact.as_ref())
@@ -102,6 +139,23 @@ pub(crate) struct TouchData {
 
 #[pymethods]
 impl Scene {
+    /// Creates a scene from its settings; paths are relative to the working directory.
+    #[new]
+    #[pyo3(signature = (*, seed = 0, **settings))]
+    fn new<'py>(
+        py: Python<'py>,
+        seed: u64,
+        settings: Option<Bound<'py, PyDict>>,
+    ) -> PyResult<Self> {
+        let settings = settings.unwrap_or_else(|| PyDict::new(py));
+        if !settings.contains("simulator")? {
+            settings.set_item("simulator", "swept")?;
+        }
+        let module = py.import("palpate._settings")?;
+        let sets: Vec<String> = module.call_method1("assignments", (settings,))?.extract()?;
+        Self::build(py, Self::read(None, &sets)?, None, seed)
+    }
+
     /// Loads a scene's file, or a scene of the package by its name ("bird"). `seed` seeds the
     /// sensor noise; `settings` are settings of a scene, as in finger__radius_m=0.001.
     #[staticmethod]
@@ -145,30 +199,61 @@ impl Scene {
         scene.call_method("of_mesh", arguments, settings)
     }
 
+    /// Loads a scene's file, or assignments alone, with the mesh, if there is one, in place of its
+    /// object.
     #[staticmethod]
-    fn _load(py: Python<'_>, path: PathBuf, sets: Vec<String>, seed: u64) -> PyResult<Self> {
-        let scene = sim::Scene::load(&path, &sets).map_err(errors::config)?;
-        Self::around(py, seed, || Environment::build(scene).map_err(errors::scene))
-    }
-
-    /// Loads a scene's file with the mesh in place of its object.
-    #[staticmethod]
-    fn _from_mesh(
+    #[pyo3(signature = (path, sets, seed, mesh = None))]
+    fn _load(
         py: Python<'_>,
-        path: PathBuf,
+        path: Option<PathBuf>,
         sets: Vec<String>,
         seed: u64,
-        vertices: PyReadonlyArray2<'_, f64>,
-        triangles: PyReadonlyArray2<'_, i64>,
+        mesh: Option<MeshArrays>,
     ) -> PyResult<Self> {
-        let scene = sim::Scene::load(&path, &sets).map_err(errors::config)?;
-        let (mesh, report) = mesh_of(&vertices, &triangles)?;
-        Self::around(py, seed, || {
-            let x_wo = scene.object.as_ref().map(|object| object.x_wo()).unwrap_or_default();
-            let bvh = MeshBvh::new(mesh.transformed(&x_wo));
-            Environment::with_shape(scene, ObjectShape::Mesh { bvh, report: report.into() })
-                .map_err(errors::scene)
-        })
+        Self::build(py, Self::read(path.as_deref(), &sets)?, mesh, seed)
+    }
+
+    #[staticmethod]
+    fn _restore(
+        py: Python<'_>,
+        version: Version,
+        toml: String,
+        former: FormerNames,
+        mesh: Option<MeshArrays>,
+        seed: u64,
+    ) -> PyResult<Self> {
+        pickle::check(&version, "Scene")?;
+        let text = Loader::from_text(errors::SETTINGS.as_ref(), toml);
+        let read = text.and_then(|loader| sim::Scene::from_loader(loader, &[]));
+        let mut settings = read.map_err(errors::config)?;
+        (settings.former_names, settings.effects.legacy_keys) = former;
+        Self::build(py, settings, mesh, seed)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, SceneState>> {
+        let Self { settings, mesh, seed, .. } = slf.get();
+        let former = (settings.former_names.clone(), settings.effects.legacy_keys.clone());
+        let clone = |(vertices, triangles): &MeshArrays| {
+            (vertices.clone_ref(slf.py()), triangles.clone_ref(slf.py()))
+        };
+        let mesh = mesh.as_ref().map(clone);
+        pickle::reduced(slf, (pickle::version(), settings.to_toml(false), former, mesh, *seed))
+    }
+
+    /// Settings on one line, for an experiment on this scene.
+    fn _value(&self) -> PyResult<String> {
+        match &self.mesh {
+            None => Ok(self.settings.to_toml(true)),
+            Some(_) => Err(PyTypeError::new_err(
+                "a scene of arrays has no file that an experiment can name: write the mesh with \
+                 palpate.write_mesh, and use palpate.Scene(object={\"mesh\": FILE}, …)",
+            )),
+        }
+    }
+
+    /// Returns all settings, including defaults, as TOML.
+    fn to_toml(&self) -> String {
+        self.environment().scene().to_toml(false)
     }
 
     /// Explored zone of one side of the object.
@@ -223,6 +308,13 @@ impl Scene {
     }
 }
 
+/// Outcomes of a touch.
+const OUTCOMES: [&str; 3] = ["contact", "miss", "overload"];
+
+/// Version, target, outcome, contact point and normal, place and height, and time of a touch.
+type TouchState =
+    (Version, Vec<f64>, &'static str, Option<[[f64; 3]; 2]>, Option<(Vec<f64>, f64)>, Option<f64>);
+
 /// Result of a touch.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Touch {
@@ -268,6 +360,39 @@ impl Touch {
     #[getter]
     fn height_m(&self) -> Option<f64> {
         Some(self.place.as_ref()?.1)
+    }
+
+    #[staticmethod]
+    fn _restore(
+        version: Version,
+        target: Vec<f64>,
+        outcome: &str,
+        contact: Option<[[f64; 3]; 2]>,
+        place: Option<(Vec<f64>, f64)>,
+        time_s: Option<f64>,
+    ) -> PyResult<Self> {
+        pickle::check(&version, "Touch")?;
+        let outcome = OUTCOMES.into_iter().find(|known| *known == outcome);
+        let contact = contact.map(|[p_wc, normal_w]| probe::Contact {
+            p_wc: p_wc.into(),
+            normal_w: normal_w.into(),
+        });
+        Ok(Self { target, outcome: outcome.unwrap_or_default(), contact, place, time_s })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, TouchState>> {
+        let Self { target, outcome, contact, place, time_s } = slf.get();
+        let contact = contact.as_ref().map(|it| [it.p_wc.into(), it.normal_w.into()]);
+        let state = (pickle::version(), target.clone(), *outcome, contact, place.clone(), *time_s);
+        pickle::reduced(slf, state)
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     fn __repr__(&self) -> String {

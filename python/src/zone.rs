@@ -1,6 +1,7 @@
 //! Exploration region of one side of an object: a zone.
 
 use crate::errors;
+use crate::pickle::{self, Reduced, Version};
 use crate::places::{Places, rows};
 use numpy::{PyArray1, PyArrayDyn};
 use palpate::task;
@@ -62,15 +63,23 @@ impl Zone {
         places.reshape_vectors(py, &points, 3)
     }
 
-    /// Recreates a zone from JSON, for pickling.
     #[staticmethod]
-    fn _of(text: &str) -> PyResult<Self> {
-        serde_json::from_str(text).map(Self).map_err(errors::other)
+    fn _restore(version: Version, json: &str) -> PyResult<Self> {
+        pickle::check(&version, "Zone")?;
+        serde_json::from_str(json).map(Self).map_err(errors::other)
     }
 
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, (String,))> {
-        let text = serde_json::to_string(&slf.get().0).map_err(errors::other)?;
-        Ok((slf.get_type().getattr("_of")?.unbind(), (text,)))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, (Version, String)>> {
+        let json = serde_json::to_string(&slf.get().0).map_err(errors::other)?;
+        pickle::reduced(slf, (pickle::version(), json))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     fn __repr__(&self) -> String {

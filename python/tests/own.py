@@ -80,3 +80,26 @@ class Killed:
 
 class Nothing:
     """Has no method plan."""
+
+
+def no_planner():
+    return Nothing()
+
+
+class Spread:
+    """Touches at equal steps along x, modulo the zone; its state is the number of its plans."""
+
+    def __init__(self, step=0.3):
+        self.step, self.count = step, 0
+
+    def plan(self, belief):
+        self.count += 1
+        zone = belief.zone
+        return zone.lower + (self.count * self.step % 1.0) * (zone.upper - zone.lower)
+
+
+class Step(Spread):
+    """Spread with a repr that shows its argument."""
+
+    def __repr__(self):
+        return f"Step(step={self.step})"

@@ -10,6 +10,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
+def test_the_examples_of_objects_run(tmp_path):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), re.DOTALL)
+    ball = "palpate.write_mesh('part.stl', *(lambda m: (1000 * m[0], m[1]))(palpate.Scene.load('bird').mesh()))\n"
+    words = ("import palpate", 'object={"mesh"', "comparison =", "class Step")
+    code = ball.join(next(block for block in blocks if word in block) for word in words)
+    command = [sys.executable, "-c", code + "\nprint(comparison.best, len(comparison.table()) > 0)"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[-1].split() == ["active", "True"]
+
+
 @pytest.mark.parametrize("page", ["docs/your-planner.md", "docs/python.md", "python/README.md"])
 def test_the_first_example_prints_a_table(page, tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)

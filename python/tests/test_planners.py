@@ -2,6 +2,7 @@
 
 import functools
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,8 +12,8 @@ import numpy as np
 import own
 import palpate
 import pytest
-from palpate._planners import source_of
-from palpate.errors import PlannerError
+from palpate._source import source_of
+from palpate.errors import PalpateError, PlannerError
 from scipy import optimize
 
 
@@ -44,13 +45,13 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
 @pytest.mark.parametrize(
     ("planner", "words"),
     [
-        (own.Raises, "ValueError: no idea"),
+        (own.Raises, "planner raised ValueError: no idea"),
         (own.NotANumber, "outside the zone"),
         (own.Outside, "outside the zone"),
         (own.Many, "5 coordinates"),
-        (own.Words, "could not convert"),
-        (own.Unmade, "not today"),
-        (own.Nothing, "no method plan"),
+        (own.Words, "returned 'somewhere', which is not a target"),
+        (own.Unmade, "planner raised RuntimeError: not today"),
+        (own.no_planner, "no method plan"),
     ],
 )
 def test_a_planner_that_fails_is_a_row_with_the_reason(planner, words, how):
@@ -92,9 +93,21 @@ def test_an_interrupt_does_not_wait_for_a_planner():
 
 def test_what_is_no_planner_is_refused():
     toy = palpate.Experiment.load("toy", touches=6)
-    for wrong in (own.Middle(toy.zone, None), functools.partial(own.Middle), 3):
-        with pytest.raises(PlannerError):
+    for wrong, words in [
+        (own.Nothing, "own:Nothing: the class Nothing has no method plan"),
+        ("own:Nothing", "the class Nothing has no method plan"),
+        (functools.partial(own.Nothing), "the class Nothing has no method plan"),
+        (3, "3 is not a planner"),
+        (("a b", own.Middle), "letters, digits"),
+        (("mine", "active"), "keeps its name"),
+        (("mine", own.Middle, 1), "pair"),
+        ("own:Spread(step=0.5)", "pass the object"),
+        (functools.partial(own.Middle, rng=threading.Lock()), "cannot be copied"),
+    ]:
+        with pytest.raises(PlannerError, match=re.escape(words)):
             toy.run([wrong])
+    with pytest.raises(PlannerError, match="two planners have the name own:Spread"):
+        toy.run([own.Spread(0.1), own.Spread(0.2)])
     for wrong in ("own:Nobody", "nowhere:Nobody"):
         with pytest.raises(PlannerError, match=wrong):
             toy.run([wrong])
@@ -111,6 +124,61 @@ def test_the_program_runs_planners_of_python(tmp_path, program):
     experiment = palpate.Experiment.load("toy", touches=8)
     assert run.rows() == experiment.run(["random", "own:Middle"], trials=2).rows()
     assert (tmp_path / "run/report.html").is_file()
+
+
+PLANNERS = [
+    functools.partial(own.Spread, step=0.3),
+    own.Spread(0.3),
+    own.Step(0.3),
+    lambda: own.Spread(0.3),
+    ("mine", own.Spread),
+    ("x:mine(0.3)", functools.partial(own.Spread, 0.3)),
+]
+NAMES = [
+    "own:Spread(step=0.3)",
+    "own:Spread",
+    "own:Step(step=0.3)",
+    "test_planners:<lambda>",
+    "own:mine",
+    "x:mine(0.3)",
+]
+
+
+@pytest.mark.parametrize(("planner", "name"), zip(PLANNERS, NAMES, strict=True))
+def test_planners_are_classes_partials_functions_or_instances(planner, name):
+    toy = palpate.Experiment.load("toy", touches=7, initial_touches=3)
+    run = toy.run([planner, "random"], trials=3, threads=2)
+    assert run.planners == [name, "random"] and run.trials()["failure"].isna().all()
+    touches = run.touches().query("planner == @name and touch > 3")
+    # A planner that counts its plans starts from 0 in each trial.
+    each = touches.pivot(index="touch", columns="trial", values="target_x_m")
+    expected = -2 + 4 * (0.3 * np.arange(1, 5) % 1.0)
+    assert np.allclose(each, expected[:, None], atol=1e-12)
+    if name.endswith("<lambda>"):
+        with pytest.raises(PlannerError, match="isolate=True"):
+            toy.run([planner], trials=1, isolate=True)
+    else:
+        assert toy.run([planner, "random"], trials=3, isolate=True).rows() == run.rows()
+
+
+def test_an_instance_is_copied_and_stays_as_it_was():
+    planner = own.Spread(0.3)
+    experiment = palpate.Experiment(scene="toy", planners=[planner], touches=7, initial_touches=3, trials=1)
+    rows = experiment.run().rows()
+    planner.count = 5
+    assert experiment.run().rows() == rows
+    assert experiment.run([planner]).rows() != rows
+    assert planner.count == 5
+
+
+def test_another_argument_does_not_keep_its_rows(tmp_path):
+    toy = palpate.Experiment.load("toy", touches=6)
+    spread = functools.partial(own.Spread, 0.3)
+    rows = toy.run([("mine", spread)], trials=1, out=tmp_path).rows()
+    assert toy.run([("mine", functools.partial(own.Spread, 0.3))], trials=1, out=tmp_path).rows() == rows
+    for other in (functools.partial(own.Spread, 0.4), own.Spread, own.Spread(0.3), lambda: spread()):
+        with pytest.raises(PalpateError, match="planner own:mine has changed"):
+            toy.run([("own:mine", other)], trials=1, out=tmp_path)
 
 
 class Least:
@@ -177,6 +245,43 @@ def test_an_edited_planner_does_not_keep_its_rows(tmp_path):
 def test_the_source_of_a_planner_is_that_of_its_module():
     assert source_of(own.Middle) == source_of(own.Raises)
     assert source_of(own.Middle).startswith("# own.py\n")
-    # A planner without source is unique.
+    assert source_of(functools.partial(own.Spread, 0.3)) != source_of(functools.partial(own.Spread, 0.4))
+    assert source_of(own.Spread(0.3)) != source_of(own.Spread(0.4))
+    assert source_of(own.Spread(0.3)) == source_of(own.Spread(0.3))
+    arrays = [functools.partial(own.Spread, np.arange(count)) for count in (3, 3, 4)]
+    assert source_of(arrays[0]) == source_of(arrays[1]) != source_of(arrays[2])
+
+    def enclosed(step):
+        return lambda: own.Spread(step)
+
+    assert source_of(enclosed(0.3)) == source_of(enclosed(0.3)) != source_of(enclosed(0.4))
+    # A planner without source is unique, as is one with an argument that cannot be described.
+    lock = functools.partial(own.Spread, threading.Lock())
+    assert source_of(lock) != source_of(lock)
     built = type("Built", (), {"plan": lambda self, belief: 0.0, "__module__": "__main__"})
     assert source_of(built) != source_of(built)
+
+
+SCRIPT = """
+import palpate
+MARGIN = 0.25
+def at(zone):
+    return zone.lower + MARGIN * (zone.upper - zone.lower)
+class Fixed:
+    def __init__(self, zone):
+        self.zone = zone
+    def plan(self, belief):
+        return at(self.zone)
+palpate.Experiment(scene="toy", touches=6, grid=11).run([Fixed], trials=1, out="run")
+"""
+
+
+def test_what_a_planner_of_a_script_uses_counts(tmp_path):
+    def run(text):
+        (tmp_path / "script.py").write_text(text)
+        return subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    assert run(SCRIPT).returncode == 0, run(SCRIPT).stderr
+    assert run(SCRIPT + "\nUNUSED = 1\n").returncode == 0
+    for edited in (SCRIPT.replace("0.25", "0.5"), SCRIPT.replace("zone.lower + ", "zone.upper - ")):
+        assert "planner __main__:Fixed has changed" in run(edited).stderr

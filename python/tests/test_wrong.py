@@ -40,7 +40,6 @@ def test_a_setting_that_is_wrong():
 @pytest.mark.parametrize(
     ("planner", "words"),
     [
-        (Widest(), "pass the class Widest"),
         (3, "3 is not a planner"),
         ("no_such_module:Widest", "No module named 'no_such_module'"),
     ],

@@ -71,15 +71,19 @@ pub struct Experiment {
     /// Scan used as ground truth, in place of the object's own surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<ScanTruth>,
-    /// Scene; in a file its path, relative to that file.
+    /// Scene; in a file its path, relative to that file, or the name of a shipped scene.
     pub scene: Scene,
 }
 
 /// Key of the table that defines several experiments in one file.
 pub(super) const SWEEP: &str = "sweep";
 
-/// Tables that may be in a separate file.
-const INCLUDED: [&str; 4] = ["scene", "backend", "gp", "space"];
+/// Folder of the shipped scenes.
+pub(crate) const SCENES: &str = "scenes";
+
+/// Tables that may be in a separate file, and the folder in which it is found by name.
+const INCLUDED: [(&str, Option<&str>); 4] =
+    [("scene", Some(SCENES)), ("backend", None), ("gp", None), ("space", None)];
 
 /// Default reference planners, those of the paper.
 const BASELINES: [&str; 2] = ["random", "active"];
@@ -136,7 +140,7 @@ impl Experiment {
     /// # Errors
     /// The first invalid setting, with its place.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
-        Self::finish(Loader::read(path)?, sets)
+        Self::from_loader(Loader::read(path)?, sets)
     }
 
     /// Reads an experiment from `text`, the contents of the file `path`, as [`load`](Self::load)
@@ -145,10 +149,14 @@ impl Experiment {
     /// # Errors
     /// See [`load`](Self::load).
     pub fn parse(path: &Path, text: String, sets: &[String]) -> Result<Self, ConfigError> {
-        Self::finish(Loader::from_text(path, text)?, sets)
+        Self::from_loader(Loader::from_text(path, text)?, sets)
     }
 
-    pub(super) fn finish(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
+    /// Reads an experiment from a loader of its file, as [`load`](Self::load) does.
+    ///
+    /// # Errors
+    /// See [`load`](Self::load).
+    pub fn from_loader(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
         if loader.has(SWEEP) {
             let remedy = "use palpate run, or one of its combinations: runs/NAME/resolved.toml";
             return Err(loader.wrong_kind("a sweep of experiments", remedy));
@@ -163,11 +171,11 @@ impl Experiment {
         // `--set scene=FILE` selects the file; the other assignments then edit its settings.
         let is_file = |set: &&String| {
             let key = set.split('=').next().map(str::trim);
-            key.is_some_and(|key| INCLUDED.contains(&key))
+            key.is_some_and(|key| INCLUDED.iter().any(|(included, _)| *included == key))
         };
         let (files, others): (Vec<_>, Vec<_>) = sets.iter().partition(is_file);
         files.iter().try_for_each(|set| loader.set(set))?;
-        INCLUDED.iter().try_for_each(|key| loader.include(key))?;
+        INCLUDED.iter().try_for_each(|(key, folder)| loader.include(key, *folder))?;
         others.iter().try_for_each(|set| loader.set(set))?;
         loader.read_former_keys("", &FORMER_KEYS)?;
         let legacy_keys = Scene::resolve(&mut loader, "scene.")?;

@@ -3,6 +3,7 @@
 
 use crate::experiment::experiment::{Experiment, SWEEP, is_name_character};
 use palpate_input::config::{ConfigError, Loader};
+use palpate_input::shipped;
 use std::path::Path;
 use toml::Value;
 
@@ -12,6 +13,11 @@ const CASES_MAX: usize = 10_000;
 
 /// Settings whose values are file names, relative to the experiment's file.
 const FILES: [&str; 4] = ["scene", "backend", "scene.object.mesh", "truth.scan"];
+
+/// Whether `name` is a plain name without a file in `folder`.
+fn is_shipped(folder: &Path, name: &str) -> bool {
+    shipped::is_plain(Path::new(name)) && !folder.join(name).is_file()
+}
 
 /// One combination of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,7 +55,7 @@ pub fn sweep_cases(path: &Path) -> Result<Vec<SweepCase>, ConfigError> {
         let longer = |case: &SweepCase| -> Vec<SweepCase> {
             let with = |(i, value): (usize, &Value)| {
                 let set = match value {
-                    Value::String(name) if is_file(key, name) => {
+                    Value::String(name) if is_file(key, name) && !is_shipped(folder, name) => {
                         format!(
                             "{key}={}",
                             Value::String(folder.join(name).to_string_lossy().into())
@@ -109,7 +115,7 @@ impl Experiment {
         let mut loader = Loader::read(path)?;
         loader.take(SWEEP);
         let sets = [sets, &case.sets].concat();
-        let mut experiment = Self::finish(loader, &sets)?;
+        let mut experiment = Self::from_loader(loader, &sets)?;
         experiment.name += &case.label;
         Ok(experiment)
     }

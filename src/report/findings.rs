@@ -212,14 +212,12 @@ const PROPOSED_MAX: f64 = 10_000.0;
 /// first baseline in the same trials or, unless that is established, the number of trials that
 /// would show it. `None` if the planners cannot be compared.
 pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
-    let baseline = *run.experiment.baselines().first()?;
-    let error = run.experiment.error_measure();
-    let found = final_errors(run, analysis, baseline);
-    let best = found.min_by(|a, b| a.paired.mean.total_cmp(&b.paired.mean))?;
-    let (planner, paired) = (best.planner, &best.paired);
+    let closest = smallest_error(run, analysis)?;
+    let PairedComparison { planner, baseline, paired, .. } = closest;
     if let Some(too_few) = too_few(paired.trials) {
         return Some(too_few);
     }
+    let error = run.experiment.error_measure();
     let [low, high] = paired.interval?;
     let shown = |value: f64| digits(error.unit.per_si * value);
     let size = |[low, high]: [f64; 2]| {
@@ -232,24 +230,61 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
         counted(run.experiment.touches, "touch"),
         counted(paired.trials, "trial")
     );
-    Some(if high < 0.0 {
-        format!("{planner} is better: {} less {after}.", size([-high, -low]))
-    } else if low > 0.0 {
-        format!("{baseline} is best: {planner} has {} more {after}.", size([low, high]))
-    } else {
-        let ratio = 0.5 * (high - low) / paired.mean.abs();
-        let needed = (POWER * paired.trials as f64 * ratio * ratio).ceil();
-        let needed = match needed <= PROPOSED_MAX {
-            true => format!("about {needed} trials (--set trials={needed}) would probably show it"),
-            false => format!("more than {PROPOSED_MAX} trials would be needed to show one"),
-        };
-        let [low, high] = [low, high].map(shown);
-        format!(
-            "No difference is established: {planner} has {} {} [{low}, {high}] {after}; {needed}.",
-            shown(paired.mean),
-            error.unit.symbol,
-        )
+    Some(match better_of(closest) {
+        Some(better) if better == *planner => {
+            format!("{planner} is better: {} less {after}.", size([-high, -low]))
+        }
+        Some(_) => format!("{baseline} is best: {planner} has {} more {after}.", size([low, high])),
+        None => {
+            let ratio = 0.5 * (high - low) / paired.mean.abs();
+            let needed = (POWER * paired.trials as f64 * ratio * ratio).ceil();
+            let needed = match needed <= PROPOSED_MAX {
+                true => {
+                    format!("about {needed} trials (--set trials={needed}) would probably show it")
+                }
+                false => format!("more than {PROPOSED_MAX} trials would be needed to show one"),
+            };
+            let [low, high] = [low, high].map(shown);
+            format!(
+                "No difference is established: {planner} has {} {} [{low}, {high}] {after}; {needed}.",
+                shown(paired.mean),
+                error.unit.symbol,
+            )
+        }
     })
+}
+
+/// Returns the better of the planner with the smallest error and the first baseline; `None` if no
+/// difference is established.
+pub fn best<'a>(run: &'a Run, analysis: &'a Analysis<'a>) -> Option<&'a str> {
+    better_of(smallest_error(run, analysis)?)
+}
+
+/// Returns the comparison with the first baseline of the planner that has the smallest error.
+fn smallest_error<'a>(
+    run: &'a Run,
+    analysis: &'a Analysis<'a>,
+) -> Option<&'a PairedComparison<'a>> {
+    let baseline = *run.experiment.baselines().first()?;
+    let found = final_errors(run, analysis, baseline);
+    found.min_by(|a, b| a.paired.mean.total_cmp(&b.paired.mean))
+}
+
+/// Returns the better planner of a comparison; `None` if there are too few trials, or the interval
+/// contains 0.
+fn better_of<'a>(comparison: &PairedComparison<'a>) -> Option<&'a str> {
+    match established(comparison)? {
+        "better" => Some(comparison.planner),
+        _ => Some(comparison.baseline),
+    }
+}
+
+/// Returns whether the planner of a comparison is better or worse; `None` if there are too few
+/// trials, or the interval contains 0.
+pub fn established(comparison: &PairedComparison) -> Option<&'static str> {
+    let PairedComparison { measure, paired, .. } = comparison;
+    let is_enough = too_few(paired.trials).is_none();
+    verdict(paired.interval, 0.0, measure.direction).filter(|_| is_enough)
 }
 
 /// Returns a sentence instead of a comparison if there are too few paired trials.

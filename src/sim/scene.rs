@@ -426,7 +426,14 @@ impl Scene {
     /// # Errors
     /// Returns the first invalid setting, with its place in the file.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
-        let mut loader = Loader::read(path)?;
+        Self::from_loader(Loader::read(path)?, sets)
+    }
+
+    /// Reads a scene from a loader of its file, as [`load`](Self::load) does.
+    ///
+    /// # Errors
+    /// See [`load`](Self::load).
+    pub fn from_loader(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
         if loader.has("planners") || loader.has("scene") {
             return Err(loader.wrong_kind(
                 "an experiment",
@@ -441,6 +448,15 @@ impl Scene {
         scene.former_names = former_names;
         scene.effects.legacy_keys = legacy_keys;
         Ok(scene)
+    }
+
+    /// Returns the scene with all defaults as TOML, on one line if it is the value of a key.
+    pub fn to_toml(&self, is_value: bool) -> String {
+        match is_value {
+            true => toml::Value::try_from(self).map(|value| value.to_string()),
+            false => toml::to_string(self),
+        }
+        .unwrap_or_default()
     }
 
     /// Makes the paths of a scene under `prefix` absolute, and copies the constants of its sensor

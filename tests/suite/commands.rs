@@ -1,6 +1,8 @@
 //! Tests of the command line.
 
 use crate::common::program::{command, fails, folder, palpate, run_to_end, stderr, succeeds};
+use palpate::config::Loader;
+use palpate::experiment::Experiment;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -94,6 +96,40 @@ fn a_setting_given_as_an_option_is_answered_with_its_assignment() {
         assert!(message.contains("unexpected argument"), "{message}");
         assert!(!message.contains("--set"), "{message}");
     }
+}
+
+/// A plain name of a scene in an experiment is that of a file beside it, or else of a shipped scene.
+#[test]
+fn an_experiment_finds_a_shipped_scene_by_name() {
+    let (folder, home) = (folder(), tempfile::tempdir().unwrap());
+    let text = fs::read_to_string(folder.path().join("small.toml")).unwrap();
+    let by_name = text.replace("\"scene.toml\"", "\"pebble\"");
+    assert_ne!(by_name, text);
+    let load = |text: &str, sets: &[&str]| {
+        let file = folder.path().join("small.toml");
+        let loader = Loader::from_text(&file, text.into()).unwrap().with_home(home.path());
+        let sets: Vec<String> = sets.iter().map(|&set| set.into()).collect();
+        Experiment::from_loader(loader, &sets).map_err(|error| error.to_string())
+    };
+    fs::create_dir(home.path().join("scenes")).unwrap();
+    for name in ["mesh.obj", "scene.toml"] {
+        fs::copy(folder.path().join(name), home.path().join("scenes").join(name)).unwrap();
+    }
+    let shipped = home.path().join("scenes/pebble.toml");
+    fs::rename(home.path().join("scenes/scene.toml"), &shipped).unwrap();
+    let found = load(&by_name, &[]).unwrap();
+    assert_eq!(found.scene.object.as_ref().unwrap().mesh, home.path().join("scenes/mesh.obj"));
+    assert_eq!(load(&text, &["scene=pebble"]).unwrap(), found);
+    let edited = load(&by_name, &["scene.finger.radius_m=0.004"]).unwrap();
+    assert_eq!(edited.scene.finger.radius_m, 0.004);
+    let error = load(&text.replace("scene.toml", "peble"), &[]).unwrap_err();
+    for words in ["small.toml:", "`scene` = \"peble\"", "did you mean `pebble`?", "scenes/"] {
+        assert!(error.contains(words), "{error}");
+    }
+    // The file beside the experiment is preferred.
+    fs::copy(folder.path().join("scene.toml"), folder.path().join("pebble")).unwrap();
+    let beside = load(&by_name, &[]).unwrap();
+    assert_eq!(beside.scene.object.unwrap().mesh, folder.path().join("mesh.obj"));
 }
 
 /// Deprecated command names still work, with a note of the new name.

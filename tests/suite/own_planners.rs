@@ -111,8 +111,16 @@ fn a_planner_that_is_not_there_is_an_error() {
 
 #[test]
 fn names_of_own_planners_have_a_module() {
-    assert!(["a:b", "my.module:Class.Inner", "__main__:f"].into_iter().all(is_external));
-    assert!(!["active", ":b", "a:", "a:b:c", "a b:c", "a/b:c"].into_iter().any(is_external));
+    assert!(
+        ["a:b", "my.module:Class.Inner", "__main__:f", "a:B(c='d: (e', f=0.1)"]
+            .into_iter()
+            .all(is_external)
+    );
+    assert!(
+        !["active", ":b", "a:", "a:b:c", "a b:c", "a/b:c", "a:b(c", "a:(b)", "a:b(\n)"]
+            .into_iter()
+            .any(is_external)
+    );
     assert!(planner::PLANNERS.iter().all(|entry| !is_external(entry.name)));
 }
 

@@ -26,6 +26,7 @@ use palpate_gp::math::normal;
 use palpate_gp::means::FixedPlaceMeans;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::{Hyperparameters, Observation, Posterior};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Grid points per side at which the bound is stored; a heuristic: finer than a fingertip in any
 /// zone that takes more than a few touches.
@@ -45,10 +46,17 @@ const SOFTNESS_MIN: f64 = 1e-2;
 const SURE: f64 = 0.92;
 
 /// The lowest upper bound so far, on a grid over the zone.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct FreeSpaceBound {
     places: Vec<Vec<f64>>,
+    #[serde(deserialize_with = "infinite_if_null")]
     heights_m: Vec<f64>,
+}
+
+/// Reads numbers from JSON, which has null in place of infinity.
+fn infinite_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let values: Vec<Option<f64>> = Deserialize::deserialize(from)?;
+    Ok(values.into_iter().map(|value| value.unwrap_or(f64::INFINITY)).collect())
 }
 
 impl FreeSpaceBound {

@@ -25,6 +25,7 @@ use palpate_gp::math::normal;
 use palpate_gp::{
     Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
 };
+use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 
 /// Probability of a surface one radius beyond a contact, on the side of the hull's middle.
@@ -39,7 +40,7 @@ const LESS_AT_THE_RIM: f64 = 0.9;
 const MISS_PLACES: usize = 3;
 
 /// Evidence from touches for the presence of a surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SurfaceEvidence {
     /// For each contact, the target of the hull and the place of contact.
     contacts: Vec<[Vector2<f64>; 2]>,
@@ -315,7 +316,7 @@ impl Table {
 }
 
 /// The places within a radius of a segment in the zone's plane.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Stadium {
     /// The tip.
     start: Vector2<f64>,

@@ -1,6 +1,7 @@
 //! Observations: places with heights and, optionally, slopes.
 
 use crate::math::simd::widest;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// An observation at one place.
@@ -68,7 +69,7 @@ impl From<f64> for NoiseRatio {
 /// The observed numbers are stored in the order of addition: for each place the height and then the
 /// slope along each axis, if any. A slope is counted per length scale, so that it has the unit and
 /// scale of a height.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Observations {
     columns: Vec<Vec<f64>>,
     heights: Vec<f64>,

@@ -5,6 +5,7 @@
 //! | [`files`] | reads and replaces files named by users |
 //! | [`config`] | settings from a TOML file and `key=value` overrides |
 //! | [`error`] | error of invalid input: place, value, allowed values |
+//! | [`shipped`] | lookup of shipped files by name |
 //! | [`mod@format`] | formatting of values and parser messages for users |
 //!
 //! ```
@@ -33,3 +34,4 @@ pub mod config;
 pub mod error;
 pub mod files;
 pub mod format;
+pub mod shipped;

@@ -12,6 +12,11 @@ use serde_json::{Value, json};
 /// Returns a table with a row for each planner and tabled touch count; columns without a value are
 /// left out.
 pub fn table(run: &Run) -> Table {
+    table_after(run, &run.experiment.table_touch_counts())
+}
+
+/// Returns the rows of [`table`] after `counts` touches.
+pub fn table_after(run: &Run, counts: &[u32]) -> Table {
     let aggregates: Vec<(&Measure, bool)> = (MEASURES.iter())
         .filter(|measure| measure.in_tables)
         .flat_map(|measure| [(measure, false), (measure, true)])
@@ -31,9 +36,9 @@ pub fn table(run: &Run) -> Table {
     let curves: Vec<Vec<CurvePoint>> = (run.experiment.planners.iter())
         .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
         .collect();
-    for count in run.experiment.table_touch_counts() {
-        for point in curves.iter().flatten().filter(|point| point.touches == count) {
-            let start = [Cell::from(count as usize), point.planner.as_str().into()];
+    for count in counts {
+        for point in curves.iter().flatten().filter(|point| point.touches == *count) {
+            let start = [Cell::from(*count as usize), point.planner.as_str().into()];
             let value = |(measure, is_median): &(&Measure, bool)| match point.of(measure) {
                 None => Cell::default(),
                 Some(summary) if *is_median => summary.median.into(),

@@ -13,6 +13,7 @@ use palpate_gp::inducing::InducingPosterior;
 use palpate_gp::math::normal::BAND_95;
 use palpate_gp::posterior::Posterior;
 use palpate_gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
+use serde::{Deserialize, Serialize};
 
 /// Distance between contact and target above which the target counts as unreached, in units of the
 /// zone's sides; a heuristic: well above rounding, below the grid spacing of any figure.
@@ -23,9 +24,10 @@ const REACHED_WITHIN: f64 = 1e-3;
 const NORMAL_Y_MIN: f64 = 0.05;
 
 /// Belief of a height field over a zone.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct HeightField {
     zone: Zone,
+    #[serde(skip, default = "no_kernels")]
     kernels: KernelSelection,
     settings: GpSettings,
     contacts: Observations,
@@ -36,10 +38,18 @@ pub struct HeightField {
     has_missed: bool,
     targets: Vec<Vec<f64>>,
     unreached: Vec<Vec<f64>>,
+    /// Fit that `surface` is conditioned with.
     fit: Option<Fit>,
+    #[serde(skip)]
     surface: Option<Posterior>,
     /// `surface`, conditioned also on the unreached targets, which are not worth another touch.
+    #[serde(skip)]
     planning_posterior: Option<Posterior>,
+}
+
+/// Selection in place of that of a stored belief.
+fn no_kernels() -> KernelSelection {
+    KernelSelection::new(&[])
 }
 
 impl HeightField {
@@ -147,7 +157,17 @@ impl HeightField {
         let (posterior, _) = self.posterior(fit.hyperparameters.clone())?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
+        self.fit = Some(fit.clone());
         Ok(())
+    }
+
+    /// Conditions a stored belief again.
+    ///
+    /// # Errors
+    /// If the covariance of the contacts cannot be factored.
+    pub(super) fn restore(&mut self) -> Result<(), CovarianceError> {
+        self.kernels = KernelSelection::new(self.settings.kernel.names());
+        self.fit.take().map_or(Ok(()), |fit| self.condition(&fit))
     }
 
     /// Number of inducing touches, if the posterior is not exact.
@@ -247,7 +267,8 @@ impl HeightField {
         &self.zone
     }
 
-    /// Returns the result of the last [`refit`](Self::refit).
+    /// Returns the fit of the posterior: that of the last [`refit`](Self::refit) or
+    /// [`condition`](Self::condition).
     pub fn fit(&self) -> Option<&Fit> {
         self.fit.as_ref()
     }

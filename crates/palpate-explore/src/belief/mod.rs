@@ -12,9 +12,15 @@ use crate::task::{Approach, Region, Target, Task};
 use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
+use palpate_input::error::InputError;
+use palpate_input::format;
+use serde::{Deserialize, Serialize};
 
 /// Belief of one trial. Both variants are large, and few exist at a time.
-#[derive(Clone)]
+///
+/// To store a belief use [`to_json`](Self::to_json) and [`from_json`](Self::from_json), which
+/// computes the posterior again.
+#[derive(Clone, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)]
 pub enum Belief {
     /// Heights over a zone.
@@ -81,6 +87,30 @@ impl Belief {
             Self::HeightField(field) => field.condition(&fit),
             Self::ImplicitSurface(surface) => surface.condition(Some(&fit), &fit),
         }
+    }
+
+    /// Returns the touches, the settings and the last fit as JSON.
+    ///
+    /// # Errors
+    /// If memory is exhausted.
+    pub fn to_json(&self) -> Result<String, InputError> {
+        serde_json::to_string(self).map_err(|error| InputError::new(format::json(&error)))
+    }
+
+    /// Reads a belief from [`to_json`](Self::to_json) and conditions it again: its posterior is
+    /// equal to the last bit. Around a whole object it does not know the reach of an arm.
+    ///
+    /// # Errors
+    /// If the text is not that of a belief, or the covariance of the touches cannot be factored.
+    pub fn from_json(text: &str) -> Result<Self, InputError> {
+        let mut belief: Self = serde_json::from_str(text)
+            .map_err(|error| InputError::new(format::json(&error)).at("belief"))?;
+        let restored = match &mut belief {
+            Self::HeightField(field) => field.restore(),
+            Self::ImplicitSurface(surface) => surface.restore(),
+        };
+        restored.map_err(|error| InputError::new(error.to_string()).at("belief"))?;
+        Ok(belief)
     }
 
     /// Returns the result of the last [`refit`](Self::refit).

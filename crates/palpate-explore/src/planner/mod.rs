@@ -34,13 +34,17 @@ pub const PLANNERS: &[PlannerEntry] = &[
     ucb::ENTRY,
 ];
 
-/// Whether `name` names an external planner, `MODULE:NAME`. An experiment may list external
-/// planners: a program that runs it needs [their factories](PlannerFactory), one that only reads it
-/// does not.
+/// Whether `name` names an external planner, `MODULE:NAME` or `MODULE:NAME(ARGUMENTS)`. An
+/// experiment may list external planners: a program that runs it needs
+/// [their factories](PlannerFactory), one that only reads it does not.
 pub fn is_external(name: &str) -> bool {
-    let is_plain = |c: char| c.is_alphanumeric() || "_.<>".contains(c);
+    let is_plain = |c: char| c.is_alphanumeric() || "_.<>-".contains(c);
     let is_word = |word: &str| !word.is_empty() && word.chars().all(is_plain);
-    name.split_once(':').is_some_and(|(module, name)| is_word(module) && is_word(name))
+    name.split_once(':').is_some_and(|(module, name)| {
+        let (word, arguments) = name.split_once('(').unwrap_or((name, ")"));
+        let is_list = arguments.ends_with(')') && !arguments.contains(char::is_control);
+        is_word(module) && is_word(word) && is_list
+    })
 }
 
 /// Returns the planner with this name.

@@ -70,15 +70,16 @@ pub enum Fallback {
 
 /// Error of a planner that returned no target.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("the planner returned no target: {reason}")]
+#[error("{reason}")]
 pub struct PlanError {
-    /// The planner's own message.
+    /// Complete message.
     pub reason: String,
 }
 
 impl From<&str> for PlanError {
-    fn from(reason: &str) -> Self {
-        Self { reason: reason.into() }
+    /// Creates the error from the planner's own message.
+    fn from(message: &str) -> Self {
+        Self { reason: format!("the planner returned no target: {message}") }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::backend::Fault;
 use crate::robot::Finger;
 use crate::task::{Approach, Zone};
 use nalgebra::{Isometry3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Result of a touch.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +21,7 @@ pub enum Touch {
 }
 
 /// A contact with the surface.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// The point of contact in `W`; its place may differ from the target.
     pub p_wc: Point3<f64>,

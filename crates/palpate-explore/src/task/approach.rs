@@ -102,7 +102,7 @@ impl WholeObject {
 }
 
 /// A ball that contains the object, or that the finger travels around between approaches.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ball {
     /// Centre in `W`.
     pub centre_w: Point3<f64>,

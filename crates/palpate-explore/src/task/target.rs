@@ -79,7 +79,7 @@ impl From<Aim> for Target {
 }
 
 /// A straight approach through a point of a ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Aim {
     /// The point, in `W`.
     pub p_w: Point3<f64>,

@@ -141,6 +141,11 @@ impl Task {
         &self.touch
     }
 
+    /// The finger that touches.
+    pub(crate) fn finger(&self) -> &Finger {
+        &self.finger
+    }
+
     /// Nearest and farthest depth along the approach from the origin of `Z`; zeros for a ball.
     pub fn depth_m(&self) -> [f64; 2] {
         self.depth_m

@@ -9,16 +9,17 @@ use palpate_geometry::implicit::Field;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
 use palpate_gp::{Observation, Observations, Slope};
+use serde::{Deserialize, Serialize};
 
 /// All contacts and swept volumes.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct TouchEvidence {
     contacts: Vec<Contact>,
     ways: Vec<SweptPath>,
 }
 
 /// Path of a fingertip that was free up to its end.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct SweptPath {
     /// End point and direction.
     end: Aim,

@@ -17,17 +17,27 @@ use palpate_gp::math::optimize::compass;
 use palpate_gp::{
     Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
 };
+use serde::{Deserialize, Serialize};
 
 /// Belief of one trial around a whole object.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct ImplicitSurface {
     scope: ExplorationSetup,
     settings: SpatialGpSettings,
+    #[serde(skip, default = "default_kernel")]
     kernel: &'static dyn Kernel,
     evidence: TouchEvidence,
     asked: Vec<Aim>,
     fit: Option<Fit>,
+    /// Hyperparameters that the last fit started from.
+    start: Option<Hyperparameters>,
+    #[serde(skip)]
     surface: Option<Surface>,
+}
+
+/// Kernel in place of that of a stored belief.
+fn default_kernel() -> &'static dyn Kernel {
+    &Matern52
 }
 
 /// Signal's standard deviation before the first fit, as a fraction of the radius of the ball around
@@ -54,7 +64,7 @@ impl ImplicitSurface {
     pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (TouchEvidence::default(), Vec::new());
-        Self { scope, settings, kernel, evidence, asked, fit: None, surface: None }
+        Self { scope, settings, kernel, evidence, asked, fit: None, start: None, surface: None }
     }
 
     /// Adds a touch at `aim` that followed `approach`, and the volume it swept; the belief changes
@@ -78,10 +88,10 @@ impl ImplicitSurface {
     /// # Errors
     /// If the covariance of the touches cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Surface), CovarianceError> {
-        let start = self.fit.as_ref().map(|fit| &fit.hyperparameters);
-        let (prior, observations) = self.observations(start);
-        let fit = self.search(start, &observations)?;
-        self.conclude(prior, observations, fit)
+        let start = self.fit.as_ref().map(|fit| fit.hyperparameters.clone());
+        let (prior, observations) = self.observations(start.as_ref());
+        let fit = self.search(start.as_ref(), &observations)?;
+        self.conclude((prior, observations), start, fit)
     }
 
     /// Conditions on all touches with the given fit, which started from `last`, e.g. to draw a
@@ -90,15 +100,32 @@ impl ImplicitSurface {
     /// # Errors
     /// If the covariance of the touches cannot be factored.
     pub fn condition(&mut self, last: Option<&Fit>, fit: &Fit) -> Result<(), CovarianceError> {
-        let start = last.map(|last| &last.hyperparameters);
-        let (prior, observations) = self.observations(start);
-        self.conclude(prior, observations, fit.clone()).map(|_| ())
+        self.condition_from(last.map(|last| last.hyperparameters.clone()), fit)
+    }
+
+    /// Conditions a stored belief again.
+    ///
+    /// # Errors
+    /// If the covariance of the touches cannot be factored.
+    pub(crate) fn restore(&mut self) -> Result<(), CovarianceError> {
+        self.kernel = kernel::by_name(&self.settings.kernel).unwrap_or(&Matern52);
+        let start = self.start.take();
+        self.fit.take().map_or(Ok(()), |fit| self.condition_from(start, &fit))
+    }
+
+    fn condition_from(
+        &mut self,
+        start: Option<Hyperparameters>,
+        fit: &Fit,
+    ) -> Result<(), CovarianceError> {
+        let made = self.observations(start.as_ref());
+        self.conclude(made, start, fit.clone()).map(|_| ())
     }
 
     fn conclude(
         &mut self,
-        prior: PriorMean,
-        observations: Observations,
+        (prior, observations): (PriorMean, Observations),
+        start: Option<Hyperparameters>,
         fit: Fit,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
         let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), observations)?;
@@ -106,6 +133,7 @@ impl ImplicitSurface {
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
         let met = (self.contacts(), offset_m);
         let surface = Surface::new(&self.scope, prior, posterior, met);
+        self.start = start;
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
 

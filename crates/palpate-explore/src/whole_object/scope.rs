@@ -1,9 +1,12 @@
 //! Scope of an exploration around a whole object: the ball and the finger.
 
 use crate::robot::Finger;
+use crate::task::touch::TouchSettings;
 use crate::task::{Aim, Ball, Task};
 use nalgebra::Point3;
 use palpate_geometry::primitives::extent;
+use palpate_input::error::InputError;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Common offset of the surface that is estimated by
@@ -12,7 +15,8 @@ use std::sync::Arc;
 const SOFT_OFFSET_M: f64 = 3e-4;
 
 /// A ball that contains the object, and the finger that touches it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(into = "StoredSetup", try_from = "StoredSetup")]
 pub struct ExplorationSetup {
     /// The ball that contains the object.
     pub ball: Ball,
@@ -21,6 +25,31 @@ pub struct ExplorationSetup {
     /// Standard deviation of the error common to all contacts.
     pub offset_m: f64,
     task: Arc<Task>,
+}
+
+/// Stored form of a scope; it has no arm, so that all aims are within its reach.
+#[derive(Serialize, Deserialize)]
+struct StoredSetup {
+    ball: Ball,
+    offset_m: f64,
+    touch: TouchSettings,
+    finger: Finger,
+}
+
+impl From<ExplorationSetup> for StoredSetup {
+    fn from(ExplorationSetup { ball, offset_m, task, .. }: ExplorationSetup) -> Self {
+        Self { ball, offset_m, touch: task.touch().clone(), finger: task.finger().clone() }
+    }
+}
+
+impl TryFrom<StoredSetup> for ExplorationSetup {
+    type Error = InputError;
+
+    fn try_from(stored: StoredSetup) -> Result<Self, InputError> {
+        let StoredSetup { ball, offset_m, touch, finger } = stored;
+        let task = Task::new(ball, touch, &finger)?;
+        Ok(Self { offset_m, ..Self::new(ball, &task, (&finger, false)) })
+    }
 }
 
 impl ExplorationSetup {

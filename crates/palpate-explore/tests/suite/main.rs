@@ -1,3 +1,4 @@
 //! Tests of palpate-explore, in one binary.
 
 mod planners;
+mod stored;

@@ -7,7 +7,7 @@ mod rules;
 pub use error::{ConfigError, Origin};
 pub use rules::{Rules, Validate};
 
-use crate::{files, format};
+use crate::{files, format, shipped};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -42,6 +42,8 @@ pub struct Loader {
     read_as: Vec<[String; 2]>,
     /// Former names that were read, each with the present one.
     former_names: Vec<String>,
+    /// Folder of the shipped files; `None` for that of the environment.
+    home: Option<PathBuf>,
 }
 
 impl Loader {
@@ -67,7 +69,14 @@ impl Loader {
             sets: Vec::new(),
             read_as: Vec::new(),
             former_names: Vec::new(),
+            home: None,
         })
+    }
+
+    /// Sets the folder of the files that [`include`](Self::include) finds by name; default: that of
+    /// [`shipped::HOME`].
+    pub fn with_home(self, home: &Path) -> Self {
+        Self { home: Some(home.into()), ..self }
     }
 
     /// Reads the dotted key `given` as `present`, if it has a value; messages name it as given.
@@ -176,15 +185,25 @@ impl Loader {
         ConfigError { allowed: Some(remedy.into()), ..ConfigError::new(origin, message) }
     }
 
-    /// Replaces `key` by the table in the file that it names, if it names a file.
+    /// Replaces `key` by the table in the file that it names, if it names a file. A plain name
+    /// without such a file is that of a shipped file in `folder`.
     ///
     /// # Errors
     /// If the file cannot be read or is not TOML.
-    pub fn include(&mut self, key: &str) -> Result<(), ConfigError> {
+    pub fn include(&mut self, key: &str, folder: Option<&str>) -> Result<(), ConfigError> {
         let Some(Value::String(name)) = self.table.get(key) else { return Ok(()) };
-        let path = self.beside(key, Path::new(name));
+        let mut path = self.beside(key, Path::new(name));
+        let folder = folder.filter(|_| shipped::is_plain(Path::new(name)) && !path.is_file());
+        if let Some(folder) = folder {
+            path = shipped::find(Path::new(name), folder, self.home.as_deref()).unwrap_or(path);
+        }
         let text = files::text(&path, files::TEXT_MAX).map_err(|cause| {
-            let allowed = format!("a readable file ({}: {cause})", path.display());
+            let mut allowed = format!("a readable file ({}: {cause})", path.display());
+            if let Some(folder) = folder {
+                let names = shipped::names(folder, self.home.as_deref());
+                let remedy = shipped::remedy(name, &names);
+                allowed += &format!(", or a name in {folder}/: {}{remedy}", names.join(", "));
+            }
             self.not_allowed(key, &format!("\"{name}\""), &allowed)
         })?;
         let (table, document) = parse(&path, text)?;

@@ -1,0 +1,58 @@
+//! Lookup of shipped files by name: `bird` finds `scenes/bird.toml`.
+
+use crate::format;
+use std::path::{Path, PathBuf};
+
+/// Environment variable: the folder that contains the folders of shipped files if they are neither
+/// in the working directory nor beside the program.
+pub const HOME: &str = "PALPATE_HOME";
+
+/// Whether `name` has no folder and no extension.
+pub fn is_plain(name: &Path) -> bool {
+    name.extension().is_none() && name.components().count() == 1
+}
+
+/// Returns the file `NAME.toml` in a `folder` of shipped files: in the working directory, beside
+/// the program, or in `home`, by default that of [`HOME`]. A name with an extension is a path there.
+pub fn find(name: &Path, folder: &str, home: Option<&Path>) -> Option<PathBuf> {
+    let (file, folder) = match name.extension() {
+        None => (name.with_extension("toml"), folder),
+        Some(_) => (name.to_owned(), ""),
+    };
+    folders(folder, home).map(|folder| folder.join(&file)).find(|path| path.is_file())
+}
+
+/// Returns the sorted names of the files that [`find`] finds.
+pub fn names(folder: &str, home: Option<&Path>) -> Vec<String> {
+    let files = folders(folder, home).filter_map(|folder| std::fs::read_dir(folder).ok());
+    let stem = |path: PathBuf| -> Option<String> {
+        let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+        Some(path.file_stem()?.to_str()?.to_owned()).filter(|_| is_toml)
+    };
+    let mut names: Vec<String> =
+        files.flatten().flatten().filter_map(|entry| stem(entry.path())).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// Returns the end of a message about a `name` that [`find`] does not find: the most similar of
+/// `names`, or how to set the folder if there are none.
+pub fn remedy(name: &str, names: &[String]) -> String {
+    match format::nearest(name, names) {
+        Some(meant) => format!(", did you mean `{meant}`?"),
+        None if names.is_empty() => {
+            format!("; set {HOME} to the folder that has experiments/ and scenes/")
+        }
+        None => String::new(),
+    }
+}
+
+/// Candidate locations of `folder`, in search order.
+fn folders(folder: &str, home: Option<&Path>) -> impl Iterator<Item = PathBuf> {
+    let program = std::env::current_exe().ok();
+    let beside = program.and_then(|program| Some(program.parent()?.join(folder)));
+    let home = home.map(Path::to_owned).or_else(|| std::env::var_os(HOME).map(PathBuf::from));
+    let home = home.map(|home| home.join(folder));
+    std::iter::once(PathBuf::from(folder)).chain(beside).chain(home)
+}
