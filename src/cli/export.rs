@@ -4,19 +4,21 @@ use super::find::{SCENES, find};
 use super::output::Overwrite;
 use super::prepare::check_applicable;
 use super::scan::{Grid, ScanArgs, grid, scan};
+use super::slow_steps::report_slow_steps;
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
+use crate::experiment::trial::row::planner_rows;
 use crate::report::points::PointCloud;
 use crate::report::replay::{self, BeliefReplay};
-use crate::report::{figures, files, style, whole_object};
+use crate::report::{animation, figures, files, film, style, whole_object};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
 use palpate_geometry::import::is_mesh_file;
 use palpate_gp::posterior::Scratch;
 use palpate_input::format::counted;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -24,6 +26,7 @@ Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate export runs/bird --planner random --trial 3 --touches 60 --out bird.obj
   palpate export runs/mug --planner active --grid 128 --out mug.ply
+  palpate export runs/bird --planner active --out bird.gif
   palpate export scenes/container.toml --grid 41x51 --out runs/container-scan
 
 From a run: writes the belief after some touches as FILE.ply or FILE.obj, and the belief beside the true surface as \
@@ -31,6 +34,11 @@ FILE.svg, FILE.png and FILE.pdf. The standard deviation is the property `sigma_m
 vertex of an OBJ file. Colours show it on the viridis map, from 0 to the largest. Vertices where a surface is \
 less likely than none are omitted. A run around a whole object gives the closed mean surface; sigma_m is the standard \
 deviation along its normal, and error_m is the signed distance to the true surface, negative inside.
+
+FILE.gif and FILE.mp4 are a film: the belief, coloured by its standard deviation, after each touch up to --touches, with \
+the touches and the error, in at most 60 frames. MP4 needs the program ffmpeg. Without --trial all formats show the \
+planner's median trial by final error, or its first trial if there is no ground truth. Film and output name the trial \
+and its rank.
 
 From a scene: touches a grid of targets. FOLDER holds cloud.ply (contact points with normals), cloud.csv (also the \
 misses), scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops it without writing anything; the \
@@ -41,18 +49,20 @@ pub(super) struct Args {
     /// Run only: planner whose belief is written.
     #[arg(long)]
     planner: Option<String>,
-    /// Run only: trial number.
-    #[arg(long, default_value_t = 0)]
-    trial: u32,
-    /// Run only: number of touches that the belief is fitted to [default: all].
+    /// Run only: trial number [default: the planner's median trial by final error].
+    #[arg(long)]
+    trial: Option<u32>,
+    /// Run only: number of touches that the belief, or the last of a film, is fitted to [default:
+    /// all].
     #[arg(long)]
     touches: Option<u32>,
-    /// Output: a .ply or .obj file for a run, a folder for a scene [default: runs/SCENE-scan].
+    /// Output: for a run a mesh (.ply, .obj) or a film (.gif, .mp4), for a scene a folder
+    /// [default: runs/SCENE-scan].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// For a run, vertices along each side of the zone, or cells along the longest side of a whole
-    /// object [default: the experiment's grid or gp.cells]. For a scene, targets along x and z
-    /// [default: square cells, 81 along the longer side].
+    /// For a mesh of a run, vertices along each side of the zone, or cells along the longest side of
+    /// a whole object [default: the experiment's grid or gp.cells]. For a scene, targets along x
+    /// and z [default: square cells, 81 along the longer side].
     #[arg(long, value_name = "N|NxM", value_parser = grid)]
     grid: Option<Grid>,
     #[command(flatten)]
@@ -86,14 +96,14 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let path = if is_run { args.path.clone() } else { find(&args.path, SCENES)? };
     let options = [
         ("--planner", args.planner.is_some(), is_run, "a run's folder"),
-        ("--trial", args.trial != 0, is_run, "a run's folder"),
+        ("--trial", args.trial.is_some(), is_run, "a run's folder"),
         ("--touches", args.touches.is_some(), is_run, "a run's folder"),
         ("--set", !args.scan.set.is_empty(), !is_run, "a scene (.toml)"),
         ("--threads", args.scan.threads != 0, !is_run, "a scene (.toml)"),
     ];
     check_applicable(&path, &options)?;
     if is_run {
-        return belief(args);
+        return belief(args, talk);
     }
     scan(&path, &args.scan, (args.out.as_deref(), args.grid, args.force), talk)
 }
@@ -101,30 +111,98 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
 /// Allowed cells of a belief around an object, as for `gp.cells`.
 const CELLS: std::ops::RangeInclusive<usize> = 8..=256;
 
-fn belief(args: &Args) -> anyhow::Result<Outcome> {
-    let out = args.out.as_ref().context("--out FILE: allowed is a file ending in .ply or .obj")?;
-    let write: fn(&PointCloud) -> String =
-        match out.extension().and_then(|extension| extension.to_str()) {
-            Some("ply") => PointCloud::ply,
-            Some("obj") => PointCloud::obj,
-            _ => bail!("--out {}: allowed is a file ending in .ply or .obj", out.display()),
-        };
-    args.force.check_files(out, &files::FORMATS)?;
+/// File format of a run's export.
+enum Format {
+    Mesh(fn(&PointCloud) -> String),
+    Gif,
+    Mp4,
+}
+
+/// Returns the format of a file by its extension.
+fn format(out: &Path) -> anyhow::Result<Format> {
+    Ok(match out.extension().and_then(|extension| extension.to_str()) {
+        Some("ply") => Format::Mesh(PointCloud::ply),
+        Some("obj") => Format::Mesh(PointCloud::obj),
+        Some("gif") => Format::Gif,
+        Some("mp4") => Format::Mp4,
+        _ => bail!("--out {}: allowed is a file ending in {ENDINGS}", out.display()),
+    })
+}
+
+const ENDINGS: &str = ".ply or .obj (mesh), .gif or .mp4 (film)";
+
+fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+    let out = args.out.as_ref();
+    let out = out.with_context(|| format!("--out FILE: allowed is a file ending in {ENDINGS}"))?;
+    let format = format(out)?;
+    match format {
+        Format::Mesh(_) => args.force.check_files(out, &files::FORMATS)?,
+        Format::Gif | Format::Mp4 => args.force.check_file(out)?,
+    }
     let mut run = Run::read(&args.path)?;
-    let is_around = run.experiment.scene.whole_object.is_some();
-    ensure!(
-        run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
-        "{} explored a curve, which has no mesh; see the figures of the run",
-        args.path.display()
-    );
-    let touches = checked_touches(&run, args)?;
+    let (trial, touches) = checked_trial(&run, args)?;
     // Draws the run's figure of beliefs for this planner, trial and touch count only.
     run.experiment.report = ReportSettings {
         touch_counts: vec![touches],
-        trial: args.trial,
+        trial,
         planners: args.planner.clone().into_iter().collect(),
         ..ReportSettings::default()
     };
+    match format {
+        Format::Mesh(write) => mesh_file(run, args, (touches, write), out),
+        Format::Gif | Format::Mp4 => film_file(&run, args, touches, (&format, out), talk),
+    }
+}
+
+/// Writes the film of a trial up to some touches.
+fn film_file(
+    run: &Run,
+    args: &Args,
+    touches: u32,
+    (format, out): (&Format, &Path),
+    talk: Verbosity,
+) -> anyhow::Result<Outcome> {
+    ensure!(args.grid.is_none(), "--grid applies only to a mesh (.ply, .obj)");
+    let planner = args.planner();
+    let row = replay::row(run, planner).context("the trial is missing")?;
+    let counts = film::counts(run, row, touches);
+    let (Some(first), Some(last)) = (counts.first(), counts.last()) else {
+        bail!("{planner} has no fit in trial {} up to {touches} touches", row.trial);
+    };
+    if matches!(format, Format::Mp4) {
+        animation::check_ffmpeg()?;
+    }
+    report_slow_steps(talk, |tell| -> anyhow::Result<()> {
+        tell(&format!("drawing {} frames", counts.len()));
+        let drawings = film::drawings(run, planner, &counts)?;
+        match format {
+            Format::Mp4 => animation::mp4(&drawings, out),
+            _ => Ok(write_whole(out, animation::gif(&drawings)?)?),
+        }
+    })?;
+    let megabytes = std::fs::metadata(out).map_or(0.0, |file| file.len() as f64 / 1e6);
+    print(&format!(
+        "{}: {} frames, {first} to {last} touches of {planner}, {megabytes:.1} MB\n{}",
+        out.display(),
+        counts.len(),
+        film::rank_words(run, planner, row.trial),
+    ))?;
+    Ok(Outcome::Done)
+}
+
+/// Writes the belief after some touches as a mesh, with a picture.
+fn mesh_file(
+    mut run: Run,
+    args: &Args,
+    (touches, write): (u32, fn(&PointCloud) -> String),
+    out: &Path,
+) -> anyhow::Result<Outcome> {
+    let is_around = run.experiment.scene.whole_object.is_some();
+    ensure!(
+        run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
+        "{} explored a curve, which has no mesh; use a file ending in .gif, or the figures of the run",
+        args.path.display()
+    );
     let (mesh, score) = if is_around {
         closed_surface(&mut run, args, touches)?
     } else {
@@ -138,11 +216,12 @@ fn belief(args: &Args) -> anyhow::Result<Outcome> {
     let score = if score.is_empty() { score } else { format!("; {score}") };
     let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
     print(&format!(
-        "{}: {} vertices, {} triangles, sigma up to {:.3} mm{score}\npicture: {}",
+        "{}: {} vertices, {} triangles, sigma up to {:.3} mm{score}\n{}\npicture: {}",
         out.display(),
         mesh.points.len(),
         mesh.triangles.len(),
         1e3 * largest_m,
+        film::rank_words(&run, args.planner(), run.experiment.report.trial),
         out.with_extension("png").display()
     ))?;
     Ok(Outcome::Done)
@@ -199,40 +278,51 @@ fn title(run: &Run, args: &Args, touches: u32) -> String {
         "Palpate {}: belief of {} in trial {} of {} after {}",
         env!("CARGO_PKG_VERSION"),
         args.planner(),
-        args.trial,
+        run.experiment.report.trial,
         run.experiment.name,
         counted(touches, "touch"),
     )
 }
 
-/// Returns the touch count after which the belief is exported.
+/// Returns the trial that is exported, and the number of its touches.
 ///
 /// # Errors
 /// If the run lacks the planner, the trial or the touch count.
-fn checked_touches(run: &Run, args: &Args) -> anyhow::Result<u32> {
-    let (planner, trial) = (args.planner(), &args.trial);
+fn checked_trial(run: &Run, args: &Args) -> anyhow::Result<(u32, u32)> {
+    let planner = args.planner();
     let planners = &run.experiment.planners;
     ensure!(
         planners.iter().any(|known| known == planner),
         "--planner {planner}: this run has {}",
         planners.join(", ")
     );
-    let rows = || run.rows.iter().filter(|row| row.planner == planner);
-    let Some(row) = rows().find(|row| row.trial == *trial) else {
-        match (rows().map(|row| row.trial).min(), rows().map(|row| row.trial).max()) {
-            (Some(first), Some(last)) => {
-                bail!("--trial {trial}: {planner} has finished trials {first} to {last}")
+    let mut rows = planner_rows(&run.rows, planner);
+    let ranked = film::ranked(run, planner);
+    let median = ranked.get(film::median_index(ranked.len())).map(|(row, _)| *row);
+    let row = match args.trial {
+        None => median.or_else(|| rows.next()),
+        Some(trial) => rows.find(|row| row.trial == trial),
+    };
+    let Some(row) = row else {
+        let asked = args.trial.map_or("--trial".into(), |trial| format!("--trial {trial}"));
+        // Rows are ordered by trial.
+        let mut trials = planner_rows(&run.rows, planner).map(|row| row.trial);
+        match (trials.next(), trials.last()) {
+            (Some(first), last) => {
+                let last = last.unwrap_or(first);
+                bail!("{asked}: {planner} has finished trials {first} to {last}")
             }
-            _ => bail!("--trial {trial}: {planner} has finished no trial"),
+            _ => bail!("{asked}: {planner} has finished no trial"),
         }
     };
     let (first, last) = (run.experiment.initial_touches, row.touches.len() as u32);
     let touches = args.touches.unwrap_or(last);
     ensure!(
         (first..=last).contains(&touches),
-        "--touches {touches}: trial {trial} of {planner} has beliefs after {first} to {last} touches"
+        "--touches {touches}: trial {} of {planner} has beliefs after {first} to {last} touches",
+        row.trial
     );
-    Ok(touches)
+    Ok((row.trial, touches))
 }
 
 /// Posterior mean as a surface in `W`, where a surface is more likely than none.

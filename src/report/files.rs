@@ -63,22 +63,31 @@ pub fn tree(svg: &str) -> anyhow::Result<Tree> {
     Ok(Tree::from_str(svg, &options)?)
 }
 
+/// Converts an SVG to pixels, `scale` of them per unit of the drawing.
+///
+/// # Errors
+/// If it is not an SVG, or too large for memory.
+pub fn pixels(svg: &str, scale: f32) -> anyhow::Result<Pixmap> {
+    let tree = tree(svg)?;
+    let size = tree.size().to_int_size().scale_by(scale).context("the drawing has no size")?;
+    let mut pixels =
+        Pixmap::new(size.width(), size.height()).context("the drawing is too large")?;
+    resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixels.as_mut());
+    Ok(pixels)
+}
+
 /// Converts an SVG to PNG, at [`PNG_SCALE`], with the name of the program in its metadata.
 ///
 /// # Errors
 /// If it is not an SVG, or too large for memory.
 pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
-    let tree = tree(svg)?;
-    let size = tree.size().to_int_size().scale_by(PNG_SCALE).context("the drawing has no size")?;
-    let mut pixels =
-        Pixmap::new(size.width(), size.height()).context("the drawing is too large")?;
-    resvg::render(&tree, Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
+    let pixels = pixels(svg, PNG_SCALE)?;
     let rgba = pixels.pixels().iter().flat_map(|pixel| {
         let colour = pixel.demultiply();
         [colour.red(), colour.green(), colour.blue(), colour.alpha()]
     });
     let mut bytes = Vec::new();
-    let mut encoder = Encoder::new(&mut bytes, size.width(), size.height());
+    let mut encoder = Encoder::new(&mut bytes, pixels.width(), pixels.height());
     encoder.set_color(ColorType::Rgba);
     encoder.add_text_chunk("Software".into(), "Palpate".into())?;
     encoder.write_header()?.write_image_data(&rgba.collect::<Vec<u8>>())?;

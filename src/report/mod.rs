@@ -1,6 +1,7 @@
 //! Report of a run: tables, figures and a page, drawn from its recorded rows.
 
 pub mod accuracy;
+pub mod animation;
 pub mod axes;
 pub mod canvas;
 pub mod check;
@@ -8,6 +9,7 @@ pub mod compare;
 pub mod explorer;
 pub mod figures;
 pub mod files;
+pub mod film;
 pub mod findings;
 mod glossary;
 pub mod heat_map;

@@ -212,24 +212,40 @@ impl Relief {
     /// heights are missing. Heights are coloured along `axis`.
     pub fn new(
         panel: &ReliefPanel,
-        [xs, zs]: [&[f64]; 2],
+        sides: [&[f64]; 2],
         heights_m: &[Option<f64>],
         axis: &Axis,
     ) -> Self {
+        let colour = |_: &[usize], corners: &[Vector3<f64>], normal: &Vector3<f64>| {
+            height_colour(axis, corners, normal)
+        };
+        Self::coloured(panel, sides, heights_m, colour)
+    }
+
+    /// Creates a surface like [`Relief::new`]; the colour function gets the indices of a face's
+    /// corners on the grid, the corners (x, height, z), and the face's unit normal.
+    pub fn coloured(
+        panel: &ReliefPanel,
+        [xs, zs]: [&[f64]; 2],
+        heights_m: &[Option<f64>],
+        colour: impl Fn(&[usize], &[Vector3<f64>], &Vector3<f64>) -> String,
+    ) -> Self {
         let [low, high] = panel.space.height_m;
-        let corner = |(i, j): (usize, usize)| -> Option<Vector3<f64>> {
-            let height = (*heights_m.get(j * xs.len() + i)?)?;
+        let corner = |(i, j): (usize, usize)| -> Option<(usize, Vector3<f64>)> {
+            let index = j * xs.len() + i;
+            let height = (*heights_m.get(index)?)?;
             let is_known = height.is_finite();
-            is_known.then(|| Vector3::new(xs[i], height.clamp(low, high), zs[j]))
+            is_known.then(|| (index, Vector3::new(xs[i], height.clamp(low, high), zs[j])))
         };
         let cells = (1..zs.len()).flat_map(|j| (1..xs.len()).map(move |i| (i, j)));
         let face = |(i, j): (usize, usize)| {
             let around = [(i - 1, j - 1), (i, j - 1), (i, j), (i - 1, j)];
-            let corners: Vec<_> = around.into_iter().filter_map(corner).collect();
+            let (indices, corners): (Vec<_>, Vec<_>) =
+                around.into_iter().filter_map(corner).unzip();
             // Three corners of four still make a face, which smooths the outline of an object.
             (corners.len() >= 3).then(|| {
                 let normal = normal(&panel.camera, &corners);
-                let colour = height_colour(axis, &corners, &normal);
+                let colour = colour(&indices, &corners, &normal);
                 (corners, colour)
             })
         };
@@ -266,12 +282,11 @@ impl Relief {
     /// Draws the surface, far faces first.
     pub fn draw(&self, canvas: &mut Canvas) {
         // A stroke in the face's own colour closes the hairlines between faces.
-        let shared = r#"fill="currentColor" stroke="currentColor" stroke-width=".7""#;
-        canvas.grouped(shared, |canvas| {
+        canvas.grouped(r#"stroke-width=".7""#, |canvas| {
             for Face { outline, colour, .. } in &self.faces {
                 let corners: Vec<String> = outline.iter().map(|&corner| pair(corner)).collect();
                 let data = format!("M{}z", corners.join("L"));
-                canvas.outline(&data, &format!(r#"color="{colour}""#));
+                canvas.outline(&data, &format!(r#"fill="{colour}" stroke="{colour}""#));
             }
         });
     }

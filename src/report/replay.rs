@@ -85,8 +85,7 @@ impl<'a> BeliefReplay<'a> {
 
     /// Returns every touch with its colour.
     pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, &'static str)> {
-        let colour = |i| style::touch(i < self.initial_touches);
-        self.touches.iter().enumerate().map(move |(i, touch)| (touch, colour(i)))
+        marks(self.touches, self.initial_touches)
     }
 
     /// Returns the agreement with the truth as text.
@@ -122,6 +121,14 @@ impl<'a> BeliefReplay<'a> {
             }
         }
     }
+}
+
+/// Returns touches, the first `initial` of which all planners share, with their colours.
+pub fn marks(
+    touches: &[TouchRow],
+    initial: usize,
+) -> impl Iterator<Item = (&TouchRow, &'static str)> {
+    touches.iter().enumerate().map(move |(i, touch)| (touch, style::touch(i < initial)))
 }
 
 /// Returns a sentence of a caption on where beliefs are drawn; empty if the surface is everywhere.

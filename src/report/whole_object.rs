@@ -15,6 +15,7 @@ use palpate_explore::task::Task;
 use palpate_explore::whole_object::{ExplorationSetup, ImplicitSurface};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::decimate::decimate;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 // Largest number of triangles of a surface that is drawn.
 // heuristic: a page stays a few megabytes.
@@ -69,7 +70,7 @@ pub const FIGURE: ReportFigure = ReportFigure {
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
-fn sequences(
+pub(super) fn sequences(
     run: &Run,
     planners: &[&str],
     counts: &[u32],
@@ -92,11 +93,13 @@ fn sequences(
                 is_initial: i < initial_touches,
             });
         }
-        for &count in counts {
+        let frame = |&count: &u32| {
             let frame = frame(&run.experiment, row, count, truth, TRIANGLES);
-            let undrawn = || format!("{} cannot be drawn", place(count as usize));
-            sequence.frames.extend(frame.with_context(undrawn)?);
-        }
+            frame.with_context(|| format!("{} cannot be drawn", place(count as usize)))
+        };
+        let frames: Vec<Option<SurfaceFrame>> =
+            counts.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
+        sequence.frames = frames.into_iter().flatten().collect();
         Ok(sequence)
     };
     planners.iter().filter_map(|planner| replay::row(run, planner)).map(sequence).collect()

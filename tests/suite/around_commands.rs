@@ -53,6 +53,13 @@ fn a_whole_belief_is_exported_and_read_back() {
     for extension in ["svg", "png", "pdf"] {
         assert!(folder.path().join(format!("it.{extension}")).is_file(), "{extension}");
     }
+    // A film has the beliefs whose errors were computed.
+    let says = succeeds(
+        folder.path(),
+        &["export", "runs/small", "--planner", "active", "--out", "it.gif"],
+    );
+    assert!(says.contains("2 frames, 4 to 8 touches of active"), "{says}");
+    assert!(says.contains("the median of 2 by final Chamfer distance"), "{says}");
     let export = ["export", "runs/small", "--planner", "active", "--out", "no.ply", "--grid", "4"];
     fails(folder.path(), &export, &["--grid 4", "8 to 256 cells"]);
     assert!(!folder.path().join("no.ply").exists());

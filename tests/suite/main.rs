@@ -29,6 +29,7 @@ mod examples;
 mod experiments;
 mod figures;
 mod files;
+mod film;
 mod finger;
 mod finger_parts;
 mod finger_signals;

@@ -119,7 +119,7 @@ fn a_belief_is_exported_as_it_was_and_mistakes_say_what_is_allowed() {
     assert!(export("activ", "0", "8", &mesh).contains("active, random, sobol"));
     assert!(export("active", "1", "8", &mesh).contains("trials 0 to 0"));
     assert!(export("active", "0", "4", &mesh).contains("5 to 9 touches"));
-    assert!(export("active", "0", "8", &file("belief.stl")).contains(".ply or .obj"));
+    assert!(export("active", "0", "8", &file("belief.stl")).contains(".ply or .obj (mesh)"));
 }
 
 #[test]

@@ -54,16 +54,19 @@ const BYTES_OF_PLACE: usize = 6;
 const MARGIN: [f64; 2] = [0.3, 0.08];
 
 /// Belief on the grid, in metres.
-struct Frame {
-    touches: u32,
+pub struct HeightFrame {
+    /// Number of touches.
+    pub touches: u32,
     score: String,
     /// Means; `None` where no belief is drawn.
-    means_m: Vec<Option<f64>>,
-    deviations_m: Vec<f64>,
+    pub means_m: Vec<Option<f64>>,
+    /// Standard deviations.
+    pub deviations_m: Vec<f64>,
 }
 
-impl Frame {
-    fn of(replay: &BeliefReplay, places: &[&[f64]]) -> Self {
+impl HeightFrame {
+    /// Reads a belief at `places`.
+    pub fn of(replay: &BeliefReplay, places: &[&[f64]]) -> Self {
         let predictions = replay.surface.predict(places.iter().copied());
         let drawn = replay.is_drawn(places.iter().copied()).into_iter().zip(&predictions);
         Self {
@@ -92,11 +95,11 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     for name in names() {
         let frame = |&count: &u32| {
             let replay = BeliefReplay::new(run, name, count)?;
-            anyhow::Ok(replay.map(|replay| Frame::of(&replay, &places)))
+            anyhow::Ok(replay.map(|replay| HeightFrame::of(&replay, &places)))
         };
-        let frames: Vec<Option<Frame>> =
+        let frames: Vec<Option<HeightFrame>> =
             touch_counts.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
-        let frames: Vec<Frame> = frames.into_iter().flatten().collect();
+        let frames: Vec<HeightFrame> = frames.into_iter().flatten().collect();
         if !frames.is_empty() {
             beliefs.push((name, frames));
         }
@@ -117,7 +120,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
         grid.along(side).into_iter().map(|at_m| short(at_m * unit.per_m)).collect()
     };
     let space = zone.z_m.map(|z_m| Space { x_m: zone.x_m, z_m, height_m: [low, high] });
-    let frame = |frame: &Frame| {
+    let frame = |frame: &HeightFrame| {
         json!({
             "touches": frame.touches,
             "score": frame.score,
@@ -125,7 +128,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
             "deviation": encode_log(deviation_range_m, frame.deviations_m.iter().copied()),
         })
     };
-    let planner = |(name, frames): &(&str, Vec<Frame>)| {
+    let planner = |(name, frames): &(&str, Vec<HeightFrame>)| {
         let touches = replay::row(run, name).map_or(&[][..], |row| &row.touches);
         let contacts = touches.iter().map(|touch| contact(zone, touch, unit));
         json!({

@@ -75,7 +75,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 
 /// Creates a panel of heights over the zone, as large as `most`. If both axes are in millimetres
 /// they have the same scale, and the panel is as high as needed, up to `height_px`.
-pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f64) -> Panel {
+pub fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f64) -> Panel {
     let unit = Length::of(zone);
     let [low, high] = zone.x_m.map(|x| x * unit.per_m);
     let x = Axis::linear(low, high, 5.0);
@@ -86,13 +86,13 @@ pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f6
 }
 
 /// Returns a height axis around the truth and all drawn touches, with a margin for the bands.
-pub(super) fn height_axis(run: &Run, unit: Length) -> Option<Axis> {
+pub fn height_axis(run: &Run, unit: Length) -> Option<Axis> {
     let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
     Axis::around(heights_m.map(|height_m| height_m * unit.per_m), 0.4, 5.0)
 }
 
 /// Returns the legend entries for [`draw_belief`], with `more` after those of touches.
-pub(super) fn entries(
+pub fn entries(
     run: &Run,
     more: impl IntoIterator<Item = (Swatch, &'static str)>,
 ) -> impl Iterator<Item = (Swatch, &'static str)> {
@@ -107,7 +107,7 @@ pub(super) fn entries(
 }
 
 /// Draws the belief in `panel`: band, truth, mean, touches.
-pub(super) fn draw_belief(
+pub fn draw_belief(
     canvas: &mut Canvas,
     panel: &Panel,
     run: &Run,

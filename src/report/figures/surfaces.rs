@@ -2,6 +2,7 @@
 
 use super::ReportFigure;
 use crate::experiment::store::Run;
+use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, miss_entry, touch_entries};
@@ -34,7 +35,7 @@ fn caption(run: &Run) -> String {
 }
 
 /// Places along each side of a relief; more would not be visible at this size.
-const PLACES: usize = 41;
+pub const PLACES: usize = 41;
 const MARGIN: (f64, f64) = (24.0, 44.0);
 const PANEL: (f64, f64) = (252.0, 316.0);
 const FOOT_PX: f64 = 62.0;
@@ -77,7 +78,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                 });
                 let relief = relief(canvas, &panel, heights.collect());
                 canvas.grouped(ON_RELIEF, |canvas| {
-                    mark(&panel, canvas, zone, &relief, &replay);
+                    mark(&panel, canvas, zone, &relief, replay.marks());
                 });
             }
         }
@@ -98,22 +99,22 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 
 /// Returns the drawn space: the zone, and heights around the truth and the drawn touches; `None`
 /// for a curve.
-fn space(run: &Run, zone: &Zone) -> Option<Space> {
+pub fn space(run: &Run, zone: &Zone) -> Option<Space> {
     let (low, high) =
         Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
     Some(Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] })
 }
 
-/// Marks touches: a point for a contact, hollow if the surface hides it; a diamond at the back for
-/// a miss.
-fn mark(
+/// Marks touches in their colours: a point for a contact, hollow if the surface hides it; a diamond
+/// at the back for a miss.
+pub fn mark<'a>(
     panel: &ReliefPanel,
     canvas: &mut Canvas,
     zone: &Zone,
     relief: &Relief,
-    replay: &BeliefReplay,
+    marks: impl Iterator<Item = (&'a TouchRow, &'static str)>,
 ) {
-    for (touch, colour) in replay.marks() {
+    for (touch, colour) in marks {
         match replay::contact(zone, touch) {
             Some((place, height)) => {
                 let point = Vector3::new(place[0], height, place[1]);

@@ -2,15 +2,16 @@
 //! count.
 
 use super::panel::{View, inner, scale};
-use super::section::{TRUTH_TRIANGLES, deviation_range};
+use super::section::{TRUTH_TRIANGLES, deviation_axis};
 use super::{PlannerSurfaces, SurfaceFrame};
 use crate::report::axes::{Axis, MM, colour_bar};
-use crate::report::canvas::{Area, Canvas};
+use crate::report::canvas::{Area, Canvas, PointPx};
 use crate::report::legend::{FigureLayout, MISS, touch_entries};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
+use palpate_geometry::solids::Triangles;
 use palpate_input::format::counted;
 
 const PANEL: (f64, f64) = (236.0, 258.0);
@@ -44,8 +45,7 @@ pub fn figure(
     let contacts = touches().filter_map(|touch| touch.contact_w.as_ref());
     let points = meshes.flat_map(|(vertices, _)| vertices).chain(contacts);
     let points: Vec<_> = points.map(|p_w| p_w.coords).collect();
-    let ends_m = deviation_range(drawn.iter().flat_map(|frame| &frame.sd_m));
-    let axis = ends_m.and_then(|ends_m| Axis::log(ends_m.map(|end_m| end_m * MM.per_m)));
+    let axis = deviation_axis(drawn.iter().flat_map(|frame| &frame.sd_m), MM);
     let axis = axis.filter(|_| !points.is_empty())?;
 
     let columns = counts.len() + usize::from(truth.is_some());
@@ -77,6 +77,55 @@ pub fn figure(
     Some(sheet.canvas.finish())
 }
 
+/// Panels of a film: the estimated surface from the front and from behind, and the true object.
+pub struct FilmPanels<'a> {
+    sequence: &'a PlannerSurfaces,
+    views: Vec<View>,
+    truth: Option<Triangles>,
+    px_per_m: f64,
+    axis: Axis,
+}
+
+impl<'a> FilmPanels<'a> {
+    /// Creates the panels in the first of `areas`, three of one size; all frames have one scale and
+    /// the same colours. Returns `None` if there is nothing to draw.
+    pub fn new(
+        sequence: &'a PlannerSurfaces,
+        truth: Option<&Mesh>,
+        areas: [Area; 3],
+    ) -> Option<Self> {
+        let truth = truth.map(|mesh| decimate(mesh, TRUTH_TRIANGLES));
+        let meshes = sequence.frames.iter().map(|frame| &frame.mesh).chain(&truth);
+        let contacts = sequence.touches.iter().filter_map(|touch| touch.contact_w.as_ref());
+        let points = meshes.flat_map(|(vertices, _)| vertices).chain(contacts);
+        let points: Vec<_> = points.map(|p_w| p_w.coords).collect();
+        let axis = deviation_axis(sequence.frames.iter().flat_map(|frame| &frame.sd_m), MM)?;
+        let px_per_m = scale(&points, areas[0]);
+        let sides = areas.into_iter().zip([false, true, false]);
+        let views = sides.map(|(area, is_behind)| View::new(area, is_behind, px_per_m, &points));
+        Some(Self { sequence, views: views.collect(), truth, px_per_m, axis })
+    }
+
+    /// Axis of the colours, in millimetres.
+    pub fn axis(&self) -> &Axis {
+        &self.axis
+    }
+
+    /// Draws one of the frames, and a scale bar at `scale_at`.
+    pub fn draw(&self, canvas: &mut Canvas, frame: &SurfaceFrame, scale_at: PointPx) {
+        let [front, behind, true_view] = &self.views[..] else { return };
+        for view in [front, behind] {
+            view.title(canvas, "belief", "");
+            draw_frame(view, canvas, (self.sequence, frame), &self.axis);
+        }
+        if let Some(truth) = &self.truth {
+            true_view.title(canvas, "true object", "");
+            true_view.relief(canvas, truth, |_, light| style::height(PLAIN, light));
+        }
+        View::draw_scale(canvas, self.px_per_m, scale_at);
+    }
+}
+
 fn belief(
     view: &View,
     canvas: &mut Canvas,
@@ -88,6 +137,17 @@ fn belief(
         return view.title(canvas, &title, "no belief at this count");
     };
     view.title(canvas, &title, &frame.score);
+    draw_frame(view, canvas, (sequence, frame), axis);
+}
+
+/// Draws a surface, coloured by its standard deviation along `axis`, and its touches.
+fn draw_frame(
+    view: &View,
+    canvas: &mut Canvas,
+    (sequence, frame): (&PlannerSurfaces, &SurfaceFrame),
+    axis: &Axis,
+) {
+    let count = frame.touches as usize;
     // Colour of a triangle by the mean of its corners.
     let colour = |triangle: usize, light: f64| {
         let shares = frame.mesh.1[triangle].map(|vertex| {
@@ -101,13 +161,13 @@ fn belief(
     };
     let relief = view.relief(canvas, &frame.mesh, colour);
     canvas.grouped(ON_RELIEF, |canvas| {
-        for (i, touch) in sequence.touches.iter().take(count as usize).enumerate() {
+        for (i, touch) in sequence.touches.iter().take(count).enumerate() {
             let colour = style::touch(touch.is_initial);
             let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;
             let at = view.camera.at(&p_w);
             // The target of a missed touch may lie outside of the drawing.
             if touch.contact_w.is_some() {
-                let radius = RADII_PX[usize::from(i + 1 == count as usize)];
+                let radius = RADII_PX[usize::from(i + 1 == count)];
                 relief.mark(canvas, (&view.camera, &p_w), radius, colour);
             } else if inner(view.area).contains(at) {
                 canvas.diamond(at, &style::stroke(colour, 1.3));

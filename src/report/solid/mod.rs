@@ -7,9 +7,9 @@ mod panel;
 mod reach;
 mod section;
 
-pub use figure::figure;
+pub use figure::{FilmPanels, figure};
 pub use reach::picture;
-pub use section::{counts, section};
+pub use section::{counts, deviation_axis, section};
 
 use crate::report::points::PointCloud;
 use crate::report::style;

@@ -2,7 +2,7 @@
 //! Lengths are in millimetres, and meshes are encoded as compact text.
 
 use super::{PlannerSurfaces, SolidTouch, SurfaceFrame};
-use crate::report::axes::{self, MM};
+use crate::report::axes::{self, Axis, Length, MM};
 use crate::report::explorer::{
     self, InteractiveView, LEAST_SHARE, PARTS, encode, encode_log, short,
 };
@@ -122,10 +122,16 @@ fn data(
 
 /// Returns the range of the finite positive values of σ, widened if it is empty; `None` without
 /// any.
-pub(super) fn deviation_range<'a>(sds_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
+fn deviation_range<'a>(sds_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     let (least, most) = axes::range(sds_m.copied().filter(|&sd_m| sd_m > 0.0))?;
     let least = least.max(LEAST_SHARE * most);
     Some(if least < most { [least, most] } else { [ALIKE_SHARE * most, most] })
+}
+
+/// Returns a logarithmic axis, in `unit`, around the finite positive values of σ; `None` without
+/// any.
+pub fn deviation_axis<'a>(sds_m: impl Iterator<Item = &'a f64>, unit: Length) -> Option<Axis> {
+    Axis::log(deviation_range(sds_m)?.map(|end_m| end_m * unit.per_m))
 }
 
 /// Returns the range, symmetric about zero, of the finite errors; `None` without any.
