@@ -137,17 +137,15 @@ pub(crate) fn equal_errors<'py>(
     counts(&table, "trials", found.iter().map(|it| it.trials))?;
     numbers(&table, "goal", found.iter().map(|it| Some(it.goal)))?;
     numbers(&table, "baseline_touches", found.iter().map(|it| Some(it.baseline_touches)))?;
-    let estimates: [(&str, for<'a> fn(&'a EqualError<'a>) -> &'a IntervalEstimate); 3] = [
-        ("touches", |it| &it.touches),
-        ("ratio", |it| &it.ratio),
-        ("path_ratio", |it| &it.path_ratio),
-    ];
-    for (name, of) in estimates {
+    let estimates = |name: &str, of: fn(&EqualError) -> IntervalEstimate| -> PyResult<()> {
         let end = |i: usize| found.iter().map(move |it| Some(of(it).interval?[i]));
         numbers(&table, name, found.iter().map(|it| Some(of(it).value)))?;
         numbers(&table, &format!("{name}_low"), end(0))?;
-        numbers(&table, &format!("{name}_high"), end(1))?;
-    }
+        numbers(&table, &format!("{name}_high"), end(1))
+    };
+    estimates("touches", |it| it.touches)?;
+    estimates("ratio", |it| it.ratio)?;
+    estimates("path_ratio", |it| it.path_ratio)?;
     Ok(table)
 }
 

@@ -297,7 +297,7 @@ mod tests {
         let open = without(&whole, |_| {
             let next = state.get().wrapping_mul(6364136223846793005).wrapping_add(1);
             state.set(next);
-            (next >> 33) % 40 == 0
+            (next >> 33).is_multiple_of(40)
         });
         assert!(whole.triangles().len() - open.triangles().len() > 30);
         let patched = open.with_patches(&find_holes(&open));
