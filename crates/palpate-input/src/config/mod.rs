@@ -202,7 +202,7 @@ impl Loader {
             if let Some(folder) = folder {
                 let names = shipped::names(folder, self.home.as_deref());
                 let remedy = shipped::remedy(name, &names);
-                allowed += &format!(", or a name in {folder}/: {}{remedy}", names.join(", "));
+                allowed += &format!(", or a name in {folder}/ ({}){remedy}", names.join(", "));
             }
             self.not_allowed(key, &format!("\"{name}\""), &allowed)
         })?;
