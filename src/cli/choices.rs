@@ -33,16 +33,17 @@ impl Asker {
         Self { can_ask: is_terminal && !take_defaults, talk }
     }
 
-    /// Returns the chosen one of `choices` (a value and its description), and whether the user chose
-    /// it; the first is the default. A default that is not confirmed is a guess: the note `why` says
-    /// so.
+    /// Returns the chosen one of `choices` (a value and its description), and whether the user
+    /// chose it; `None` if there are none. The first is the default. A default that is not
+    /// confirmed is a guess: the note `why` says so.
     fn choose<T: Copy>(self, what: &str, choices: &[(T, String)], why: &str) -> Option<(T, bool)> {
         let default = choices.first()?.0;
         if !self.can_ask {
             self.talk.note(why);
             return Some((default, false));
         }
-        let lines = choices.iter().enumerate().map(|(i, (_, words))| format!("  {} {words}", i + 1));
+        let lines =
+            choices.iter().enumerate().map(|(i, (_, words))| format!("  {} {words}", i + 1));
         print_stderr(&format!("{what}?\n{}", lines.collect::<Vec<_>>().join("\n")));
         for _ in 0..TRIES {
             print_stderr(&format!("number, 1 to {} [1]:", choices.len()));
@@ -81,7 +82,7 @@ fn length(length_m: f64) -> String {
 }
 
 /// Returns the name of a unit in a sentence, where "in" would be read as a word.
-fn label(unit: Unit) -> String {
+pub(super) fn label(unit: Unit) -> String {
     if unit == Unit::In { "inch".into() } else { unit.to_string() }
 }
 
@@ -150,7 +151,8 @@ pub(super) fn unit(
                 label(other)
             );
             let size = |unit: &Unit| length(extent * unit.metres_per_unit());
-            let choices = plausible.iter().map(|unit| (*unit, format!("{}: {}", label(*unit), size(unit))));
+            let choices =
+                plausible.iter().map(|unit| (*unit, format!("{}: {}", label(*unit), size(unit))));
             let choices: Vec<_> = choices.collect();
             let (unit, is_confirmed) = asker
                 .choose("Unit of the file, and largest side of the object", &choices, &why)
@@ -216,7 +218,8 @@ pub(super) fn up(
         .chain(rest)
         .map(|up| {
             let share = size_m.dot(&up.direction()).abs() / size_m.max();
-            let height = format!("{} up: {:.0} % of its longest side high", name(&up), 100.0 * share);
+            let height =
+                format!("{} up: {:.0} % of its longest side high", name(&up), 100.0 * share);
             (up, height)
         })
         .collect();

@@ -1,6 +1,6 @@
 //! Command `palpate new`.
 
-use super::choices::{self, Asker, Choice, name};
+use super::choices::{self, Asker, Choice, label, name};
 use super::find::is_experiment;
 use super::output::{Overwrite, make_folder, sealed};
 use super::picture::picture;
@@ -13,6 +13,7 @@ use crate::sim::Scene;
 use crate::sim::placement::{self, ObjectAxes, ObjectSide, UpAxis, ZoneProposal};
 use crate::sim::scene::Unit;
 use anyhow::{Context, bail, ensure};
+use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::holes::Hole;
 use palpate_geometry::import::{import_with, statements};
@@ -105,7 +106,9 @@ impl FingerKind {
     fn template(self, is_around: bool) -> FingerTemplate {
         // The pad of a soft finger is at half of its tip, a rigid finger touches with its apex.
         let turned = |pitch_deg: u32| match is_around {
-            true => format!("\n[finger]\npitch_deg = {pitch_deg}              # of the finger to its motion\n"),
+            true => format!(
+                "\n[finger]\npitch_deg = {pitch_deg}              # of the finger to its motion\n"
+            ),
             false => String::new(),
         };
         let minutes = |zone, around| if is_around { around } else { zone };
@@ -182,6 +185,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut written = vec![experiment.display().to_string(), scene.display().to_string()];
     let environment = prepare_environment(Scene::load(&scene, &[])?, talk)?;
     environment.notices().iter().for_each(|notice| talk.note(notice));
+    placed.narrow_zone(args).iter().for_each(|notice| talk.note(notice));
     if let Some(svg) = picture(&environment, None) {
         write_whole(&pictures[0], png(&svg)?)?;
         write_whole(&pictures[1], &svg)?;
@@ -206,7 +210,9 @@ fn check_is_mesh(path: &Path) -> anyhow::Result<()> {
         return Ok(());
     }
     match is_experiment(path) {
-        true => bail!("{name} is an experiment, and new takes a mesh; to run it: palpate run {name}"),
+        true => {
+            bail!("{name} is an experiment, and new takes a mesh; to run it: palpate run {name}")
+        }
         false => bail!("{name} is no mesh; if it is a scene: palpate show {name}"),
     }
 }
@@ -294,8 +300,7 @@ impl MeshPlacement {
             others += "allow_external_buffers = true\n";
         }
         if !self.holes.is_empty() {
-            others +=
-                "fill_holes = true           # a flat patch over each hole; false if the object has them\n";
+            others += "fill_holes = true           # a flat patch over each hole; false if the object has them\n";
         }
         Ok(format!(
             "# Scene of {}; change any number.\n\
@@ -338,17 +343,36 @@ impl MeshPlacement {
         )
     }
 
+    /// Notice of a zone that is narrower than the finger.
+    fn narrow_zone(&self, args: &Args) -> Option<String> {
+        let zone = &self.found.as_ref()?.zone;
+        let sides_m = zone.extents_m();
+        let narrowest_m = sides_m.iter().copied().fold(f64::INFINITY, f64::min);
+        (narrowest_m < 2.0 * BIOTAC_RADIUS_M).then(|| {
+            let sides = sides_m.iter().map(|side_m| format!("{:.0}", 1e3 * side_m));
+            format!(
+                "the zone on the object's {} ({} mm) is narrower than the finger ({:.0} mm): try another \
+                 --side (top, left, …), or --around",
+                name(&args.side),
+                sides.collect::<Vec<_>>().join(" x "),
+                2e3 * BIOTAC_RADIUS_M
+            )
+        })
+    }
+
     /// Describes the choices for the terminal.
     fn words(&self, args: &Args) -> String {
-        let Self { up, unit: Choice { value: (unit, scale), evidence }, size_mm: [x, y, z], .. } = self;
+        let Self {
+            up, unit: Choice { value: (unit, scale), evidence }, size_mm: [x, y, z], ..
+        } = self;
         let scaled = match *scale {
             1.0 => String::new(),
             scale => format!(", scaled by {scale}"),
         };
         let region = match &self.found {
             Some(ZoneProposal { zone, fill_fraction }) => {
-                let [width, height] = [zone.x_m, zone.z_m.unwrap_or_default()]
-                    .map(|[low, high]| 1e3 * (high - low));
+                let [width, height] =
+                    [zone.x_m, zone.z_m.unwrap_or_default()].map(|[low, high]| 1e3 * (high - low));
                 let [near, far] = zone.depth_m.unwrap_or_default();
                 let (deep, percent) = (1e3 * (far - near), 100.0 * fill_fraction);
                 format!(
@@ -359,10 +383,11 @@ impl MeshPlacement {
         };
         format!(
             "{}: {x:.1} x {y:.1} x {z:.1} mm; its {} faces the finger\n\
-             unit {unit}{scaled}: {evidence}\n\
+             unit {}{scaled}: {evidence}\n\
              up {}: {}\n{region}",
             args.mesh.display(),
             name(&args.side),
+            label(*unit),
             name(&up.value),
             up.evidence,
         )

@@ -147,7 +147,8 @@ fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
     }
     if let Some(path) = &args.png {
         let shape = whole_object.as_ref().and_then(|(_, shape)| shape.as_ref());
-        let svg = picture(&environment, shape).context("--png: this scene has no object to draw")?;
+        let svg =
+            picture(&environment, shape).context("--png: this scene has no object to draw")?;
         store::write_whole(path, png(&svg)?)?;
         text += &format!("picture: {}\n", path.display());
     }

@@ -2,12 +2,12 @@
 
 use crate::common::program::{fails, palpate, stderr, succeeds};
 use crate::common::shapes::sphere_mesh;
+use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::pose::pose;
 use palpate::sim::Scene;
-use clap::ValueEnum;
 use palpate::sim::placement::{ObjectAxes, ObjectSide, UpAxis, rotation_deg};
 use std::fmt::Write;
 use std::fs;

@@ -171,7 +171,11 @@ mod tests {
         for (name, bytes, metres) in [
             ("a.obj", b"# Units: inch\nv 0 0 0\n".to_vec(), Some(0.0254)),
             ("b.obj", b"v 0 0 0\no units mm\n".to_vec(), None),
-            ("a.ply", b"ply\nformat ascii 1.0\ncomment units mm\nend_header\n".to_vec(), Some(1e-3)),
+            (
+                "a.ply",
+                b"ply\nformat ascii 1.0\ncomment units mm\nend_header\n".to_vec(),
+                Some(1e-3),
+            ),
             ("b.ply", b"ply\nend_header\ncomment units mm\n".to_vec(), None),
             ("a.stl", b"solid part, units: cm\nfacet\n".to_vec(), Some(1e-2)),
             ("b.stl", binary, Some(1e-3)),
