@@ -33,9 +33,9 @@ impl Asker {
         Self { can_ask: is_terminal && !take_defaults, talk }
     }
 
-    /// Returns the chosen one of `choices` (a value and its description), and whether the user chose
-    /// it; the first is the default. A default that is not confirmed is a guess: the note `why` says
-    /// so.
+    /// Returns the chosen one of `choices` (a value and its description), and whether the user
+    /// chose it; `None` if there are none. The first is the default. A default that is not
+    /// confirmed is a guess: the note `why` says so.
     fn choose<T: Copy>(self, what: &str, choices: &[(T, String)], why: &str) -> Option<(T, bool)> {
         let default = choices.first()?.0;
         if !self.can_ask {
@@ -82,7 +82,7 @@ fn length(length_m: f64) -> String {
 }
 
 /// Returns the name of a unit in a sentence, where "in" would be read as a word.
-fn label(unit: Unit) -> String {
+pub(super) fn label(unit: Unit) -> String {
     if unit == Unit::In { "inch".into() } else { unit.to_string() }
 }
 

@@ -1,6 +1,6 @@
 //! Command `palpate new`.
 
-use super::choices::{self, Asker, Choice, name};
+use super::choices::{self, Asker, Choice, label, name};
 use super::find::is_experiment;
 use super::output::{Overwrite, make_folder, sealed};
 use super::picture::picture;
@@ -13,6 +13,7 @@ use crate::sim::Scene;
 use crate::sim::placement::{self, ObjectAxes, ObjectSide, UpAxis, ZoneProposal};
 use crate::sim::scene::Unit;
 use anyhow::{Context, bail, ensure};
+use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::holes::Hole;
 use palpate_geometry::import::{import_with, statements};
@@ -184,6 +185,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut written = vec![experiment.display().to_string(), scene.display().to_string()];
     let environment = prepare_environment(Scene::load(&scene, &[])?, talk)?;
     environment.notices().iter().for_each(|notice| talk.note(notice));
+    placed.narrow_zone(args).iter().for_each(|notice| talk.note(notice));
     if let Some(svg) = picture(&environment, None) {
         write_whole(&pictures[0], png(&svg)?)?;
         write_whole(&pictures[1], &svg)?;
@@ -341,6 +343,23 @@ impl MeshPlacement {
         )
     }
 
+    /// Notice of a zone that is narrower than the finger.
+    fn narrow_zone(&self, args: &Args) -> Option<String> {
+        let zone = &self.found.as_ref()?.zone;
+        let sides_m = zone.extents_m();
+        let narrowest_m = sides_m.iter().copied().fold(f64::INFINITY, f64::min);
+        (narrowest_m < 2.0 * BIOTAC_RADIUS_M).then(|| {
+            let sides = sides_m.iter().map(|side_m| format!("{:.0}", 1e3 * side_m));
+            format!(
+                "the zone on the object's {} ({} mm) is narrower than the finger ({:.0} mm): try another \
+                 --side (top, left, …), or --around",
+                name(&args.side),
+                sides.collect::<Vec<_>>().join(" x "),
+                2e3 * BIOTAC_RADIUS_M
+            )
+        })
+    }
+
     /// Describes the choices for the terminal.
     fn words(&self, args: &Args) -> String {
         let Self {
@@ -364,10 +383,11 @@ impl MeshPlacement {
         };
         format!(
             "{}: {x:.1} x {y:.1} x {z:.1} mm; its {} faces the finger\n\
-             unit {unit}{scaled}: {evidence}\n\
+             unit {}{scaled}: {evidence}\n\
              up {}: {}\n{region}",
             args.mesh.display(),
             name(&args.side),
+            label(*unit),
             name(&up.value),
             up.evidence,
         )

@@ -52,8 +52,8 @@ impl Overwrite {
         extensions.iter().try_for_each(|extension| self.check_file(&path.with_extension(extension)))
     }
 
-    /// Checks that `path`, a file for the user to edit, does not exist, is as [`sealed`] wrote it, or
-    /// may be replaced.
+    /// Checks that `path`, a file for the user to edit, does not exist, is as [`sealed`] wrote it,
+    /// or may be replaced.
     ///
     /// # Errors
     /// If it was edited or written otherwise, without `--force`, or is not a file.

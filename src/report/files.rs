@@ -60,7 +60,19 @@ pub fn remove(path: &Path) -> io::Result<()> {
 /// If it is not an SVG.
 pub fn tree(svg: &str) -> anyhow::Result<Tree> {
     let options = Options { fontdb: FONTS.clone(), ..Options::default() };
-    Ok(Tree::from_str(svg, &options)?)
+    Ok(Tree::from_str(&with_own_colours(svg), &options)?)
+}
+
+/// Returns the drawing with the colours of a relief's faces as their fill and stroke: usvg does not
+/// let a group's `currentColor` take the colour of each path.
+fn with_own_colours(svg: &str) -> String {
+    let mut parts = svg.split(" color=\"");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let colour = part.split('"').next().unwrap_or_default();
+        text += &format!(" stroke=\"{colour}\" fill=\"{part}");
+    }
+    text
 }
 
 /// Converts an SVG to pixels, `scale` of them per unit of the drawing.
@@ -116,4 +128,20 @@ fn in_order(pdf: &[u8]) -> Vec<u8> {
     let mut lines: Vec<&[u8]> = pdf.split(|byte| *byte == b'\n').collect();
     lines.chunk_by_mut(|a, b| is_entry(a) && is_entry(b)).for_each(<[&[u8]]>::sort);
     lines.join(&b'\n')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A path in a group of `currentColor` has its own colour.
+    #[test]
+    fn faces_of_a_relief_keep_their_colour() {
+        let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="8" height="8">
+            <g fill="currentColor" stroke="currentColor"><path d="M0 0h8v8h-8z" color="#204060"/></g></svg>"##;
+        let mut pixels = Pixmap::new(8, 8).unwrap();
+        resvg::render(&tree(svg).unwrap(), Transform::identity(), &mut pixels.as_mut());
+        let colour = pixels.pixel(4, 4).unwrap();
+        assert_eq!([colour.red(), colour.green(), colour.blue()], [0x20, 0x40, 0x60]);
+    }
 }

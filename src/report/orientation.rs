@@ -12,7 +12,7 @@ const FINGER_PX: f64 = 80.0;
 /// Length and half width of an arrow's head.
 const HEAD_PX: [f64; 2] = [9.0, 3.6];
 /// Shortest and longest scale bar.
-const BAR_PX: [f64; 2] = [14.0, 400.0];
+const BAR_PX: [f64; 2] = [14.0, 424.0];
 /// Length of the scale bar, unless it would be too short or too long.
 const BAR_M: f64 = 0.1;
 
@@ -49,8 +49,8 @@ pub fn draw_finger(canvas: &mut Canvas, camera: &Camera, to: PointPx, back: &Vec
     canvas.text([from[0] + 4.0 * dx.signum(), from[1] + 8.0], "finger", SMALL_PX, anchor);
 }
 
-/// Draws a bar of 100 mm, or of another power of ten if that has no visible length at this scale,
-/// with its left end at a point.
+/// Draws a bar of 100 mm, or of another round length if that is too short or too long at this
+/// scale, with its left end at a point.
 pub fn draw_scale_bar(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
     let length_m = bar_m(px_per_m);
     let right = left + length_m * px_per_m;
@@ -69,7 +69,12 @@ fn bar_m(px_per_m: f64) -> f64 {
     match BAR_M * px_per_m {
         px if !px.is_normal() => BAR_M,
         px if (shortest_px..=longest_px).contains(&px) => BAR_M,
-        _ => 10f64.powf((longest_px / px_per_m).log10().floor()),
+        _ => {
+            let most_m = longest_px / px_per_m;
+            let power = 10f64.powf(most_m.log10().floor());
+            let lengths = [5.0, 2.0].map(|digit| digit * power);
+            lengths.into_iter().find(|length_m| *length_m <= most_m).unwrap_or(power)
+        }
     }
 }
 
@@ -93,12 +98,12 @@ mod tests {
 
     #[test]
     fn bars_of_100_mm_are_replaced_only_where_they_cannot_be_seen() {
-        for (px_per_m, length_m) in [(3000.0, 0.1), (400.0, 0.1), (140.0, 0.1), (4000.0, 0.1)] {
+        for (px_per_m, length_m) in [(3000.0, 0.1), (400.0, 0.1), (140.0, 0.1), (4200.0, 0.1)] {
             assert_eq!(bar_m(px_per_m), length_m, "{px_per_m}");
         }
         for px_per_m in [1.0, 13.0, 100.0, 5e3, 3e5, 1e8] {
             let px = bar_m(px_per_m) * px_per_m;
-            assert!((BAR_PX[1] / 10.0..=BAR_PX[1]).contains(&px), "{px_per_m}: {px}");
+            assert!((BAR_PX[1] / 2.5..=BAR_PX[1]).contains(&px), "{px_per_m}: {px}");
         }
     }
 }

@@ -80,8 +80,8 @@ impl Camera {
         ]
     }
 
-    /// Returns the direction of a vector in the drawing; of length 1 for a unit vector parallel to the
-    /// drawing, and shorter for others.
+    /// Returns the direction of a vector in the drawing; its length is 1 for a unit vector parallel
+    /// to the drawing, and less for others.
     pub fn direction(&self, v: &Vector3<f64>) -> PointPx {
         [v.dot(&self.right), -v.dot(&self.up)]
     }

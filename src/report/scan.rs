@@ -3,8 +3,9 @@
 
 use super::axes::{Axis, Length, height_bar, rounded};
 use super::canvas::{Area, Canvas};
+use super::legend::{Legend, Swatch};
 use super::orientation::{draw_axes, draw_finger, draw_scale_bar};
-use super::relief::{Camera, Relief, ReliefPanel, Space, height_colour};
+use super::relief::{Camera, Relief, ReliefPanel, Space, brightness, height_colour};
 use super::style::{self, PLANNED};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
@@ -16,9 +17,18 @@ const ZONE_PX: [f64; 2] = [560.0, 560.0];
 const SCAN_PX: [f64; 2] = [430.0, 480.0];
 const FOOT_PX: f64 = 64.0;
 /// Height of the row with axes and scale bar below a scene.
-const AXES_PX: f64 = 66.0;
+const AXES_PX: f64 = 84.0;
+/// Left end of the scale bar, beside the axes.
+const BAR_LEFT_PX: f64 = 126.0;
 // heuristic: samples along each side of the zone for its heights, as many as in a report.
 const GRID: usize = 41;
+
+/// Colour of a patch over a hole.
+const HOLE: u32 = 0xd55e00;
+const HOLE_LEGEND: &str = "#d55e00";
+
+/// Margin of the colours above and below the surface, so that those of a flat one have a range.
+const FLAT_M: f64 = 5e-4;
 
 /// True height above the datum at a place of a zone, m; `None` where there is no surface.
 pub type Heights<'a> = &'a dyn Fn(&[f64]) -> Option<f64>;
@@ -30,6 +40,7 @@ type Contact = (Point3<f64>, Vector3<f64>);
 /// datum; `None` without a second coordinate or a surface.
 pub fn zone_picture(zone: &Zone, mesh: &Mesh, height_m: Heights) -> Option<String> {
     let heights_m = zone.grid(GRID).into_iter().filter_map(|place| height_m(&place));
+    let heights_m = heights_m.flat_map(|height_m| [height_m - FLAT_M, height_m + FLAT_M]);
     let axis = Axis::around(heights_m, 0.04, 5.0)?;
     draw((zone, mesh, height_m), &axis, None)
 }
@@ -59,9 +70,13 @@ fn draw(
     let first = Area { left: 0.0, top: 8.0, width, height };
     let camera = draw_object(&mut canvas, first, object, axis);
     if contacts.is_none() {
-        let top = height + FOOT_PX + 0.6 * AXES_PX;
-        draw_axes(&mut canvas, &camera, [80.0, top], &zone.x_wz().rotation.inverse());
-        draw_scale_bar(&mut canvas, camera.px_per_m(), [bar_px - 50.0, top - 6.0]);
+        let top = height + FOOT_PX + 0.5 * AXES_PX;
+        draw_axes(&mut canvas, &camera, [66.0, top], &zone.x_wz().rotation.inverse());
+        draw_scale_bar(&mut canvas, camera.px_per_m(), [BAR_LEFT_PX, top - 14.0]);
+        if object.1.has_patches() {
+            let hole = [(Swatch::Box(HOLE_LEGEND), "hole of the mesh, without ground truth")];
+            Legend::new(width, hole).draw(&mut canvas, [BAR_LEFT_PX, top + 24.0]);
+        }
     }
     if let Some(contacts) = contacts {
         let panel = ReliefPanel::new(unit, Area { left: width, ..first }, space);
@@ -116,7 +131,12 @@ fn draw_object(
     let at = |x_m, height_m, z_m| panel.camera.at(&Vector3::new(x_m, height_m, z_m));
     let datum = zone.datum_y_m() * Vector3::y();
     let triangles = mesh.iter_corners().map(|corners| corners.map(|p_z| p_z.coords - datum));
-    let colour = |_, corners: &[Vector3<f64>], normal| height_colour(axis, corners, &normal);
+    let colour = |triangle: usize, corners: &[Vector3<f64>], normal: Vector3<f64>| match mesh
+        .is_patch(triangle as u32)
+    {
+        true => style::shaded_colour(&[HOLE; 2], 0.0, brightness(&normal)),
+        false => height_colour(axis, corners, &normal),
+    };
     Relief::of_triangles(&panel.camera, triangles, colour).draw(canvas);
     for side in rim(zone) {
         // Where the zone reaches past the object, its outline is at the height of the datum.
@@ -136,7 +156,8 @@ fn draw_object(
 
 /// Formats the size of an object along x, y and z of its picture.
 pub fn size_words(size_m: &Vector3<f64>) -> String {
-    let [x, y, z] = [size_m.x, size_m.y, size_m.z].map(|side_m| rounded(1e3 * side_m));
+    let [x, y, z] =
+        [size_m.x, size_m.y, size_m.z].map(|side_m| rounded((1e4 * side_m).round() / 10.0));
     format!("{x} x {y} x {z} mm along x, y and z")
 }
 

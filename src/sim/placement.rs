@@ -80,8 +80,8 @@ fn is_explorable(size_m: f64) -> bool {
 }
 
 /// Returns the usual units in which an object has a size that a finger can explore, the most
-/// plausible first: millimetres, then by the ratio to the size of a hand. `extent` is the largest in
-/// the file's numbers.
+/// plausible first: millimetres, then by the ratio to the size of a hand. `extent` is the largest
+/// in the file's numbers.
 pub fn plausible_units(extent: f64) -> Vec<Unit> {
     let size_m = |unit: &Unit| extent * unit.metres_per_unit();
     let mut units: Vec<Unit> =
@@ -158,8 +158,8 @@ pub struct ObjectAxes {
 }
 
 impl ObjectAxes {
-    /// Returns the directions for a file in which `up` points up, by the usual convention: the front
-    /// is towards −y if z is up or down, otherwise towards +z.
+    /// Returns the directions for a file in which `up` points up, by the usual convention: the
+    /// front is towards −y if z is up or down, otherwise towards +z.
     pub fn of(up: UpAxis) -> Self {
         let front_o = match up {
             UpAxis::Z | UpAxis::MinusZ => -Vector3::y(),
@@ -211,8 +211,8 @@ pub const STAGE_CENTRE_M: [f64; 3] = [0.0, -0.65, 0.5];
 // heuristic: the place of the bird in scenes/bird_around_pa10.toml, reached from most sides.
 pub const ARM_CENTRE_M: [f64; 3] = [0.0, -0.6, 0.6];
 
-/// Returns the position in `W` of the origin of a mesh, already rotated, that puts the middle of its
-/// bounds at `centre_m`, rounded to 0.1 mm.
+/// Returns the position in `W` of the origin of a mesh, already rotated, that puts the middle of
+/// its bounds at `centre_m`, rounded to 0.1 mm.
 pub fn centred_m(turned: &Mesh, centre_m: [f64; 3]) -> [f64; 3] {
     let (low, high) = turned.bounds();
     std::array::from_fn(|i| tenth_mm(centre_m[i] - 0.5 * (low[i] + high[i])))

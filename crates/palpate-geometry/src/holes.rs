@@ -306,6 +306,36 @@ mod tests {
         assert!((patched.area_m2() / whole.area_m2() - 1.0).abs() < 1e-3);
     }
 
+    /// Holes with ragged borders are closed, wherever they lie on an egg.
+    #[test]
+    fn ragged_holes_are_closed() {
+        let (vertices, triangles) = sphere_mesh(Point3::origin(), 0.05, 40);
+        let stretched = |p: &Point3<f64>| Point3::new(1.2 * p.x, 0.8 * p.z, p.y);
+        let vertices: Vec<Point3<f64>> = vertices.iter().map(stretched).collect();
+        let egg = Mesh::new(&vertices, &triangles).unwrap().0;
+        for centre in [
+            [0.03, -0.03, 0.015],
+            [-0.03, -0.03, -0.01],
+            [0.0, 0.04, 0.0],
+            [0.0, 0.0, 0.05],
+            [-0.04, -0.02, -0.03],
+        ] {
+            for radius_m in [0.004, 0.011, 0.02] {
+                let middle = |corners: [Point3<f64>; 3]| {
+                    Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0)
+                };
+                let away_m = |p: Point3<f64>| (p - Point3::from(centre)).norm();
+                let open = without(&egg, |corners| away_m(middle(corners)) < radius_m);
+                let holes = find_holes(&open);
+                assert_eq!(holes.len(), usize::from(open != egg), "{centre:?} {radius_m}");
+                let patched = open.with_patches(&holes);
+                let (_, report) = Mesh::new(patched.vertices(), patched.triangles()).unwrap();
+                assert_eq!(report.border_edges.count, 0, "{centre:?} {radius_m}");
+                assert!(patched.volume_m3() > 0.9 * egg.volume_m3());
+            }
+        }
+    }
+
     /// A drilled face and the wall of its hole, which share no vertices, touch along a seam.
     #[test]
     fn seams_are_no_holes() {
