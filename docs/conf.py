@@ -53,6 +53,7 @@ your-planner
 your-robot
 safety
 results
+benchmark
 many-runs
 physics
 whole-objects
