@@ -55,6 +55,7 @@ your-planner
 your-robot
 safety
 results
+benchmark
 many-runs
 physics
 whole-objects

@@ -1,5 +1,6 @@
-"""Tests of regression tests of Python planners, from Python and on the command line."""
+"""Tests of regression tests and of the benchmark of Python planners, from Python and on the command line."""
 
+import json
 import subprocess
 import sys
 
@@ -61,6 +62,17 @@ def test_an_edited_planner_is_worse_on_the_command_line(tmp_path):
     worse = check("--markdown", "check.md")
     assert worse.returncode == 1 and "WORSE" in worse.stdout, worse.stdout + worse.stderr
     assert "WORSE" in (tmp_path / "check.md").read_text()
+
+
+def test_a_planner_that_stays_in_a_corner_is_last_in_the_benchmark(tmp_path):
+    corner = GOOD.replace("at * (", "0.1 * at * (").replace("Spread", "Corner")
+    (tmp_path / "my_planner.py").write_text(corner)
+    command = [sys.executable, "-m", "palpate", "-q", "benchmark", "--quick", "--planner", "my_planner:Corner"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "runs" / "benchmark-1-quick" / "benchmark.json").read_text())
+    assert result["protocol"] == "1" and result["quick"]
+    assert result["planners"][-1]["name"] == "my_planner:Corner"
 
 
 def test_errors_of_planners_are_recorded_or_raised(experiment, tmp_path):

@@ -60,9 +60,9 @@ pub(super) struct Args {
     /// [default: runs/SCENE-scan].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// For a mesh of a run, vertices along each side of the zone, or cells along the longest side of
-    /// a whole object [default: the experiment's grid or gp.cells]. For a scene, targets along x
-    /// and z [default: square cells, 81 along the longer side].
+    /// For a mesh of a run, vertices along each side of the zone, or cells along the longest side
+    /// of a whole object [default: the experiment's grid or gp.cells]. For a scene, targets along
+    /// x and z [default: square cells, 81 along the longer side].
     #[arg(long, value_name = "N|NxM", value_parser = grid)]
     grid: Option<Grid>,
     #[command(flatten)]

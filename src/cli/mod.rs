@@ -1,6 +1,7 @@
 //! The command line.
 
 mod accuracy;
+mod benchmark;
 mod calibrate;
 mod check;
 mod choices;
@@ -64,6 +65,7 @@ Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate export scenes/bird.toml           touch the whole zone, write a point cloud
   palpate run experiments/suite/six.toml    compare planners on several objects
+  palpate benchmark --planner my_planner:MyPlanner
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
 
@@ -85,6 +87,8 @@ enum Command {
     Export(export::Args),
     /// Compare planners over several runs.
     Compare(compare::Args),
+    /// Run a fixed protocol over many objects and rank planners, your own too.
+    Benchmark(benchmark::Args),
     /// Test planners for regressions against a stored baseline.
     Check(check::Args),
     /// Measure the error and time of simulation levels and effects of a scene.
@@ -110,7 +114,7 @@ enum Command {
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "report", "show", "export"]),
-    ("Evaluate", &["compare", "check", "accuracy"]),
+    ("Evaluate", &["compare", "benchmark", "check", "accuracy"]),
     ("Robot", &["serve", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
@@ -180,6 +184,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Show(args) => show::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
         Command::Compare(args) => compare::run(&args),
+        Command::Benchmark(args) => benchmark::run(&args, talk, host),
         Command::Check(args) => check::run(&args, talk, host),
         Command::Accuracy(args) => accuracy::run(&args, talk),
         Command::Serve(args) => serve::run(&args, talk),

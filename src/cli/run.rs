@@ -14,7 +14,7 @@ use crate::experiment::store::{Journal, RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::row::TrialId;
 use crate::report;
-use crate::study::compare::compare;
+use crate::study::compare::{SuiteComparison, compare};
 use anyhow::{Context, bail, ensure};
 use palpate_input::config::ConfigError;
 use palpate_input::error::InputError;
@@ -43,13 +43,13 @@ An experiment with a [sweep] runs each combination in runs/NAME. Planners are co
 combinations and per combination, relative to sobol (or the first baseline): tables, the page suite.html
 and the table suite.csv. Use `palpate compare` for another reference planner.";
 
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 pub(super) struct Args {
     /// Experiment file (TOML), or the name of one in experiments/.
     experiment: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    pub(super) set: Vec<String>,
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -87,6 +87,11 @@ pub(super) struct Args {
 }
 
 impl Args {
+    /// Options of a run with additional planners, all others at their defaults.
+    pub(super) fn of(planners: &[String], threads: u16, fresh: bool) -> Self {
+        Self { planner: planners.to_vec(), threads, fresh, ..Self::default() }
+    }
+
     /// Suffix of a shard's folder name.
     fn suffix(&self) -> String {
         self.shard.map(|it| format!("-{}-of-{}", it.index, it.count)).unwrap_or_default()
@@ -162,10 +167,7 @@ fn compare_cells(
     let against = if is_usual { REFERENCE } else { first.baselines()[0] };
     // Cells with different planners, or without ground truth, cannot be compared.
     let Ok(mut compared) = compare(&runs, against) else { return Ok(()) };
-    for object in &mut compared.objects {
-        let label = object.strip_prefix(name).unwrap_or(object);
-        *object = label.trim_start_matches("-scene").trim_start_matches('-').to_owned();
-    }
+    name_objects(&mut compared, name);
     let mut text = compare::text(&compared);
     if !args.no_report {
         let page = compare::write(folder, (name, &first.question), &compared)?;
@@ -177,8 +179,16 @@ fn compare_cells(
     Ok(())
 }
 
+/// Shortens the names of a sweep's objects by the name of the sweep and the key of the scenes.
+pub(super) fn name_objects(compared: &mut SuiteComparison, sweep: &str) {
+    for object in &mut compared.objects {
+        let label = object.strip_prefix(sweep).unwrap_or(object);
+        *object = label.trim_start_matches("-scene").trim_start_matches('-').to_owned();
+    }
+}
+
 /// Loads the experiment with the given settings and adds the planners of `--planner`.
-fn with_planners(
+pub(super) fn with_planners(
     args: &Args,
     load: impl Fn(&[String]) -> Result<Experiment, ConfigError>,
 ) -> Result<Experiment, ConfigError> {
@@ -193,7 +203,7 @@ fn with_planners(
 }
 
 /// Result of a run.
-struct RunResult {
+pub(super) struct RunResult {
     path: PathBuf,
     /// Number of trials run and their duration.
     summary: String,
@@ -210,7 +220,7 @@ impl RunResult {
     }
 
     /// Returns the outcome; prints to stderr the number of failed trials and the first failure.
-    fn outcome(&self, talk: Verbosity) -> Outcome {
+    pub(super) fn outcome(&self, talk: Verbosity) -> Outcome {
         let RowCounts { trials, failed } = &self.tally;
         let all_failed = *trials > 0 && failed.len() == *trials;
         if let Some((TrialId { trial, planner }, reason)) = failed.first() {
@@ -232,7 +242,7 @@ impl RunResult {
 }
 
 /// Runs the missing trials.
-fn run_missing(
+pub(super) fn run_missing(
     args: &Args,
     experiment: Experiment,
     out: Option<PathBuf>,

@@ -41,8 +41,8 @@ const BAR_PX: [f64; 2] = [50.0, 260.0];
 /// Width that the colour bar and its label need.
 const WIDTH_MIN_PX: f64 = 460.0;
 
-/// Returns the finished trials of a planner with their final errors, the smallest error first; empty
-/// without ground truth.
+/// Returns the finished trials of a planner with their final errors, the smallest error first;
+/// empty without ground truth.
 pub fn ranked<'a>(run: &'a Run, planner: &'a str) -> Vec<(&'a TrialRow, f64)> {
     let experiment = &run.experiment;
     let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());

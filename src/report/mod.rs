@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod animation;
 pub mod axes;
+pub mod benchmark;
 pub mod canvas;
 pub mod check;
 pub mod compare;

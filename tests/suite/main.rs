@@ -11,6 +11,7 @@ mod arm;
 mod around_commands;
 mod backend;
 mod bench;
+mod benchmark;
 mod broken;
 mod calibration;
 mod check;

@@ -1,0 +1,274 @@
+//! Benchmark of planners: a fixed, versioned protocol, and its results in one document.
+//!
+//! The protocol is an experiment file with a sweep of scenes. Its hash covers that file and all
+//! files that it names, so results of different protocols cannot be taken for each other.
+
+use super::compare::{Entrant, SuiteComparison, gap_closed, geometric_mean};
+use crate::experiment::Experiment;
+use crate::experiment::statistics::equal_error::IntervalEstimate;
+use crate::experiment::statistics::median;
+use crate::experiment::store::Run;
+use crate::experiment::trial::row::{TrialRow, planner_rows};
+use palpate_input::error::InputError;
+use palpate_input::files;
+use palpate_input::format::hex;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Version of the protocol. A new one needs a new file in `experiments/suite`.
+pub const PROTOCOL: &str = "1";
+
+/// Planner whose errors are the unit.
+pub const REFERENCE: &str = "sobol";
+
+/// Seed of all bootstraps.
+const SEED: u64 = 0;
+
+/// Maximum size of a file of the protocol.
+const FILE_MAX: u64 = 1 << 30;
+
+/// Results of all planners on all objects.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BenchmarkResult {
+    /// Version of the protocol.
+    pub protocol: String,
+    /// SHA-256 of the protocol's files.
+    pub protocol_sha256: String,
+    /// Whether objects and trials were left out, so that the result cannot be compared.
+    pub quick: bool,
+    /// Version of Palpate.
+    pub palpate: String,
+    /// Commit of the build.
+    pub commit: String,
+    /// Planner whose errors are the unit.
+    pub reference: String,
+    /// Names of the objects.
+    pub objects: Vec<String>,
+    /// Trials per planner and object.
+    pub trials: u32,
+    /// Seed of the trials.
+    pub seed: u64,
+    /// Initial touches of a trial, the same for all planners.
+    pub initial_touches: u32,
+    /// Touches of a trial, initial ones included.
+    pub touches: u32,
+    /// Touch counts of the entries of `after` and `error_m`.
+    pub budgets: Vec<u32>,
+    /// Results of each planner, the smallest error first.
+    pub planners: Vec<PlannerResult>,
+}
+
+/// Results of a planner.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlannerResult {
+    /// Name of the planner.
+    pub name: String,
+    /// exp(mean log error over the touches after the initial ones), relative to the reference in
+    /// the same trial: geometric mean over trials and objects.
+    #[serde(flatten)]
+    pub error: RelativeError,
+    /// Number of objects with the interval of the error below 1.
+    pub better_on: usize,
+    /// Number of objects with the interval of the error above 1.
+    pub worse_on: usize,
+    /// Share of the way from `random` to the oracle, in mean log error.
+    pub gap_closed: Option<f64>,
+    /// Error after each budget, relative to the reference.
+    pub after: Vec<RelativeError>,
+    /// Finished trials on all objects.
+    pub trials: usize,
+    /// Failed trials on all objects; they have no error.
+    pub failures: usize,
+    /// Results on each object.
+    pub objects: Vec<PlannerOnObject>,
+}
+
+/// Results of a planner on one object.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlannerOnObject {
+    /// Name of the object.
+    pub object: String,
+    /// Error over the touches, relative to the reference.
+    #[serde(flatten)]
+    pub error: RelativeError,
+    /// Median error after each budget, in metres.
+    pub error_m: Vec<Option<f64>>,
+    /// Finished trials.
+    pub trials: usize,
+    /// Failed trials.
+    pub failures: usize,
+}
+
+/// Error relative to the reference with its 95 % bootstrap interval; both `None` without a trial.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RelativeError {
+    /// Geometric mean.
+    pub error: Option<f64>,
+    /// Ends of the interval.
+    pub error_interval: Option<[f64; 2]>,
+}
+
+impl RelativeError {
+    fn new(strata: &[&[f64]]) -> Self {
+        geometric_mean(strata, SEED).map_or(Self::default(), |found| Self {
+            error: Some(found.value),
+            error_interval: found.interval,
+        })
+    }
+
+    /// Returns the error as an estimate; `None` without a trial.
+    pub fn estimate(&self) -> Option<IntervalEstimate> {
+        self.error.map(|value| IntervalEstimate { value, interval: self.error_interval })
+    }
+
+    fn is_below_1(&self) -> bool {
+        self.error_interval.is_some_and(|[_, high]| high < 1.0)
+    }
+
+    fn is_above_1(&self) -> bool {
+        self.error_interval.is_some_and(|[low, _]| low > 1.0)
+    }
+}
+
+/// Returns the SHA-256 of the experiment file at `path` and of all files that it names, directly or
+/// through other settings files.
+///
+/// # Errors
+/// If a file cannot be read.
+pub fn protocol_sha256(path: &Path) -> Result<String, InputError> {
+    let mut hash = Sha256::new();
+    add_file(&mut hash, path)?;
+    Ok(hex(hash.finalize()))
+}
+
+fn add_file(hash: &mut Sha256, path: &Path) -> Result<(), InputError> {
+    let bytes = files::bytes(path, FILE_MAX).map_err(|cause| InputError::io(path, cause))?;
+    hash.update((bytes.len() as u64).to_le_bytes());
+    hash.update(&bytes);
+    let text = path.extension().filter(|extension| *extension == "toml");
+    let table = text.and_then(|_| str::from_utf8(&bytes).ok()?.parse::<toml::Table>().ok());
+    let mut named = Vec::new();
+    strings(&toml::Value::Table(table.unwrap_or_default()), &mut named);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let files = named.iter().map(|name| folder.join(name)).filter(|file| file.is_file());
+    files.into_iter().try_for_each(|file| add_file(hash, &file))
+}
+
+/// Appends all strings in a value, in the order of keys.
+fn strings(value: &toml::Value, found: &mut Vec<String>) {
+    match value {
+        toml::Value::String(text) => found.push(text.clone()),
+        toml::Value::Array(values) => values.iter().for_each(|value| strings(value, found)),
+        toml::Value::Table(table) => table.values().for_each(|value| strings(value, found)),
+        _ => {}
+    }
+}
+
+/// Program and protocol of a benchmark.
+pub struct BenchmarkSource<'a> {
+    /// SHA-256 of the protocol's files.
+    pub protocol_sha256: String,
+    /// Whether objects and trials were left out.
+    pub quick: bool,
+    /// Commit of the build.
+    pub commit: &'a str,
+}
+
+/// Summarises the runs of a benchmark, one per object in the order of `compared.objects`.
+pub fn summarise(
+    source: BenchmarkSource,
+    runs: &[Run],
+    compared: &SuiteComparison,
+) -> BenchmarkResult {
+    let experiment = runs.first().map(|run| &run.experiment);
+    let budgets = experiment.map_or(Vec::new(), Experiment::table_touch_counts);
+    let count = |of: fn(&Experiment) -> u32| experiment.map_or(0, of);
+    let mut planners: Vec<PlannerResult> =
+        compared.contenders.iter().map(|it| planner(it, runs, compared, &budgets)).collect();
+    let order = |it: &PlannerResult| it.error.error.unwrap_or(f64::INFINITY);
+    planners.sort_by(|a, b| order(a).total_cmp(&order(b)));
+    BenchmarkResult {
+        protocol: PROTOCOL.into(),
+        protocol_sha256: source.protocol_sha256,
+        quick: source.quick,
+        palpate: env!("CARGO_PKG_VERSION").into(),
+        commit: source.commit.into(),
+        reference: compared.reference.clone(),
+        objects: compared.objects.clone(),
+        trials: count(|it| it.trials),
+        seed: experiment.map_or(0, |it| it.seed),
+        initial_touches: count(|it| it.initial_touches),
+        touches: count(|it| it.touches),
+        budgets,
+        planners,
+    }
+}
+
+fn planner(
+    entrant: &Entrant,
+    runs: &[Run],
+    compared: &SuiteComparison,
+    budgets: &[u32],
+) -> PlannerResult {
+    let on_object = |(object, run): (&String, &Run), scores: &[f64]| {
+        let rows: Vec<&TrialRow> = planner_rows(&run.rows, &entrant.name).collect();
+        let failures = rows.iter().filter(|row| row.failure.is_some()).count();
+        let after = |&budget: &u32| {
+            let errors: Vec<f64> = errors_m(run, &entrant.name, budget).into_values().collect();
+            median(&errors)
+        };
+        PlannerOnObject {
+            object: object.clone(),
+            error: RelativeError::new(&[scores]),
+            error_m: budgets.iter().map(after).collect(),
+            trials: rows.len() - failures,
+            failures,
+        }
+    };
+    let objects: Vec<PlannerOnObject> = (compared.objects.iter().zip(runs))
+        .zip(entrant.scores())
+        .map(|(object, scores)| on_object(object, scores))
+        .collect();
+    let all: Vec<usize> = (0..objects.len()).collect();
+    let number = |is_it: fn(&RelativeError) -> bool| {
+        objects.iter().filter(|object| is_it(&object.error)).count()
+    };
+    PlannerResult {
+        name: entrant.name.clone(),
+        error: RelativeError::new(&entrant.scores()),
+        better_on: number(RelativeError::is_below_1),
+        worse_on: number(RelativeError::is_above_1),
+        gap_closed: gap_closed(compared, entrant, &all, SEED).map(|gap| gap.value),
+        after: budgets.iter().map(|&budget| after(entrant, runs, compared, budget)).collect(),
+        trials: objects.iter().map(|object| object.trials).sum(),
+        failures: objects.iter().map(|object| object.failures).sum(),
+        objects,
+    }
+}
+
+/// Error of a planner after some touches, relative to the reference in the same trial.
+fn after(
+    entrant: &Entrant,
+    runs: &[Run],
+    compared: &SuiteComparison,
+    budget: u32,
+) -> RelativeError {
+    let ratios = |run: &Run| -> Vec<f64> {
+        let unit = errors_m(run, &compared.reference, budget);
+        let mut errors: Vec<(u32, f64)> =
+            errors_m(run, &entrant.name, budget).into_iter().collect();
+        errors.sort_by_key(|(trial, _)| *trial);
+        errors.into_iter().filter_map(|(trial, error)| Some(error / unit.get(&trial)?)).collect()
+    };
+    let strata: Vec<Vec<f64>> = runs.iter().map(ratios).collect();
+    RelativeError::new(&strata.iter().map(Vec::as_slice).collect::<Vec<_>>())
+}
+
+/// Errors after some touches of a planner's finished trials, in metres.
+fn errors_m(run: &Run, planner: &str, budget: u32) -> HashMap<u32, f64> {
+    let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
+    let measure = run.experiment.error_measure();
+    finished.filter_map(|row| Some((row.trial, measure.value(row, budget)?))).collect()
+}
