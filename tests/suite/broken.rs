@@ -190,7 +190,7 @@ fn broken_command_lines_are_refused() {
     let cases: &[(&[&str], &[&str])] = &[
         (&["run", "none.toml"], &["none.toml"]),
         (&["run", "."], &["."]),
-        (&["run", "mesh.obj"], &["mesh.obj", "not valid TOML"]),
+        (&["run", "mesh.obj"], &["mesh.obj is a mesh", "palpate new mesh.obj"]),
         (&["run", "scene.toml"], &["scene.toml", "this is a scene", "palpate show"]),
         (&["export", "small.toml"], &["small.toml", "this is an experiment", "palpate run"]),
         (&["accuracy", "small.toml"], &["small.toml", "this is an experiment"]),

@@ -64,7 +64,7 @@ fn shipped_files_are_found_in_an_empty_folder() {
     ];
     run(&[&["run", "bird", "--no-report"], &few[..]].concat());
     assert!(folder.path().join("runs/bird/trials.jsonl").is_file());
-    for path in ["suite/six", "experiments/suite/six.toml"] {
+    for path in ["paper/bird-10", "experiments/paper/bird-10.toml"] {
         run(&["run", path, "--plan", "2"]);
     }
     assert_eq!(homes().count(), 1, "nothing else is written");

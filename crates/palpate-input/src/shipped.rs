@@ -13,7 +13,8 @@ pub fn is_plain(name: &Path) -> bool {
 }
 
 /// Returns the file `NAME.toml` in a `folder` of shipped files: in the working directory, beside
-/// the program, or in `home`, by default that of [`HOME`]. A name with an extension is a path there.
+/// the program, or in `home`, by default that of [`HOME`]. A name with an extension is a whole
+/// path in these places.
 pub fn find(name: &Path, folder: &str, home: Option<&Path>) -> Option<PathBuf> {
     let (file, folder) = match name.extension() {
         None => (name.with_extension("toml"), folder),
