@@ -4,6 +4,7 @@ pub(super) use crate::experiment::experiment::SCENES;
 use anyhow::{bail, ensure};
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::{files, shipped};
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
 /// Folder of the shipped experiments.
@@ -37,6 +38,13 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
         false => shipped::remedy(&word, &file_stems(folder)),
     };
     bail!("{word}: no such file, and no {folder}/{file}{remedy}")
+}
+
+/// Returns the path of a mesh: as it is, or that of a shipped file if there is no other.
+pub(super) fn find_mesh(path: &str) -> Result<PathBuf, Infallible> {
+    let path = Path::new(path);
+    let found = path.extension().and_then(|_| shipped::find(path, "", None));
+    Ok(found.unwrap_or_else(|| path.into()))
 }
 
 /// Whether the file is an experiment: experiments have `planners` or `scene`, scenes do not. An

@@ -1,7 +1,7 @@
 //! Command `palpate new`.
 
 use super::choices::{self, Asker, Choice, label, name};
-use super::find::is_experiment;
+use super::find::{find_mesh, is_experiment};
 use super::output::{Overwrite, make_folder, sealed};
 use super::picture::picture;
 use super::prepare::prepare_environment;
@@ -38,7 +38,8 @@ gives a size that a finger can explore, 30 to 400 mm; if none does, the mesh is 
 comment, then a flat base, then y for OBJ and z for others. If the evidence is ambiguous, palpate asks; without a terminal, or with --yes, \
 it takes the most plausible value and says so.")]
 pub(super) struct Args {
-    /// Mesh file.
+    /// Mesh file; a shipped one, such as models/suite/mug.glb, is found in every folder.
+    #[arg(value_parser = find_mesh)]
     mesh: PathBuf,
     /// Explore the whole object from all sides, instead of a zone on one side.
     #[arg(long)]

@@ -67,6 +67,8 @@ fn shipped_files_are_found_in_an_empty_folder() {
     for path in ["paper/bird-10", "experiments/paper/bird-10.toml"] {
         run(&["run", path, "--plan", "2"]);
     }
+    run(&["new", "models/suite/mug.glb"]);
+    assert!(run(&["show", "mug-scene.toml"]).contains("mug.glb"));
     assert_eq!(homes().count(), 1, "nothing else is written");
 }
 
