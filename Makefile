@@ -168,7 +168,7 @@ lint: setup
 	cargo fmt --all --check
 	cargo clippy --locked --all-targets --features ros2 -- -D warnings
 	cargo clippy --locked --lib --bins --tests --no-default-features --features ros2 -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features ros2
 
 # Code for windows and rendering, whose packages take long to check.
 lint-windows: setup
@@ -260,7 +260,7 @@ test-python: install-python
 docs: install-python
 	rm -rf target/docs-site
 	$(DEPS)/python/bin/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -c docs -d target/docs-tree . target/docs-site
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features ros2
 	cp -r target/doc target/docs-site/rust
 
 # Runs the notebooks and stores their outputs, to be committed.
