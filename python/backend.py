@@ -51,6 +51,10 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         os.environ["LD_LIBRARY_PATH"] = os.pathsep.join(
             filter(None, [folder, os.environ.get("LD_LIBRARY_PATH")])
         )
+        # The library is copied into a wheel only if its tag names the C library: here this machine's.
+        tag = os.confstr("CS_GNU_LIBC_VERSION").replace("glibc ", "manylinux_").replace(".", "_")
+        given = os.environ.get("MATURIN_PEP517_ARGS", "")
+        os.environ["MATURIN_PEP517_ARGS"] = f"{given} --compatibility {tag}"
         return maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
 
 
