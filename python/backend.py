@@ -1,6 +1,6 @@
 """Build backend of the Python package: maturin, with MuJoCo's library and the shipped files in place.
 
-`pip install ./python` and the source distribution build with it; `python3 backend.py` only copies the shipped files,
+`pip install .` and the source distribution build with it; `python3 backend.py` only copies the shipped files,
 as the Makefile does before it calls maturin.
 """
 
