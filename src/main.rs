@@ -1,12 +1,10 @@
 //! The `palpate` program.
 
-mod shipped;
+mod embedded;
 
+use palpate_input::shipped::HOME;
 use std::path::Path;
 use std::process::ExitCode;
-
-/// Environment variable: the folder with the shipped experiments and scenes.
-const HOME: &str = "PALPATE_HOME";
 
 fn main() -> ExitCode {
     #[cfg(feature = "ros1")]
@@ -15,7 +13,7 @@ fn main() -> ExitCode {
         ["experiments/toy.toml", "scenes/toy.toml"].iter().all(|it| Path::new(it).is_file());
     if std::env::var_os(HOME).is_none()
         && !is_here
-        && let Some(folder) = shipped::folder()
+        && let Some(folder) = embedded::folder()
     {
         // SAFETY: the process has one thread.
         unsafe { std::env::set_var(HOME, folder) };

@@ -1,6 +1,7 @@
 //! Experiments, scenes and models inside the program, for use outside a checkout.
 
 use include_dir::{Dir, include_dir};
+use palpate_input::format::hex;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,8 +26,7 @@ pub fn folder() -> Option<PathBuf> {
         hash.update(path.to_string_lossy().as_bytes());
         hash.update(content);
     }
-    let digest: String = hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-    let folder = cache.join("palpate").join(digest);
+    let folder = cache.join("palpate").join(hex(&hash.finalize()[..8]));
     if !folder.is_dir() {
         write(&folder, &files).ok()?;
     }
