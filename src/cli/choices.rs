@@ -33,9 +33,9 @@ impl Asker {
         Self { can_ask: is_terminal && !take_defaults, talk }
     }
 
-    /// Returns the chosen one of `choices` (a value and its description), and whether the user
-    /// chose it; `None` if there are none. The first is the default. A default that is not
-    /// confirmed is a guess: the note `why` says so.
+    /// Returns the value that the user selects among `choices` (values and their descriptions), and
+    /// whether it was confirmed; `None` if there are none. The first is the default. A default that
+    /// is not confirmed is a guess: the note `why` says so.
     fn choose<T: Copy>(self, what: &str, choices: &[(T, String)], why: &str) -> Option<(T, bool)> {
         let default = choices.first()?.0;
         if !self.can_ask {
@@ -51,13 +51,13 @@ impl Asker {
             if !matches!(io::stdin().lock().read_line(&mut answer), Ok(1..)) {
                 break;
             }
-            let chosen = match answer.trim() {
-                "" => Some(0),
-                number => number.parse().ok().and_then(|number: usize| number.checked_sub(1)),
+            let number: Option<usize> = match answer.trim() {
+                "" => Some(1),
+                text => text.parse().ok(),
             };
-            match chosen.and_then(|chosen| choices.get(chosen)) {
-                Some((value, _)) => return Some((*value, true)),
-                None => continue,
+            let index = number.and_then(|number| number.checked_sub(1));
+            if let Some((value, _)) = index.and_then(|index| choices.get(index)) {
+                return Some((*value, true));
             }
         }
         self.talk.note(why);

@@ -29,6 +29,16 @@ fn citation_changelog_and_packages_have_the_programs_version() {
         let package: toml::Table = text(&format!("crates/{name}/Cargo.toml")).parse().unwrap();
         assert_eq!(package["package"]["version"]["workspace"].as_bool(), Some(true), "{name}");
     }
+    // The wheel of the source distribution contains the library that `make setup` fetches.
+    let fetched = text(".cargo/mujoco.txt");
+    let pin = fetched
+        .lines()
+        .find_map(|line| line.split(" --hash").next().filter(|it| it.starts_with("mujoco==")))
+        .unwrap();
+    let build: toml::Table = text("pyproject.toml").parse().unwrap();
+    let required = build["build-system"]["requires"].as_array().unwrap();
+    assert!(required.iter().any(|it| it.as_str() == Some(pin)), "{pin} in pyproject.toml");
+
     let python: toml::Table = text("python/Cargo.toml").parse().unwrap();
     assert_eq!(
         python["package"]["version"]["workspace"].as_bool(),
