@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 use ndshape::{RuntimeShape, Shape};
 use palpate::geometry::implicit::ImplicitSolid;
 use serde_json::json;
+use std::collections::HashMap;
 
 /// Closed triangle mesh, metres, wound counterclockwise as seen from outside.
 pub struct Mesh {
@@ -33,10 +34,20 @@ pub fn nets(surface: &dyn ImplicitSolid, cell_m: f64) -> Result<Mesh> {
         .positions
         .iter()
         .map(|p| project(surface, low + Vector3::from(p.map(f64::from)) * cell_m))
-        .collect::<Result<_>>()?;
-    let triangles =
-        buffer.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| i as usize)).collect();
-    Ok(Mesh { vertices, triangles })
+        .collect::<Result<Vec<_>>>()?;
+    let triangles = buffer.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| i as usize));
+    Ok(welded(vertices, triangles.collect()))
+}
+
+/// Joins vertices that coincide in single precision, and leaves out the triangles that vanish.
+fn welded(vertices: Vec<Point3<f64>>, mut triangles: Vec<[usize; 3]>) -> Mesh {
+    let bits = |p: &Point3<f64>| [p.x, p.y, p.z].map(|x| (x as f32 + 0.0).to_bits());
+    let mut first = HashMap::new();
+    let joined: Vec<usize> =
+        vertices.iter().enumerate().map(|(i, p)| *first.entry(bits(p)).or_insert(i)).collect();
+    triangles.iter_mut().for_each(|corners| *corners = corners.map(|i| joined[i]));
+    triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+    Mesh { vertices, triangles }
 }
 
 pub fn project(surface: &dyn ImplicitSolid, p: Point3<f64>) -> Result<Point3<f64>> {

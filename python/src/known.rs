@@ -54,7 +54,7 @@ impl GroundTruth {
     pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<BeliefErrors> {
         match (self, known) {
             (Self::Zone(truth), Known::HeightField(belief)) => {
-                truth.compare(belief.surface()?).map(BeliefErrors::Zone)
+                truth.compare(belief).map(BeliefErrors::Zone)
             }
             (Self::Around(shape), Known::ImplicitSurface(belief)) => {
                 Some(BeliefErrors::Around(shape.as_ref()?.evaluate(belief.surface()?, cells)))

@@ -21,7 +21,7 @@ Examples:
   palpate benchmark --planner my_planner:MyPlanner       the built-in planners and one of your own
   palpate benchmark --out runs/mine --threads 8
 
-Runs a fixed protocol, experiments/suite/benchmark-1.toml: objects, planners, touches, trials and seeds. Writes \
+Runs a fixed protocol, experiments/suite/benchmark-2.toml: objects, planners, touches, trials and seeds. Writes \
 benchmark.json and the table benchmark.md, with a run's folder for each object. Ctrl-C stops it; the same command \
 continues it, and runs only the missing planners. Results of two programs can be compared if the protocol's version and \
 hash in their files are equal. --quick runs a part of the protocol and marks its files.")]
@@ -34,7 +34,7 @@ pub(super) struct Args {
     /// comparable.
     #[arg(long)]
     quick: bool,
-    /// Folder for the results [default: runs/benchmark-1, or runs/benchmark-1-quick].
+    /// Folder for the results [default: runs/benchmark-2, or runs/benchmark-2-quick].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Threads; 0 means all cores. Results do not depend on it.

@@ -3,6 +3,7 @@
 mod accuracy;
 mod benchmark;
 mod calibrate;
+mod calibrate_band;
 mod check;
 mod choices;
 mod columns;
@@ -101,6 +102,8 @@ enum Command {
     Replay(replay::Args),
     /// Fit the finger's constants to recordings on a flat plate.
     Calibrate(calibrate::Args),
+    /// Learn the 95 % band from objects of known shape, or test it.
+    CalibrateBand(calibrate_band::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
     /// Print the state of MuJoCo, display, ROS, clock and files, with remedies.
@@ -114,7 +117,7 @@ enum Command {
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "report", "show", "export"]),
-    ("Evaluate", &["compare", "benchmark", "check", "accuracy"]),
+    ("Evaluate", &["compare", "benchmark", "check", "accuracy", "calibrate-band"]),
     ("Robot", &["serve", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
@@ -191,6 +194,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Register(args) => register::run(&args, talk),
         Command::Replay(args) => replay::run(&args, talk),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::CalibrateBand(args) => calibrate_band::run(&args, talk),
         Command::List(args) => list::run(&args),
         Command::Doctor(_) => doctor::run(host),
         Command::Completions(args) => completions::run(&args, Cli::command()),

@@ -408,9 +408,9 @@ fn experiment_text(name: &str, scene: &str, gp: &str) -> String {
          grid = 41                   # test points along each side of the zone\n\n\
          # Gaussian process for unknown objects; without this table the paper's settings apply.\n\
          [gp]\n\
-         kernel = [\"squared_exponential\", \"matern_52\"]\n\
+         kernel = \"matern_52\"\n\
          noise = [1e-4, 1e-1]\n\
-         band = \"leave_one_out\"\n\
+         band = \"objects\"\n\
          free_space = true\n{gp}"
     )
 }

@@ -20,6 +20,7 @@ pub mod orientation;
 pub mod page;
 pub mod points;
 pub mod reference;
+pub mod reliability;
 pub mod relief;
 pub mod replay;
 pub mod scan;

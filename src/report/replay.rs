@@ -67,7 +67,9 @@ impl<'a> BeliefReplay<'a> {
             // A normal that is not recorded was not observed.
             let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
             belief.observe(target, &touched);
-            if let Some(swept) = swept(experiment.scene.finger.clone(), touch) {
+            let finger = &experiment.scene.finger;
+            let pitched = touch.target.pitch_deg().and_then(|pitch| finger.with_pitch(pitch));
+            if let Some(swept) = swept(pitched.unwrap_or_else(|| finger.clone()), touch) {
                 belief.observe_swept(&swept);
             }
         }

@@ -5,6 +5,7 @@ use crate::sim::environment::{CLEARANCE_M, ObjectShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch, check_finite};
+use palpate_explore::robot::Finger;
 use palpate_explore::task::Approach;
 use palpate_explore::task::approach::BEYOND_M;
 use palpate_geometry::bvh::SweepHit;
@@ -45,7 +46,7 @@ impl Probe for ExactProbe {
                 + approach.direction_w().scale(turnaround_distance_m(environment, approach))
         };
         let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
-        self.swept = Some(SweptVolume { finger: environment.scene().finger.clone(), p_wt });
+        self.swept = Some(SweptVolume { finger: pitched(environment, approach), p_wt });
         self.tip = found
             .as_ref()
             .map(|rest| Isometry3::from_parts(rest.p_wt.coords.into(), approach.r_wt()));
@@ -63,6 +64,13 @@ impl Probe for ExactProbe {
     }
 }
 
+/// Returns the finger with the pitch of an approach: its own, or a further one.
+fn pitched(environment: &Environment, approach: &Approach) -> Finger {
+    let finger = &environment.scene().finger;
+    let found = finger.pitched().find(|pitched| pitched.r_at() == approach.r_at);
+    found.unwrap_or_else(|| finger.clone())
+}
+
 /// Pose of the hull at rest on the object.
 pub struct RestingPose {
     /// Centre of the fingertip's hemisphere in `W`.
@@ -75,7 +83,7 @@ pub struct RestingPose {
 /// a mesh.
 pub fn resting_pose(environment: &Environment, approach: &Approach) -> Option<RestingPose> {
     let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return None };
-    let finger = &environment.scene().finger;
+    let finger = &pitched(environment, approach);
     let (ahead_w, reach_m) = (approach.direction_w(), reach_m(environment));
     let start_w = approach.p_near_w - ahead_w.scale(reach_m);
     let axis_w = match approach.r_at == finger.r_at() {

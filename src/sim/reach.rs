@@ -8,8 +8,9 @@
 use super::probe::resting_pose;
 use crate::sim::Environment;
 use crate::sim::scene::SimulatorKind;
+use palpate_explore::robot::Finger;
 use palpate_explore::robot::finger::shape::FrontProfile;
-use palpate_explore::task::Zone;
+use palpate_explore::task::{Target, Zone};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -25,8 +26,8 @@ const PER_SIDE_MAX: f64 = 128.0;
 const ROUNDING_M: f64 = 1e-9;
 
 /// Returns whether the finger, sent to some target in the zone, can touch the surface at each of
-/// `places`, whose true heights above the datum are `heights_m`. A place without a surface is not
-/// reachable. `tell` is called with the progress.
+/// `places` with one of its pitches. Their true heights above the datum are `heights_m`. A place
+/// without a surface is not reachable. `tell` is called with the progress.
 pub fn reachable(
     environment: &Environment,
     places: &[Vec<f64>],
@@ -36,16 +37,26 @@ pub fn reachable(
     if environment.scene().simulator == SimulatorKind::Analytic {
         return heights_m.iter().map(Option::is_some).collect();
     }
-    let Some(fingers) = FingerGrid::new(environment) else { return vec![false; places.len()] };
-    let lowest_y_m = fingers.tip_lower_bounds_y_m();
+    let pitched: Vec<Finger> = environment.scene().finger.pitched().collect();
+    let grids = pitched.iter().enumerate().filter_map(|(i, finger)| {
+        let grid = FingerGrid::new(environment, finger, i > 0)?;
+        let lowest_y_m = grid.tip_lower_bounds_y_m();
+        Some((grid, lowest_y_m))
+    });
+    let grids: Vec<(FingerGrid, Vec<f64>)> = grids.collect();
+    let is_touched = |place: &[f64], height_m: f64| {
+        grids.iter().any(|(fingers, lowest_y_m)| fingers.touch(place, height_m, lowest_y_m))
+    };
     let part = places.len().div_ceil(PARTS).max(1);
     let mut is_reachable = Vec::with_capacity(places.len());
     for (places, heights_m) in places.chunks(part).zip(heights_m.chunks(part)) {
         let percent = 100 * is_reachable.len() / (PARTS * part);
         tell(&format!("computing where the finger can touch the surface: {percent} %"));
-        is_reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
-            height_m.is_some_and(|height_m| fingers.touch(place, height_m, &lowest_y_m))
-        }));
+        is_reachable.par_extend(
+            places.par_iter().zip(heights_m).map(|(place, height_m)| {
+                height_m.is_some_and(|height_m| is_touched(place, height_m))
+            }),
+        );
     }
     is_reachable
 }
@@ -57,6 +68,10 @@ const PARTS: usize = 20;
 struct FingerGrid<'a> {
     environment: &'a Environment,
     zone: &'a Zone,
+    /// Radius of the finger.
+    radius_m: f64,
+    /// Pitch of the targets; `None` for the finger's own.
+    pitch_deg: Option<f64>,
     front: FrontProfile,
     /// Coordinates along each side of the zone, x fastest; z is 0 if the zone has only x.
     sides_m: [Vec<f64>; 2],
@@ -75,10 +90,11 @@ struct TargetRow {
 }
 
 impl<'a> FingerGrid<'a> {
-    /// Creates the grid over the task's zone; `None` without a zone.
-    fn new(environment: &'a Environment) -> Option<Self> {
+    /// Creates the grid of `finger` over the task's zone, with a further pitch if `is_tilted`;
+    /// `None` without a zone.
+    fn new(environment: &'a Environment, finger: &Finger, is_tilted: bool) -> Option<Self> {
         let zone = environment.task().zone()?;
-        let radius_m = environment.scene().finger.radius_m;
+        let radius_m = finger.radius_m;
         let steps = |side_m: f64| (side_m * PER_RADIUS / radius_m).clamp(1.0, PER_SIDE_MAX).ceil();
         let mut sides_m = [vec![0.0], vec![0.0]];
         for (targets_m, [low, high]) in sides_m.iter_mut().zip(zone.sides()) {
@@ -95,7 +111,9 @@ impl<'a> FingerGrid<'a> {
         Some(Self {
             environment,
             zone,
-            front: environment.scene().finger.front(),
+            radius_m,
+            pitch_deg: is_tilted.then_some(finger.pitch_deg),
+            front: finger.front(),
             sides_m,
             tips_y_m: (0..count).map(|_| OnceLock::new()).collect(),
             tolerance_m: TOLERANCE_M + missed_m,
@@ -156,7 +174,7 @@ impl<'a> FingerGrid<'a> {
             steps.min(self.sides_m[side].len() as isize - 1)
         };
         let at = |side: usize, steps: isize| steps as f64 * step_m[side];
-        let radius_m = self.environment.scene().finger.radius_m;
+        let radius_m = self.radius_m;
         let [above_m, below_m] = self.front.axis_z_m();
         let (across, rows) =
             (reach(0, radius_m), -reach(1, radius_m + below_m)..=reach(1, radius_m + above_m));
@@ -175,7 +193,7 @@ impl<'a> FingerGrid<'a> {
     /// Returns the fingers whose hull is over `place`, each with the y of its front there relative
     /// to its tip.
     fn over(&self, place: &[f64]) -> impl Iterator<Item = (usize, f64)> {
-        let radius_m = self.environment.scene().finger.radius_m + ROUNDING_M;
+        let radius_m = self.radius_m + ROUNDING_M;
         let [x_m, z_m] = [place[0], place.get(1).copied().unwrap_or(0.0)];
         let within = |side: &[f64], at: f64, [below_m, above_m]: [f64; 2]| {
             let first = side.partition_point(|&x| x < at - below_m - radius_m);
@@ -200,8 +218,12 @@ impl<'a> FingerGrid<'a> {
 
     fn tip_y_m(&self, finger: usize) -> Option<f64> {
         *self.tips_y_m[finger].get_or_init(|| {
-            let target = self.target(finger)[..self.zone.sides().count()].to_vec();
-            let approach = self.environment.task().approach(&target.into())?;
+            let place = self.target(finger);
+            let target = match self.pitch_deg {
+                Some(pitch_deg) => Target::Tilted { place, pitch_deg },
+                None => place[..self.zone.sides().count()].into(),
+            };
+            let approach = self.environment.task().approach(&target)?;
             let rest = resting_pose(self.environment, &approach)?;
             let x_zw = self.zone.x_wz().inverse();
             Some(x_zw.transform_point(&rest.p_wt).y)

@@ -275,6 +275,15 @@ impl Validate for Scene {
             }
         }
         rules.table("finger", &self.finger);
+        let others = &self.finger.other_pitches_deg;
+        let is_flat = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
+        let can_tilt = self.simulator == SimulatorKind::Swept && is_flat;
+        rules.require(
+            "finger.other_pitches_deg",
+            format!("{others:?}"),
+            others.is_empty() || can_tilt,
+            || "none, unless simulator = \"swept\" touches a zone with x_m and z_m".into(),
+        );
         let body = self.simulator.name();
         if self.simulator == SimulatorKind::Analytic {
             let allowed = "\"toy\", because simulator = \"analytic\"";

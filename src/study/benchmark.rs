@@ -18,7 +18,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Version of the protocol. A new one needs a new file in `experiments/suite`.
-pub const PROTOCOL: &str = "1";
+pub const PROTOCOL: &str = "2";
 
 /// Planner whose errors are the unit.
 pub const REFERENCE: &str = "sobol";

@@ -19,16 +19,16 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-const FILE: &str = "experiments/suite/benchmark-1.toml";
+const FILE: &str = "experiments/suite/benchmark-2.toml";
 
-/// The files of protocol 1. A change of one of them changes the results: it needs a new version.
+/// The files of protocol 2. A change of one of them changes the results: it needs a new version.
 #[test]
 fn the_protocol_is_that_of_its_version() {
-    assert_eq!(PROTOCOL, "1");
+    assert_eq!(PROTOCOL, "2");
     assert_eq!(protocol_sha256(Path::new(FILE)).unwrap(), SHA256);
 }
 
-const SHA256: &str = "0151ec29091ded53aa450563f918a83cddfa0983bac70d309cb29a8e54900976";
+const SHA256: &str = "2a41b3aa635283d1b5bd1ee870eff75d3f1cf9ed8c2de49c847b4bc30661362d";
 
 /// The hash covers scenes and meshes, and nothing else that lies beside them.
 #[test]
@@ -156,7 +156,7 @@ fn a_quick_benchmark_runs_and_continues() {
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let (json, table) = (read("benchmark.json"), read("benchmark.md"));
     let result: Value = serde_json::from_str(&json).unwrap();
-    assert_eq!(result["protocol"], "1");
+    assert_eq!(result["protocol"], "2");
     assert_eq!(result["protocol_sha256"], SHA256);
     assert_eq!(result["quick"], true);
     assert_eq!(result["budgets"], serde_json::json!([10, 15]));
@@ -175,7 +175,7 @@ fn a_quick_benchmark_runs_and_continues() {
     assert!(["random", "sobol", "active", "silhouette"].iter().all(|it| names.contains(it)));
 
     // A kill in the middle of a line.
-    let rows = folder.path().join("benchmark-1-scene-waves/trials.jsonl");
+    let rows = folder.path().join("benchmark-2-scene-waves/trials.jsonl");
     let all = fs::read(&rows).unwrap();
     fs::write(&rows, &all[..all.len() / 2]).unwrap();
     succeeds(root, &run);

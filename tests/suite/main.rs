@@ -10,6 +10,7 @@ mod approach;
 mod arm;
 mod around_commands;
 mod backend;
+mod band;
 mod bench;
 mod benchmark;
 mod broken;

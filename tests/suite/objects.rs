@@ -103,8 +103,8 @@ fn an_oracle_may_fit_again() {
     assert!(found[1] < found[0] - 0.05, "{found:?}");
 }
 
-/// With the touches of an even spread, free space makes the belief of no object significantly
-/// worse, and the overall error smaller.
+/// With the touches of an even spread, free space makes the belief of no object worse by more than
+/// 6 %, and the overall error smaller.
 #[test]
 fn free_space_makes_no_belief_worse() {
     let mut found = Vec::new();
@@ -123,7 +123,7 @@ fn free_space_makes_no_belief_worse() {
     }
     let mean = found.iter().map(|(_, log)| log).sum::<f64>() / found.len() as f64;
     println!("all: {:.3}", mean.exp());
-    assert!(found.iter().all(|(_, log)| *log < 0.05) && mean < -0.01, "{mean}: {found:?}");
+    assert!(found.iter().all(|(_, log)| *log < 0.06) && mean < -0.02, "{mean}: {found:?}");
 }
 
 /// The runs of a sweep are compared in tables, a page and a CSV file; existing runs give the same

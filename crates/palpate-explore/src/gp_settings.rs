@@ -1,5 +1,6 @@
 //! Settings of the Gaussian process of a belief.
 
+use crate::band::{LearnedBand, OBJECTS};
 use palpate_gp::kernel;
 use palpate_gp::{LogNormal, MeanModel};
 use palpate_input::config::{Rules, Validate, is_default};
@@ -38,7 +39,8 @@ pub struct GpSettings {
     // The hyperparameters are then fitted to between this number and twice as many touches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inducing_touches: Option<u32>,
-    /// Calibration of the standard deviations.
+    /// Calibration of the band: `"likelihood"`, `"leave_one_out"`, `"objects"`, or a table of
+    /// `palpate calibrate-band`.
     #[serde(skip_serializing_if = "is_default")]
     pub band: Band,
     /// Log-normal priors of the hyperparameters.
@@ -65,15 +67,44 @@ impl Kernels {
     }
 }
 
-/// Calibration of the belief's standard deviations.
+/// Calibration of the belief's band.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Band {
+    /// A built-in calibration.
+    Named(BandName),
+    /// Half-widths learned from objects, as printed by `palpate calibrate-band`.
+    Learned(LearnedBand),
+}
+
+/// Name of a built-in calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Band {
+pub enum BandName {
     /// Maximum likelihood, as for all hyperparameters.
     #[default]
     Likelihood,
     /// Leave-one-out: scaled so that 95 % of contacts lie within 1.96 standard deviations.
     LeaveOneOut,
+    /// Two-sided, learned from the objects of the suite's tuning half.
+    Objects,
+}
+
+impl Default for Band {
+    fn default() -> Self {
+        Self::Named(BandName::Likelihood)
+    }
+}
+
+impl Band {
+    /// Returns the half-widths learned from objects, if they are.
+    pub fn learned(&self) -> Option<&LearnedBand> {
+        match self {
+            Self::Named(BandName::Objects) => Some(&OBJECTS),
+            Self::Named(_) => None,
+            Self::Learned(band) => Some(band),
+        }
+    }
 }
 
 /// Log-normal priors, in the units of the bounds; flat if omitted.
@@ -151,10 +182,13 @@ impl Validate for GpSettings {
             rules.require("normals", self.normals, !self.normals, || {
                 "false with inducing_touches, which supports heights only".into()
             });
-            let by_likelihood = self.band == Band::Likelihood;
-            rules.require("band", "\"leave_one_out\"", by_likelihood, || {
+            let is_leave_one_out = self.band == Band::Named(BandName::LeaveOneOut);
+            rules.require("band", "\"leave_one_out\"", !is_leave_one_out, || {
                 "\"likelihood\" with inducing_touches, whose errors are correlated".into()
             });
+        }
+        if let Band::Learned(band) = &self.band {
+            rules.table("band", band);
         }
         let priors = [
             ("prior.length_scale", self.prior.length_scale),

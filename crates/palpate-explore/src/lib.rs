@@ -12,6 +12,7 @@
 //! | [`robot`] | the arm from a model file, the finger, its sensors |
 //! | [`backend`] | the trait `Backend`, faults, interlocks |
 //! | [`belief`], [`whole_object`] | beliefs of a height field and of a whole object |
+//! | [`band`] | the two-sided 95 % band of the heights |
 //! | [`surface_evidence`] | probability of a surface from contacts and misses |
 //! | [`planner`] | planners, one list for both |
 //! | [`probe`], [`control`] | a touch, and the motion of the arm |
@@ -47,6 +48,7 @@
 //! ```
 
 pub mod backend;
+pub mod band;
 pub mod belief;
 pub mod control;
 mod free_space;

@@ -44,6 +44,9 @@ const MISS_PLACES: usize = 3;
 pub struct SurfaceEvidence {
     /// For each contact, the target of the hull and the place of contact.
     contacts: Vec<[Vector2<f64>; 2]>,
+    /// Hull of each contact; of the last touch where it is not known.
+    #[serde(default)]
+    hulls: Vec<Option<Stadium>>,
     misses: Vec<Stadium>,
     /// Hull of the last touch; for another target it is translated.
     hull: Option<Stadium>,
@@ -53,7 +56,13 @@ pub struct SurfaceEvidence {
 impl SurfaceEvidence {
     /// Creates an empty set of evidence.
     pub(super) fn new(zone: &Zone) -> Self {
-        Self { contacts: Vec::new(), misses: Vec::new(), hull: None, zone: zone.clone() }
+        Self {
+            contacts: Vec::new(),
+            hulls: Vec::new(),
+            misses: Vec::new(),
+            hull: None,
+            zone: zone.clone(),
+        }
     }
 
     /// Adds a contact at `p_w` of a touch at `target`.
@@ -61,6 +70,7 @@ impl SurfaceEvidence {
         let target = flat(&self.zone.local(target, 0.0));
         let contact = flat(&self.zone.x_wz().inverse_transform_point(p_w));
         self.contacts.push([target, contact]);
+        self.hulls.resize(self.contacts.len(), None);
     }
 
     /// Adds the final place of a touch's hull, and whether the touch was a miss.
@@ -69,6 +79,8 @@ impl SurfaceEvidence {
         let hull = Stadium::new(&swept.finger, tip);
         if has_missed {
             self.misses.push(hull.clone());
+        } else if let Some(last) = self.hulls.last_mut() {
+            last.get_or_insert_with(|| hull.clone());
         }
         self.hull = Some(hull);
     }
@@ -82,8 +94,9 @@ impl SurfaceEvidence {
     fn labels(&self) -> Vec<(Vector2<f64>, f64)> {
         let mut labels = Vec::new();
         let Some(hull) = &self.hull else { return labels };
-        for [target, contact] in &self.contacts {
+        for (i, [target, contact]) in self.contacts.iter().enumerate() {
             labels.push((*contact, 1.0));
+            let hull = self.hulls.get(i).and_then(Option::as_ref).unwrap_or(hull);
             let inwards = hull.moved_to(*target).nearest(contact) - contact;
             let offset = inwards.norm() / hull.radius_m;
             if offset > 0.0 {

@@ -1,6 +1,5 @@
 //! Errors of a belief relative to the true surface.
 
-use palpate_gp::math::normal::BAND_95;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,10 +23,19 @@ pub struct Metrics {
     /// Root mean square error on the unreachable surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unreachable_rmse_m: Option<f64>,
-    /// Share of the truth within 1.96·sqrt(σ² + noise²) of the mean; the noise includes errors that
-    /// a smooth surface cannot represent.
+    /// Share of the truth within the 95 % band: between the belief's quantiles at 0.025 and 0.975.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
+    /// Coverage of the reachable surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reachable_coverage: Option<f64>,
+    /// Coverage of the unreachable surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unreachable_coverage: Option<f64>,
+    /// Mean interval score of the 95 % band (Gneiting & Raftery 2007, Eq. 43): its width plus 40
+    /// times the distance of the truth outside of it, m; lower is better.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_score_m: Option<f64>,
     /// Mean negative log density of the true heights (in m): ½·ln(2π·s²) + ½·error²/s², s² = σ² +
     /// noise²; lower is better.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,22 +52,49 @@ pub(in crate::experiment) fn rmse(errors: impl IntoIterator<Item = f64>) -> Opti
     (count > 0.0).then(|| f64::sqrt(squares / count))
 }
 
-/// Returns [coverage](Metrics::coverage) and [NLPD](Metrics::nlpd) of errors with their predicted
-/// variances; `None` if there are none.
-pub(in crate::experiment) fn calibration(
-    errors: impl IntoIterator<Item = (f64, f64)>,
-) -> (Option<f64>, Option<f64>) {
-    let (mut count, mut inside, mut nlpd) = (0.0, 0.0, 0.0);
-    for (error, variance) in errors {
+/// Returns the [NLPD](Metrics::nlpd) of errors with their predicted variances; `None` if there are
+/// none.
+pub(in crate::experiment) fn nlpd(errors: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {
+    mean(errors.into_iter().map(|(error, variance)| {
         // A belief without noise may have zero variance.
         let variance = f64::max(variance, f64::MIN_POSITIVE);
-        count += 1.0;
-        inside += f64::from(u8::from(f64::abs(error) <= BAND_95 * variance.sqrt()));
-        nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
-    }
-    // Rounded to four decimals: each row stores one per touch.
-    let mean = |sum: f64| Some((1e4 * sum / count).round() / 1e4).filter(|mean| mean.is_finite());
-    (mean(inside), mean(nlpd))
+        0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance
+    }))
+    .map(round)
+}
+
+/// Returns the share of values within their band [low, high]; `None` if there are none.
+pub(in crate::experiment) fn coverage(
+    banded: impl IntoIterator<Item = (f64, [f64; 2])>,
+) -> Option<f64> {
+    let is_inside = |(value, [low, high]): (f64, [f64; 2])| low <= value && value <= high;
+    mean(banded.into_iter().map(|it| f64::from(u8::from(is_inside(it))))).map(round)
+}
+
+/// Share of the truth outside a 95 % band.
+const OUTSIDE: f64 = 0.05;
+
+/// Returns the mean [interval score](Metrics::interval_score_m) of values with their band [low,
+/// high]; `None` if there are none.
+pub(in crate::experiment) fn interval_score(
+    banded: impl IntoIterator<Item = (f64, [f64; 2])>,
+) -> Option<f64> {
+    mean(banded.into_iter().map(|(value, [low, high])| {
+        let outside = (low - value).max(0.0) + (value - high).max(0.0);
+        high - low + 2.0 / OUTSIDE * outside
+    }))
+}
+
+/// Mean of finite values; `None` if there are none or it is not finite.
+fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (count, sum) =
+        values.into_iter().fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+    Some(sum / count).filter(|mean: &f64| mean.is_finite())
+}
+
+/// Rounds to four decimals: each row stores one value per touch.
+fn round(value: f64) -> f64 {
+    (1e4 * value).round() / 1e4
 }
 
 impl Metrics {
@@ -101,6 +136,9 @@ impl Metrics {
             reachable_rmse_m: None,
             unreachable_rmse_m: None,
             coverage: None,
+            reachable_coverage: None,
+            unreachable_coverage: None,
+            interval_score_m: None,
             nlpd: None,
         }
     }
@@ -128,6 +166,7 @@ fn ratio(numerator: f64, denominator: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_gp::math::normal;
 
     fn compare(pairs: &[(f64, f64)]) -> Metrics {
         Metrics::from_heights(pairs.iter().copied())
@@ -178,27 +217,34 @@ mod tests {
         assert_eq!((zero.r, zero.centred_r), (0.0, 0.0));
     }
 
-    /// Errors drawn from the predictive distribution lie in its band in 95 % of cases, and their
-    /// mean negative log density is the distribution's entropy ½·ln(2πe·s²).
+    /// Errors drawn from the predictive distribution lie in its band in 95 % of cases, their mean
+    /// negative log density is the distribution's entropy ½·ln(2πe·s²), and no other band has a
+    /// smaller interval score.
     #[test]
     fn honest_errors_are_covered_and_score_the_entropy() {
         let sd: f64 = 1e-3;
         let count = 20_000;
-        let errors = (0..count).map(|i| {
-            // Quantiles of the normal distribution, by bisection.
-            let share = (f64::from(i) + 0.5) / f64::from(count);
-            let (mut low, mut high) = (-9.0, 9.0);
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                let is_below = palpate_gp::math::normal::cumulative(middle) < share;
-                if is_below { low = middle } else { high = middle }
-            }
-            (sd * low, sd * sd)
-        });
-        let (coverage, nlpd) = calibration(errors);
-        let coverage = coverage.unwrap();
-        assert!((coverage - 0.95).abs() < 1e-9, "{coverage}");
+        let errors: Vec<f64> = (0..count)
+            .map(|i| sd * normal::quantile((f64::from(i) + 0.5) / f64::from(count)))
+            .collect();
+        let banded = |factor: f64| {
+            let half = factor * normal::BAND_95 * sd;
+            errors.iter().map(move |error| (*error, [-half, half]))
+        };
+        let covered = coverage(banded(1.0)).unwrap();
+        assert!((covered - 0.95).abs() < 1e-9, "{covered}");
         let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E * sd * sd).ln();
-        assert!((nlpd.unwrap() - entropy).abs() < 1e-3);
+        let density = nlpd(errors.iter().map(|error| (*error, sd * sd))).unwrap();
+        assert!((density - entropy).abs() < 1e-3);
+        let score = interval_score(banded(1.0)).unwrap();
+        assert!([0.5, 0.9, 1.1, 2.0].iter().all(|&it| interval_score(banded(it)).unwrap() > score));
+    }
+
+    /// Below the band by 1, inside, and above by 2: 40 times 3 over 3, plus the width.
+    #[test]
+    fn the_interval_score_adds_forty_times_the_distance_outside() {
+        let values = [-1.0, 2.0, 6.0].map(|value| (value, [0.0, 4.0]));
+        assert!((interval_score(values).unwrap() - 44.0).abs() < 1e-12);
+        assert_eq!((interval_score([]), coverage([]), nlpd([])), (None, None, None));
     }
 }

@@ -9,10 +9,11 @@ pub mod shape;
 pub mod silhouette;
 
 use self::Direction::{Maximise, Minimise, Undirected};
-use self::metrics::{Metrics, calibration, rmse};
+use self::metrics::{Metrics, coverage, nlpd, rmse};
 use self::shape::ShapeMetrics;
 use self::silhouette::SilhouetteMetrics;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
+use palpate_gp::math::normal::BAND_95;
 use std::fmt;
 
 /// All measures, in the order of columns and panels. Add an entry here to add a measure.
@@ -25,7 +26,6 @@ pub static MEASURES: &[Measure] = &[
         .from(Source::Metrics(|it| it.reachable_rmse_m))
         .aggregated(Aggregate::Median)
         .drawn(PanelAxis::LogBeside(&UNREACHABLE_RMSE))
-        .untabled()
         .error(),
     UNREACHABLE_RMSE,
     measure(Minimise, "max_error_m", "maximum error", MM)
@@ -34,6 +34,13 @@ pub static MEASURES: &[Measure] = &[
     COVERAGE,
     measure(Minimise, "coverage_error", "coverage error of the 95 % band", SHARE)
         .from(Source::Metrics(|it| Some((it.coverage? - CALIBRATED_COVERAGE).abs())))
+        .untabled(),
+    measure(Undirected, "reachable_coverage", "coverage, reachable", SHARE)
+        .from(Source::Metrics(|it| it.reachable_coverage)),
+    measure(Undirected, "unreachable_coverage", "coverage, unreachable", SHARE)
+        .from(Source::Metrics(|it| it.unreachable_coverage)),
+    measure(Minimise, "interval_score_m", "interval score of the 95 % band", MM)
+        .from(Source::Metrics(|it| it.interval_score_m))
         .untabled(),
     measure(Minimise, "nlpd", "NLPD", PLAIN).from(Source::Metrics(|it| it.nlpd)),
     measure(Minimise, "presence_brier", "Brier score of surface probability", SHARE)
@@ -72,7 +79,7 @@ pub static MEASURES: &[Measure] = &[
     measure(Minimise, "time_s", "robot time", SECONDS).from(Source::Touch(|it| it.time_s)),
     VERIFICATION_RMSE,
     measure(Minimise, "verification_nlpd", "NLPD at verification touches", PLAIN)
-        .from(Source::Trial(|row, n| predicted(row, n)?.1)),
+        .from(Source::Trial(|row, n| nlpd(predicted(row, n)?.map(|(error, sd)| (error, sd * sd))))),
     VERIFICATION_COVERAGE,
     measure(Minimise, "verification_miss_share", "missed verification touches", SHARE)
         .from(Source::Trial(missed)),
@@ -116,8 +123,7 @@ pub const EDGE_RMSE: Measure = measure(Minimise, "edge_rmse_m", "RMSE in the out
 
 const UNREACHABLE_RMSE: Measure = measure(Minimise, "unreachable_rmse_m", "RMSE, unreachable", MM)
     .from(Source::Metrics(|it| it.unreachable_rmse_m))
-    .aggregated(Aggregate::Median)
-    .untabled();
+    .aggregated(Aggregate::Median);
 
 /// Share of the truth inside the 95 % band.
 pub const COVERAGE: Measure = measure(Undirected, "coverage", "coverage of the 95 % band", SHARE)
@@ -140,8 +146,11 @@ pub const VERIFICATION_RMSE: Measure =
 
 /// Share of verification touches inside the 95 % band.
 pub const VERIFICATION_COVERAGE: Measure =
-    measure(Undirected, "verification_coverage", "coverage of verification touches", SHARE)
-        .from(Source::Trial(|row, n| predicted(row, n)?.0));
+    measure(Undirected, "verification_coverage", "coverage of verification touches", SHARE).from(
+        Source::Trial(|row, n| {
+            coverage(predicted(row, n)?.map(|(error, sd)| (error, [-BAND_95 * sd, BAND_95 * sd])))
+        }),
+    );
 
 /// Root mean square difference between a touch and the one it repeats.
 pub const REPEATABILITY: Measure = measure(Minimise, "repeatability_m", "repeatability, RMS", MM)
@@ -164,10 +173,9 @@ fn verified(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &Verifi
     Some(verification(row, touches)?.iter().filter(|touch| touch.repeats.is_none()))
 }
 
-/// Coverage and NLPD of the errors at verification touches.
-fn predicted(row: &TrialRow, touches: u32) -> Option<(Option<f64>, Option<f64>)> {
-    let errors = verified(row, touches)?.filter_map(|touch| touch.error_m.zip(touch.sd_m));
-    Some(calibration(errors.map(|(error, sd)| (error, sd * sd))))
+/// Errors at verification touches, each with its standard deviation.
+fn predicted(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = (f64, f64)>> {
+    Some(verified(row, touches)?.filter_map(|touch| touch.error_m.zip(touch.sd_m)))
 }
 
 /// Share of verification touches that missed or were aborted.

@@ -79,7 +79,8 @@ fn run_touches(
     let mut planner = factory.make(&experiment.planning, stream(name));
     // Rows contain contact normals and tips if the belief uses them.
     let writes_normals = experiment.gp.normals || is_around;
-    let writes_tips = experiment.gp.free_space || is_around;
+    let uses_tips = experiment.gp.free_space || experiment.gp.band.learned().is_some();
+    let writes_tips = uses_tips || is_around;
     for count in 1..=experiment.touches {
         let is_start = count <= experiment.initial_touches;
         let plan = if is_start { start.plan(&belief) } else { planner.plan(&belief) };
@@ -143,7 +144,7 @@ fn evaluate(
     match belief {
         Belief::HeightField(field) => {
             if fitted.is_ok() {
-                row.metrics = field.surface().and_then(|it| truth.truth.compare(it));
+                row.metrics = truth.truth.compare(field);
             }
             // Only the last row contains the reliability.
             row.silhouette = SilhouetteMetrics::of(field.surface_evidence(), &truth.truth);

@@ -90,10 +90,10 @@ impl Planner for Oracle {
             Belief::HeightField(field) => {
                 let count = self.search.settings.oracle.candidates;
                 let places = self.search.spread_places(field.zone(), count);
-                let targets = places.into_iter().map(Target::from).collect();
-                match self.best(belief, targets) {
-                    Some(Target::Place(place)) => self.search.plan_at(field, place),
-                    _ => self.search.anywhere(field.zone()),
+                let targets = places.into_iter().map(|place| field.target(place)).collect();
+                match self.best(belief, targets).as_ref().and_then(Target::place) {
+                    Some(place) => self.search.plan_at(field, place.to_vec()),
+                    None => self.search.anywhere(field.zone()),
                 }
             }
             Belief::ImplicitSurface(surface) => {

@@ -152,6 +152,7 @@ impl TouchRow {
     fn place(&self) -> &[f64] {
         match (&self.target, &self.contact) {
             (Target::Place(place), _) => place,
+            (Target::Tilted { place, .. }, _) => place,
             (Target::Aim(_), Some(contact)) => contact,
             (Target::Aim(aim), None) => aim.p_w.coords.as_slice(),
         }

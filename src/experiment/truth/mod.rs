@@ -42,9 +42,10 @@
 pub mod scan;
 pub mod scan_truth;
 
-use crate::experiment::measure::metrics::{Metrics, calibration, rmse};
+use crate::experiment::measure::metrics::{Metrics, coverage, interval_score, nlpd, rmse};
 use crate::sim::Environment;
 use crate::sim::reach;
+use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
@@ -76,6 +77,9 @@ const TRIANGLES: usize = 20_000;
 /// Step between the grid points at which the belief's variance is computed.
 // heuristic: the variance costs the square of the number of touches, the mean only that number.
 const CALIBRATION_STEP: usize = 4;
+
+/// Probabilities at the ends of the 95 % band.
+const BAND: [f64; 2] = [0.025, 0.975];
 
 impl Truth {
     /// Samples the environment's surface on a grid of `per_side` points along each side of the
@@ -150,21 +154,26 @@ impl Truth {
         heights_m.filter_map(|(i, (height_m, mean))| Some((i, (*height_m)? - mean)))
     }
 
-    /// Compares a belief with the ground truth over the known surface; `None` without one.
-    pub fn compare(&self, belief: &Posterior) -> Option<Metrics> {
-        if self.surface_count() == 0 {
-            return None;
-        }
+    /// Compares a belief with the ground truth over the known surface; `None` without one, or before
+    /// the belief's first fit.
+    pub fn compare(&self, field: &HeightField) -> Option<Metrics> {
+        let belief = field.surface().filter(|_| self.surface_count() > 0)?;
         let means = belief.means(self.places.iter().map(Vec::as_slice));
-        let calibrated: Vec<Vec<f64>> =
-            self.places.iter().step_by(CALIBRATION_STEP).cloned().collect();
-        let variances = belief.variances(&calibrated, &mut []);
+        let is_calibrated = |i: &usize| i.is_multiple_of(CALIBRATION_STEP);
+        let places: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATION_STEP).cloned().collect();
+        let variances = belief.variances(&places, &mut []);
+        let bands_m = field.quantiles_m(&places, &BAND)?;
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
-        let (coverage, nlpd) = calibration(
-            self.errors(&means)
-                .filter(|(i, _)| i % CALIBRATION_STEP == 0)
-                .map(|(i, error)| (error, variances[i / CALIBRATION_STEP] + noise2)),
-        );
+        let densities = self.errors(&means).filter(|(i, _)| is_calibrated(i));
+        let densities =
+            densities.map(|(i, error)| (error, variances[i / CALIBRATION_STEP] + noise2));
+        let banded = |holds: &dyn Fn(usize) -> bool| -> Vec<(f64, [f64; 2])> {
+            let heights_m = self.heights_m.iter().enumerate().step_by(CALIBRATION_STEP);
+            let known = heights_m.zip(&bands_m).filter(|((i, _), _)| holds(*i));
+            known
+                .filter_map(|((_, height_m), band)| Some(((*height_m)?, [band[0], band[1]])))
+                .collect()
+        };
         let rmse_where = |holds: &dyn Fn(usize) -> bool| {
             rmse(self.errors(&means).filter(|(i, _)| holds(*i)).map(|(_, error)| error))
         };
@@ -174,8 +183,11 @@ impl Truth {
             edge_rmse_m: rmse_where(&|i| self.is_edge[i]),
             reachable_rmse_m: rmse_where(&|i| self.is_reachable[i]),
             unreachable_rmse_m: rmse_where(&|i| !self.is_reachable[i]),
-            coverage,
-            nlpd,
+            coverage: coverage(banded(&|_| true)),
+            reachable_coverage: coverage(banded(&|i| self.is_reachable[i])),
+            unreachable_coverage: coverage(banded(&|i| !self.is_reachable[i])),
+            interval_score_m: interval_score(banded(&|_| true)),
+            nlpd: nlpd(densities),
             ..Metrics::from_heights(heights_m)
         })
     }

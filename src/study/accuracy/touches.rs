@@ -247,5 +247,5 @@ pub fn surface_rmse_m(
         belief.observe(target.place()?, &touch);
     }
     let (_, surface) = belief.refit().ok()?;
-    Some(Truth::sample(environment, GRID, &|_| ()).compare(surface)?.rmse_m)
+    Truth::sample(environment, GRID, &|_| ()).rmse_m(surface)
 }

@@ -107,6 +107,9 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         reachable_rmse_m: Some(error_m),
         unreachable_rmse_m: None,
         coverage: Some(0.9),
+        reachable_coverage: Some(0.9),
+        unreachable_coverage: None,
+        interval_score_m: Some(error_m),
         nlpd: Some(-3.0),
     };
     let is_fitted = count >= experiment.initial_touches;

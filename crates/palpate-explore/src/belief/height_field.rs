@@ -1,8 +1,9 @@
 //! Belief of the heights of a surface over a zone: a Gaussian process with its uncertainty.
 
 use crate::free_space::FreeSpaceBound;
-use crate::gp_settings::{Band, GpSettings};
+use crate::gp_settings::{Band, BandName, GpSettings};
 use crate::probe::{SweptVolume, Touch};
+use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
 use nalgebra::Vector3;
@@ -26,22 +27,28 @@ const NORMAL_Y_MIN: f64 = 0.05;
 /// Belief of a height field over a zone.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct HeightField {
-    zone: Zone,
+    pub(super) zone: Zone,
     #[serde(skip, default = "no_kernels")]
     kernels: KernelSelection,
-    settings: GpSettings,
-    contacts: Observations,
+    pub(super) settings: GpSettings,
+    pub(super) contacts: Observations,
     /// Upper bound from free space, if that is enabled.
     ceiling: Option<FreeSpaceBound>,
     presence: SurfaceEvidence,
+    /// Space swept by the touches with contact, if the band uses it.
+    #[serde(default)]
+    pub(super) swept: Vec<SweptVolume>,
     /// Whether the last touch was a miss.
     has_missed: bool,
+    /// Finger of the touches, if known.
+    #[serde(default)]
+    pub(super) finger: Option<Finger>,
     targets: Vec<Vec<f64>>,
     unreached: Vec<Vec<f64>>,
     /// Fit that `surface` is conditioned with.
     fit: Option<Fit>,
     #[serde(skip)]
-    surface: Option<Posterior>,
+    pub(super) surface: Option<Posterior>,
     /// `surface`, conditioned also on the unreached targets, which are not worth another touch.
     #[serde(skip)]
     planning_posterior: Option<Posterior>,
@@ -60,7 +67,9 @@ impl HeightField {
             ceiling: settings.free_space.then(|| FreeSpaceBound::new(&zone)),
             kernels: KernelSelection::new(settings.kernel.names()),
             presence: SurfaceEvidence::new(&zone),
+            swept: Vec::new(),
             has_missed: false,
+            finger: None,
             zone,
             settings,
             contacts,
@@ -70,6 +79,12 @@ impl HeightField {
             surface: None,
             planning_posterior: None,
         }
+    }
+
+    /// Sets the finger, whose further pitches a [target](Self::target) may use.
+    pub fn with_finger(mut self, finger: Finger) -> Self {
+        self.finger = Some(finger);
+        self
     }
 
     /// Adds a touch; the belief changes at the next [`refit`](Self::refit).
@@ -98,6 +113,9 @@ impl HeightField {
     /// there after a miss.
     pub fn observe_swept(&mut self, swept: &SweptVolume) {
         self.presence.add_hull(swept, self.has_missed);
+        if !self.has_missed && self.settings.band.learned().is_some() {
+            self.swept.push(swept.clone());
+        }
         if let Some(ceiling) = self.ceiling.as_mut().filter(|_| !self.has_missed) {
             ceiling.lower(&self.zone, swept);
         }
@@ -134,7 +152,7 @@ impl HeightField {
                 self.kernels.fit(&search_box, &thinned)
             }
         };
-        if self.settings.band == Band::LeaveOneOut {
+        if self.settings.band == Band::Named(BandName::LeaveOneOut) {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
                 Posterior::new(self.kernels.kernel(), hyperparameters, self.contacts.clone())?;

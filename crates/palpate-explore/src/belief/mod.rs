@@ -1,6 +1,8 @@
 //! Belief after some touches: a Gaussian process over a zone or in space.
 
 mod height_field;
+mod quantiles;
+mod reach;
 
 pub use height_field::HeightField;
 
@@ -38,7 +40,9 @@ impl Belief {
         space: &SpatialGpSettings,
     ) -> Self {
         match task.region() {
-            Region::Zone(zone) => HeightField::new(zone.clone(), gp.clone()).into(),
+            Region::Zone(zone) => {
+                HeightField::new(zone.clone(), gp.clone()).with_finger(finger.clone()).into()
+            }
             Region::Ball(ball) => {
                 let scope = ExplorationSetup::new(*ball, task, (finger, is_soft));
                 ImplicitSurface::new(scope, space.clone()).into()
@@ -54,12 +58,12 @@ impl Belief {
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
-        match (self, target) {
-            (Self::HeightField(field), Target::Place(place)) => {
+        match (self, target.place(), target.aim()) {
+            (Self::HeightField(field), Some(place), _) => {
                 field.observe(place, touch);
                 swept.into_iter().for_each(|swept| field.observe_swept(swept));
             }
-            (Self::ImplicitSurface(surface), Target::Aim(aim)) => {
+            (Self::ImplicitSurface(surface), _, Some(aim)) => {
                 surface.observe(aim, approach, (touch, swept));
             }
             _ => {}

@@ -85,7 +85,7 @@ impl Search {
         let stall = fallback_reason(belief, &place);
         let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
         let sd_m = Some(variance(belief, &target).sqrt());
-        Plan { target: target.into(), sd_m, fallback: stall }
+        Plan { target: belief.target(target), sd_m, fallback: stall }
     }
 
     /// Returns the largest value of `score` found and its place.

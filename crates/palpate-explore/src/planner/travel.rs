@@ -58,9 +58,10 @@ impl Travel {
         match &plan {
             // Earlier touches of this tour may have removed the variance that this one was planned
             // for.
-            Plan { fallback: None, target: Target::Place(place), .. } => {
-                self.search.plan_at(field, place.clone())
-            }
+            Plan { fallback: None, target, .. } => match target.place() {
+                Some(place) => self.search.plan_at(field, place.to_vec()),
+                None => plan,
+            },
             _ => plan,
         }
     }

@@ -56,7 +56,7 @@ pub trait Probe: Send {
 
 /// Volume swept by a touch, which is free: the hull at the end of an approach along the zone's
 /// axis. The hull moved there in a straight line, so no surface lies above its front.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweptVolume {
     /// The finger's hull.
     pub finger: Finger,

@@ -11,6 +11,13 @@ use serde::{Deserialize, Serialize};
 pub enum Target {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
+    /// The place (x, z) of a zone, m, touched with another pitch of the finger.
+    Tilted {
+        /// The place.
+        place: [f64; 2],
+        /// Pitch of the finger, one of the further pitches of its settings, deg.
+        pitch_deg: f64,
+    },
     /// A point of a ball, and the direction of the approach.
     Aim(Aim),
 }
@@ -20,34 +27,46 @@ impl Target {
     pub fn place(&self) -> Option<&[f64]> {
         match self {
             Self::Place(place) => Some(place),
+            Self::Tilted { place, .. } => Some(place),
             Self::Aim(_) => None,
+        }
+    }
+
+    /// Returns the pitch of the finger, if it is not the finger's own.
+    pub fn pitch_deg(&self) -> Option<f64> {
+        match self {
+            Self::Tilted { pitch_deg, .. } => Some(*pitch_deg),
+            Self::Place(_) | Self::Aim(_) => None,
         }
     }
 
     /// Returns the aim into a ball, if it is one.
     pub fn aim(&self) -> Option<&Aim> {
         match self {
-            Self::Place(_) => None,
+            Self::Place(_) | Self::Tilted { .. } => None,
             Self::Aim(aim) => Some(aim),
         }
     }
 
-    /// Returns the coordinates for a table: (x) or (x, z) of a place; for an aim, x, y and z of the
-    /// point, then of the direction.
+    /// Returns the coordinates for a table: (x) or (x, z) of a place, followed by the pitch in
+    /// degrees if the finger is tilted; for an aim, x, y and z of the point, then of the direction.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Place(place) => place.clone(),
+            Self::Tilted { place: [x, z], pitch_deg } => vec![*x, *z, *pitch_deg],
             Self::Aim(aim) => {
                 aim.p_w.coords.iter().chain(aim.direction_w.iter()).copied().collect()
             }
         }
     }
 
-    /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, six for an
-    /// aim. Returns `None` for another count, and for an aim without a direction.
+    /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, three for
+    /// a place and a pitch, six for an aim. Returns `None` for another count, and for an aim
+    /// without a direction.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match *numbers {
             [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
+            [x, z, pitch_deg] => Some(Self::Tilted { place: [x, z], pitch_deg }),
             [x, y, z, u, v, w] => Some(Self::Aim(Aim::along([x, y, z], [u, v, w])?)),
             _ => None,
         }
@@ -115,6 +134,13 @@ impl Aim {
 enum TargetOut {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
+    /// The place of a zone, touched with another pitch of the finger.
+    Tilted {
+        /// The place (x, z), m.
+        place: [f64; 2],
+        /// Pitch of the finger, deg.
+        pitch_deg: f64,
+    },
     /// An approach to a whole object.
     Aim {
         /// The point aimed at, in `W`, m.
@@ -128,6 +154,7 @@ impl From<Target> for TargetOut {
     fn from(target: Target) -> Self {
         match target {
             Target::Place(place) => Self::Place(place),
+            Target::Tilted { place, pitch_deg } => Self::Tilted { place, pitch_deg },
             Target::Aim(Aim { p_w, direction_w: ahead_w }) => {
                 Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
             }
@@ -149,6 +176,9 @@ impl TryFrom<TargetIn> for Target {
     fn try_from(read: TargetIn) -> Result<Self, String> {
         match read {
             TargetIn::Written(TargetOut::Place(place)) => Ok(Self::Place(place)),
+            TargetIn::Written(TargetOut::Tilted { place, pitch_deg }) => {
+                Ok(Self::Tilted { place, pitch_deg })
+            }
             TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
                 let aim = Aim::along(p_w, ahead_w);
                 aim.map(Self::Aim).ok_or_else(|| {
@@ -156,7 +186,7 @@ impl TryFrom<TargetIn> for Target {
                 })
             }
             TargetIn::Numbers(numbers) => Self::from_numbers(&numbers)
-                .ok_or_else(|| format!("a target has 1, 2 or 6 numbers, not {}", numbers.len())),
+                .ok_or_else(|| format!("a target has 1, 2, 3 or 6 numbers, not {}", numbers.len())),
         }
     }
 }
@@ -174,7 +204,8 @@ mod tests {
             outward in prop::array::uniform3(-1f64..1.0),
         ) {
             let aim = Aim::against(Point3::from(at), &Vector3::from(outward));
-            for target in [Target::from(aim), Target::from(at[..2].to_vec())] {
+            let tilted = Target::Tilted { place: [at[0], at[1]], pitch_deg: at[2] };
+            for target in [Target::from(aim), Target::from(at[..2].to_vec()), tilted] {
                 let json = serde_json::to_string(&target).unwrap();
                 prop_assert_eq!(&serde_json::from_str::<Target>(&json).unwrap(), &target);
                 let numbers = serde_json::to_string(&target.numbers()).unwrap();
@@ -195,7 +226,7 @@ mod tests {
     fn an_aim_has_a_point_and_a_direction() {
         assert!(Aim::along([0.0; 3], [0.0; 3]).is_none());
         assert!(Aim::along([0.0; 3], [0.0, 0.0, f64::NAN]).is_none());
-        assert!(Target::from_numbers(&[0.0; 3]).is_none());
+        assert!(Target::from_numbers(&[0.0; 4]).is_none());
         assert_eq!(*Aim::along([0.0; 3], [0.0, 0.0, -2.0]).unwrap().direction_w, -Vector3::z());
     }
 }

@@ -40,9 +40,9 @@ impl Region {
     /// Whether `target` is a place of the zone, or an aim at a point of the ball.
     pub fn contains(&self, target: &Target) -> bool {
         match (self, target) {
-            (Self::Zone(zone), Target::Place(place)) => zone.contains(place),
             (Self::Ball(ball), Target::Aim(aim)) => ball.contains(aim),
-            _ => false,
+            (Self::Zone(zone), _) => target.place().is_some_and(|place| zone.contains(place)),
+            (Self::Ball(_), _) => false,
         }
     }
 
@@ -50,14 +50,14 @@ impl Region {
     /// points where two approaches enter the ball. 0 if one is not a target of the region.
     pub fn travel_m(&self, from: &Target, to: &Target) -> f64 {
         match (self, from, to) {
-            (Self::Zone(_), Target::Place(from), Target::Place(to)) => {
-                from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
-            }
             (Self::Ball(ball), Target::Aim(from), Target::Aim(to)) => {
                 let entrance_w = |aim: &Aim| aim.p_w + aim.direction_w.scale(ball.chord_m(aim)[0]);
                 (entrance_w(from) - entrance_w(to)).norm()
             }
-            _ => 0.0,
+            (Self::Zone(_), ..) => from.place().zip(to.place()).map_or(0.0, |(from, to)| {
+                from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+            }),
+            (Self::Ball(_), ..) => 0.0,
         }
     }
 }
@@ -185,20 +185,25 @@ impl Task {
         directions(of).filter(is_missed).collect()
     }
 
-    /// Returns the approach of `target`: along the zone's axis for a place, straight through the
-    /// point for an aim. Returns `None` if the target does not match the region's kind, or cannot
+    /// Returns the approach of `target`: along the zone's axis for a place, with the finger's own
+    /// pitch or the target's, straight through the point for an aim. Returns `None` if the target does not match the region's kind, or cannot
     /// be reached.
     pub fn approach(&self, target: &Target) -> Option<Approach> {
         match (&self.region, target) {
-            (Region::Zone(zone), Target::Place(place)) => {
+            (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
+            (Region::Zone(zone), _) => {
+                let place = target.place()?;
+                let finger = match target.pitch_deg() {
+                    Some(pitch_deg) => &self.finger.with_pitch(pitch_deg)?,
+                    None => &self.finger,
+                };
                 let x_wz = zone.x_wz();
                 let [p_near_w, p_far_w] =
                     self.depth_m.map(|depth_m| x_wz * zone.local(place, -depth_m));
-                let (r_wa, r_at) = (x_wz.rotation, self.finger.r_at());
+                let (r_wa, r_at) = (x_wz.rotation, finger.r_at());
                 Some(Approach { p_near_w, p_far_w, r_wa, r_at, obstacle: None })
             }
-            (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
-            _ => None,
+            (Region::Ball(_), _) => None,
         }
     }
 

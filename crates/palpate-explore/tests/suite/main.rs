@@ -1,4 +1,5 @@
 //! Tests of palpate-explore, in one binary.
 
 mod planners;
+mod reach;
 mod stored;

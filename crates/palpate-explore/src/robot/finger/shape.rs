@@ -24,6 +24,10 @@ pub struct Finger {
     /// Angle of the finger's axis above the approach, deg: 0 touches with the apex, 90 with the
     /// side.
     pub pitch_deg: f64,
+    /// Further pitches that a touch of a zone may use, deg; planners choose. At 0 the finger is
+    /// narrowest and reaches most. Requires `simulator = "swept"`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other_pitches_deg: Vec<f64>,
 }
 
 impl Default for Finger {
@@ -31,7 +35,8 @@ impl Default for Finger {
     /// mm long (FEM mesh of NVlabs/biotac_sim). The pitch is a heuristic, half-way between contact
     /// at the apex and at the pad.
     fn default() -> Self {
-        Self { radius_m: BIOTAC_RADIUS_M, length_m: 0.021, pitch_deg: 45.0 }
+        let other_pitches_deg = Vec::new();
+        Self { radius_m: BIOTAC_RADIUS_M, length_m: 0.021, pitch_deg: 45.0, other_pitches_deg }
     }
 }
 
@@ -39,6 +44,19 @@ impl Finger {
     /// Ratio of all lengths to those of a BioTac.
     pub fn scale(&self) -> f64 {
         self.radius_m / BIOTAC_RADIUS_M
+    }
+
+    /// Returns the finger with one of its further pitches; `None` for any other pitch.
+    pub fn with_pitch(&self, pitch_deg: f64) -> Option<Self> {
+        let is_known = self.other_pitches_deg.contains(&pitch_deg);
+        is_known.then(|| Self { pitch_deg, other_pitches_deg: Vec::new(), ..self.clone() })
+    }
+
+    /// Returns the finger with its own pitch alone, then with each further one.
+    pub fn pitched(&self) -> impl Iterator<Item = Self> {
+        let own = Self { other_pitches_deg: Vec::new(), ..self.clone() };
+        let others = self.other_pitches_deg.iter();
+        std::iter::once(own).chain(others.filter_map(|pitch_deg| self.with_pitch(*pitch_deg)))
     }
 
     /// Vector from the hemisphere's centre (origin of `T`) to the cylinder's far end, in a frame
@@ -161,6 +179,7 @@ impl Validate for Finger {
         rules.number("radius_m", self.radius_m, 1e-5..=0.1);
         rules.number("length_m", self.length_m, 0.0..=1.0);
         rules.number("pitch_deg", self.pitch_deg, -90.0..=90.0);
+        rules.numbers("other_pitches_deg", &self.other_pitches_deg, -90.0..=90.0);
     }
 }
 
