@@ -121,6 +121,13 @@ class Belief:
         """Mean height above the datum, metres."""
     def variance(self, points: npt.ArrayLike) -> _Array:
         """Variance of the height without touch noise, square metres."""
+    def quantiles(self, points: npt.ArrayLike, p: list[float]) -> _Array:
+        """Quantiles of the height above the datum at the probabilities `p`, shape (..., len(p)), metres.
+
+        They are those of the band `gp.band`.
+        """
+    def reachable(self, points: npt.ArrayLike) -> _Array:
+        """Whether the finger can touch the estimated surface at each point: 1 or 0."""
     def variance_gradient(self, points: npt.ArrayLike) -> _Array:
         """Gradient of `variance`, shape (..., d), metres."""
     def explorable_variance(self, points: npt.ArrayLike) -> _Array:

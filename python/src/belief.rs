@@ -14,6 +14,7 @@ use palpate::explore::whole_object::ImplicitSurface;
 use palpate::format::counted;
 use palpate::gp::Posterior;
 use palpate::task::Target;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -107,6 +108,33 @@ impl Belief {
         self.values(points, (belief, belief.surface()), variances)
     }
 
+    /// Quantiles of the height above the datum at the probabilities `p`, shape (..., len(p)),
+    /// metres; those of the band `gp.band`.
+    fn quantiles<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        p: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let belief = self.over_zone("quantiles")?;
+        if let Some(wrong) = p.iter().find(|p| !(**p > 0.0 && **p < 1.0)) {
+            let message = format!("p = {wrong}; allowed is above 0 and below 1");
+            return Err(PyValueError::new_err(message));
+        }
+        let places = Places::of(points, belief.zone().dimension())?;
+        let unknown = || vec![vec![f64::NAN; p.len()]; places.each.len()];
+        let rows = belief.quantiles_m(&places.each, &p).unwrap_or_else(unknown);
+        places.reshape_vectors(points.py(), &rows, p.len())
+    }
+
+    /// Whether the finger can touch the estimated surface at each point: 1 or 0.
+    fn reachable<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let belief = self.over_zone("reachable")?;
+        let places = Places::of(points, belief.zone().dimension())?;
+        let reached = belief.is_reachable(&places.each);
+        let values = reached.iter().map(|&reached| f64::from(u8::from(reached))).collect();
+        places.reshape(points.py(), values)
+    }
+
     /// Gradient of `variance`, shape (..., d), metres.
     fn variance_gradient<'py>(
         &self,
@@ -152,8 +180,9 @@ impl Belief {
     /// All targets so far, shape (n, d), metres; (n, 6) around an object.
     #[getter]
     fn targets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let targets: Vec<Vec<f64>> = self.0.targets().iter().map(Target::numbers).collect();
         let width = target_numbers(&self.0);
+        let mut targets: Vec<Vec<f64>> = self.0.targets().iter().map(Target::numbers).collect();
+        targets.iter_mut().for_each(|target| target.truncate(width));
         rows(py, &targets, width)
     }
 

@@ -85,6 +85,9 @@ def test_what_is_of_zones_is_refused_around_an_object_and_the_other_way_round(ru
     for name in ("mean", "variance", "explorable_variance", "variance_gradient", "has_surface"):
         with pytest.raises(AttributeError, match="a whole object"):
             getattr(belief, name)([[0.0, 0.0]])
+    for ask in (lambda: belief.quantiles([[0.0, 0.0]], [0.5]), lambda: belief.reachable([[0.0, 0.0]])):
+        with pytest.raises(AttributeError, match="a whole object"):
+            ask()
     for ask in (lambda: run.zone, run.truth, lambda: palpate.Scene.load(MUG).zone):
         with pytest.raises(AttributeError, match="a whole object"):
             ask()

@@ -118,6 +118,7 @@ def bird():
         ("toy", {}),
         ("toy", {"kernel": ["matern_52", "squared_exponential"]}),
         ("bird", {"free_space": True, "band": "leave_one_out"}),
+        ("bird", {"free_space": True, "band": "objects"}),
     ],
 )
 def test_a_copied_belief_is_equal_to_the_last_bit(name, gp):
@@ -127,8 +128,27 @@ def test_a_copied_belief_is_equal_to_the_last_bit(name, gp):
     for other in copies(belief):
         for of in ("mean", "variance", "explorable_variance", "variance_gradient", "has_surface"):
             assert (getattr(other, of)(points) == getattr(belief, of)(points)).all(), of
+        assert (other.quantiles(points, [0.025, 0.9]) == belief.quantiles(points, [0.025, 0.9])).all()
+        assert (other.reachable(points) == belief.reachable(points)).all()
         assert (other.targets == belief.targets).all() and (other.heights_m == belief.heights_m).all()
         assert other.hyperparameters == belief.hyperparameters
+
+
+@pytest.mark.parametrize("band", ["likelihood", "objects"])
+def test_quantiles_are_ordered_and_those_of_the_band(band):
+    run = palpate.Experiment(scene="bird", touches=10, trials=1, grid=11, gp={"band": band}).run(["active"])
+    belief = run.belief(0, "active", 10)
+    points = belief.zone.grid(9)
+    low, middle, high = np.moveaxis(belief.quantiles(points, [0.025, 0.5, 0.975]), -1, 0)
+    assert low.shape == belief.mean(points).shape
+    assert (low <= middle).all() and (middle <= high).all() and (low < high).any()
+    half = 1.959963984540054 * np.sqrt(belief.variance(points) + belief.hyperparameters["noise_sd"] ** 2)
+    is_normal = np.allclose(high - middle, half) and np.allclose(middle - low, half)
+    assert is_normal == (band == "likelihood")
+    assert set(np.unique(belief.reachable(points))) <= {0.0, 1.0}
+    for wrong in (0, 1, -0.5, float("nan")):
+        with pytest.raises(ValueError, match="above 0 and below 1"):
+            belief.quantiles(points, [wrong])
 
 
 class Keeps:

@@ -30,7 +30,7 @@ Examples:
   palpate calibrate-band experiments/suite/reporting.toml --test     coverage of the experiment's own band
 
 Runs trials on objects whose surface is known and fits the two half-widths of the 95 % band by quantile regression. \
-Writes band.toml, to be named in an experiment as gp.band, and reliability.svg. The printed coverage is that of \
+Writes band.toml, the table [gp.band] of an experiment, and reliability.svg. The printed coverage is that of \
 objects left out of the learning.")]
 pub(super) struct Args {
     /// Experiment over zones of known objects, best with a sweep of scenes; its oracle is left out.
@@ -58,9 +58,14 @@ pub(super) struct Args {
 // heuristic: one object of each fold, and one more.
 const OBJECTS_MIN: usize = 6;
 
-/// Contents of `band.toml`.
+/// Contents of `band.toml`, a part of an experiment's file.
 #[derive(Serialize)]
 struct BandFile {
+    gp: BandTable,
+}
+
+#[derive(Serialize)]
+struct BandTable {
     band: LearnedBand,
 }
 
@@ -142,7 +147,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut text = table(&covered);
     if let Some(band) = band {
         let file = out.join("band.toml");
-        let band = toml::to_string(&BandFile { band })?;
+        let band = toml::to_string(&BandFile { gp: BandTable { band } })?;
         write_whole(&file, &band)?;
         text += &format!("\n\n{band}");
     }

@@ -343,7 +343,8 @@ impl Experiment {
 }
 
 /// Maximum touches around an object; each adds seven values to the Gaussian process.
-const AROUND_TOUCHES_MAX: u32 = 500;
+// heuristic: the covariance then takes a gigabyte.
+const AROUND_TOUCHES_MAX: u32 = 1500;
 
 impl Validate for Experiment {
     fn check(&self, rules: &mut Rules) {

@@ -58,7 +58,9 @@ impl<'a> BeliefReplay<'a> {
             return Ok(None);
         };
         let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let mut belief = HeightField::new(zone.clone(), experiment.gp.clone());
+        let finger = &experiment.scene.finger;
+        let belief = HeightField::new(zone.clone(), experiment.gp.clone());
+        let mut belief = belief.with_finger(finger.clone());
         for touch in touches {
             let target = touch.target.place().filter(|it| it.len() == zone.dimension());
             let target = target.with_context(|| {
@@ -67,7 +69,6 @@ impl<'a> BeliefReplay<'a> {
             // A normal that is not recorded was not observed.
             let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
             belief.observe(target, &touched);
-            let finger = &experiment.scene.finger;
             let pitched = touch.target.pitch_deg().and_then(|pitch| finger.with_pitch(pitch));
             if let Some(swept) = swept(pitched.unwrap_or_else(|| finger.clone()), touch) {
                 belief.observe_swept(&swept);

@@ -1,5 +1,6 @@
 //! Tests of the belief's quantiles and of the finger's reach on the believed surface.
 
+use crate::common::program::{fails, palpate, succeeds};
 use nalgebra::Vector3;
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
@@ -11,6 +12,7 @@ use palpate::math::normal::BAND_95;
 use palpate::robot::Finger;
 use palpate::task::{Target, Zone};
 use proptest::prelude::*;
+use std::fs;
 use std::path::Path;
 
 const SIDE_M: f64 = 0.1;
@@ -138,4 +140,41 @@ fn a_further_pitch_reaches_more() {
     assert!(free.task().approach(&Target::Tilted { place, pitch_deg: 0.0 }).is_some());
     assert!(free.task().approach(&Target::Tilted { place, pitch_deg: 10.0 }).is_none());
     assert!(own.task().approach(&Target::Tilted { place, pitch_deg: 0.0 }).is_none());
+}
+
+/// A band is learned from objects, and an experiment with the printed table has it. What cannot be
+/// learned from is refused.
+#[test]
+fn a_band_is_learned_by_a_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = env!("CARGO_MANIFEST_DIR");
+    let at = |name: &str| format!("{root}/experiments/{name}");
+    let (six, toy) = (at("suite/six.toml"), at("toy.toml"));
+    let few =
+        ["--set", "touches=10", "--set", "grid=13", "--set", "planners=[\"sobol\"]", "--trials=1"];
+    let learn = [&["--quiet", "calibrate-band", &six, "--out", "out"], &few[..]].concat();
+    let text = succeeds(folder.path(), &learn);
+    assert!(text.contains("[gp.band]") && text.contains("ring"), "{text}");
+    for file in ["band.toml", "coverage.json", "reliability.svg", "reliability.png"] {
+        assert!(folder.path().join("out").join(file).is_file(), "{file}");
+    }
+    let band = fs::read_to_string(folder.path().join("out/band.toml")).unwrap();
+    let mine = format!(
+        "name = \"mine\"\nscene = {:?}\nplanners = [\"sobol\"]\ninitial_touches = 5\ntouches = 8\ntrials = 1\nseed = 1\n\
+                        grid = 13\n{band}",
+        format!("{root}/scenes/suite/ring.toml")
+    );
+    fs::write(folder.path().join("mine.toml"), mine).unwrap();
+    succeeds(folder.path(), &["--quiet", "run", "mine.toml", "--no-report"]);
+    let test = ["--quiet", "calibrate-band", "mine.toml", "--test", "--trials=1"];
+    assert!(succeeds(folder.path(), &test).contains("ring"));
+    // The same command replaces its own result.
+    assert_eq!(palpate(folder.path(), &learn).status.code(), Some(0));
+
+    fails(folder.path(), &["calibrate-band", &toy], &["at least 6", "[sweep]"]);
+    fails(folder.path(), &["calibrate-band", &six, "--set", "touches=5"], &["at least 7"]);
+    fails(folder.path(), &["calibrate-band", &toy, "--test"], &["gp.band", "objects"]);
+    fails(folder.path(), &["run", &toy, "--set", "gp.band=\"foo\""], &["gp.band", "leave_one_out"]);
+    let pitch = "scene.finger.other_pitches_deg=[0]";
+    fails(folder.path(), &["run", &toy, "--set", pitch], &["other_pitches_deg", "swept"]);
 }

@@ -69,7 +69,11 @@ impl Kernels {
 
 /// Calibration of the belief's band.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "allowed are \"likelihood\", \"leave_one_out\", \"objects\", and a table of \
+                 palpate calibrate-band: learned_from, below, above, tail"
+)]
 pub enum Band {
     /// A built-in calibration.
     Named(BandName),

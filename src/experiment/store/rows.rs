@@ -87,8 +87,8 @@ fn check_row(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
 /// # Errors
 /// The reason why the touch does not fit.
 fn check_touch(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
-    let numbers = touch.target.numbers();
-    let target = numbers.len();
+    let place = touch.target.place().map(<[f64]>::len);
+    let target = place.unwrap_or_else(|| touch.target.numbers().len());
     if target != coordinates {
         return Err(format!("a target has {target} coordinates; needed are {coordinates}"));
     }

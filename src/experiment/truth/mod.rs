@@ -154,8 +154,8 @@ impl Truth {
         heights_m.filter_map(|(i, (height_m, mean))| Some((i, (*height_m)? - mean)))
     }
 
-    /// Compares a belief with the ground truth over the known surface; `None` without one, or before
-    /// the belief's first fit.
+    /// Compares a belief with the ground truth over the known surface; `None` without one, or
+    /// before the belief's first fit.
     pub fn compare(&self, field: &HeightField) -> Option<Metrics> {
         let belief = field.surface().filter(|_| self.surface_count() > 0)?;
         let means = belief.means(self.places.iter().map(Vec::as_slice));

@@ -26,8 +26,8 @@ fn caption(run: &Run) -> String {
 
 /// Places at which curves are computed.
 const STEPS: usize = 300;
-/// Half-width of a 95 % band in standard deviations.
-const BAND_SD: f64 = 1.96;
+/// Probabilities of the band's ends.
+const BAND: [f64; 2] = [0.025, 0.975];
 const MARGIN: (f64, f64) = (72.0, 80.0);
 const PANEL: (f64, f64) = (236.0, 188.0);
 /// Largest height of a panel with equal axes.
@@ -116,10 +116,8 @@ pub fn draw_belief(
 ) {
     let per_m = Length::of(replay.belief.zone()).per_m;
     let belief = read(replay);
-    let band: Vec<(f64, f64, f64)> = belief
-        .iter()
-        .map(|&(x, mean, sd)| (x, mean - BAND_SD * sd, mean + BAND_SD * sd))
-        .map(|(x, low, high)| (x * per_m, low * per_m, high * per_m))
+    let band: Vec<(f64, f64, f64)> = (belief.iter())
+        .map(|&(x, _, [low, high])| (x * per_m, low * per_m, high * per_m))
         .collect();
     panel.band(canvas, &band, colour);
     let truth: Vec<(f64, f64)> = (run.truth.places.iter().zip(&run.truth.heights_m))
@@ -137,18 +135,16 @@ pub fn draw_belief(
     });
 }
 
-/// Returns (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
-fn read(replay: &BeliefReplay) -> Vec<(f64, f64, f64)> {
+/// Returns (x, mean, ends of the band) along the zone, not finite where the belief is not drawn.
+fn read(replay: &BeliefReplay) -> Vec<(f64, f64, [f64; 2])> {
     let mut scratch = Scratch::default();
     let places = replay.belief.zone().grid(STEPS);
     let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));
-    (places.iter().zip(drawn))
-        .map(|(place, is_drawn)| match is_drawn {
-            true => {
-                let variance = replay.surface.variance(place, &mut scratch);
-                (place[0], replay.surface.mean(place, &mut scratch), variance.sqrt())
-            }
-            false => (place[0], f64::NAN, f64::NAN),
+    let bands = replay.belief.quantiles_m(&places, &BAND).unwrap_or_default();
+    (places.iter().zip(drawn).zip(bands))
+        .map(|((place, is_drawn), band)| match is_drawn {
+            true => (place[0], replay.surface.mean(place, &mut scratch), [band[0], band[1]]),
+            false => (place[0], f64::NAN, [f64::NAN; 2]),
         })
         .collect()
 }

@@ -186,8 +186,8 @@ impl Task {
     }
 
     /// Returns the approach of `target`: along the zone's axis for a place, with the finger's own
-    /// pitch or the target's, straight through the point for an aim. Returns `None` if the target does not match the region's kind, or cannot
-    /// be reached.
+    /// pitch or the target's, straight through the point for an aim. Returns `None` if the target
+    /// does not match the region's kind, or cannot be reached.
     pub fn approach(&self, target: &Target) -> Option<Approach> {
         match (&self.region, target) {
             (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
