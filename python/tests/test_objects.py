@@ -142,7 +142,7 @@ def test_quantiles_are_ordered_and_those_of_the_band(band):
     low, middle, high = np.moveaxis(belief.quantiles(points, [0.025, 0.5, 0.975]), -1, 0)
     assert low.shape == belief.mean(points).shape
     assert (low <= middle).all() and (middle <= high).all() and (low < high).any()
-    half = 1.959963984540054 * np.sqrt(belief.variance(points) + belief.hyperparameters["noise_sd"] ** 2)
+    half = 1.959963984540054 * np.sqrt(belief.variance(points) + belief.hyperparameters["noise_sd_m"] ** 2)
     is_normal = np.allclose(high - middle, half) and np.allclose(middle - low, half)
     assert is_normal == (band == "likelihood")
     assert set(np.unique(belief.reachable(points))) <= {0.0, 1.0}
