@@ -65,7 +65,7 @@ impl Default for SpatialGpSettings {
             slope_noise: [0.01, 1.0],
             normals: true,
             free_space_samples: 3,
-            sd_inflation: 1.6,
+            sd_inflation: 1.8,
             offset_m: None,
             cells: 64,
             evaluate_every: 5,
