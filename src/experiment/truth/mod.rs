@@ -50,6 +50,7 @@ use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::Posterior;
+use palpate_gp::math::normal::BAND_95;
 use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.
@@ -162,8 +163,16 @@ impl Truth {
         let is_calibrated = |i: &usize| i.is_multiple_of(CALIBRATION_STEP);
         let places: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATION_STEP).cloned().collect();
         let variances = belief.variances(&places, &mut []);
-        let bands_m = field.quantiles_m(&places, &BAND)?;
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
+        // A band that is not learned follows from the variances, which are already known.
+        let normal = |(mean, variance): (&f64, &f64)| {
+            let half_m = BAND_95 * (variance + noise2).max(0.0).sqrt();
+            vec![mean - half_m, mean + half_m]
+        };
+        let bands_m = match field.has_learned_band() {
+            true => field.quantiles_m(&places, &BAND)?,
+            false => means.iter().step_by(CALIBRATION_STEP).zip(&variances).map(normal).collect(),
+        };
         let densities = self.errors(&means).filter(|(i, _)| is_calibrated(i));
         let densities =
             densities.map(|(i, error)| (error, variances[i / CALIBRATION_STEP] + noise2));

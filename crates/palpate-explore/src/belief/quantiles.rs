@@ -31,6 +31,11 @@ impl HeightField {
         Some(features.iter().map(row).collect())
     }
 
+    /// Whether the band is learned from objects.
+    pub fn has_learned_band(&self) -> bool {
+        self.settings.band.learned().is_some()
+    }
+
     /// Returns the features of a learned band at each of `places`; `None` before the first fit.
     pub fn band_features(&self, places: &[Vec<f64>]) -> Option<Vec<BandFeatures>> {
         let surface = self.surface.as_ref()?;
