@@ -119,10 +119,10 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         let jobs: Vec<(u32, &String)> = (0..args.trials)
             .flat_map(|trial| planners.iter().map(move |name| (trial, name)))
             .collect();
-        let samples: Vec<_> = (jobs.into_par_iter())
+        let samples = (jobs.into_par_iter())
             .filter(|_| !stop.load(Ordering::Relaxed))
             .map(|(trial, name)| sample_trial(&simulation, name, trial, &|| step(talk, &bar)))
-            .collect();
+            .collect::<Result<Vec<_>, _>>()?;
         if stop.load(Ordering::Relaxed) {
             return Ok(Outcome::Interrupted);
         }

@@ -69,8 +69,7 @@ impl<'a> BeliefReplay<'a> {
             // A normal that is not recorded was not observed.
             let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
             belief.observe(target, &touched);
-            let pitched = touch.target.pitch_deg().and_then(|pitch| finger.with_pitch(pitch));
-            if let Some(swept) = swept(pitched.unwrap_or_else(|| finger.clone()), touch) {
+            if let Some(swept) = swept(finger, touch) {
                 belief.observe_swept(&swept);
             }
         }
@@ -230,6 +229,7 @@ pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyho
 }
 
 /// Returns the volume that the finger swept in a recorded touch, if it is known.
-pub(super) fn swept(finger: Finger, touch: &TouchRow) -> Option<SweptVolume> {
+pub(super) fn swept(finger: &Finger, touch: &TouchRow) -> Option<SweptVolume> {
+    let finger = finger.with_pitch(touch.target.pitch_deg())?;
     Some(SweptVolume { finger, p_wt: Point3::from(touch.tip?) })
 }

@@ -165,7 +165,7 @@ pub fn belief(
             .context("the target has no direction, which a whole object needs")?;
         // The roll of the finger does not change its path.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
-        let swept = swept(scene.finger.clone(), touch);
+        let swept = swept(&scene.finger, touch);
         belief.observe(aim, &approach, (&touched(touch, None)?, swept.as_ref()));
     }
     belief.condition(before, fit)?;

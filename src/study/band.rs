@@ -6,10 +6,11 @@
 //! the objects shows the coverage of objects that the band has not seen.
 
 use crate::experiment::Simulation;
-use palpate_explore::band::{BandFeatures, COEFFICIENTS, LOG_RANGE, LearnedBand};
+use palpate_explore::band::{BandFeatures, COEFFICIENTS, LearnedBand, relative_width};
 use palpate_explore::belief::Belief;
 use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions};
 use palpate_gp::math::optimize::Bounds;
+use palpate_input::error::InputError;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -78,22 +79,25 @@ pub struct ObjectSamples {
 
 /// Runs a trial of `planner` and returns its samples; empty without a known surface over a zone.
 /// `tell` is called after each touch.
+///
+/// # Errors
+/// If the planner is not available, or the trial ended early.
 pub fn sample_trial(
     simulation: &Simulation,
     planner: &str,
     trial: u32,
     tell: &(dyn Fn() + Sync),
-) -> Vec<BandSample> {
+) -> Result<Vec<BandSample>, InputError> {
     let mut samples = Vec::new();
     let truth = simulation.truth();
     let known = truth.heights_m.iter().enumerate().step_by(PLACES_STEP);
     let known: Vec<(usize, f64)> = known.filter_map(|(i, height)| Some((i, (*height)?))).collect();
     let places: Vec<Vec<f64>> = known.iter().map(|(i, _)| truth.places[*i].clone()).collect();
-    let (Some(planner), Ok(mut probe)) = (simulation.planner(planner), simulation.probe(trial))
-    else {
-        return samples;
-    };
-    simulation.trial_with(&mut *probe, planner, trial, &mut |touch| {
+    let failed = |reason: String| InputError::new(format!("trial {trial} of {planner}: {reason}"));
+    let available = simulation.planner(planner);
+    let available = available.ok_or_else(|| failed("this program has no such planner".into()))?;
+    let mut probe = simulation.probe(trial).map_err(|fault| failed(fault.to_string()))?;
+    let row = simulation.trial_with(&mut *probe, available, trial, &mut |touch| {
         tell();
         let Belief::HeightField(field) = touch.belief else { return Ok(()) };
         let features = COUNTS.contains(&touch.count).then(|| field.band_features(&places));
@@ -106,7 +110,10 @@ pub fn sample_trial(
         }));
         Ok(())
     });
-    samples
+    match row.failure {
+        Some(reason) => Err(failed(reason)),
+        None => Ok(samples),
+    }
 }
 
 /// Learns the band from objects.
@@ -179,8 +186,7 @@ fn pinball(rows: &[Row], coefficients: &[f64]) -> (f64, [f64; COEFFICIENTS]) {
     type Sum = (f64, [f64; COEFFICIENTS]);
     const ZERO: Sum = (0.0, [0.0; COEFFICIENTS]);
     let add = |(loss, mut gradient): Sum, row: &Row| -> Sum {
-        let log: f64 = coefficients.iter().zip(&row.features).map(|(c, it)| c * it).sum();
-        let width_m = row.signal_sd * log.clamp(LOG_RANGE[0], LOG_RANGE[1]).exp();
+        let width_m = row.signal_sd * relative_width(coefficients, &row.features);
         let quantile_m = width_m.min(row.limit_m);
         let soft_m = SOFTNESS * row.sd_m;
         let steps = (row.away_m - quantile_m) / soft_m;

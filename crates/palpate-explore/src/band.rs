@@ -28,7 +28,7 @@ const CONTACTS: f64 = 15.0;
 const LEAST: f64 = 0.1;
 
 /// Smallest and largest logarithm of a half-width in units of the signal; far beyond any belief.
-pub const LOG_RANGE: [f64; 2] = [-12.0, 6.0];
+const LOG_RANGE: [f64; 2] = [-12.0, 6.0];
 
 /// Half-widths of the band, learned from objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -65,10 +65,8 @@ impl LearnedBand {
     /// Returns the lower and upper half-width of the 95 % band, m.
     pub fn half_widths_m(&self, at: &BandFeatures) -> [f64; 2] {
         let [below, above] = at.features();
-        [(self.below, below), (self.above, above)].map(|(constants, features)| {
-            let log: f64 = constants.iter().zip(features).map(|(c, feature)| c * feature).sum();
-            at.signal_sd * log.clamp(LOG_RANGE[0], LOG_RANGE[1]).exp()
-        })
+        [(self.below, below), (self.above, above)]
+            .map(|(constants, features)| at.signal_sd * relative_width(&constants, &features))
     }
 
     /// Returns the quantile at the probability `p`, m above the datum, within the limits.
@@ -81,6 +79,13 @@ impl LearnedBand {
         let [low_m, high_m] = at.limits_m;
         height_m.min(high_m).max(low_m)
     }
+}
+
+/// Returns a half-width in units of the signal's standard deviation, from its coefficients and
+/// features.
+pub fn relative_width(coefficients: &[f64], features: &[f64; COEFFICIENTS]) -> f64 {
+    let log: f64 = coefficients.iter().zip(features).map(|(c, feature)| c * feature).sum();
+    log.clamp(LOG_RANGE[0], LOG_RANGE[1]).exp()
 }
 
 /// Returns the deviation at which a share `p` ≤ ½ of a tail lies beyond, in units of the half-width

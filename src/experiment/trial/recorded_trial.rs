@@ -189,10 +189,7 @@ impl Probe for ResumedProbe<'_> {
             // Without a stored tip, only the passage of the finger is known.
             Some((row, p_far_w)) => {
                 let p_wt = row.tip.map_or(*p_far_w, Point3::from);
-                let pitch_deg = row.target.pitch_deg();
-                let pitched = pitch_deg.and_then(|pitch_deg| self.finger.with_pitch(pitch_deg));
-                let finger = pitched.unwrap_or_else(|| self.finger.clone());
-                Some(SweptVolume { finger, p_wt })
+                Some(SweptVolume { finger: self.finger.with_pitch(row.target.pitch_deg())?, p_wt })
             }
             None => self.probe.swept_volume(),
         }

@@ -50,7 +50,6 @@ use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::Posterior;
-use palpate_gp::math::normal::BAND_95;
 use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.
@@ -162,20 +161,12 @@ impl Truth {
         let means = belief.means(self.places.iter().map(Vec::as_slice));
         let is_calibrated = |i: &usize| i.is_multiple_of(CALIBRATION_STEP);
         let places: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATION_STEP).cloned().collect();
-        let variances = belief.variances(&places, &mut []);
+        let predictions = belief.predict(places.iter().map(Vec::as_slice));
+        let bands_m = field.predicted_quantiles_m(&places, &predictions, &BAND)?;
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
-        // A band that is not learned follows from the variances, which are already known.
-        let normal = |(mean, variance): (&f64, &f64)| {
-            let half_m = BAND_95 * (variance + noise2).max(0.0).sqrt();
-            vec![mean - half_m, mean + half_m]
-        };
-        let bands_m = match field.has_learned_band() {
-            true => field.quantiles_m(&places, &BAND)?,
-            false => means.iter().step_by(CALIBRATION_STEP).zip(&variances).map(normal).collect(),
-        };
         let densities = self.errors(&means).filter(|(i, _)| is_calibrated(i));
-        let densities =
-            densities.map(|(i, error)| (error, variances[i / CALIBRATION_STEP] + noise2));
+        let densities = densities
+            .map(|(i, error)| (error, predictions[i / CALIBRATION_STEP].variance + noise2));
         let banded = |holds: &dyn Fn(usize) -> bool| -> Vec<(f64, [f64; 2])> {
             let heights_m = self.heights_m.iter().enumerate().step_by(CALIBRATION_STEP);
             let known = heights_m.zip(&bands_m).filter(|((i, _), _)| holds(*i));

@@ -2,6 +2,7 @@
 
 use super::HeightField;
 use crate::band::BandFeatures;
+use palpate_gp::batch::Prediction;
 use palpate_gp::math::normal;
 use palpate_gp::posterior::Scratch;
 
@@ -15,29 +16,42 @@ impl HeightField {
     /// Without a learned band they are those of the posterior with the noise of a touch. With one
     /// they lie within the zone's depth and below the swept space.
     pub fn quantiles_m(&self, places: &[Vec<f64>], probabilities: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let predictions = self.surface.as_ref()?.predict(places.iter().map(Vec::as_slice));
+        self.predicted_quantiles_m(places, &predictions, probabilities)
+    }
+
+    /// Returns [`quantiles_m`](Self::quantiles_m) from the predictions of the surface at `places`.
+    pub fn predicted_quantiles_m(
+        &self,
+        places: &[Vec<f64>],
+        predictions: &[Prediction],
+        probabilities: &[f64],
+    ) -> Option<Vec<Vec<f64>>> {
         let Some(band) = self.settings.band.learned() else {
-            let surface = self.surface.as_ref()?;
-            let noise2 = surface.hyperparameters().noise_sd.powi(2);
+            let noise2 = self.surface.as_ref()?.hyperparameters().noise_sd.powi(2);
             let z: Vec<f64> = probabilities.iter().map(|p| normal::quantile(*p)).collect();
-            let predictions = surface.predict(places.iter().map(Vec::as_slice));
             let row = predictions.iter().map(|at| {
                 let sd_m = (at.variance + noise2).max(0.0).sqrt();
                 z.iter().map(|z| at.mean + z * sd_m).collect()
             });
             return Some(row.collect());
         };
-        let features = self.band_features(places)?;
+        let features = self.predicted_features(places, predictions)?;
         let row = |at| probabilities.iter().map(|p| band.quantile_m(at, *p)).collect();
         Some(features.iter().map(row).collect())
     }
 
-    /// Whether the band is learned from objects.
-    pub fn has_learned_band(&self) -> bool {
-        self.settings.band.learned().is_some()
-    }
-
     /// Returns the features of a learned band at each of `places`; `None` before the first fit.
     pub fn band_features(&self, places: &[Vec<f64>]) -> Option<Vec<BandFeatures>> {
+        let predictions = self.surface.as_ref()?.predict(places.iter().map(Vec::as_slice));
+        self.predicted_features(places, &predictions)
+    }
+
+    fn predicted_features(
+        &self,
+        places: &[Vec<f64>],
+        predictions: &[Prediction],
+    ) -> Option<Vec<BandFeatures>> {
         let surface = self.surface.as_ref()?;
         let hyperparameters = surface.hyperparameters();
         let noise2 = hyperparameters.noise_sd.powi(2);
@@ -47,15 +61,14 @@ impl HeightField {
         });
         let mut scratch = Scratch::default();
         let mut gradient = vec![0.0; self.zone.dimension()];
-        let variances = surface.variances(places, &mut []);
         let upper_m = self.upper_bounds_m(places);
         let lower_m = self.depth_limits_m()[0];
-        let at = places.iter().zip(variances).zip(upper_m).map(|((place, variance), upper_m)| {
-            let mean_m = surface.mean_gradient(place, &mut gradient, &mut scratch);
+        let at = places.iter().zip(predictions).zip(upper_m).map(|((place, at), upper_m)| {
+            surface.mean_gradient(place, &mut gradient, &mut scratch);
             let parts = gradient.iter().zip(&hyperparameters.length_scales);
             BandFeatures {
-                mean_m,
-                sd_m: (variance + noise2).max(0.0).sqrt(),
+                mean_m: at.mean,
+                sd_m: (at.variance + noise2).max(0.0).sqrt(),
                 signal_sd: hyperparameters.signal_sd,
                 rise_m: parts.map(|(slope, length)| (slope * length).powi(2)).sum::<f64>().sqrt(),
                 contacts_m,

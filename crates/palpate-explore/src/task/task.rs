@@ -193,10 +193,7 @@ impl Task {
             (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
             (Region::Zone(zone), _) => {
                 let place = target.place()?;
-                let finger = match target.pitch_deg() {
-                    Some(pitch_deg) => &self.finger.with_pitch(pitch_deg)?,
-                    None => &self.finger,
-                };
+                let finger = self.finger.with_pitch(target.pitch_deg())?;
                 let x_wz = zone.x_wz();
                 let [p_near_w, p_far_w] =
                     self.depth_m.map(|depth_m| x_wz * zone.local(place, -depth_m));

@@ -46,17 +46,20 @@ impl Finger {
         self.radius_m / BIOTAC_RADIUS_M
     }
 
-    /// Returns the finger with one of its further pitches; `None` for any other pitch.
-    pub fn with_pitch(&self, pitch_deg: f64) -> Option<Self> {
-        let is_known = self.other_pitches_deg.contains(&pitch_deg);
-        is_known.then(|| Self { pitch_deg, other_pitches_deg: Vec::new(), ..self.clone() })
+    /// Returns the finger with its own pitch if that is `None`, or with one of its further pitches;
+    /// `None` for any other pitch.
+    pub fn with_pitch(&self, pitch_deg: Option<f64>) -> Option<Self> {
+        let pitch_deg = match pitch_deg {
+            Some(other_deg) if !self.other_pitches_deg.contains(&other_deg) => return None,
+            pitch_deg => pitch_deg.unwrap_or(self.pitch_deg),
+        };
+        Some(Self { pitch_deg, other_pitches_deg: Vec::new(), ..*self })
     }
 
     /// Returns the finger with its own pitch alone, then with each further one.
     pub fn pitched(&self) -> impl Iterator<Item = Self> {
-        let own = Self { other_pitches_deg: Vec::new(), ..self.clone() };
-        let others = self.other_pitches_deg.iter();
-        std::iter::once(own).chain(others.filter_map(|pitch_deg| self.with_pitch(*pitch_deg)))
+        let others = self.other_pitches_deg.iter().copied().map(Some);
+        std::iter::once(None).chain(others).filter_map(|pitch_deg| self.with_pitch(pitch_deg))
     }
 
     /// Vector from the hemisphere's centre (origin of `T`) to the cylinder's far end, in a frame
