@@ -15,7 +15,10 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+
+# Features of all tests; one set, so that nothing is built twice.
+FEATURES := ros2,franka
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
 
@@ -45,23 +48,24 @@ paper-planners: setup
 
 # Includes ROS 2, to test the topics of an arm without an arm.
 test: setup
-	cargo test --locked --features ros2
-	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
+	cargo test --locked --features $(FEATURES)
+	for example in $(EXAMPLES); do cargo run --quiet --locked --features $(FEATURES) --example $$example || exit; done
 	tests/clusters/test.sh target/debug/palpate
 	$(MAKE) test-faults
-	$(MAKE) test-ros2 TOUCHES=6 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop'
+	$(MAKE) test-ros2 TOUCHES=3 UR_TOUCHES=2 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop lab_ur::a_peer lab_ur::a_ur_of lab_ur::the_container'
+	$(MAKE) test-franka FRANKA_TESTS=franka::a_cylinder FRANKA_TOUCHES=2
 
 # Distance that the tip moves after each failure between explorer and arm: the table of docs/safety.md.
 # It runs in real time and needs an idle machine.
 test-faults: setup
-	cargo test --locked -p palpate --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults
+	cargo test --locked -p palpate --features $(FEATURES) --test suite -- --ignored --test-threads 1 --nocapture twin_faults
 
 # Regression test of planners against experiments/baselines; palpate check --accept REASON accepts a change.
 CHECKED := toy container bird
 
 # The program of the tests is used, because one without their dependencies' features is another build.
 check-planners: setup
-	cargo test --quiet --locked --features ros2 --no-run
+	cargo test --quiet --locked --features $(FEATURES) --no-run
 	for experiment in $(CHECKED); do \
 		target/debug/palpate --quiet check $$experiment --baseline experiments/baselines/$$experiment.jsonl || exit; \
 	done
@@ -69,7 +73,7 @@ check-planners: setup
 # Compares instruction counts with experiments/baselines/cost.toml; skipped without valgrind.
 check-cost: export CARGO_INCREMENTAL := 0
 check-cost: setup
-	cargo test --quiet --locked --features ros2 --no-run
+	cargo test --quiet --locked --features $(FEATURES) --no-run
 	tests/cost.py --program target/debug/palpate
 
 # All hard cases at all severities, periods and time steps, ten minutes of processor time: writes
@@ -79,7 +83,7 @@ hard-cases: setup
 
 # Shards with GNU parallel and with Slurm on one node; each is skipped if not installed.
 test-clusters: setup
-	cargo build --locked --features ros2
+	cargo build --locked --features $(FEATURES)
 	tests/clusters/test.sh target/debug/palpate
 
 install-clusters:
@@ -88,20 +92,38 @@ install-clusters:
 # An explorer, a simulated robot over ROS 2, and a peer with another implementation, in their own network
 # namespace, isolated from the network.
 TOUCHES := 20
-OVER_TOPICS := lab:: lab_faults::
+UR_TOUCHES := 24
+UR_ENDS := 20
+OVER_TOPICS := lab:: lab_faults:: lab_ur::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 NO_NAMESPACE := no permission for a network namespace (unshare --map-root-user --net)
 LAB_TESTS = cargo test --locked -p palpate --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
 
 test-ros2: setup $(DEPS)/ros2/bin/python
 	@if $(NAMESPACE) true 2>/dev/null; then \
-		PALPATE_PEER=$(abspath $(DEPS)/ros2/bin/python) PALPATE_TOUCHES=$(TOUCHES) $(NAMESPACE) \
-			$(call LAB_TESTS,ros2); \
+		PALPATE_PEER=$(abspath $(DEPS)/ros2/bin/python) PALPATE_TOUCHES=$(TOUCHES) \
+			PALPATE_UR_TOUCHES=$(UR_TOUCHES) PALPATE_UR_ENDS=$(UR_ENDS) $(NAMESPACE) \
+			$(call LAB_TESTS,$(FEATURES)); \
 	else echo "test-ros2 is skipped: $(NO_NAMESPACE)"; fi
 
 $(DEPS)/ros2/bin/python: tests/ros2/peer.txt
 	python3 -m venv $(DEPS)/ros2
 	$(DEPS)/ros2/bin/python -m pip install --quiet --only-binary=:all: -r tests/ros2/peer.txt
+	touch $@
+
+# A Franka arm against a simulated control box, in their own network namespace.
+FRANKA_TOUCHES := 12
+FRANKA_TESTS := franka::
+test-franka: setup $(DEPS)/franka/bin/python
+	@if $(NAMESPACE) true 2>/dev/null; then \
+		PALPATE_FRANKA=$(abspath $(DEPS)/franka/bin/python) PALPATE_FRANKA_TOUCHES=$(FRANKA_TOUCHES) \
+			PALPATE_FRANKA_ENDS=20 $(NAMESPACE) cargo test --locked -p palpate --features $(FEATURES) \
+			--test suite -- --ignored --test-threads 1 $(FRANKA_TESTS); \
+	else echo "test-franka is skipped: $(NO_NAMESPACE)"; fi
+
+$(DEPS)/franka/bin/python: tests/franka/box.txt
+	python3 -m venv $(DEPS)/franka
+	$(DEPS)/franka/bin/python -m pip install --quiet --only-binary=:all: -r tests/franka/box.txt
 	touch $@
 
 # The same tests over ROS 1, with Debian's master and rospy; `make install-ros1` installs them.
@@ -166,9 +188,9 @@ messages: setup
 
 lint: setup
 	cargo fmt --all --check
-	cargo clippy --locked --all-targets --features ros2 -- -D warnings
-	cargo clippy --locked --lib --bins --tests --no-default-features --features ros2 -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features ros2
+	cargo clippy --locked --all-targets --features $(FEATURES) -- -D warnings
+	cargo clippy --locked --lib --bins --no-default-features --features $(FEATURES) -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features $(FEATURES)
 
 # Code for windows and rendering, whose packages take long to check.
 lint-windows: setup
@@ -212,8 +234,10 @@ $(DEPS)/peers/bin/python: benches/peers.txt
 PYTHON := $(DEPS)/python/bin/python
 PYTHON_READY := $(DEPS)/python/ready
 PYTHON_HOME := python/palpate/home
-# The wheel contains MuJoCo's library, which maturin finds by LD_LIBRARY_PATH.
-MATURIN = LD_LIBRARY_PATH=$(abspath $(DEPS)/lib) PATH=$(abspath $(DEPS)/python/bin):$$PATH \
+# The wheel contains MuJoCo's library, which maturin finds by LD_LIBRARY_PATH. It edits the extension that Cargo linked,
+# which is therefore linked again each time.
+MATURIN = rm -f target/*/deps/lib_palpate.so target/*/*/deps/lib_palpate.so && \
+	LD_LIBRARY_PATH=$(abspath $(DEPS)/lib) PATH=$(abspath $(DEPS)/python/bin):$$PATH \
 	maturin build --quiet --locked
 
 wheel: setup $(PYTHON_READY) $(PYTHON_HOME)
@@ -224,7 +248,7 @@ wheel: setup $(PYTHON_READY) $(PYTHON_HOME)
 RELEASE := target/release-files
 
 release: dist $(PYTHON_READY) $(PYTHON_HOME)
-	cargo test --locked --features ros2 -p palpate --test suite release::
+	cargo test --locked --features $(FEATURES) -p palpate --test suite release::
 	@test -z "$(TAG)" || test "$(TAG)" = "v$(VERSION)" || { echo "tag $(TAG): allowed is v$(VERSION)" >&2; exit 2; }
 	rm -rf $(RELEASE) && mkdir -p $(RELEASE)
 	$(PYTHON) -m pip install --quiet --only-binary=:all: -r python/release.txt
@@ -260,7 +284,7 @@ test-python: install-python
 docs: install-python
 	rm -rf target/docs-site
 	$(DEPS)/python/bin/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -c docs -d target/docs-tree . target/docs-site
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features ros2
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features $(FEATURES)
 	cp -r target/doc target/docs-site/rust
 
 # Runs the notebooks and stores their outputs, to be committed.

@@ -133,7 +133,7 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
                     let rng = seed::stream(experiment.seed, number.into(), "estimates");
                     let exact = simulation.simulator().probe(number.into()).unwrap();
                     let mut probe = Estimating { exact, rng };
-                    simulation.trial_with(&mut probe, entry, number, &mut |_| Ok(()))
+                    simulation.trial_with(&mut probe, entry, number, &mut |_| Ok(None))
                 };
                 row.planner = belief.into();
                 row

@@ -53,6 +53,7 @@ first-experiment
 your-object
 your-planner
 your-robot
+arms
 safety
 results
 benchmark

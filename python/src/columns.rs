@@ -208,5 +208,6 @@ fn fallback(reason: Fallback) -> &'static str {
         Fallback::NoVariance => "no_variance",
         Fallback::DuplicateTarget => "duplicate_target",
         Fallback::Unreachable => "unreachable",
+        Fallback::Operator => "operator",
     }
 }

@@ -271,7 +271,7 @@ def test_progress_counts_the_trials(capsys, toy):
 
 def test_dask_gives_the_same_rows_also_if_a_worker_is_killed(toy, rows, marks):
     with (
-        distributed.LocalCluster(1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
         assert toy.run(PLANNERS, executor=client).rows() == rows

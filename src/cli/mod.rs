@@ -33,6 +33,7 @@ mod serve;
 mod setting_tip;
 mod show;
 mod slow_steps;
+mod step;
 mod terminal;
 mod watch;
 

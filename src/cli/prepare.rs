@@ -2,12 +2,12 @@
 
 use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
+use crate::experiment::real_arm::RealArm;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, bail, ensure};
 use palpate_input::format::counted;
-use palpate_ros::arm::RosArm;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -79,9 +79,9 @@ pub(super) fn prepare_simulator(
 }
 
 /// Checks that a real arm may be moved; first clears faults latched on the robot if `clear_fault`.
-pub(super) fn prepare_arm(lab: &Arc<RosArm>, clear_fault: bool) -> anyhow::Result<()> {
+pub(super) fn prepare_arm(arm: &RealArm, clear_fault: bool) -> anyhow::Result<()> {
     if clear_fault {
-        lab.clear_fault()?;
+        arm.clear_fault()?;
     }
-    Ok(lab.check_start()?)
+    Ok(arm.check_start()?)
 }

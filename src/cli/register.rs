@@ -7,6 +7,7 @@ use super::prepare::{prepare_arm, prepare_simulator};
 use super::progress::{progress_bar, step};
 use super::register_cloud::{CloudArgs, register_cloud};
 use super::terminal::{Outcome, Verbosity, print};
+use crate::experiment::real_arm::RealArm;
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
@@ -14,7 +15,6 @@ use anyhow::Context;
 use palpate_explore::probe::Touch;
 use palpate_explore::registration::{RegistrationDesign, register};
 use palpate_gp::math::seed;
-use palpate_ros::arm::RosArm;
 use palpate_ros::settings::{BackendKind, BackendSettings};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -94,10 +94,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut probe = match settings.kind {
         BackendKind::Simulated => simulator.probe(args.seed)?,
         _ => {
-            let lab = RosArm::connect_over(&settings, &robot.chain)?;
-            prepare_arm(&lab, args.clear_fault)?;
-            let body = Box::new(lab.backend());
-            Box::new(simulator.servo_within(body, args.seed, &settings.interlocks)?)
+            let arm = RealArm::connect(&settings, &robot.chain)?;
+            prepare_arm(&arm, args.clear_fault)?;
+            Box::new(simulator.servo_within(arm.backend(), args.seed, &settings.interlocks)?)
         }
     };
     let bar = progress_bar(talk, "register", "touches", of as u64, 0);

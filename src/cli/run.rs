@@ -6,12 +6,14 @@ use super::host::Host;
 use super::plan::plan;
 use super::prepare::{planners_setting, prepare_arm, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
+use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, error, print, quoted};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{Journal, RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
+use crate::experiment::trial::NextTouch;
 use crate::experiment::trial::row::TrialId;
 use crate::report;
 use crate::study::compare::{SuiteComparison, compare};
@@ -20,6 +22,7 @@ use palpate_input::config::ConfigError;
 use palpate_input::error::InputError;
 use palpate_input::files;
 use palpate_input::format::counted;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,6 +81,13 @@ pub(super) struct Args {
     /// Clear latched faults on the robot before moving (operator only).
     #[arg(long)]
     clear_fault: bool,
+    /// Ask before each touch of a real arm: go, skip, elsewhere or stop [default at a terminal
+    /// until `palpate register` has written registration.toml].
+    #[arg(long, conflicts_with = "no_step")]
+    step: bool,
+    /// Do not ask before each touch.
+    #[arg(long)]
+    no_step: bool,
     /// Write only trials and summary, no figures and no report page.
     #[arg(long)]
     no_report: bool,
@@ -90,6 +100,25 @@ impl Args {
     /// Options of a run with additional planners, all others at their defaults.
     pub(super) fn of(planners: &[String], threads: u16, fresh: bool) -> Self {
         Self { planner: planners.to_vec(), threads, fresh, ..Self::default() }
+    }
+
+    /// Whether an operator is asked before each touch of a real arm.
+    fn is_asked(&self, run: &Path, talk: Verbosity) -> bool {
+        if self.step || self.no_step {
+            return self.step;
+        }
+        let beside = self.experiment.parent().unwrap_or(Path::new(""));
+        if !is_unregistered(&[Path::new(""), beside, run]) {
+            return false;
+        }
+        let is_terminal = std::io::stdin().is_terminal();
+        if !is_terminal {
+            talk.note(
+                "the arm has no registration.toml, and stdin is no terminal: touches are made without \
+                 asking; --step reads the answers from stdin",
+            );
+        }
+        is_terminal
     }
 
     /// Suffix of a shard's folder name.
@@ -105,7 +134,13 @@ impl Args {
             .chain(out.iter().map(|out| ("out", out)))
             .chain(self.planner.iter().map(|planner| ("planner", planner)));
         valued.for_each(|(name, value)| command += &format!(" --{name} {}", quoted(value)));
-        let flags = [("record", self.record), ("no-report", self.no_report), ("json", self.json)];
+        let flags = [
+            ("record", self.record),
+            ("step", self.step),
+            ("no-step", self.no_step),
+            ("no-report", self.no_report),
+            ("json", self.json),
+        ];
         let given = flags.iter().filter(|(_, is_given)| *is_given);
         given.for_each(|(name, _)| command += &format!(" --{name}"));
         command + " --clear-fault"
@@ -260,6 +295,11 @@ pub(super) fn run_missing(
              \"kinematic\" and \"dynamic\""
         );
     }
+    if args.step && !simulation.is_real() {
+        bail!(
+            "--step: a simulation needs no operator; allowed with backend.kind = \"ros2\", \"ros1\""
+        );
+    }
     if args.shard.is_some() && simulation.is_real() {
         bail!("--shard: a real arm runs one trial at a time; remove --shard");
     }
@@ -308,7 +348,17 @@ pub(super) fn run_missing(
     let (count, halt) = match simulation.is_real() {
         true => {
             let rows = (&mut folder, done.as_slice());
-            runner::run_real(&simulation, rows, stop, recorded, &tick)?
+            let is_asked = args.is_asked(&path, talk);
+            let new = || Stepper::new(&simulation, std::io::stdin().lock());
+            let mut stepper = is_asked.then(new).transpose()?;
+            let mut confirm = |next: &NextTouch| match &mut stepper {
+                Some(stepper) => bar.suspend(|| stepper.ask(next)).inspect_err(|_| {
+                    // The operator's stop is one between two touches, like Ctrl-C.
+                    stop.store(true, Ordering::Relaxed);
+                }),
+                None => Ok(None),
+            };
+            runner::run_real(&simulation, rows, stop, recorded, &tick, &mut confirm)?
         }
         false => {
             let rows = (&mut folder, jobs);

@@ -112,7 +112,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     let stop = stop_on_interrupt("ticks")?;
-    let open = connect(&settings, Endpoint::Arm, services())?;
+    let open = connect(&settings, Endpoint::Arm, services(settings.profile))?;
     let injections = args.inject.clone();
     let mut twin =
         SimulatedRobotServer::new(body, &robot.chain, &settings, open, injections, args.seed)

@@ -71,7 +71,7 @@ pub(super) fn watch(
     let number = args.trial;
     // The main thread must draw the window.
     let worker = std::thread::spawn(move || {
-        let row = simulation.trial_with(&mut probe, planner, number, &mut |_| Ok(()));
+        let row = simulation.trial_with(&mut probe, planner, number, &mut |_| Ok(None));
         let _ = print(&ending(&row));
     });
     let drawn = show(window, &sight);

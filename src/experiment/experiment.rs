@@ -16,6 +16,7 @@ use palpate_explore::planner::PlanningSettings;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
+use palpate_ros::profile::Profile;
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -191,6 +192,7 @@ impl Experiment {
         // Version 0.1 wrote settings of planners that were removed.
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
         take_former_keys(&mut loader)?;
+        Profile::fill_in(&mut loader);
         let former_names = loader.take_former_names();
         let mut experiment: Self = loader.finish()?;
         experiment.scene.former_names = former_names;

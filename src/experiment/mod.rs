@@ -24,6 +24,7 @@
 pub mod experiment;
 pub mod measure;
 pub mod notice;
+pub mod real_arm;
 pub mod real_robot;
 pub mod report_settings;
 pub mod runner;

@@ -1,13 +1,15 @@
 //! Execution of trials × planners: simulated trials in parallel, those of a real arm in sequence.
 
+use crate::experiment::real_arm::RealArm;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
-use crate::experiment::trial::FinishedTouch;
 use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
 use crate::experiment::trial::row::{TrialId, TrialRow};
+use crate::experiment::trial::{NextTouch, TrialEvent, view};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::pace;
-use palpate_explore::planner::PlannerFactory;
+use palpate_explore::planner::{Fallback, PlannerFactory};
+use palpate_explore::task::Target;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
 use rayon::iter::{
@@ -168,9 +170,11 @@ fn run_caught(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> TrialRow {
     let path = recorded.map(|run| recording_path(run, planner, trial));
-    let mut count = |_: &FinishedTouch| {
-        progress(Progress::Touch);
-        Ok(())
+    let mut count = |event: &TrialEvent| {
+        if matches!(event, TrialEvent::Finished(_)) {
+            progress(Progress::Touch);
+        }
+        Ok(None)
     };
     let run =
         || recorded_trial::run(simulation, (trial, planner), path.as_deref(), &[], &mut count);
@@ -185,6 +189,8 @@ fn run_caught(
 /// true between two touches. Every touch is stored in the journal of `folder`, from which an
 /// interrupted trial continues.
 ///
+/// `confirm` is called before each new touch, and may return another target or a fault.
+///
 /// Returns the number of finished trials and, if it stopped early, the trial, the reason and the
 /// stored touches.
 ///
@@ -196,6 +202,7 @@ pub fn run_real(
     stop: &AtomicBool,
     recorded: Option<&Path>,
     progress: &(dyn Fn(Progress) + Sync),
+    confirm: &mut dyn FnMut(&NextTouch) -> Result<Option<Target>, Fault>,
 ) -> Result<(usize, Option<String>), RunError> {
     let mut journal = Journal::open(folder.path())?;
     let mut finished = 0;
@@ -210,13 +217,35 @@ pub fn run_real(
         };
         let made = journal.touches(trial, name);
         let (mut is_asked, mut unstored) = (false, None);
-        let mut keep = |touched: &FinishedTouch| {
+        let mut keep = |event: &TrialEvent| {
+            // Touches made before an interruption are not shown again, except the last.
+            let is_shown = event.count() as usize >= made.len();
+            if let Some(arm) = simulation.arm().and_then(RealArm::ros).filter(|_| is_shown) {
+                view::show(arm, simulation, event);
+            }
+            let touched = match event {
+                TrialEvent::Next(next) => {
+                    // An operator's target is repeated, as the planner's own is planned again.
+                    return match made.get(next.count as usize - 1) {
+                        Some(made) => {
+                            let chosen = made.fallback == Some(Fallback::Operator);
+                            Ok(chosen.then(|| made.target.clone()))
+                        }
+                        None => {
+                            let answer = confirm(next);
+                            is_asked |= matches!(answer, Err(Fault::Stopped { .. }));
+                            answer
+                        }
+                    };
+                }
+                TrialEvent::Finished(touched) => touched,
+            };
             let time_s = touched.row.time_s.unwrap_or_default();
             progress(Progress::Touch);
             if let Some(made) = made.get(touched.count as usize - 1) {
                 let (touch, target) = (touched.count, made.target.numbers());
                 return match made.target == touched.row.target {
-                    true => Ok(()),
+                    true => Ok(None),
                     false => Err(Fault::from(InputError::new(format!(
                         "touch {touch}: recorded target {target:?} differs from the current plan; program or \
                          experiment changed, use --fresh to start again"
@@ -228,8 +257,8 @@ pub fn run_real(
                 unstored = Some(error);
                 return Err(Fault::RecordingFailed { time_s, message });
             }
-            is_asked = stop.load(Ordering::Relaxed);
-            if is_asked { Err(Fault::Stopped { time_s }) } else { Ok(()) }
+            is_asked |= stop.load(Ordering::Relaxed);
+            if is_asked { Err(Fault::Stopped { time_s }) } else { Ok(None) }
         };
         let path = recorded.map(|run| next_part(&recording_path(run, planner, trial)));
         let job = (trial, planner);

@@ -3,6 +3,7 @@
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
+use crate::experiment::real_arm::RealArm;
 use crate::experiment::real_robot;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{self, GroundTruth, OracleFactory, TrialObserver};
@@ -16,7 +17,6 @@ use palpate_explore::probe::servo::Servo;
 use palpate_explore::task::Task;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
-use palpate_ros::arm::RosArm;
 use palpate_ros::settings::BackendKind;
 use rand::RngExt;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub struct Simulation {
     simulator: Simulator,
     truth: Arc<GroundTruth>,
     /// Connected arm that replaces the simulated robot.
-    arm: Option<Arc<RosArm>>,
+    arm: Option<RealArm>,
     /// Notice about a scanned ground truth.
     scan_notice: Option<String>,
     /// Planners that are not built in: the oracle, and added ones.
@@ -198,13 +198,18 @@ impl Simulation {
     ///
     /// # Errors
     /// If the arm cannot be reached, or is not ready to be moved.
-    pub fn connect(&mut self) -> Result<Option<Arc<RosArm>>, LinkFault> {
+    pub fn connect(&mut self) -> Result<Option<RealArm>, LinkFault> {
         if self.is_real() {
             let lacks = || LinkFault::Arm("the scene has no object to touch".into());
             let chain = self.environment().chain().ok_or_else(lacks)?;
-            self.arm = Some(RosArm::connect_over(&self.experiment.backend, &chain)?);
+            self.arm = Some(RealArm::connect(&self.experiment.backend, &chain)?);
         }
         Ok(self.arm.clone())
+    }
+
+    /// Returns the connected arm, if any.
+    pub fn arm(&self) -> Option<&RealArm> {
+        self.arm.as_ref()
     }
 
     /// Returns the backend of a trial: the connected arm or the simulated robot; `None` if touches
@@ -214,7 +219,7 @@ impl Simulation {
     /// If no arm is connected, or memory for the simulator's state is missing.
     pub fn backend(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         match &self.arm {
-            Some(lab) => Ok(Some(Box::new(lab.backend()))),
+            Some(arm) => Ok(Some(arm.backend())),
             None if self.is_real() => Err(Fault::lacks("a connection to the arm")),
             None => self.simulator.body(),
         }
@@ -243,7 +248,7 @@ impl Simulation {
     /// Runs one trial of `planner` from start to end; the row contains any failure.
     pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
         match self.probe(trial) {
-            Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(())),
+            Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(None)),
             Err(fault) => TrialRow::not_started(trial, planner.name(), &fault),
         }
     }

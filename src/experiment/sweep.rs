@@ -2,6 +2,7 @@
 //! `[sweep]`.
 
 use crate::experiment::experiment::{Experiment, SWEEP, is_name_character};
+use palpate_explore::robot::arm::settings::FILE_ENDINGS;
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::shipped;
 use std::path::Path;
@@ -31,7 +32,8 @@ pub struct SweepCase {
 /// Whether `value` of `key` is a file's name; an arm's model may be one.
 fn is_file(key: &str, value: &str) -> bool {
     FILES.contains(&key)
-        || (["scene.arm.model", "scene.effects.sensor"].contains(&key) && value.ends_with(".toml"))
+        || (key == "scene.effects.sensor" && value.ends_with(".toml"))
+        || (key == "scene.arm.model" && FILE_ENDINGS.iter().any(|ending| value.ends_with(ending)))
 }
 
 /// Returns the combinations of the file at `path`, the last key varying fastest; empty without a

@@ -329,8 +329,16 @@ fn normal(camera: &Camera, corners: &[Vector3<f64>]) -> Vector3<f64> {
 
 /// Returns the colour of a face from the mean height of its corners along `axis`, and its light.
 pub fn height_colour(axis: &Axis, corners: &[Vector3<f64>], normal: &Vector3<f64>) -> String {
-    let mean = corners.iter().map(|corner| corner.y).sum::<f64>() / corners.len() as f64;
-    style::height(axis.fraction(mean), brightness(normal))
+    style::height(mean_height(axis, corners), brightness(normal))
+}
+
+/// Returns the colour of a face like [`height_colour`], for one out of the finger's reach.
+pub fn unreachable_colour(axis: &Axis, corners: &[Vector3<f64>], normal: &Vector3<f64>) -> String {
+    style::shaded_colour(&style::OUT_OF_REACH, mean_height(axis, corners), brightness(normal))
+}
+
+fn mean_height(axis: &Axis, corners: &[Vector3<f64>]) -> f64 {
+    axis.fraction(corners.iter().map(|corner| corner.y).sum::<f64>() / corners.len() as f64)
 }
 
 /// Returns the brightness of a matt face with this unit normal (x, height, z), 0..1.

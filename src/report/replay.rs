@@ -150,6 +150,8 @@ pub struct Grid<'a> {
     pub side: usize,
     /// Places, with the true height at each.
     pub places: Vec<(&'a [f64], Option<f64>)>,
+    /// Whether the finger can reach the true surface at each place.
+    pub is_reachable: Vec<bool>,
 }
 
 impl<'a> Grid<'a> {
@@ -167,9 +169,13 @@ impl<'a> Grid<'a> {
         let steps = (side - 1).min(most - 1);
         let picked: Vec<usize> = (0..=steps).map(|i| i * (side - 1) / steps).collect();
         let rows = if dimension == 1 { &[0][..] } else { &picked };
-        let indices = rows.iter().flat_map(|j| picked.iter().map(move |i| j * side + i));
+        let indices = || rows.iter().flat_map(|j| picked.iter().map(move |i| j * side + i));
         let at = |index: usize| (truth.places[index].as_slice(), truth.heights_m[index]);
-        Ok(Self { side: picked.len(), places: indices.map(at).collect() })
+        Ok(Self {
+            side: picked.len(),
+            places: indices().map(at).collect(),
+            is_reachable: indices().map(|index| truth.is_reachable[index]).collect(),
+        })
     }
 
     /// Returns the places without their heights.

@@ -93,6 +93,7 @@ pub fn touch_colours() -> Value {
         "initial": light_and_dark(INITIAL),
         "later": light_and_dark(PLANNED),
         "height": HEIGHT.map(rgb),
+        "out_of_reach": OUT_OF_REACH.map(rgb),
     })
 }
 
@@ -135,6 +136,9 @@ pub const DEVIATION: [u32; 9] =
 /// Colour map of heights: slate to cream, pale enough for blue and red points to be visible under
 /// shading.
 pub const HEIGHT: [u32; 5] = [0x68869e, 0x96b2b8, 0xc4d3c4, 0xe6e4c1, 0xfceebe];
+
+/// Colour map of heights out of the finger's reach: mauve, as light as those within.
+pub const OUT_OF_REACH: [u32; 5] = [0x8d7793, 0xad98b2, 0xcab9cd, 0xddd0de, 0xeae0ea];
 
 /// Colour map of errors: ColorBrewer's PuOr (too low, right, too high); neither end is the colour
 /// of a touch.

@@ -1,5 +1,6 @@
 //! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
+use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::sim::finger::Fingertip;
@@ -7,7 +8,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
 use palpate_explore::robot::Robot;
 use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
-use palpate_explore::robot::arm::{ArmSettings, Chain, model};
+use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
 use palpate_geometry::bvh::MeshBvh;
@@ -55,6 +56,19 @@ pub(super) fn invalid(error: impl std::fmt::Display) -> InputError {
 }
 
 impl Environment {
+    /// Returns the model of an arm, and what its file lacks or what is assumed instead, in words.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or does not describe an arm.
+    pub fn arm_model(settings: &ArmSettings) -> Result<(ArmModel, Vec<String>), InputError> {
+        #[cfg(feature = "mujoco")]
+        if settings.model.ends_with(".xml") {
+            let path = settings.model.as_ref();
+            return settings.assembled(super::mujoco::arm_parts(path, settings.tip.as_deref())?);
+        }
+        settings.model()
+    }
+
     /// Loads the mesh that the scene names and builds the environment.
     ///
     /// # Errors
@@ -92,7 +106,19 @@ impl Environment {
     pub fn with_shape(mut scene: Scene, shape: ObjectShape) -> Result<Self, InputError> {
         let mut notices = Vec::new();
         let (shape, holes) = with_patches(&scene, shape);
-        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
+        let mut arm_mjcf = None;
+        let arm = match &scene.arm {
+            Some(settings) => {
+                let (model, lacks) = Self::arm_model(settings)?;
+                if !lacks.is_empty() {
+                    notices.push(notice::arm_lacks(&settings.model, &lacks));
+                }
+                arm_mjcf =
+                    model::mjcf(&settings.model, &model).map_err(invalid)?.or_else(|| arm(&model));
+                Some(settings.chain_of(&model)?)
+            }
+            None => None,
+        };
         if let Cow::Owned(effects) = scene.effective_effects() {
             scene.effects = effects;
             notices.push(notice::DEFAULT_FINGER.into());
@@ -131,12 +157,10 @@ impl Environment {
             zone.datum_y_m.get_or_insert(0.0);
             Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
         };
-        let arm_mjcf = match &scene.arm {
-            Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
-            None => None,
-        };
         if scene.simulator == SimulatorKind::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
-            return Err(missing_part("`mjcf` in its arm's model"));
+            return Err(missing_part(
+                "masses: `mjcf` or the `dynamics` of every joint, in its arm's model",
+            ));
         }
         let fingertip =
             scene.effects.skin.is_some().then(|| Fingertip::new(&scene.finger, &scene.effects));

@@ -19,6 +19,14 @@ pub(super) fn former_names(names: &[String]) -> String {
     format!("rename these settings, which the next version will not read: {}", names.join(", "))
 }
 
+/// Notice that the file of an arm lacks something.
+pub(super) fn arm_lacks(file: &str, lacks: &[String]) -> String {
+    format!(
+        "{file} lacks the following, with what is assumed: {}; give them in an arm model (.toml)",
+        lacks.join("; ")
+    )
+}
+
 /// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
 pub(super) fn legacy_keys(keys: &[String]) -> String {
     format!(

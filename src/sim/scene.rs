@@ -6,6 +6,7 @@ use crate::sim::finger::effects::sensor;
 use clap::ValueEnum;
 use nalgebra::Isometry3;
 use palpate_explore::robot::arm::ArmSettings;
+use palpate_explore::robot::arm::settings::FILE_ENDINGS;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_explore::task::WholeObject;
@@ -478,7 +479,9 @@ impl Scene {
         loader.read_former_keys(prefix, &FORMER_KEYS)?;
         loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
         loader.resolve_path(&format!("{prefix}object.mesh"));
-        loader.resolve_path_ending(&format!("{prefix}arm.model"), ".toml");
+        for ending in FILE_ENDINGS {
+            loader.resolve_path_ending(&format!("{prefix}arm.model"), ending);
+        }
         sensor::load(loader, &format!("{prefix}effects"))
     }
 }

@@ -6,6 +6,7 @@
 //! the objects shows the coverage of objects that the band has not seen.
 
 use crate::experiment::Simulation;
+use crate::experiment::trial::TrialEvent;
 use palpate_explore::band::{BandFeatures, COEFFICIENTS, LearnedBand, relative_width};
 use palpate_explore::belief::Belief;
 use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions};
@@ -97,9 +98,10 @@ pub fn sample_trial(
     let available = simulation.planner(planner);
     let available = available.ok_or_else(|| failed("this program has no such planner".into()))?;
     let mut probe = simulation.probe(trial).map_err(|fault| failed(fault.to_string()))?;
-    let row = simulation.trial_with(&mut *probe, available, trial, &mut |touch| {
+    let row = simulation.trial_with(&mut *probe, available, trial, &mut |event| {
+        let TrialEvent::Finished(touch) = event else { return Ok(None) };
         tell();
-        let Belief::HeightField(field) = touch.belief else { return Ok(()) };
+        let Belief::HeightField(field) = touch.belief else { return Ok(None) };
         let features = COUNTS.contains(&touch.count).then(|| field.band_features(&places));
         let features = features.flatten().unwrap_or_default().into_iter().zip(&known);
         samples.extend(features.map(|(features, (i, height_m))| BandSample {
@@ -108,7 +110,7 @@ pub fn sample_trial(
             height_m: *height_m,
             features,
         }));
-        Ok(())
+        Ok(None)
     });
     match row.failure {
         Some(reason) => Err(failed(reason)),

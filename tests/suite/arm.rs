@@ -17,7 +17,7 @@ fn environment(arm: Option<ArmSettings>) -> Environment {
 fn arm(model: &str) -> ArmSettings {
     ArmSettings {
         model: model.into(),
-        base_position_m: [0.1, -0.05, 0.2],
+        base_position_m: Some([0.1, -0.05, 0.2]),
         base_rotation_deg: [5.0, -10.0, 30.0],
         ..Default::default()
     }
@@ -346,7 +346,7 @@ mod mujoco {
         let home = ArmSettings::default().chain().unwrap().home;
         let run = || {
             let mut plant = Plant::new(Arc::clone(&model)).unwrap();
-            plant.reset(home.as_slice()).unwrap();
+            plant.reset(&home.as_slice()[..7]).unwrap();
             for k in 0..1000 {
                 let speed = 0.1 * (k as f64 * 0.01).sin();
                 let force_n = Vector3::new(-(k as f64 * 0.003).sin(), 0.0, 0.0);
@@ -364,7 +364,7 @@ mod mujoco {
         // Another trial on the same data is independent of the previous one.
         let mut plant = Plant::new(Arc::clone(&model)).unwrap();
         for _ in 0..2 {
-            plant.reset(home.as_slice()).unwrap();
+            plant.reset(&home.as_slice()[..7]).unwrap();
             for k in 0..1000 {
                 let speed = 0.1 * (k as f64 * 0.01).sin();
                 let force_n = Vector3::new(-(k as f64 * 0.003).sin(), 0.0, 0.0);

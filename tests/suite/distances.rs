@@ -144,8 +144,8 @@ proptest! {
     /// interlock skips checks.
     #[test]
     fn no_point_moves_by_more_than_the_joints_reaches_say(
-        q in prop::array::uniform7(-1.0f64..1.0),
-        by in prop::array::uniform7(-0.5f64..0.5),
+        q in prop::array::uniform8(-1.0f64..1.0),
+        by in prop::array::uniform8(-0.5f64..0.5),
     ) {
         let robot = robot("pa10");
         let chain = &robot.chain;

@@ -58,9 +58,10 @@ fn an_own_sensor_ends_touches_and_places_them() {
     assert!(below_m.abs() < 2e-3, "{below_m}");
 }
 
-/// An arm from a file, with six joints, reaches the same object and touches it like a stage.
+/// Built-in arms and one from a file, with six and seven joints, reach the same object and touch it
+/// like a stage.
 #[test]
-fn an_arm_from_a_file_touches() {
+fn every_arm_touches_like_a_stage() {
     let touched = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| (*set).into()).collect();
         let scene = Scene::load("scenes/container_finger.toml".as_ref(), &sets).unwrap();
@@ -74,17 +75,31 @@ fn an_arm_from_a_file_touches() {
             other => panic!("{other:?}"),
         })
     };
-    let arm = touched(&["arm.model=examples/ur5e.toml", "effects={skin={}}"]);
     let stage = touched(&["effects={skin={}}"]);
-    for (arm, stage) in arm.iter().zip(&stage) {
-        assert!((arm - stage).norm() < 1e-3, "{arm} {stage}");
+    for (model, simulator) in [
+        ("models/arms/ur5e.toml", "kinematic"),
+        ("ur5e", "kinematic"),
+        ("fr3", "kinematic"),
+        ("iiwa14", "kinematic"),
+        #[cfg(feature = "mujoco")]
+        ("ur5e", "dynamic"),
+        #[cfg(feature = "mujoco")]
+        ("fr3", "dynamic"),
+        #[cfg(feature = "mujoco")]
+        ("iiwa14", "dynamic"),
+    ] {
+        let sets = [format!("arm.model={model}"), format!("simulator={simulator}")];
+        let arm = touched(&[&sets[0], &sets[1], "effects={skin={}}"]);
+        for (arm, stage) in arm.iter().zip(&stage) {
+            assert!((arm - stage).norm() < 1e-3, "{model}, {simulator}: {arm} {stage}");
+        }
     }
 }
 
 /// An invalid arm file is rejected with its name, the key, and the allowed values.
 #[test]
 fn a_wrong_arm_is_refused_by_name() {
-    let text = std::fs::read_to_string("examples/ur5e.toml").unwrap();
+    let text = std::fs::read_to_string("models/arms/ur5e.toml").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let wrong = [
         ("axis = [0.0, 0.0, 1.0]", "axis = [0, 0, 0]", "joint[0].axis"),
@@ -107,7 +122,7 @@ fn a_wrong_arm_is_refused_by_name() {
     let sets = ["arm.model=pa11".to_string()];
     let error = Scene::load("scenes/container_finger.toml".as_ref(), &sets).unwrap_err();
     assert!(
-        error.to_string().contains("\"pa10\", \"pa10_a\", or a file ending in .toml"),
+        error.to_string().contains("\"iiwa14\", or a file ending in .toml, .urdf, .xml"),
         "{error}"
     );
 }

@@ -1,10 +1,9 @@
 //! Tests of an arm over topics, run in a network namespace by `make test-ros2` and `make
 //! test-ros1`. They are ignored otherwise, because DDS multicasts to the local network.
 
-use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row};
+use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, contacts_off_m, count, row};
 use palpate::backend::pace;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::probe::Touch;
 use palpate::format::counted;
 use palpate::robot::arm::ArmSettings;
 use palpate::ros::arm::RosArm;
@@ -24,7 +23,7 @@ use std::time::{Duration, Instant};
 
 /// Number of touches per planner; fewer if time is short.
 fn touches() -> u32 {
-    std::env::var("PALPATE_TOUCHES").ok().and_then(|text| text.parse().ok()).unwrap_or(20)
+    count("PALPATE_TOUCHES", 20)
 }
 
 /// Maximum number of overruns due to a busy machine.
@@ -87,22 +86,7 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
         far.push(row.touches.last().unwrap().metrics.unwrap().rmse_m);
         let entry = palpate::explore::planner::by_name(planner).unwrap();
         near.push(simulation.trial(entry, 0).touches.last().unwrap().metrics.unwrap().rmse_m);
-        // The same targets in sequence, with the body in this process.
-        let mut probe = simulation.probe(0).unwrap();
-        let mut off_m = Vec::new();
-        for touch in &row.touches {
-            let approach = simulation.task().approach(&touch.target).unwrap();
-            let here = match probe.touch(&approach).unwrap() {
-                Touch::Contact(contact) => Some(contact.p_wc),
-                _ => None,
-            };
-            let there = touch.contact.map(nalgebra::Point3::from);
-            assert_eq!(here.is_some(), there.is_some(), "{:?}", touch.target);
-            if let (Some(here), Some(there)) = (here, there) {
-                off_m.push((here - there).norm());
-            }
-        }
-        off_m.sort_by(f64::total_cmp);
+        let off_m = contacts_off_m(&simulation, &row);
         let [.., second_m, worst_m] = off_m.as_slice() else { panic!("{off_m:?}") };
         println!("{planner}: contacts off the simulator's by {:.3} mm at most", 1e3 * worst_m);
         // On a steep surface a late tick moves the contact; one such contact is allowed.

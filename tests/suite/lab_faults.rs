@@ -1,15 +1,14 @@
 //! Tests of failures between an explorer and its arm: which side detects each, and how soon the arm
 //! is at rest. Prints the table of `docs/safety.md`.
 
-use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, signal};
+use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, set_network, signal};
 use palpate::backend::pace;
 use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
 use palpate::ros::link::Link;
 use palpate::ros::topics::{CommandTopic, Endpoint};
 use serde_json::Value;
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -165,20 +164,16 @@ fn the_death_of_either_side_stops_the_other() {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
-    let ip = |words: &str| Command::new("ip").args(words.split(' ')).status().unwrap().success();
-    let has_dummy = Path::new("/sys/class/net/dds0").exists();
     let mut scene = FaultScenario::new(54, &[], &[]);
     scene.twin.wait_until_it_moves();
     let before_s = pace::now_s();
-    assert!(ip("link set lo down") && (!has_dummy || ip("link set dds0 down")));
+    set_network(false);
     let at_s = pace::now_s();
     sleep(Duration::from_secs(1));
     let seen_s = scene.twin.alarmed_s(before_s) - at_s;
     let rest_s = scene.rest_s(at_s);
     let count = scene.twin.events.lock().unwrap().len();
-    let device = if has_dummy { "dds0" } else { "lo" };
-    assert!(ip("link set lo up") && (!has_dummy || ip("link set dds0 up")));
-    assert!(ip(&format!("route replace 224.0.0.0/4 dev {device}")));
+    set_network(true);
     let (said, halted_s) = scene.halted();
     values("network gone: the arm's side", Some(seen_s), Some(rest_s), "");
     values("network gone: the explorer", Some(halted_s - at_s), None, &said);

@@ -8,6 +8,8 @@ mod all_around;
 mod allocation;
 mod approach;
 mod arm;
+#[cfg(feature = "mujoco")]
+mod arm_files;
 mod around_commands;
 mod backend;
 mod band;
@@ -39,6 +41,8 @@ mod fit;
 mod folders;
 mod formats;
 mod former_names;
+#[cfg(all(feature = "franka", feature = "mujoco"))]
+mod franka;
 mod fuzz;
 mod gates;
 mod geometry;
@@ -52,6 +56,8 @@ mod interlocks;
 mod lab;
 #[cfg(feature = "mujoco")]
 mod lab_faults;
+#[cfg(feature = "mujoco")]
+mod lab_ur;
 mod layers;
 mod memory;
 mod meshes;

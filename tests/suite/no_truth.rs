@@ -67,6 +67,18 @@ fn an_exact_probe_repeats_and_verifies() {
     assert_eq!(of("verification_miss_share"), 0.0);
     let ratio = of("verification_rmse_m") / of("rmse_m");
     assert!((0.4..2.5).contains(&ratio), "{ratio}");
+    // The band is wider below than above, unlike two standard deviations.
+    let learned = ["verification_touches=40", "gp.band=\"objects\""];
+    let learned = row(container(&learned), "active", 0);
+    let bands_m: Vec<[f64; 2]> = learned.verification.iter().filter_map(|it| it.band_m).collect();
+    assert_eq!(bands_m.len(), 40);
+    assert!(bands_m.iter().all(|[low, high]| -low > *high), "{bands_m:?}");
+    let within = learned.verification.iter().filter(|it| {
+        let [low, high] = it.band_m.unwrap();
+        (low..=high).contains(&it.error_m.unwrap())
+    });
+    let coverage = measure::by_id("verification_coverage").unwrap().value(&learned, 10).unwrap();
+    assert!((within.count() as f64 / 40.0 - coverage).abs() < 1e-9);
     let again: Vec<u32> = verified.verification.iter().filter_map(|touch| touch.repeats).collect();
     assert_eq!(again.len(), 6);
     for touch in verified.verification.iter().filter(|touch| touch.repeats.is_some()) {

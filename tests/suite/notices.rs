@@ -147,6 +147,10 @@ fn what_an_arm_does_not_reach_is_refused_before_it_is_sent() {
     let folder = folder("container_pa10.toml", &[]);
     let says = ["the arm does not reach 25 of 25 places", "the stand-off", "arm.base_position_m"];
     let far = "arm.base_position_m=[0, 1.5, 0]";
+    // A quarter of a metre too far back; a move along y by more brings it within reach.
+    let near = "arm.base_position_m=[0, 0.35, 0]";
+    let moved = ["places of the zone", "set arm.base_position_m to", "reaches the zone's corners"];
+    fails(folder.path(), &["show", "scene.toml", "--set", near], &moved);
     fails(folder.path(), &["show", "scene.toml", "--set", far], &says);
     fails(folder.path(), &["run", "it.toml", "--set", &format!("scene.{far}")], &says);
     assert!(!folder.path().join("runs").exists());

@@ -47,6 +47,7 @@ const key = (key) => () => explorer.querySelector("canvas").dispatchEvent(new Ke
   await after("planner", click("input[name=planner][value='1']"));
   await after("truth", click("input[name=truth]"));
   await after("deviation", click("input[value=deviation]"));
+  await after("band", click("input[value=band]"));
   await after("error", click("input[value=error]"));
   await after("turn", key("ArrowLeft"));
   click("button")();
@@ -272,8 +273,10 @@ fn what_is_moved_and_clicked_changes_what_is_drawn() {
     let Some(browser) = browser_or_note() else { return };
     let surface = acts(&browser, SURFACE);
     let curve = acts(&browser, CURVE);
-    for (acts, unmoved) in [(&surface, &[][..]), (&curve, &["deviation", "error", "turn"][..])] {
-        assert_eq!(acts.len(), 8, "{acts:?}");
+    for (acts, unmoved) in
+        [(&surface, &[][..]), (&curve, &["deviation", "band", "error", "turn"][..])]
+    {
+        assert_eq!(acts.len(), 9, "{acts:?}");
         for pair in acts.windows(2) {
             let [_, [name, picture, _]] = pair else { unreachable!() };
             let is_same = pair[0][1] == *picture;
@@ -284,5 +287,5 @@ fn what_is_moved_and_clicked_changes_what_is_drawn() {
     assert!(words(0).starts_with("random after 20 touches: R 0.99"), "{}", words(0));
     assert!(words(1).starts_with("random after 7 touches"), "{}", words(1));
     assert!(words(2).starts_with("active after 7 touches"), "{}", words(2));
-    assert!(!words(7).starts_with("active after 7 touches"), "{}", words(7));
+    assert!(!words(8).starts_with("active after 7 touches"), "{}", words(8));
 }

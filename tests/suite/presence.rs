@@ -145,7 +145,7 @@ fn a_trial_goes_on_where_it_was_broken_off() {
     assert!(whole.touches.iter().all(|touch| touch.tip.is_some() == touch.contact.is_none()));
     let mut probe = simulation.probe(0).unwrap();
     let mut resumed = ResumedProbe::new(made, &simulation, &mut *probe);
-    assert_eq!(simulation.trial_with(&mut resumed, planner, 0, &mut |_| Ok(())), whole);
+    assert_eq!(simulation.trial_with(&mut resumed, planner, 0, &mut |_| Ok(None)), whole);
 }
 
 /// Each object belongs to one half of the suite: defaults and constants are tuned on one and tested

@@ -19,7 +19,7 @@ const AVOIDED: [&str; 7] =
 const SENTENCE_MAX: usize = 35;
 
 /// Largest numbers of words of the guides, and of those that are generated.
-const WORDS_MAX: [usize; 2] = [24_000, 9_000];
+const WORDS_MAX: [usize; 2] = [25_000, 9_000];
 
 const GENERATED: [&str; 2] = ["hard-cases.md", "reference.md"];
 

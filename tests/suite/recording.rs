@@ -9,7 +9,7 @@ use mcap::records::{MessageHeader, Record};
 use palpate::backend::{
     Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample, Wrench,
 };
-use palpate::experiment::trial::FinishedTouch;
+use palpate::experiment::trial::TrialEvent;
 use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
 use palpate::experiment::trial::replay::{self, Difference};
 use palpate::experiment::trial::row::TouchRow;
@@ -80,6 +80,7 @@ impl Fake {
             period_s: 0.01,
             resettable: true,
             real_time: false,
+            tactile: true,
         };
         Self(capabilities, results, Reading::default())
     }
@@ -286,7 +287,10 @@ fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
             time_s: readings[readings.len() - 1].time_s,
             ..TouchMessage::default()
         };
-        recording.touched(&done, [shape.clone(), shape]).unwrap();
+        let mut contacts = shape.clone();
+        contacts.ns = "contacts".into();
+        recording.show(done.time_s, &[shape, contacts]).unwrap();
+        recording.touched(&done).unwrap();
     }
     recording.end(1.0, &TrialEnd::default()).unwrap();
     let bytes = paper.0.lock().unwrap().clone();
@@ -415,7 +419,7 @@ fn what_others_read_is_what_was_read() {
     }
     let frames = readings.iter().map(|reading| reading.frames().count()).sum();
     assert!(frames > 20);
-    assert_eq!(seen, [81, 80, 81, frames, 81, 2, 2, 2]);
+    assert_eq!(seen, [81, 80, 81, frames, 81, 2, 2, 2, 0, 0, 0]);
 }
 
 #[test]
@@ -464,9 +468,8 @@ fn a_disk_that_is_full_is_a_fault() {
         let step = |i| recorder.step(&Command { qdot: vec![f64::from(i).sin(); 3] }).map(drop);
         let ticks = (0..2000).try_for_each(step);
         let ended = ticks.and_then(|()| {
-            let shape = || Marker::new("belief", Shape::LineStrip, 1e-3, Default::default());
             let touch = TouchMessage { time_s: 2.5, ..TouchMessage::default() };
-            recording.touched(&touch, [shape(), shape()])
+            recording.touched(&touch)
         });
         let fault = ended.unwrap_err();
         assert!(matches!(fault, Fault::RecordingFailed { time_s: 2.5, .. }), "{fault}");
@@ -511,7 +514,7 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
     let active = planner::by_name("active").unwrap();
     let path = recording_path(folder, active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let row = recorded_trial::run(&simulation, (0, active), Some(&path), &[], &mut |_| Ok(()));
+    let row = recorded_trial::run(&simulation, (0, active), Some(&path), &[], &mut |_| Ok(None));
     let bare = simulation.trial(active, 0);
     assert_eq!(row.failure, None);
     assert_eq!(serde_json::to_string(&row).unwrap(), serde_json::to_string(&bare).unwrap());
@@ -638,13 +641,14 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let touched = [2, 4, 5];
     for after in touched {
         let (part, made) = (next_part(&path), kept.clone());
-        let mut interrupt = |touched: &FinishedTouch| {
+        let mut interrupt = |event: &TrialEvent| {
+            let TrialEvent::Finished(touched) = event else { return Ok(None) };
             if touched.count as usize > kept.len() {
                 kept.push(touched.row.clone());
             }
             match touched.count == after {
                 true => Err(Fault::Stopped { time_s: touched.row.time_s.unwrap() }),
-                false => Ok(()),
+                false => Ok(None),
             }
         };
         let job: (u32, &dyn PlannerFactory) = (0, active);

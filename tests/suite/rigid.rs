@@ -252,7 +252,7 @@ fn gains_in_the_mass_matrix_are_mujocos_servos_where_nothing_rubs() {
             [compile(text).unwrap(), own].map(|model| Plant::new(Arc::new(model)).unwrap());
         let mut most: f64 = 0.0;
         for plant in &mut plants {
-            plant.reset(home.as_slice()).unwrap();
+            plant.reset(&home.as_slice()[..7]).unwrap();
         }
         for i in 0..250 {
             let speed_rad_s =

@@ -306,15 +306,19 @@ fn a_solid_is_turned_zoomed_and_coloured() {
     let (acts, _) = DRIVER.rsplit_once("})();").unwrap();
     let acts: Vec<[String; 3]> =
         log(&browser, &page(folder.path(), &format!("{acts}{more}")), &DRAWN);
-    assert_eq!(acts.len(), 13, "{acts:?}");
+    assert_eq!(acts.len(), 14, "{acts:?}");
     for pair in acts.windows(2) {
         let [_, [name, picture, _]] = pair else { unreachable!() };
         // It is coloured by σ initially, and the view from above is limited.
         let is_same = pair[0][1] == *picture;
-        assert_eq!(is_same, ["deviation", "pole"].contains(&name.as_str()), "{name}: {acts:?}");
+        assert_eq!(
+            is_same,
+            ["deviation", "band", "pole"].contains(&name.as_str()),
+            "{name}: {acts:?}"
+        );
     }
     // No trace remains of the intermediate view.
-    assert_eq!(acts[12][1], acts[9][1], "{acts:?}");
+    assert_eq!(acts[13][1], acts[10][1], "{acts:?}");
     let words = |act: usize| acts[act][2].as_str();
     assert!(words(0).starts_with("uncertain after 12 touches: Chamfer"), "{}", words(0));
     assert!(words(1).starts_with("uncertain after 6 touches"), "{}", words(1));

@@ -7,6 +7,7 @@ use crate::common::rig::ARM;
 use crate::common::rig::{Rig, STAGE, patient};
 use palpate::explore::probe::Touch;
 use palpate::ros::arm::RosArm;
+use palpate::ros::profile::Profile;
 use palpate::ros::server::serve::services;
 use palpate::ros::settings::BackendSettings;
 use palpate::ros::topics::{CommandMessage, Endpoint, Service, TactileMessage};
@@ -105,7 +106,9 @@ fn the_arm_moves_again_when_the_operator_has_cleared_it() {
 
 #[test]
 fn every_service_has_a_name_of_its_own() {
-    let names: std::collections::HashSet<String> =
-        services().iter().map(|service| service.name("/pa10")).collect();
-    assert_eq!(names.len(), services().len());
+    for profile in [Profile::Palpate, Profile::Ur] {
+        let names: std::collections::HashSet<String> =
+            services(profile).iter().map(|service| service.name("/pa10")).collect();
+        assert_eq!(names.len(), services(profile).len());
+    }
 }

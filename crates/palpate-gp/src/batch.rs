@@ -14,7 +14,7 @@ pub struct Prediction {
 
 /// Number of places solved together: with four rows of the factor, eight vectors of the widest
 /// kind.
-const MANY: usize = 16;
+pub(super) const MANY: usize = 16;
 /// Number of places solved together for the remainder.
 const FEW: usize = 8;
 
@@ -68,6 +68,21 @@ impl Posterior {
         };
         self.in_blocks(&places, asked, |prediction| variances.push(prediction.variance));
         variances
+    }
+
+    /// Passes L⁻¹·k(X, x) of each block of `places`, one lane per place, its squared norms, and the
+    /// number of places of the block.
+    pub(super) fn whitened(
+        &self,
+        places: &[&[f64]],
+        mut tell: impl FnMut(&[[f64; MANY]], [f64; MANY], usize),
+    ) {
+        let mut lanes = Lanes::<MANY>::default();
+        for block in places.chunks(MANY) {
+            lanes.correlate(self, block, false);
+            let explained = self.factor().solve_lower_lanes(&mut lanes.correlations);
+            tell(&lanes.correlations, explained, block.len());
+        }
     }
 
     fn in_blocks<'a>(
@@ -178,7 +193,7 @@ impl<const N: usize> Lanes<N> {
 
 widest_fn! {
     /// Adds ((at − x) / length)² along one axis.
-    fn add_squares<'a, const N: usize>(
+    pub(super) fn add_squares<'a, const N: usize>(
         r2: &'a mut [[f64; N]],
         at: [f64; N],
         column: &'a [f64],

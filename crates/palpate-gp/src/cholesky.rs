@@ -191,6 +191,61 @@ fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
 }
 
 vectorised_fn! {
+    /// Subtracts from each row of `lanes` the sum of the rows of `known`, weighted by the row of
+    /// `weights` with the same number; a row of `weights` has a number for each row of `known`.
+    pub(super) fn subtract_products<'a, V: Vector, const N: usize>(
+        weights: &'a [f64],
+        known: &'a [[f64; N]],
+        lanes: &'a mut [[f64; N]],
+    ) -> () {
+        let mut lane = 0;
+        while lane < N {
+            if V::LANES == 8 && N - lane >= 16 {
+                subtract::<V, N, 2, 4>(weights, known, lanes, lane);
+                lane += 16;
+            } else {
+                subtract::<V, N, 1, 8>(weights, known, lanes, lane);
+                lane += V::LANES;
+            }
+        }
+    }
+}
+
+/// Subtracts the products of `WIDE` vectors of lanes from `lane` on, `ROWS` rows at a time.
+#[inline(always)]
+fn subtract<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
+    weights: &[f64],
+    known: &[[f64; N]],
+    lanes: &mut [[f64; N]],
+    lane: usize,
+) {
+    let length = known.len();
+    for (block, lanes) in lanes.chunks_mut(ROWS).enumerate() {
+        let last = lanes.len() - 1;
+        // Beyond the last row the last one is repeated, and not written.
+        let rows: [&[f64]; ROWS] =
+            std::array::from_fn(|r| &weights[(ROWS * block + r.min(last)) * length..][..length]);
+        let mut sums: [[V; WIDE]; ROWS] = std::array::from_fn(|r| {
+            std::array::from_fn(|v| V::load(&lanes[r.min(last)][lane + v * V::LANES..]))
+        });
+        for (k, x) in known.iter().enumerate() {
+            let x: [V; WIDE] = std::array::from_fn(|v| V::load(&x[lane + v * V::LANES..]));
+            for r in 0..ROWS {
+                let w = V::splat(-rows[r][k]);
+                for v in 0..WIDE {
+                    sums[r][v] = w.mul_add(x[v], sums[r][v]);
+                }
+            }
+        }
+        for (sums, lanes) in sums.iter().zip(lanes) {
+            for v in 0..WIDE {
+                sums[v].store(&mut lanes[lane + v * V::LANES..]);
+            }
+        }
+    }
+}
+
+vectorised_fn! {
     fn solve_upper_lanes<'a, V: Vector, const N: usize>(
         factor: &'a Factor,
         lanes: &'a mut [[f64; N]],

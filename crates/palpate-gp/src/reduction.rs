@@ -1,8 +1,13 @@
 //! Integrated variance reduction by one more observation (Cohn, Ghahramani & Jordan 1996).
+//!
+//! Sixteen places are computed together: the factor and the references are then read once for all
+//! of them, and each number read serves sixteen operations.
 
+use super::batch::{MANY, add_squares};
+use super::cholesky::subtract_products;
 use super::observations::Observations;
-use super::posterior::{Posterior, Scratch};
-use crate::math::simd::widest_dot;
+use super::posterior::Posterior;
+use crate::math::simd::widest_fn;
 
 /// A posterior with the reference places at which its variance is summed.
 pub struct VarianceReduction<'a> {
@@ -15,17 +20,18 @@ pub struct VarianceReduction<'a> {
 }
 
 impl<'a> VarianceReduction<'a> {
-    /// Prepares for `references`: n² operations per reference.
+    /// Prepares for `references`: n²/2 multiplications per reference.
     pub fn new<'b>(posterior: &'a Posterior, references: impl Iterator<Item = &'b [f64]>) -> Self {
-        let mut places = Observations::new(posterior.observations().dimension());
-        let mut whitened = Vec::new();
-        let mut scratch = Scratch::default();
-        for place in references {
-            places.push_height(place, 0.0);
-            posterior.whiten(place, &mut scratch);
-            whitened.extend_from_slice(&scratch.solved);
-        }
-        Self { posterior, weights: vec![1.0; places.len()], references: places, whitened }
+        let places: Vec<&[f64]> = references.collect();
+        let mut references = Observations::new(posterior.observations().dimension());
+        places.iter().for_each(|place| references.push_height(place, 0.0));
+        let mut whitened = Vec::with_capacity(places.len() * posterior.observations().order());
+        posterior.whitened(&places, |lanes, _, count| {
+            for lane in 0..count {
+                whitened.extend(lanes.iter().map(|lanes| lanes[lane]));
+            }
+        });
+        Self { posterior, weights: vec![1.0; places.len()], references, whitened }
     }
 
     /// Sets a weight for each reference; missing weights are 0.
@@ -35,31 +41,92 @@ impl<'a> VarianceReduction<'a> {
         self
     }
 
-    /// Returns the mean reduction of the variance at the references by an observation at `place`,
-    /// (1/m)·Σ_r w_r·k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and variance σ²:
-    /// n² + n·m operations.
-    pub fn at(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
-        let explained = self.posterior.whiten(place, scratch);
-        let Scratch { solved, slopes: correlations, .. } = scratch;
-        correlations.resize(self.references.len(), 0.0);
+    /// Returns the mean reduction of the variance at the references by an observation at each of
+    /// `places`, (1/m)·Σ_r w_r·k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and
+    /// variance σ²: n²/2 + n·m multiplications per place.
+    pub fn at(&self, places: &[&[f64]]) -> Vec<f64> {
         let hyperparameters = self.posterior.hyperparameters();
-        let lengths = &hyperparameters.length_scales;
-        self.references.distances2(place.iter().copied(), lengths, 0, correlations);
-        self.posterior.kernel().correlate(correlations);
-        let pairs = correlations.iter().zip(&self.weights).enumerate();
-        let squares: f64 = pairs
-            .map(|(r, (prior, weight))| weight * (prior - self.explained(r, solved)).powi(2))
-            .sum();
         let signal2 = hyperparameters.signal_sd.powi(2);
         let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();
-        let variance = (1.0 - explained).max(0.0) + noise2;
-        signal2 * squares / (variance * self.references.len().max(1) as f64)
+        let scale = signal2 / self.references.len().max(1) as f64;
+        let mut covariances = vec![[0.0; MANY]; self.references.len()];
+        let mut reductions = Vec::with_capacity(places.len());
+        self.posterior.whitened(places, |solved, explained, count| {
+            covariances.fill([0.0; MANY]);
+            let block = &places[reductions.len()..][..count];
+            for (axis, length) in hyperparameters.length_scales.iter().enumerate() {
+                let at = std::array::from_fn(|lane| block[lane.min(count - 1)][axis]);
+                add_squares(&mut covariances, at, self.references.column(axis), 1.0 / length);
+            }
+            self.posterior.kernel().correlate(covariances.as_flattened_mut());
+            subtract_products(&self.whitened, solved, &mut covariances);
+            let squares = weighted_squares(&covariances, &self.weights);
+            let falls = squares.iter().zip(explained).take(count);
+            reductions.extend(
+                falls.map(|(sum, explained)| scale * sum / ((1.0 - explained).max(0.0) + noise2)),
+            );
+        });
+        reductions
+    }
+}
+
+widest_fn! {
+    /// Returns Σ_r w_r·c_r² for each lane.
+    fn weighted_squares<'a>(covariances: &'a [[f64; MANY]], weights: &'a [f64]) -> [f64; MANY] {
+        let mut sums = [0.0; MANY];
+        for (covariances, weight) in covariances.iter().zip(weights) {
+            for lane in 0..MANY {
+                sums[lane] = (weight * covariances[lane]).mul_add(covariances[lane], sums[lane]);
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::Matern52;
+    use crate::posterior::Scratch;
+    use crate::{Hyperparameters, NoiseRatio, Observation, Slope};
+    use proptest::prelude::*;
+
+    fn place() -> impl Strategy<Value = [f64; 2]> {
+        [0.0..1.0, 0.0..1.0]
     }
 
-    /// Returns the part of the covariance of reference `r` with the place of `solved` that the
-    /// observations explain.
-    fn explained(&self, r: usize, solved: &[f64]) -> f64 {
-        let start = r * solved.len();
-        widest_dot(&self.whitened[start..start + solved.len()], solved)
+    proptest! {
+        /// The reduction is the mean fall of the variances when the observation is added, for any
+        /// number of places, with and without slopes.
+        #[test]
+        fn the_fall_of_the_variances(
+            touches in prop::collection::vec((place(), any::<bool>()), 1..30),
+            references in prop::collection::vec((place(), 0.0..1.0), 1..20),
+            places in prop::collection::vec(place(), 1..40),
+        ) {
+            let mut observations = Observations::new(2);
+            for ([x, z], is_sloped) in &touches {
+                let gradient = [2.0 * x, 0.5];
+                let slope = is_sloped.then_some(Slope { gradient: &gradient, noise: 1.0 });
+                observations.push(&Observation { place: &[*x, *z], height: x * x, noise: 1.0, slope });
+            }
+            let noise = NoiseRatio { height: 0.05, slope: 0.1 };
+            let hyperparameters = Hyperparameters::new(2.0, vec![0.4, 0.7], noise, 0.0);
+            let posterior = Posterior::new(&Matern52, hyperparameters, observations).unwrap();
+            let (at, weights): (Vec<[f64; 2]>, Vec<f64>) = references.into_iter().unzip();
+            let references = at.iter().map(<[f64; 2]>::as_slice);
+            let reduction = VarianceReduction::new(&posterior, references).weighted(weights.clone());
+            let asked: Vec<&[f64]> = places.iter().map(<[f64; 2]>::as_slice).collect();
+            let mut scratch = Scratch::default();
+            for (place, found) in asked.iter().zip(reduction.at(&asked)) {
+                let mut after = posterior.clone();
+                after.add(place, 0.0).unwrap();
+                let falls = at.iter().zip(&weights).map(|(at, weight)| {
+                    weight * (posterior.variance(at, &mut scratch) - after.variance(at, &mut scratch))
+                });
+                let twin = falls.sum::<f64>() / at.len() as f64;
+                prop_assert!((found - twin).abs() < 1e-10, "{found} {twin}");
+            }
+        }
     }
 }

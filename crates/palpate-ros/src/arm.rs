@@ -2,14 +2,18 @@
 //! received messages as readings.
 
 use super::link::Link;
+use super::message::Time;
 use super::net_ft::{NetFt, NetFtSettings, Record};
+use super::profile::Profile;
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
-use super::settings::BackendSettings;
+use super::settings::{BackendKind, BackendSettings};
 use super::status::ArmStatus;
 use super::topics::{Endpoint, Service, Topic};
-use super::transport::{Connect, cannot_open};
+use super::transport::{Connect, Packet, cannot_open};
+use super::ur::stoppable_share;
+use super::view::{MarkerArray, TFMessage};
 use palpate_explore::backend::interlock::check_start;
-use palpate_explore::backend::pace::RealTimePacer;
+use palpate_explore::backend::pace::{self, RealTimePacer};
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading, Sample};
 use palpate_explore::robot::arm::Chain;
 use palpate_input::error::InputError;
@@ -25,6 +29,10 @@ pub struct RosArm {
     mailbox: Arc<TopicReceiver>,
     /// First fault; it is latched until the operator clears it.
     latched: Mutex<Option<LinkFault>>,
+    /// Number of the call that made the arm accept commands, until it is handed back.
+    engaged_by: Mutex<Option<usize>>,
+    /// Shapes as last published, by name.
+    shown: Mutex<MarkerArray>,
     /// Receiver of the force/torque sensor over UDP, if one is configured.
     _net_ft: Option<NetFt>,
 }
@@ -32,12 +40,13 @@ pub struct RosArm {
 /// Polling interval for received messages; a heuristic: well below a control tick.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
+/// Time within which all parts of a UR's state have arrived.
+// heuristic: fifty cycles of the robot's controller (500 Hz).
+const STATE_SPREAD: Duration = Duration::from_millis(100);
+
 /// Time without an answer after which an idempotent service call is repeated.
 // heuristic: ten times the duration of discovery and an answer on a local network.
 const REPEAT_S: f64 = 0.5;
-
-/// Topics on which messages of the arm are required.
-const REQUIRED_TOPICS: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
 
 impl RosArm {
     /// Connects to the arm of `chain` over the transport of `settings`.
@@ -45,7 +54,7 @@ impl RosArm {
     /// # Errors
     /// The errors of [`connect`](Self::connect), and an error if this build lacks the transport.
     pub fn connect_over(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
-        let open = super::connect(settings, Endpoint::Explorer, Service::COMMON.into())?;
+        let open = super::connect(settings, Endpoint::Explorer, settings.profile.services())?;
         Self::connect(settings, chain, open)
     }
 
@@ -67,8 +76,10 @@ impl RosArm {
         let link = Link::open(connect, period, take, move || idler.idle_command())?;
         let sensor = settings.net_ft.as_ref();
         let _net_ft = sensor.map(|sensor| listen(sensor, &mailbox)).transpose()?;
-        let (chain, latched) = (chain.clone(), Mutex::default());
-        let lab = Arc::new(Self { chain, link, mailbox, latched, _net_ft });
+        let (chain, latched, engaged_by) = (chain.clone(), Mutex::default(), Mutex::default());
+        let shown = Mutex::default();
+        let lab = Arc::new(Self { chain, link, mailbox, latched, engaged_by, shown, _net_ft });
+        lab.show_frames();
         lab.wait_for_topics()?;
         lab.check_publishers()?;
         Ok(lab)
@@ -85,15 +96,49 @@ impl RosArm {
             since: Instant::now(),
             pace: RealTimePacer::new(period_s),
             still: Command { qdot: vec![0.0; self.chain.joints.len()] },
+            sent: Command::default(),
         }
     }
 
-    /// Commands the arm to rest, and checks joints and sensors.
+    /// Commands the arm to rest, sets the zero of its force/torque sensor if its driver asks for
+    /// that, and checks joints and sensors.
     ///
     /// # Errors
     /// The first check that fails.
     pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
+        if let Some(service) = self.settings().zero_wrench() {
+            let failed = |cause| Fault::Link { time_s: 0.0, cause };
+            self.call(&service).map_err(failed)?;
+        }
         check_start(&mut self.backend(), &self.chain, &self.settings().start_checks, 0)
+    }
+
+    /// Publishes a message for viewers, if this transport has its topic.
+    pub fn show(&self, packet: impl Into<Packet>) {
+        let packet = packet.into();
+        if self.settings().kind == BackendKind::Ros2 && Topic::VIEWED.contains(&packet.topic()) {
+            self.link.send(packet);
+        }
+    }
+
+    /// Publishes shapes for viewers, together with the last ones of other names.
+    pub fn show_shapes(&self, shapes: MarkerArray) {
+        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        for mut shape in shapes.markers {
+            shape.header.stamp = Time::from_s(pace::now_s());
+            match shown.markers.iter_mut().find(|other| other.ns == shape.ns) {
+                Some(other) => *other = shape,
+                None => shown.markers.push(shape),
+            }
+        }
+        self.show(shown.clone());
+    }
+
+    /// Publishes the pose of `W` in the frame of the robot's base.
+    fn show_frames(&self) {
+        let mut frames = TFMessage::of_base(self.settings().base_frame(), &self.chain.base);
+        frames.set_stamp(Time::from_s(pace::now_s()));
+        self.show(frames);
     }
 
     fn settings(&self) -> &BackendSettings {
@@ -127,7 +172,7 @@ impl RosArm {
             let is_sent = !self.link.awaits_server(service);
             if begun.elapsed().as_secs_f64() > timeout_s {
                 break match is_sent {
-                    false => format!("no server (std_srvs/srv/Trigger) found in {timeout_s} s"),
+                    false => format!("no server ({}) found in {timeout_s} s", service.type_name()),
                     true => format!(
                         "a server was found, but did not answer within {timeout_s} s; check that \
                          backend.service_mapping fits its DDS implementation"
@@ -149,7 +194,7 @@ impl RosArm {
     /// # Errors
     /// If the arm refuses.
     pub fn clear_fault(&self) -> Result<(), LinkFault> {
-        self.call(&Service::ClearFault)?;
+        self.settings().clear_fault().map_or(Ok(()), |service| self.call(&service))?;
         let mut heard = self.mailbox.latest();
         heard.refused = None;
         heard.topics.iter_mut().for_each(|state| state.stamp_s = 0.0);
@@ -170,8 +215,8 @@ impl RosArm {
                 return Err(refused.clone());
             }
             let state = |topic: &Topic| &heard.topics[*topic as usize];
-            let missing: Vec<Topic> =
-                REQUIRED_TOPICS.into_iter().filter(|topic| state(topic).at.is_none()).collect();
+            let required = self.settings().profile.topics().iter().copied();
+            let missing: Vec<Topic> = required.filter(|topic| state(topic).at.is_none()).collect();
             if missing.is_empty() {
                 return Ok(());
             }
@@ -205,10 +250,29 @@ impl RosArm {
         Err(InputError::new(words).into())
     }
 
+    /// Makes the arm accept commands.
+    fn engage(&self) -> Result<(), LinkFault> {
+        let mut refusal = Ok(());
+        for (i, service) in self.settings().engage().iter().enumerate() {
+            refusal = self.call(service);
+            if refusal.is_ok() {
+                // Later strict calls are refused, because the controller is active since the first.
+                self.engaged_by().get_or_insert(i);
+                break;
+            }
+        }
+        refusal
+    }
+
+    fn engaged_by(&self) -> MutexGuard<'_, Option<usize>> {
+        self.engaged_by.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Sends joint velocities.
     fn command(&self, qdot: &[f64]) {
-        self.mailbox.latest().commanded = Some(Instant::now());
-        self.link.send(self.mailbox.command(qdot));
+        if let Some(packet) = self.mailbox.command(qdot) {
+            self.link.send(packet);
+        }
     }
 
     /// Checks that all received messages are recent enough and permit motion.
@@ -219,7 +283,7 @@ impl RosArm {
         if let Some(words) = heard.status.as_ref().and_then(|status| status.refusal()) {
             return Err(LinkFault::Arm(words));
         }
-        for topic in REQUIRED_TOPICS {
+        for &topic in self.settings().profile.topics() {
             let topics = &self.settings().topics;
             let state = &heard.topics[topic as usize];
             if self.settings().is_on_change(topic) {
@@ -276,15 +340,16 @@ fn silent(topic: &str, age_s: f64, state: &TopicState) -> InputError {
 }
 
 impl Drop for RosArm {
-    /// Calls the hold service before commands cease, so that the arm raises no alarm.
+    /// Hands the arm back before commands cease, so that it raises no alarm.
     fn drop(&mut self) {
         let was_engaged = {
             let mut heard = self.mailbox.latest();
             heard.is_ready = false;
             std::mem::take(&mut heard.is_engaged)
         };
-        if was_engaged {
-            let _ = self.call_within(&Service::Hold, REPEAT_S);
+        let granted = self.engaged_by().take().filter(|_| was_engaged);
+        if let Some(service) = granted.and_then(|granted| self.settings().hand_back(granted)) {
+            let _ = self.call_within(&service, REPEAT_S);
         }
     }
 }
@@ -297,6 +362,8 @@ pub struct RosBackend {
     since: Instant,
     pace: RealTimePacer,
     still: Command,
+    /// The last command as sent.
+    sent: Command,
 }
 
 impl RosBackend {
@@ -305,7 +372,7 @@ impl RosBackend {
     }
 
     /// Commands zero velocity, latches a fault and returns the latched one.
-    fn fault(&self, cause: LinkFault) -> Fault {
+    fn fault(&self, mut cause: LinkFault) -> Fault {
         // Otherwise the last command would remain valid until it expires.
         self.lab.command(&self.still.qdot);
         // No command goes to an arm that was stopped by hand: even a zero velocity could release
@@ -313,6 +380,14 @@ impl RosBackend {
         if matches!(cause, LinkFault::Arm(_)) {
             let mut heard = self.lab.mailbox.latest();
             (heard.is_engaged, heard.is_ready) = (false, false);
+            drop(heard);
+            // The parts of a UR's state arrive one after another; the last one may be the reason.
+            if self.lab.settings().profile == Profile::Ur {
+                sleep(STATE_SPREAD);
+                let heard = self.lab.mailbox.latest();
+                let refusal = heard.status.as_ref().and_then(ArmStatus::refusal);
+                cause = refusal.map_or(cause, LinkFault::Arm);
+            }
         }
         let cause = self.lab.latch().get_or_insert(cause).clone();
         Fault::Link { time_s: self.time_s(), cause }
@@ -341,6 +416,14 @@ impl RosBackend {
         self.lab.check(&heard)?;
         let time_s = self.time_s();
         let dt_s = time_s - self.reading.time_s;
+        // While it plans, the arm rests.
+        if let Some(stall_s) = self.lab.link.take_stall_s().filter(|it| dt_s < it + PLANNING_S) {
+            let words = format!(
+                "this program stood still for {:.0} ms; the arm has come to rest by itself",
+                1e3 * stall_s
+            );
+            return Err(InputError::new(words).into());
+        }
         if self.reading.q.len() == heard.q.len() {
             let joints = self.lab.chain.joints.iter().zip(self.reading.q.iter().zip(&heard.q));
             for (joint, (&from, &to)) in joints {
@@ -363,6 +446,10 @@ impl RosBackend {
         Ok(())
     }
 }
+
+/// Time between two readings, beyond that of a stall, from which on the arm was at rest; a
+/// heuristic: several ticks, less than a fit.
+const PLANNING_S: f64 = 0.05;
 
 /// Tolerance of the jump detection beyond motion at a joint's speed limit, rad; a heuristic: a tick
 /// at half the fastest joint's speed.
@@ -387,7 +474,7 @@ impl Backend for RosBackend {
             heard.frames.clear();
             (heard.is_engaged, heard.is_ready) = (true, false);
         }
-        if let Err(fault) = lab.call(&Service::Unhold) {
+        if let Err(fault) = lab.engage() {
             return Err(self.fault(fault));
         }
         // Brakes are released after the first zero velocity commands.
@@ -413,14 +500,20 @@ impl Backend for RosBackend {
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
         self.latched()?;
         self.capabilities.accept(command)?;
-        self.lab.command(&command.qdot);
+        let is_stream = self.lab.settings().sends_trajectories();
+        let share = if is_stream { stoppable_share(&command.qdot) } else { 1.0 };
+        self.sent.qdot.clear();
+        self.sent.qdot.extend(command.qdot.iter().map(|qdot| qdot * share));
+        self.lab.command(&self.sent.qdot);
         self.pace.wait(1);
-        self.reading.applied.clone_from(command);
+        let scale = self.lab.mailbox.latest().speed_scale;
+        self.reading.applied.qdot.clear();
+        self.reading.applied.qdot.extend(self.sent.qdot.iter().map(|qdot| qdot * scale));
         self.read()
     }
 
     /// Calls the arm's stop service, without waiting for its answer.
     fn brake(&mut self) {
-        self.lab.link.call(Service::Stop);
+        self.lab.link.call(self.lab.settings().stop());
     }
 }

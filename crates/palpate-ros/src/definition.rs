@@ -191,6 +191,7 @@ macro_rules! messages {
     (@default $number:literal) => { $number as f64 };
     (@type bool) => { bool };
     (@type byte) => { u8 };
+    (@type int8) => { i8 };
     (@type uint8) => { u8 };
     (@type int16) => { i16 };
     (@type uint16) => { u16 };

@@ -3,7 +3,9 @@
 //! | module | content |
 //! |---|---|
 //! | [`arm`] | the arm: a [`Backend`](palpate_explore::backend::Backend) over topics |
+//! | [`profile`], [`ur`] | the drivers of arms, and where they differ |
 //! | [`topics`], [`message`] | the topics and services of an arm, and their messages |
+//! | [`view`] | messages that RViz, Foxglove and other viewers draw |
 //! | [`transport`] | sends and receives packets; [`connect`] creates one from settings |
 //! | [`server`] | a simulated robot behind the same topics, in real time |
 //! | [`recording`] | every tick of a trial as an MCAP file, and a backend that replays it |
@@ -23,12 +25,14 @@
 //! ```
 
 pub mod arm;
+mod calls;
 pub mod definition;
 pub mod joints;
 pub mod link;
 pub mod message;
 pub mod net_ft;
 pub mod network;
+pub mod profile;
 pub mod receiver;
 pub mod recording;
 #[cfg(feature = "ros1")]
@@ -41,6 +45,8 @@ pub mod status;
 pub mod tactile;
 pub mod topics;
 pub mod transport;
+pub mod ur;
+pub mod view;
 
 use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
@@ -69,9 +75,10 @@ pub fn connect(
         BackendKind::Ros1 => Ok(Box::new(move || {
             Ok(Box::new(ros1::Ros1::open(&owned, side, services)?) as Box<dyn transport::Transport>)
         })),
-        BackendKind::Simulated => Err(InputError::new(
-            "kind = \"simulated\" has no arm to connect to; allowed are \"ros2\", \"ros1\"",
-        )),
+        BackendKind::Simulated | BackendKind::Franka => Err(InputError::new(format!(
+            "kind = \"{}\" has no topics; allowed are \"ros2\", \"ros1\"",
+            settings.kind.name()
+        ))),
         #[cfg(not(all(feature = "ros1", feature = "ros2")))]
         kind => {
             drop((owned, side, services));

@@ -15,6 +15,10 @@ use std::time::{Duration, Instant};
 /// Interval for counting publishers, s; a heuristic: discovery takes longer.
 const COUNTED_S: f64 = 0.1;
 
+/// Time without a turn of the thread after which this program counts as stopped, s: an arm has come
+/// to rest by itself in that time.
+const STALL_S: f64 = 0.15;
+
 /// A send operation, run by the thread.
 type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), InputError> + Send>;
 
@@ -28,6 +32,8 @@ struct Shared {
     /// Number of known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
     broken: Mutex<Option<InputError>>,
+    /// Duration of the last stall that was not taken, s.
+    stalled_s: Mutex<Option<f64>>,
     /// Calls whose server has not been found yet.
     waiting: Mutex<Vec<Service>>,
 }
@@ -104,6 +110,12 @@ impl Link {
         lock(&self.shared.broken).clone()
     }
 
+    /// Returns the duration of the last stall of this program, s, if it is new: a signal or an
+    /// overloaded computer stopped it for longer than an arm needs to come to rest.
+    pub fn take_stall_s(&self) -> Option<f64> {
+        lock(&self.shared.stalled_s).take()
+    }
+
     fn add(&self, job: Job) {
         let mut jobs = lock(&self.shared.jobs);
         if jobs.len() == JOBS_MAX {
@@ -139,6 +151,7 @@ fn serve(
 ) {
     let mut next = Instant::now() + period;
     let mut counted = Instant::now() - Duration::from_secs(1);
+    let mut turned = Instant::now();
     while !shared.is_closed.load(Ordering::Relaxed) {
         let wait = next.saturating_duration_since(Instant::now());
         transport.receive(wait, &mut take);
@@ -155,6 +168,11 @@ fn serve(
             !is_found
         });
         let now = Instant::now();
+        let turn_s = (now - turned).as_secs_f64();
+        if turn_s > STALL_S {
+            *lock(&shared.stalled_s) = Some(turn_s);
+        }
+        turned = now;
         if now >= next {
             if let Some(packet) = idle() {
                 result = result.and(transport.send(&packet));
@@ -174,5 +192,58 @@ fn serve(
     // Pending messages are still sent at the end.
     for job in lock(&shared.jobs).drain(..) {
         let _ = job(&mut *transport);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A transport whose first wait takes much longer than asked for, as in a program that was
+    /// stopped.
+    struct Stopped(bool);
+
+    impl Transport for Stopped {
+        fn waker(&self) -> Waker {
+            Arc::new(|| ())
+        }
+
+        fn send(&mut self, _: &Packet) -> Result<(), InputError> {
+            Ok(())
+        }
+
+        fn receive(&mut self, timeout: Duration, _: &mut dyn FnMut(Delivery)) {
+            let stop = Duration::from_secs_f64(2.0 * STALL_S);
+            std::thread::sleep(if std::mem::take(&mut self.0) { stop } else { timeout });
+        }
+
+        fn publisher_count(&self, _: Topic) -> usize {
+            0
+        }
+
+        fn is_served(&mut self, _: &Service) -> bool {
+            false
+        }
+
+        fn call(&mut self, _: &Service) -> Result<(), InputError> {
+            Ok(())
+        }
+
+        fn answer(&mut self, _: &Service, _: u64, _: TriggerResponse) -> Result<(), InputError> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_stop_of_the_program_is_noticed_once() {
+        let connect: Connect = Box::new(|| Ok(Box::new(Stopped(true))));
+        let link = Link::open(connect, Duration::from_millis(4), |_| (), || None).unwrap();
+        let stalled_s = loop {
+            match link.take_stall_s() {
+                Some(stalled_s) => break stalled_s,
+                None => std::thread::sleep(Duration::from_millis(1)),
+            }
+        };
+        assert!(stalled_s >= 2.0 * STALL_S, "{stalled_s}");
     }
 }

@@ -98,6 +98,87 @@ messages! {
         float64[] data,
     }
 
+    /// A boolean.
+    #[derive(Copy)]
+    std_msgs/Bool {
+        /// Value.
+        bool data,
+    }
+
+    /// A number.
+    #[derive(Copy)]
+    std_msgs/Float64 {
+        /// Value.
+        float64 data,
+    }
+
+    /// Mode of a Universal Robots arm, by its number.
+    #[derive(Copy)]
+    ur_dashboard_msgs/RobotMode {
+        "int8 NO_CONTROLLER=-1\nint8 DISCONNECTED=0\nint8 CONFIRM_SAFETY=1\nint8 BOOTING=2\nint8 POWER_OFF=3\nint8 POWER_ON=4\nint8 IDLE=5\nint8 BACKDRIVE=6\nint8 RUNNING=7\nint8 UPDATING_FIRMWARE=8\n"
+        /// Number; 7: running.
+        int8 mode,
+    }
+
+    /// Safety mode of a Universal Robots arm, by its number.
+    #[derive(Copy)]
+    ur_dashboard_msgs/SafetyMode {
+        "uint8 NORMAL=1\nuint8 REDUCED=2\nuint8 PROTECTIVE_STOP=3\nuint8 RECOVERY=4\nuint8 SAFEGUARD_STOP=5\nuint8 SYSTEM_EMERGENCY_STOP=6\nuint8 ROBOT_EMERGENCY_STOP=7\nuint8 VIOLATION=8\nuint8 FAULT=9\nuint8 VALIDATE_JOINT_ID=10\nuint8 UNDEFINED_SAFETY_MODE=11\nuint8 AUTOMATIC_MODE_SAFEGUARD_STOP=12\nuint8 SYSTEM_THREE_POSITION_ENABLING_STOP=13\n"
+        /// Number; 1: normal.
+        uint8 mode,
+    }
+
+    /// Request to switch controllers of `ros2_control`, from ROS 2 Jazzy on.
+    controller_manager_msgs/SwitchControllerRequest {
+        "int32 BEST_EFFORT=1\nint32 STRICT=2\n"
+        /// Controllers to activate.
+        string[] activate_controllers,
+        /// Controllers to deactivate.
+        string[] deactivate_controllers,
+        /// Strictness; 1: as far as possible, 2: all or none.
+        int32 strictness,
+        /// Whether to activate as soon as the hardware is ready.
+        bool activate_asap,
+        /// Timeout; zero: none.
+        builtin_interfaces/Duration timeout,
+    }
+
+    /// The same request in ROS 2 Humble.
+    controller_manager_msgs/SwitchControllerHumbleRequest {
+        "int32 BEST_EFFORT=1\nint32 STRICT=2\n"
+        /// Controllers to activate.
+        string[] activate_controllers,
+        /// Controllers to deactivate.
+        string[] deactivate_controllers,
+        /// Empty.
+        string[] start_controllers,
+        /// Empty.
+        string[] stop_controllers,
+        /// Strictness; 1: as far as possible, 2: all or none.
+        int32 strictness,
+        /// False.
+        bool start_asap,
+        /// Whether to activate as soon as the hardware is ready.
+        bool activate_asap,
+        /// Timeout; zero: none.
+        builtin_interfaces/Duration timeout,
+    }
+
+    /// Response of a switch of controllers, from ROS 2 Jazzy on.
+    controller_manager_msgs/SwitchControllerResponse {
+        /// Whether the controllers were switched.
+        bool ok,
+        /// Description.
+        string message,
+    }
+
+    /// The same response in ROS 2 Humble.
+    #[derive(Copy)]
+    controller_manager_msgs/SwitchControllerHumbleResponse {
+        /// Whether the controllers were switched.
+        bool ok,
+    }
+
     /// Data of one finger, in counts.
     biotac_sensors/BioTacData {
         /// Serial number.
@@ -417,8 +498,12 @@ impl From<Point3<f64>> for Point {
 /// Shape of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
+    /// An arrow from the first to the second point; its size is the diameter of the shaft.
+    Arrow = 0,
     /// Points joined by a line.
     LineStrip = 4,
+    /// A line per two points.
+    LineList = 5,
     /// One ball per point.
     SphereList = 7,
     /// One triangle per three points.

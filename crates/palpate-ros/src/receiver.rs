@@ -6,8 +6,9 @@ use super::message::{Time, TriggerResponse};
 use super::settings::{BackendSettings, CLOCK_AHEAD_S};
 use super::status::ArmStatus;
 use super::tactile;
-use super::topics::{Service, Topic};
+use super::topics::{Endpoint, Service, Topic};
 use super::transport::{Delivery, Packet};
+use super::ur::{TrajectoryStream, UrState};
 use palpate_explore::backend::{LinkFault, Wrench, pace};
 use palpate_explore::robot::finger::Frame;
 use palpate_input::error::InputError;
@@ -35,6 +36,12 @@ pub struct LatestMessages {
     pub frames: VecDeque<Frame>,
     /// State of the arm.
     pub status: Option<ArmStatus>,
+    /// The same as received from a UR.
+    pub ur: UrState,
+    /// Speed of the arm as a fraction of the commanded one.
+    pub speed_scale: f64,
+    /// Stream of trajectories, if commands are sent so.
+    pub stream: TrajectoryStream,
     /// Reception state of each topic.
     pub topics: [TopicState; Topic::ALL.len()],
     /// Fault of the first refused message; it ends the run.
@@ -84,7 +91,8 @@ pub struct TopicReceiver {
 impl TopicReceiver {
     /// Creates a receiver without messages.
     pub fn new(names: JointNames, settings: BackendSettings) -> Self {
-        let heard = LatestMessages { since: Some(Instant::now()), ..LatestMessages::default() };
+        let since = Some(Instant::now());
+        let heard = LatestMessages { since, speed_scale: 1.0, ..LatestMessages::default() };
         Self { names, settings, heard: Mutex::new(heard) }
     }
 
@@ -109,26 +117,40 @@ impl TopicReceiver {
     /// Returns a zero velocity command if the arm is engaged and there was no other command
     /// recently.
     pub fn idle_command(&self) -> Option<Packet> {
+        // A trajectory ends at rest by itself.
+        if self.settings.sends_trajectories() {
+            return None;
+        }
         let heard = self.latest();
         let silent_s = SILENT_PERIODS / self.settings.rate_hz;
         let is_silent = heard.commanded.is_none_or(|last| last.elapsed().as_secs_f64() >= silent_s);
-        let still = || self.command(&vec![0.0; self.names.names().len()]);
+        let still = || self.velocities(&vec![0.0; self.names.names().len()]);
         (heard.is_engaged && is_silent).then(still)
     }
 
-    /// Returns the packet that commands joint velocities, stamped with the current time.
-    pub fn command(&self, qdot: &[f64]) -> Packet {
+    /// Returns the packet that commands joint velocities, if one is due.
+    pub fn command(&self, qdot: &[f64]) -> Option<Packet> {
+        let heard = &mut *self.latest();
+        let now = Instant::now();
+        heard.commanded = Some(now);
+        match self.settings.sends_trajectories() {
+            true => heard.stream.next(qdot, &heard.q, heard.speed_scale, now, &self.names),
+            false => Some(self.velocities(qdot)),
+        }
+    }
+
+    fn velocities(&self, qdot: &[f64]) -> Packet {
         self.names.command(pace::now_s(), qdot, &self.settings.topics.command)
     }
 
     fn take_packet(&self, mut packet: Packet, received: Instant) {
         let topic = packet.topic();
         let is_other = topic == Topic::Wrench && self.settings.net_ft.is_some();
-        if is_other || topic == Topic::Command {
+        if is_other || topic.publisher() == Endpoint::Explorer {
             return;
         }
         let heard = &mut *self.latest();
-        let stamp = packet.stamp_mut().copied().unwrap_or_default();
+        let stamp = packet.stamp_mut().copied();
         if let Err(fault) = self.read(heard, &packet, stamp, received) {
             if matches!(fault, LinkFault::Arm(_)) {
                 (heard.is_engaged, heard.is_ready) = (false, false);
@@ -142,7 +164,7 @@ impl TopicReceiver {
         &self,
         heard: &mut LatestMessages,
         packet: &Packet,
-        stamp: Time,
+        stamp: Option<Time>,
         received: Instant,
     ) -> Result<(), LinkFault> {
         let topic = packet.topic();
@@ -168,7 +190,11 @@ impl TopicReceiver {
                 return Ok(());
             }
         }
-        let is_timely = self.is_timely(state, topic, stamp);
+        if heard.ur.read(packet) {
+            status = heard.ur.status();
+        }
+        // A message without a header is as old as its receipt.
+        let is_timely = stamp.map_or(Ok(true), |stamp| self.is_timely(state, topic, stamp));
         if let Some(status) = &status {
             // A fault that only an operator can clear counts regardless of its stamp.
             let is_read = status.needs_operator() || is_timely.clone()?;
@@ -194,7 +220,17 @@ impl TopicReceiver {
                 }
                 heard.wrench = Some(wrench);
             }
-            Packet::Status(_) => heard.status = status,
+            Packet::Status(_)
+            | Packet::RobotMode(_)
+            | Packet::SafetyMode(_)
+            | Packet::ProgramRunning(_) => heard.status = status,
+            Packet::SpeedScaling(message) => {
+                let scale = 0.01 * message.data;
+                if !(0.0..=1.0).contains(&scale) {
+                    return Err(refuse(format!("{} percent", message.data)));
+                }
+                heard.speed_scale = scale;
+            }
             Packet::Hand(_) | Packet::Fingers(_) => {
                 let since_s = |since| received.saturating_duration_since(since).as_secs_f64();
                 let time_s = heard.since.map_or(0.0, since_s);
@@ -209,7 +245,11 @@ impl TopicReceiver {
                 }
                 heard.frames.push_back(frame);
             }
-            Packet::Command(_) | Packet::Velocities(_) => return Ok(()),
+            Packet::Command(_)
+            | Packet::Velocities(_)
+            | Packet::Markers(_)
+            | Packet::Points(_)
+            | Packet::Frames(_) => return Ok(()),
         }
         heard.topics[topic as usize].at = Some(received);
         Ok(())

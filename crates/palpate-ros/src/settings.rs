@@ -2,7 +2,8 @@
 
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
-use super::topics::{Topic, Topics};
+use super::profile::{Profile, Release};
+use super::topics::{CommandMessage, Topic, Topics};
 use palpate_explore::backend::interlock::{FORMER_KEYS, InterlockSettings, StartCheckSettings};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
@@ -21,6 +22,8 @@ pub enum BackendKind {
     Ros2,
     /// A real or simulated arm behind ROS 1 topics.
     Ros1,
+    /// A Franka FR3 by the Franka Control Interface.
+    Franka,
 }
 
 impl BackendKind {
@@ -30,6 +33,7 @@ impl BackendKind {
             Self::Simulated => "simulated",
             Self::Ros2 => "ros2",
             Self::Ros1 => "ros1",
+            Self::Franka => "franka",
         }
     }
 }
@@ -55,6 +59,20 @@ pub enum MappingKind {
 pub struct BackendSettings {
     /// Kind of backend: simulated, or an arm behind ROS topics.
     pub kind: BackendKind,
+    /// Driver of the arm: `palpate` for one as in the guide "Your robot", `ur` for
+    /// `ur_robot_driver`.
+    pub profile: Profile,
+    /// ROS 2 release of `ur_robot_driver`, which decides the layout of its services.
+    pub release: Release,
+    /// Time after which a watchdog of the laboratory stops the arm when velocities cease, s;
+    /// required for velocities to `ur_robot_driver`, which has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub watchdog_s: Option<f64>,
+    /// Address of the control box of a Franka arm, e.g. `"172.16.0.2"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub address: Option<String>,
+    /// Whether a Franka arm is refused without a real-time kernel.
+    pub realtime: bool,
     /// ROS 2 domain; default: the environment's `ROS_DOMAIN_ID`, or 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub domain: Option<u16>,
@@ -66,6 +84,10 @@ pub struct BackendSettings {
     pub service_mapping: MappingKind,
     /// Address of the ROS 1 master.
     pub master: String,
+    /// Frame of the robot's base for viewers, in which the pose of `W` is published; default:
+    /// `base_link`, with `profile = "ur"` `base`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub base_frame: Option<String>,
     /// Joint names in messages, from the base on; default: the manufacturer's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
@@ -99,16 +121,26 @@ pub const DOMAIN_MAX: u16 = 232;
 /// Largest rate: the cycle of the PA-10's servo driver, 2 ms (`hydro`, Orca robotics).
 const RATE_MAX_HZ: f64 = 500.0;
 
+/// Largest time in which an arm without commands must come to rest.
+// heuristic: at 0.1 m/s the tip moves 15 mm.
+const WATCHDOG_MAX_S: f64 = 0.15;
+
 impl Default for BackendSettings {
     /// Returns the defaults; all are heuristics, except the rate, which is the usual rate of joint
     /// states.
     fn default() -> Self {
         Self {
             kind: BackendKind::Simulated,
+            profile: Profile::Palpate,
+            release: Release::Jazzy,
+            watchdog_s: None,
+            address: None,
+            realtime: true,
             domain: None,
             interfaces: Vec::new(),
             service_mapping: MappingKind::Auto,
             master: "http://127.0.0.1:11311".into(),
+            base_frame: None,
             joints: Vec::new(),
             finger: 0,
             rate_hz: 250.0,
@@ -193,9 +225,24 @@ impl BackendSettings {
         }
     }
 
-    /// Whether messages of `topic` are sent on change only.
+    /// Whether messages of `topic` are sent on change only, and kept for later readers.
     pub fn is_on_change(&self, topic: Topic) -> bool {
-        topic == Topic::Status && self.status_on_change
+        match topic {
+            Topic::Status => self.status_on_change,
+            Topic::RobotMode | Topic::SafetyMode | Topic::ProgramRunning => true,
+            Topic::Markers | Topic::Points | Topic::Frames => true,
+            _ => false,
+        }
+    }
+
+    /// Whether commands are trajectories that end at rest.
+    pub fn sends_trajectories(&self) -> bool {
+        self.profile == Profile::Ur && self.topics.command.message == CommandMessage::Trajectory
+    }
+
+    /// Returns the frame of the robot's base for viewers.
+    pub fn base_frame(&self) -> &str {
+        self.base_frame.as_deref().unwrap_or(self.profile.base_frame())
     }
 
     /// Returns the names that the joints of `chain` have in messages.
@@ -212,11 +259,29 @@ impl Validate for BackendSettings {
         if let Some(domain) = self.domain {
             rules.number("domain", domain.into(), 0.0..=DOMAIN_MAX.into());
         }
+        let is_named = self.kind != BackendKind::Franka || self.address.is_some();
+        rules.require("address", "missing", is_named, || {
+            "the address of the control box, e.g. \"172.16.0.2\"".into()
+        });
         let is_address = self.master.starts_with("http://") && self.master.len() > 7;
         rules.require("master", format!("\"{}\"", self.master), is_address, || {
             "an address, e.g. \"http://127.0.0.1:11311\"".into()
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
+        if self.profile == Profile::Ur {
+            let is_ros1 = self.kind == BackendKind::Ros1;
+            rules.require("profile", "\"ur\"", !is_ros1, || "\"palpate\" over ROS 1".into());
+            let velocities = self.topics.command.message == CommandMessage::Velocities;
+            let is_safe = !velocities || self.watchdog_s.is_some();
+            rules.require("topics.command.type", "std_msgs/msg/Float64MultiArray", is_safe, || {
+                "trajectory_msgs/msg/JointTrajectory, unless backend.watchdog_s says after which \
+                 time a watchdog stops the arm: the driver keeps the last velocity for ever"
+                    .into()
+            });
+        }
+        if let Some(watchdog_s) = self.watchdog_s {
+            rules.number("watchdog_s", watchdog_s, 0.01..=WATCHDOG_MAX_S);
+        }
         rules.number("connect_timeout_s", self.connect_timeout_s, 0.1..=600.0);
         for (i, name) in self.joints.iter().enumerate() {
             let is_new = !name.is_empty() && !self.joints[..i].contains(name);

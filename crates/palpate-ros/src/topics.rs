@@ -2,9 +2,10 @@
 
 use super::definition::HasDefinition;
 use super::message::{
-    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
-    WrenchStamped,
+    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
+    JointTrajectory, RobotMode, SafetyMode, WrenchStamped,
 };
+use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,8 +21,22 @@ pub enum Topic {
     Tactile,
     /// State of the arm.
     Status,
-    /// Joint velocity commands to the arm.
+    /// Commands to the arm.
     Command,
+    /// Mode of a Universal Robots arm.
+    RobotMode,
+    /// Its safety mode.
+    SafetyMode,
+    /// Whether it runs the driver's program.
+    ProgramRunning,
+    /// Its speed as a fraction of the commanded one.
+    SpeedScaling,
+    /// Shapes for viewers: belief, contacts, next approach, limits.
+    Markers,
+    /// Points of the believed surface with their standard deviation, for viewers.
+    Points,
+    /// Pose of `W` in the frame of the robot's base, for viewers.
+    Frames,
 }
 
 /// Side of the topics: explorer or arm.
@@ -34,20 +49,55 @@ pub enum Endpoint {
 }
 
 impl Topic {
-    /// All topics, in the order of the table.
-    pub const ALL: [Self; 5] =
+    /// All topics.
+    pub const ALL: [Self; 12] = [
+        Self::Joints,
+        Self::Wrench,
+        Self::Tactile,
+        Self::Status,
+        Self::Command,
+        Self::RobotMode,
+        Self::SafetyMode,
+        Self::ProgramRunning,
+        Self::SpeedScaling,
+        Self::Markers,
+        Self::Points,
+        Self::Frames,
+    ];
+
+    /// Topics of the explorer for viewers.
+    pub const VIEWED: [Self; 3] = [Self::Markers, Self::Points, Self::Frames];
+
+    /// Topics with settings in `[backend.topics]`.
+    pub const SET: [Self; 5] =
         [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command];
 
     /// Returns the side that publishes the topic.
     pub fn publisher(self) -> Endpoint {
-        if self == Self::Command { Endpoint::Explorer } else { Endpoint::Arm }
+        match self {
+            Self::Command | Self::Markers | Self::Points | Self::Frames => Endpoint::Explorer,
+            _ => Endpoint::Arm,
+        }
     }
 
-    /// Returns the topic's key in `[backend.topics]`.
+    /// Returns the topic's key in `[backend.topics]`, if it has settings there.
     pub fn key(self) -> &'static str {
-        ["joints", "wrench", "tactile", "status", "command"][self as usize]
+        let keys = ["joints", "wrench", "tactile", "status", "command"];
+        keys.get(self as usize).copied().unwrap_or_default()
     }
 }
+
+/// Names and age limits, s, of the topics without settings: first those of `ur_robot_driver`.
+// heuristic: the age limit of the only one that is published periodically, at 100 Hz.
+const FIXED: [(&str, f64); 7] = [
+    ("io_and_status_controller/robot_mode", f64::INFINITY),
+    ("io_and_status_controller/safety_mode", f64::INFINITY),
+    ("io_and_status_controller/robot_program_running", f64::INFINITY),
+    ("speed_scaling_state_broadcaster/speed_scaling", 0.2),
+    ("/palpate/markers", f64::INFINITY),
+    ("/palpate/points", f64::INFINITY),
+    ("/tf_static", f64::INFINITY),
+];
 
 /// Default name and age limit, s, of each topic, as used by drivers (`pa10_hardware_interface`,
 /// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`).
@@ -72,10 +122,11 @@ pub enum TactileMessage {
     Fingers,
 }
 
-/// Message type of velocity commands.
+/// Message type of commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum CommandMessage {
-    /// Trajectory point with names, stamp and validity.
+    /// A point of velocities with names, stamp and validity; with `profile = "ur"` a short
+    /// trajectory of positions that ends at rest.
     #[default]
     #[serde(rename = "trajectory_msgs/msg/JointTrajectory")]
     Trajectory,
@@ -146,6 +197,7 @@ impl Topics {
             Topic::Tactile => (&self.tactile.name, self.tactile.max_age_s),
             Topic::Status => (&self.status.name, self.status.max_age_s),
             Topic::Command => (&self.command.name, self.command.max_age_s),
+            other => FIXED[other as usize - USUAL.len()],
         }
     }
 
@@ -176,6 +228,13 @@ impl Topics {
                 CommandMessage::Trajectory => JointTrajectory::DEFINITION.name,
                 CommandMessage::Velocities => Float64MultiArray::DEFINITION.name,
             },
+            Topic::RobotMode => RobotMode::DEFINITION.name,
+            Topic::SafetyMode => SafetyMode::DEFINITION.name,
+            Topic::ProgramRunning => Bool::DEFINITION.name,
+            Topic::SpeedScaling => Float64::DEFINITION.name,
+            Topic::Markers => MarkerArray::DEFINITION.name,
+            Topic::Points => PointCloud2::DEFINITION.name,
+            Topic::Frames => TFMessage::DEFINITION.name,
         }
     }
 
@@ -190,7 +249,18 @@ impl Topics {
     }
 }
 
-/// A service of the arm, without arguments (`std_srvs/Trigger`).
+/// Switch of controllers of `ros2_control`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+pub struct Switch {
+    /// Controllers to activate.
+    pub activate: Vec<String>,
+    /// Controllers to deactivate.
+    pub deactivate: Vec<String>,
+    /// Whether all are switched or none; otherwise as many as possible.
+    pub is_strict: bool,
+}
+
+/// A call of a service of the arm: `std_srvs/Trigger`, except for a switch of controllers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Service {
@@ -204,19 +274,36 @@ pub enum Service {
     ClearFault,
     /// Sets the zero of the force/torque sensor to its current value.
     Bias,
+    /// The same for a Universal Robots arm.
+    ZeroFtSensor,
+    /// Switches controllers of `ros2_control`.
+    SwitchController(Switch),
     /// Starts or ends a failure by its name; supported by a simulated robot only.
     Twin(&'static str),
 }
 
 impl Service {
-    /// Services of every arm.
+    /// Services of an arm with a driver for Palpate.
     pub const COMMON: [Self; 5] =
         [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
 
     /// Whether the call is idempotent: false for a bias, which may be taken under load the second
-    /// time, and for an injected failure, which a second call ends.
+    /// time, for an injected failure, which a second call ends, and for a strict switch, which
+    /// fails if nothing is left to do.
     pub fn is_idempotent(&self) -> bool {
-        matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
+        match self {
+            Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault => true,
+            Self::SwitchController(switch) => !switch.is_strict,
+            Self::Bias | Self::ZeroFtSensor | Self::Twin(_) => false,
+        }
+    }
+
+    /// Returns the service's type.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::SwitchController(_) => "controller_manager_msgs/srv/SwitchController",
+            _ => "std_srvs/srv/Trigger",
+        }
     }
 
     /// Returns the service's name for an arm with this namespace.
@@ -227,6 +314,10 @@ impl Service {
             Self::Stop => format!("{namespace}/stop"),
             Self::ClearFault => format!("{namespace}/clear_fault"),
             Self::Bias => "/ft_sensor/bias".into(),
+            Self::ZeroFtSensor => format!("{namespace}/io_and_status_controller/zero_ftsensor"),
+            Self::SwitchController(_) => {
+                format!("{namespace}/controller_manager/switch_controller")
+            }
             Self::Twin(name) => format!("/twin/{name}"),
         }
     }
@@ -238,12 +329,14 @@ impl Validate for Topics {
         rules.require(
             "namespace",
             format!("{namespace:?}"),
-            namespace.is_none_or(|name| name.starts_with('/') && !name.ends_with('/')),
-            || "a name that begins with a slash".into(),
+            namespace.is_none_or(|name| {
+                name.is_empty() || name.starts_with('/') && !name.ends_with('/')
+            }),
+            || "a name that begins with a slash, or \"\" for none".into(),
         );
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
-        let names = Topic::ALL.map(|topic| self.name(topic));
-        for (i, topic) in Topic::ALL.into_iter().enumerate() {
+        let names = Topic::SET.map(|topic| self.name(topic));
+        for (i, topic) in Topic::SET.into_iter().enumerate() {
             let (name, max_age_s) = self.entry(topic);
             let is_name = !name.is_empty() && !name.ends_with('/') && name.chars().all(is_plain);
             let key = format!("{}.name", topic.key());

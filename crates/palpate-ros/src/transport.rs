@@ -1,10 +1,11 @@
 //! Packets, and the transports that carry them: ROS 2, ROS 1, or a channel for tests.
 
 use super::message::{
-    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory, Time,
-    TriggerResponse, WrenchStamped,
+    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
+    JointTrajectory, RobotMode, SafetyMode, Time, TriggerResponse, WrenchStamped,
 };
 use super::topics::{Service, Topic};
+use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::error::InputError;
 use std::time::{Duration, Instant};
 
@@ -59,8 +60,22 @@ packets! {
     Fingers(Box<BiotacAll>): BiotacAll on Tactile,
     /// State of the arm.
     Status(DiagnosticArray): DiagnosticArray on Status,
-    /// Joint velocities with names and validity.
+    /// Mode of a Universal Robots arm.
+    RobotMode(RobotMode): RobotMode on RobotMode,
+    /// Its safety mode.
+    SafetyMode(SafetyMode): SafetyMode on SafetyMode,
+    /// Whether it runs the driver's program.
+    ProgramRunning(Bool): Bool on ProgramRunning,
+    /// Its speed, in percent of the commanded one.
+    SpeedScaling(Float64): Float64 on SpeedScaling,
+    /// Joint velocities with names and validity, or a trajectory of joint positions.
     Command(JointTrajectory): JointTrajectory on Command,
+    /// Shapes for viewers.
+    Markers(Box<MarkerArray>): MarkerArray on Markers,
+    /// Points for viewers.
+    Points(Box<PointCloud2>): PointCloud2 on Points,
+    /// Frames for viewers.
+    Frames(TFMessage): TFMessage on Frames,
     /// Joint velocities for `ros_control`.
     Velocities(Float64MultiArray): Float64MultiArray on Command,
 }
@@ -75,7 +90,14 @@ impl Packet {
             Self::Fingers(message) => &mut message.header,
             Self::Status(message) => &mut message.header,
             Self::Command(message) => &mut message.header,
-            Self::Velocities(_) => return None,
+            Self::RobotMode(_)
+            | Self::SafetyMode(_)
+            | Self::ProgramRunning(_)
+            | Self::SpeedScaling(_)
+            | Self::Markers(_)
+            | Self::Points(_)
+            | Self::Frames(_)
+            | Self::Velocities(_) => return None,
         };
         Some(&mut header.stamp)
     }

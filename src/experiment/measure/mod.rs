@@ -148,7 +148,10 @@ pub const VERIFICATION_RMSE: Measure =
 pub const VERIFICATION_COVERAGE: Measure =
     measure(Undirected, "verification_coverage", "coverage of verification touches", SHARE).from(
         Source::Trial(|row, n| {
-            coverage(predicted(row, n)?.map(|(error, sd)| (error, [-BAND_95 * sd, BAND_95 * sd])))
+            coverage(verified(row, n)?.filter_map(|touch| {
+                let of_sd_m = |sd_m: f64| [-BAND_95 * sd_m, BAND_95 * sd_m];
+                Some((touch.error_m?, touch.band_m.or(touch.sd_m.map(of_sd_m))?))
+            }))
         }),
     );
 

@@ -1,5 +1,6 @@
 //! Belief and contacts as shapes for viewers.
 
+use nalgebra::Point3;
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::task::Zone;
 use palpate_explore::task::zone::grid_triangles;
@@ -30,10 +31,18 @@ const CONTACT: ColorRGBA = ColorRGBA { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 // heuristic: sufficient for display, in a tenth of the time of a belief's own mesh.
 const CELLS: u32 = 28;
 
-/// Returns the mean surface in `W`, coloured by standard deviation, and the contacts as the belief
-/// has them. Over a zone it is drawn where a surface is likely, over an interval as a line. Before
-/// the first fit both are empty.
-pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
+/// The belief as viewers draw it, in `W`.
+pub(super) struct BelievedShape {
+    /// Mean surface, coloured by standard deviation, and the contacts as the belief has them.
+    pub markers: [Marker; 2],
+    /// Points of the surface with their standard deviation, m.
+    pub points: Vec<(Point3<f64>, f64)>,
+}
+
+/// Returns the belief's shape. Over a zone it is drawn where a surface is likely, over an interval
+/// as a line. Before the first fit it is empty.
+pub(super) fn shape(belief: &Belief) -> BelievedShape {
+    let mut cloud = Vec::new();
     let is_line = belief.height_field().is_some_and(|field| field.zone().z_m.is_none());
     let shape = if is_line { Shape::LineStrip } else { Shape::TriangleList };
     // Corners of triangles are absolute, so they have no size.
@@ -44,7 +53,7 @@ pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
         Belief::HeightField(field) => {
             if let Some(posterior) = field.surface() {
                 let zone = field.zone();
-                draw(zone, field, posterior, &mut surface);
+                cloud = draw(zone, field, posterior, &mut surface);
                 let seen = posterior.observations();
                 let point = |(i, &height): (usize, &f64)| {
                     zone.point(&seen.place(i).collect::<Vec<_>>(), height).into()
@@ -56,7 +65,9 @@ pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
             if let Some(believed) = belief.surface() {
                 contacts.points = belief.contacts().map(|p_w| (*p_w).into()).collect();
                 if let Some(mesh) = believed.mesh(CELLS) {
-                    let colours = colours(&believed.offsets_m(mesh.vertices()));
+                    let sds_m = believed.offsets_m(mesh.vertices());
+                    let colours = colours(&sds_m);
+                    cloud = mesh.vertices().iter().copied().zip(sds_m).collect();
                     let corners = mesh.triangles().iter().flatten().map(|&corner| corner as usize);
                     let corner = |at: usize| (Point::from(mesh.vertices()[at]), colours[at]);
                     (surface.points, surface.colors) = corners.map(corner).unzip();
@@ -64,7 +75,7 @@ pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
             }
         }
     }
-    [surface, contacts]
+    BelievedShape { markers: [surface, contacts], points: cloud }
 }
 
 /// Returns the colour of each standard deviation.
@@ -84,16 +95,23 @@ fn colours(sds: &[f64]) -> Vec<ColorRGBA> {
     sds.iter().map(colour).collect()
 }
 
-fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut Marker) {
+/// Draws the surface over a zone; returns its points with their standard deviation.
+fn draw(
+    zone: &Zone,
+    belief: &HeightField,
+    posterior: &Posterior,
+    surface: &mut Marker,
+) -> Vec<(Point3<f64>, f64)> {
     let places = zone.grid(PER_SIDE);
     let known = belief.surface_evidence().silhouette().is_likely(places.iter().map(Vec::as_slice));
     let predictions = posterior.predict(places.iter().map(Vec::as_slice));
     let sds: Vec<f64> =
         predictions.iter().map(|prediction| prediction.variance.max(0.0).sqrt()).collect();
     let colors = colours(&sds);
-    let points: Vec<Point> = (places.iter().zip(&predictions))
-        .map(|(place, prediction)| zone.point(place, prediction.mean).into())
+    let points_w: Vec<Point3<f64>> = (places.iter().zip(&predictions))
+        .map(|(place, prediction)| zone.point(place, prediction.mean))
         .collect();
+    let points: Vec<Point> = points_w.iter().map(|p_w| (*p_w).into()).collect();
     let order: Vec<usize> = match zone.z_m {
         None => (0..PER_SIDE).filter(|&i| known[i]).collect(),
         Some(_) => grid_triangles(PER_SIDE)
@@ -103,4 +121,6 @@ fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut 
     };
     surface.points = order.iter().map(|&i| points[i]).collect();
     surface.colors = order.iter().map(|&i| colors[i]).collect();
+    let all = points_w.into_iter().zip(sds).zip(known);
+    all.filter(|(_, known)| *known).map(|(point, _)| point).collect()
 }

@@ -7,19 +7,23 @@ pub mod recorded_trial;
 pub mod replay;
 pub mod row;
 mod verification;
+pub mod view;
 
 pub(super) use oracle::{GroundTruth, OracleFactory};
 
+use self::belief_shape::{BelievedShape, shape};
 use self::row::{TouchRow, TrialRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
-use palpate_explore::planner::{self, PlannerFactory};
+use palpate_explore::planner::{self, Fallback, Plan, PlannerFactory};
 use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::task::{Approach, Target, Task};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
+use std::cell::OnceCell;
 
 /// A finished touch.
 pub struct FinishedTouch<'a> {
@@ -31,11 +35,51 @@ pub struct FinishedTouch<'a> {
     pub row: &'a TouchRow,
     /// Belief that includes the touch.
     pub belief: &'a Belief,
+    /// The belief's shape, once a viewer or a recording has asked for it.
+    shape: OnceCell<BelievedShape>,
 }
 
-/// Callback after every touch of a trial, before the next is planned. It cannot change the row, but
-/// a fault that it returns ends the trial.
-pub type TrialObserver<'a> = dyn FnMut(&FinishedTouch) -> Result<(), Fault> + 'a;
+impl FinishedTouch<'_> {
+    /// Returns the belief as viewers draw it.
+    fn shape(&self) -> &BelievedShape {
+        self.shape.get_or_init(|| shape(self.belief))
+    }
+}
+
+/// A touch that is about to be made.
+pub struct NextTouch<'a> {
+    /// Number of the touch, from 1.
+    pub count: u32,
+    /// Target.
+    pub target: &'a Target,
+    /// Path of the fingertip.
+    pub approach: &'a Approach,
+    /// Belief before the touch.
+    pub belief: &'a Belief,
+}
+
+/// A moment of a trial.
+pub enum TrialEvent<'a> {
+    /// A touch is planned, and not begun.
+    Next(&'a NextTouch<'a>),
+    /// A touch is finished, and the next is not planned.
+    Finished(&'a FinishedTouch<'a>),
+}
+
+impl TrialEvent<'_> {
+    /// Returns the number of the touch, from 1.
+    pub fn count(&self) -> u32 {
+        match self {
+            Self::Next(next) => next.count,
+            Self::Finished(touched) => touched.count,
+        }
+    }
+}
+
+/// Callback at every moment of a trial. A fault that it returns ends the trial. After
+/// [`TrialEvent::Next`] it may return another target, an operator's; otherwise it cannot change the
+/// row.
+pub type TrialObserver<'a> = dyn FnMut(&TrialEvent) -> Result<Option<Target>, Fault> + 'a;
 
 /// Runs one trial of a planner from start to end with the touches of `probe`; calls `observer`
 /// after each.
@@ -84,16 +128,15 @@ fn run_touches(
     for count in 1..=experiment.touches {
         let is_start = count <= experiment.initial_touches;
         let plan = if is_start { start.plan(&belief) } else { planner.plan(&belief) };
-        let plan = plan.map_err(|error| format!("touch {count}: {error}"))?;
-        let is_inside = task.region().contains(&plan.target);
-        let Some(approach) = task.approach(&plan.target).filter(|_| is_inside) else {
-            let target = plan.target.numbers();
-            let beyond = match task.ball() {
-                None => "outside the zone",
-                Some(_) => "outside the ball, or unreachable",
-            };
-            return Err(format!("touch {count}: planned at {target:?}, {beyond}"));
-        };
+        let mut plan = plan.map_err(|error| format!("touch {count}: {error}"))?;
+        let mut approach = approach_to(task, &plan.target, count)?;
+        let (target, believed) = (&plan.target, &belief);
+        let next = NextTouch { count, target, approach: &approach, belief: believed };
+        let other = observer(&TrialEvent::Next(&next));
+        if let Some(other) = other.map_err(|fault| format!("touch {count}: {fault}"))? {
+            approach = approach_to(task, &other, count)?;
+            plan = Plan { target: other, sd_m: None, fallback: Some(Fallback::Operator) };
+        }
         let touch = probe.touch(&approach).map_err(|fault| format!("touch {count}: {fault}"))?;
         let swept = probe.swept_volume();
         belief.observe(&plan.target, &approach, (&touch, swept.as_ref()));
@@ -121,13 +164,34 @@ fn run_touches(
             true => evaluate(experiment, truth, &mut belief, (count, &mut touch_row)),
             false => Ok(()),
         };
-        let touched = FinishedTouch { count, touch: &touch, row: &touch_row, belief: &belief };
-        let observed = observer(&touched);
+        let touched = FinishedTouch {
+            count,
+            touch: &touch,
+            row: &touch_row,
+            belief: &belief,
+            shape: OnceCell::new(),
+        };
+        let observed = observer(&TrialEvent::Finished(&touched));
         row.touches.push(touch_row);
         fitted.map_err(|error| format!("fit after touch {count}: {error}"))?;
         observed.map_err(|fault| format!("touch {count}: {fault}"))?;
     }
     verify(experiment, task, &belief, probe, row)
+}
+
+/// Returns the approach to the target of touch `count`.
+///
+/// # Errors
+/// If the region does not contain the target, or the finger cannot reach it.
+fn approach_to(task: &Task, target: &Target, count: u32) -> Result<Approach, String> {
+    let is_inside = task.region().contains(target);
+    task.approach(target).filter(|_| is_inside).ok_or_else(|| {
+        let beyond = match task.ball() {
+            None => "outside the zone",
+            Some(_) => "outside the ball, or unreachable",
+        };
+        format!("touch {count}: planned at {:?}, {beyond}", target.numbers())
+    })
 }
 
 /// Fits the belief after `count` touches and writes it, with its errors, to the last touch's row.

@@ -2,9 +2,8 @@
 
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
-use crate::experiment::trial::belief_shape::shapes;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use crate::experiment::trial::{FinishedTouch, TrialObserver};
+use crate::experiment::trial::{TrialEvent, TrialObserver, view};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::PlannerFactory;
@@ -12,6 +11,7 @@ use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
 use palpate_explore::task::Approach;
 use palpate_ros::recording::{self, Recording, RecordingBackend, RecordingMetadata, TrialEnd};
+use palpate_ros::view::TFMessage;
 use std::iter;
 use std::path::{Path, PathBuf};
 
@@ -80,15 +80,27 @@ fn record(
         capabilities: body.capabilities().clone(),
     };
     let recording = Recording::create(path, &about)?;
+    let settings = &simulation.experiment().backend;
+    let base = simulation.environment().chain().map(|chain| chain.base).unwrap_or_default();
+    recording.show_frames(&TFMessage::of_base(settings.base_frame(), &base))?;
+    recording.show(0.0, &[view::limits(simulation)])?;
     for (row, count) in made.iter().zip(1..) {
-        recording.touched(&recorded(row, count)?, Default::default())?;
+        recording.touched(&recorded(row, count)?)?;
     }
     let recorder = RecordingBackend::new(body, recording.clone());
     let mut servo = simulation.servo(Box::new(recorder), seed)?;
-    let mut is_interrupted = false;
-    let mut record = |touched: &FinishedTouch| {
+    let (mut is_interrupted, mut last_s) = (false, 0.0);
+    let mut record = |event: &TrialEvent| {
         // A touch that ends the trial is recorded, too.
-        let observed = observer(touched);
+        let observed = observer(event);
+        let touched = match event {
+            TrialEvent::Next(next) => {
+                recording.show(last_s, &[view::approach(next)])?;
+                return observed;
+            }
+            TrialEvent::Finished(touched) => touched,
+        };
+        last_s = touched.row.time_s.unwrap_or_default();
         is_interrupted |= observed.is_err();
         if touched.count as usize <= made.len() {
             return observed;
@@ -97,7 +109,8 @@ fn record(
         if let Touch::Contact(contact) = touched.touch {
             touch.normal = contact.normal_w.as_slice().into();
         }
-        recording.touched(&touch, shapes(touched.belief))?;
+        recording.show(touch.time_s, &touched.shape().markers)?;
+        recording.touched(&touch)?;
         observed
     };
     let mut probe = ResumedProbe::new(made.to_vec(), simulation, &mut servo);

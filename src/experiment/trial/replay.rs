@@ -2,10 +2,12 @@
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::simulation::Simulation;
-use crate::experiment::trial::FinishedTouch;
+use crate::experiment::trial::TrialEvent;
 use crate::experiment::trial::recorded_trial::ResumedProbe;
 use crate::experiment::trial::row::TouchRow;
 use palpate_explore::backend::Fault;
+use palpate_explore::planner::Fallback;
+use palpate_explore::task::Target;
 use palpate_input::config::ConfigError;
 use palpate_input::error::InputError;
 use palpate_ros::recording::{self, RecordedTrial, ReplayBackend};
@@ -92,15 +94,19 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
     let mut servo = simulation.servo(player, simulation.body_seed(about.trial))?;
     let mut probe = ResumedProbe::new(made(recorded)?, simulation, &mut servo);
     let (mut touches, mut differs) = (0, None);
-    let mut compare = |touched: &FinishedTouch| {
+    let mut compare = |event: &TrialEvent| {
+        let touched = match event {
+            TrialEvent::Next(next) => return Ok(operators_target(recorded, next.count)),
+            TrialEvent::Finished(touched) => touched,
+        };
         let Some(then) = recorded.touches.get(touches as usize) else {
             // The recording was cut between a touch's last tick and its row, or ended there.
-            return Ok(());
+            return Ok(None);
         };
         let now = serde_json::to_string(touched.row).unwrap_or_default();
         if now == then.row || upgrade_row(&then.row).is_some_and(|then| now == then) {
             touches += 1;
-            return Ok(());
+            return Ok(None);
         }
         let (touch, recorded) = (touched.count, then.row.clone().into_owned());
         differs = Some(Difference::Row { touch, recorded, now });
@@ -134,6 +140,13 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
         }
     };
     Ok(ReplayResult { touches, is_cut, difference })
+}
+
+/// Returns the target that an operator chose for touch `count`, if any.
+fn operators_target(recorded: &RecordedTrial, count: u32) -> Option<Target> {
+    let touch = recorded.touches.get(count.checked_sub(1)? as usize)?;
+    let row: TouchRow = serde_json::from_str(&touch.row).ok()?;
+    (row.fallback == Some(Fallback::Operator)).then_some(row.target)
 }
 
 /// Returns the rows of the touches made before the recording started.

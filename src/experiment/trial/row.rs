@@ -105,6 +105,9 @@ pub struct VerificationRow {
     /// Standard deviation of `error_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd_m: Option<f64>,
+    /// Ends of the 95 % band of `error_m`; omitted around an object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band_m: Option<[f64; 2]>,
     /// Contact height minus the repeated touch's, corrected for the predicted slope between the two
     /// places.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -59,6 +59,7 @@ pub(super) fn verify(
             overload: touch == Touch::Overload,
             error_m: error.map(|(error_m, _)| error_m),
             sd_m: error.map(|(_, sd_m)| sd_m),
+            band_m: p_wc.and_then(|p_wc| band_m(belief.height_field()?, &p_wc)),
             difference_m: before.map(|((now_m, _), (before_m, _))| now_m - before_m),
         });
     }
@@ -73,6 +74,15 @@ fn height(field: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
     let noise_sd = surface.hyperparameters().noise_sd;
     let variance = surface.variance(place, &mut scratch) + noise_sd * noise_sd;
     Some((surface.mean(place, &mut scratch), variance.max(0.0).sqrt()))
+}
+
+/// Ends of the 95 % band at the place of a point of `W`, relative to the mean; `None` before the
+/// first fit.
+fn band_m(field: &HeightField, p_w: &Point3<f64>) -> Option<[f64; 2]> {
+    let place = field.zone().place(p_w);
+    let (mean_m, _) = height(field, &place)?;
+    let [ends_m] = field.bands_m(&[place])?[..] else { return None };
+    Some(ends_m.map(|end_m| end_m - mean_m))
 }
 
 /// Distance of a point of `W` outside the estimated surface and the standard deviation of a touch;

@@ -45,7 +45,7 @@ pub mod scan_truth;
 use crate::experiment::measure::metrics::{Metrics, coverage, interval_score, nlpd, rmse};
 use crate::sim::Environment;
 use crate::sim::reach;
-use palpate_explore::belief::HeightField;
+use palpate_explore::belief::{BAND, HeightField};
 use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
@@ -77,9 +77,6 @@ const TRIANGLES: usize = 20_000;
 /// Step between the grid points at which the belief's variance is computed.
 // heuristic: the variance costs the square of the number of touches, the mean only that number.
 const CALIBRATION_STEP: usize = 4;
-
-/// Probabilities at the ends of the 95 % band.
-const BAND: [f64; 2] = [0.025, 0.975];
 
 impl Truth {
     /// Samples the environment's surface on a grid of `per_side` points along each side of the

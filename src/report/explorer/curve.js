@@ -2,7 +2,6 @@
 "use strict";
 
 function curveView(canvas) {
-  const BAND_SD = 1.96;
   const [LEFT, RIGHT, TOP, GAP, BOTTOM] = [62, 16, 14, 34, 46];
   const { x: xs, unit } = data;
 
@@ -51,13 +50,13 @@ function curveView(canvas) {
   }
 
   // A band is filled piece by piece, so that it ends with the belief.
-  function band(context, at, { mean, deviation }, ink) {
-    const rim = (i, sign) => at(xs[i], mean[i] + sign * BAND_SD * deviation[i]);
+  function band(context, at, { mean, band: ends }, ink) {
+    const rim = (i, end) => at(xs[i], ends[end][i]);
     context.beginPath();
     for (let i = 1; i < xs.length; i++) {
       if (Number.isNaN(mean[i] + mean[i - 1])) continue;
       context.moveTo(...rim(i - 1, 1));
-      for (const corner of [rim(i, 1), rim(i, -1), rim(i - 1, -1)]) context.lineTo(...corner);
+      for (const corner of [rim(i, 1), rim(i, 0), rim(i - 1, 0)]) context.lineTo(...corner);
     }
     context.fillStyle = ink;
     context.fill();

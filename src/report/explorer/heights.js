@@ -6,6 +6,7 @@ function frameOf(state) {
   if (typeof frame.mean === "string") {
     frame.mean = numbers(frame.mean, data.height_range);
     frame.deviation = deviations(frame.deviation);
+    frame.band = frame.band.map((ends) => numbers(ends, data.height_range));
   }
   return frame;
 }

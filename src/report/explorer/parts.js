@@ -2,11 +2,11 @@
 "use strict";
 
 // Colour scale: its stops, the position of a value from 0 to 1, values to label, words.
-function deviationScale([least, most]) {
+function deviationScale([least, most], words = "standard deviation σ") {
   const at = (value) => Math.log(value / least) / Math.log(most / least);
   const powers = Array.from({ length: 13 }, (_, i) => 10 ** (i - 6));
   const ticks = most < 10 * least ? roundNumbers(least, most, 5) : powers.flatMap((power) => [power, 3 * power]);
-  return { stops: data.colours.deviation, at, ticks, words: "standard deviation σ" };
+  return { stops: data.colours.deviation, at, ticks, words };
 }
 
 // Finer towards zero, so that early and late errors can be distinguished on one scale.

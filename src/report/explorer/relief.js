@@ -19,6 +19,7 @@ function reliefView(canvas) {
   const scales = {
     height: heightScale,
     deviation: deviationScale(data.deviation_range),
+    band: deviationScale(data.band_range, "width of the 95 % band"),
     error: errorScale(0.5 * (high - low), "error: belief too low | too high"),
   };
   const size = Math.hypot(sides[0], sides[1] * stretch, sides[2]);
@@ -163,6 +164,7 @@ function reliefView(canvas) {
     const shown = {
       height: (k) => frame.mean[k],
       deviation: (k) => frame.deviation[k],
+      band: (k) => frame.band[1][k] - frame.band[0][k],
       error: (k) => frame.mean[k] - data.truth[k],
     }[state.colour];
     const project = projection(width, height);
@@ -171,7 +173,10 @@ function reliefView(canvas) {
     const dense = turn.isDragged ? 1 : Math.max(ratio, 2);
     const [wide, tall] = [Math.round(width * dense), Math.round(height * dense)];
     const fine = (...point) => project(...point).map((part, axis) => (axis < 2 ? part * dense : part));
-    const layer = render(frame.mean, (k) => colour(scale, scale.at(shown(k))), fine, wide, tall);
+    const outOfReach = { ...scale, stops: data.colours.out_of_reach };
+    const isHigh = state.colour === "height";
+    const tint = (k) => colour(isHigh && frame.reach[k] === "0" ? outOfReach : scale, scale.at(shown(k)));
+    const layer = render(frame.mean, tint, fine, wide, tall);
     if (state.truth) overlay(layer, render(data.truth, () => data.colours.truth, fine, wide, tall));
     const sheet = document.createElement("canvas");
     [sheet.width, sheet.height] = [wide, tall];

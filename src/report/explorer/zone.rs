@@ -16,7 +16,8 @@ const SCRIPTS: [&str; 4] =
     [PARTS, include_str!("relief.js"), include_str!("curve.js"), include_str!("heights.js")];
 
 /// Colour maps of a surface: names in scripts, and labels.
-const COLOURS: [(&str, &str); 3] = [("height", "height"), ("deviation", "σ"), ("error", "error")];
+const COLOURS: [(&str, &str); 4] =
+    [("height", "height"), ("deviation", "σ"), ("band", "95 % band"), ("error", "error")];
 
 /// Returns the section as HTML; empty if no planner has a belief to show.
 ///
@@ -41,15 +42,16 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
 }
 
 const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \
-                    Green: the true surface in front of the belief. Lines join equal heights. Drag \
-                    the surface to turn it and the slider to step through the touches, or press the \
+                    Green: the true surface in front of the belief. Mauve: believed to be out of the \
+                    finger's reach. Lines join equal heights. Drag the surface to turn it and the slider to step through the touches, or press the \
                     arrow keys.";
 
 // Largest number of places along the side of a curve and of a surface.
 // heuristic: more would not be visible at the size of the page.
 const PLACES_MAX: [usize; 2] = [301, 41];
-/// Bytes of one place in one frame: two each for mean and standard deviation, in base 64.
-const BYTES_OF_PLACE: usize = 6;
+/// Bytes of one place in one frame: two each for mean, standard deviation and the ends of the band,
+/// in base 64, and one for reach.
+const BYTES_OF_PLACE: usize = 12;
 // heuristic: margin above and below the heights of a curve, for its bands, and of a surface.
 const MARGIN: [f64; 2] = [0.3, 0.08];
 
@@ -62,18 +64,25 @@ pub struct HeightFrame {
     pub means_m: Vec<Option<f64>>,
     /// Standard deviations.
     pub deviations_m: Vec<f64>,
+    /// Ends of the 95 % band.
+    bands_m: Vec<[f64; 2]>,
+    /// Whether the finger can reach the believed surface.
+    is_reachable: Vec<bool>,
 }
 
 impl HeightFrame {
     /// Reads a belief at `places`.
     pub fn of(replay: &BeliefReplay, places: &[&[f64]]) -> Self {
         let predictions = replay.surface.predict(places.iter().copied());
+        let owned: Vec<Vec<f64>> = places.iter().map(|place| place.to_vec()).collect();
         let drawn = replay.is_drawn(places.iter().copied()).into_iter().zip(&predictions);
         Self {
             touches: replay.touches.len() as u32,
             score: replay.score(),
             means_m: drawn.map(|(is_drawn, it)| is_drawn.then_some(it.mean)).collect(),
             deviations_m: predictions.iter().map(|it| it.variance.sqrt()).collect(),
+            bands_m: replay.belief.bands_m(&owned).unwrap_or_default(),
+            is_reachable: replay.belief.is_reachable(&owned),
         }
     }
 }
@@ -104,13 +113,18 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
             beliefs.push((name, frames));
         }
     }
-    let all_m = beliefs.iter().flat_map(|(_, frames)| frames).flat_map(|it| &it.deviations_m);
-    let Some((least, most)) = axes::range(all_m.copied()) else { return Ok(None) };
+    let frames = || beliefs.iter().flat_map(|(_, frames)| frames);
+    let deviations_m = frames().flat_map(|it| it.deviations_m.iter().copied());
+    let widths_m = frames().flat_map(|it| it.bands_m.iter().map(|[low, high]| high - low));
+    let (Some(deviation_range_m), Some(band_range_m)) =
+        (log_range(deviations_m), log_range(widths_m))
+    else {
+        return Ok(None);
+    };
     let (low, high) = axis.range();
     let unit = Length::of(zone);
-    // Ranges of the codes of heights and of standard deviations (logarithmic).
+    // Range of the codes of heights.
     let height_range_m = [low - (high - low), high + (high - low)];
-    let deviation_range_m = [least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most];
     let heights = |heights_m: &mut dyn Iterator<Item = Option<f64>>| {
         let [low, high] = height_range_m;
         encode(heights_m.map(|it| (it.unwrap_or(f64::NAN) - low) / (high - low)))
@@ -121,11 +135,17 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     };
     let space = zone.z_m.map(|z_m| Space { x_m: zone.x_m, z_m, height_m: [low, high] });
     let frame = |frame: &HeightFrame| {
+        let end = |end: usize| heights(&mut frame.bands_m.iter().map(|ends| Some(ends[end])));
+        let band = [0, 1].map(end);
+        let reach: String =
+            frame.is_reachable.iter().map(|&it| if it { '1' } else { '0' }).collect();
         json!({
             "touches": frame.touches,
             "score": frame.score,
             "mean": heights(&mut frame.means_m.iter().copied()),
             "deviation": encode_log(deviation_range_m, frame.deviations_m.iter().copied()),
+            "band": band,
+            "reach": reach,
         })
     };
     let planner = |(name, frames): &(&str, Vec<HeightFrame>)| {
@@ -147,11 +167,18 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
         "stretch": space.map_or(1.0, |space| space.stretch()),
         "height_range": in_unit(height_range_m),
         "deviation_range": in_unit(deviation_range_m),
+        "band_range": in_unit(band_range_m),
         "truth": heights(&mut grid.places.iter().map(|(_, height_m)| *height_m)),
         "initial_touches": experiment.initial_touches,
         "colours": style::touch_colours(),
         "planners": beliefs.iter().map(planner).collect::<Vec<_>>(),
     })))
+}
+
+/// Returns the ends of the logarithmic scale of these lengths.
+fn log_range(lengths_m: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let (least, most) = axes::range(lengths_m)?;
+    Some([least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most])
 }
 
 /// Returns x, height and z of a touch, in the unit of the page.

@@ -26,8 +26,6 @@ fn caption(run: &Run) -> String {
 
 /// Places at which curves are computed.
 const STEPS: usize = 300;
-/// Probabilities of the band's ends.
-const BAND: [f64; 2] = [0.025, 0.975];
 const MARGIN: (f64, f64) = (72.0, 80.0);
 const PANEL: (f64, f64) = (236.0, 188.0);
 /// Largest height of a panel with equal axes.
@@ -140,10 +138,10 @@ fn read(replay: &BeliefReplay) -> Vec<(f64, f64, [f64; 2])> {
     let mut scratch = Scratch::default();
     let places = replay.belief.zone().grid(STEPS);
     let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));
-    let bands = replay.belief.quantiles_m(&places, &BAND).unwrap_or_default();
+    let bands = replay.belief.bands_m(&places).unwrap_or_default();
     (places.iter().zip(drawn).zip(bands))
         .map(|((place, is_drawn), band)| match is_drawn {
-            true => (place[0], replay.surface.mean(place, &mut scratch), [band[0], band[1]]),
+            true => (place[0], replay.surface.mean(place, &mut scratch), band),
             false => (place[0], f64::NAN, [f64::NAN; 2]),
         })
         .collect()

@@ -6,7 +6,9 @@ use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, miss_entry, touch_entries};
-use crate::report::relief::{ON_RELIEF, Relief, ReliefPanel, Space};
+use crate::report::relief::{
+    ON_RELIEF, Relief, ReliefPanel, Space, height_colour, unreachable_colour,
+};
 use crate::report::replay::{self, BeliefReplay, Grid, NO_BELIEF, drawn_caption};
 use crate::report::style;
 use nalgebra::Vector3;
@@ -27,7 +29,7 @@ fn caption(run: &Run) -> String {
     format!(
         "Posterior mean over the zone in trial {} by number of touches, and the true object on the \
          right, with the same view, scale and colours. Blue points: the {}; red: those \
-         of the planner.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
+         of the planner. Mauve: out of the finger's reach.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
         run.experiment.report.trial,
         counted(run.experiment.initial_touches, "initial touch"),
         drawn_caption(run)
@@ -58,11 +60,19 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
     let [low, high] = space.height_m;
     let axis = Axis::linear(low, high, 5.0);
-    let relief = |canvas: &mut Canvas, panel: &ReliefPanel, heights: Vec<Option<f64>>| {
-        let relief = Relief::new(panel, [&xs, &zs], &heights, &axis);
-        relief.draw(canvas);
-        relief
-    };
+    let relief =
+        |canvas: &mut Canvas, panel: &ReliefPanel, heights: Vec<Option<f64>>, reach: &[bool]| {
+            let colour = |places: &[usize], corners: &[Vector3<f64>], normal: &Vector3<f64>| {
+                let reached = places.iter().filter(|&&place| reach[place]).count();
+                match 2 * reached >= places.len() {
+                    true => height_colour(&axis, corners, normal),
+                    false => unreachable_colour(&axis, corners, normal),
+                }
+            };
+            let relief = Relief::coloured(panel, [&xs, &zs], &heights, colour);
+            relief.draw(canvas);
+            relief
+        };
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
             let panel = ReliefPanel::new(unit, sheet.area(column, row as f64), space);
@@ -76,7 +86,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                 let heights = grid.places().zip(drawn).map(|(place, is_drawn)| {
                     is_drawn.then(|| replay.surface.mean(place, &mut scratch))
                 });
-                let relief = relief(canvas, &panel, heights.collect());
+                let places: Vec<Vec<f64>> = grid.places().map(<[f64]>::to_vec).collect();
+                let reach = replay.belief.is_reachable(&places);
+                let relief = relief(canvas, &panel, heights.collect(), &reach);
                 canvas.grouped(ON_RELIEF, |canvas| {
                     mark(&panel, canvas, zone, &relief, replay.marks());
                 });
@@ -88,7 +100,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         let panel = ReliefPanel::new(unit, area, space);
         panel.frame(&mut sheet.canvas, "true object", "");
         let heights = grid.places.iter().map(|(_, height_m)| *height_m);
-        relief(&mut sheet.canvas, &panel, heights.collect());
+        relief(&mut sheet.canvas, &panel, heights.collect(), &grid.is_reachable);
     }
     // The label is on the left; its width depends on the browser's font.
     let left = (0.5 * width - 60.0).max(BAR_LEFT_MIN_PX);

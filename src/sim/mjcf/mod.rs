@@ -1,6 +1,7 @@
 //! Conversion of a scene to MJCF, the text that MuJoCo compiles into a model. Numbers are in SI
 //! units, in `W`.
 
+pub mod arm;
 mod robot;
 mod scenery;
 mod text;

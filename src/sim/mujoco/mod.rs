@@ -1,5 +1,6 @@
 //! MuJoCo bindings: compilation of models, and the plant that steps one.
 
+mod arm_file;
 mod dynamic;
 mod joint_servo;
 mod models;
@@ -9,6 +10,7 @@ mod plant;
 #[cfg(feature = "viewer")]
 pub mod window;
 
+pub use arm_file::arm_parts;
 pub use dynamic::DynamicBackend;
 pub use models::{CompiledModels, StepLimit, Substeps};
 pub use plant::Plant;
@@ -33,18 +35,23 @@ pub fn version() -> &'static str {
 /// thread has another arena.
 const SPURIOUS: &str = "unknown error in attribute";
 
+/// Stops MuJoCo from writing messages; call it before any model is compiled.
+fn quiet() {
+    static QUIET: Once = Once::new();
+    QUIET.call_once(|| {
+        // A diverging trial is a fault in its row, not a line in MUJOCO_LOG.TXT.
+        let quiet = log_config().with_logto_console(false).with_logto_file(false);
+        // SAFETY: no thread can use MuJoCo yet, because this precedes every model.
+        unsafe { set_log_config(quiet) };
+    });
+}
+
 /// Compiles a model; with an implicit integrator, its servos become those of a [`Plant`].
 ///
 /// # Errors
 /// If MuJoCo refuses it.
 pub fn compile(mjcf: &str) -> Result<MjModel, InputError> {
-    static QUIET: Once = Once::new();
-    QUIET.call_once(|| {
-        // A diverging trial is a fault in its row, not a line in MUJOCO_LOG.TXT.
-        let quiet = log_config().with_logto_console(false).with_logto_file(false);
-        // SAFETY: no thread can use MuJoCo yet, because every model is compiled here.
-        unsafe { set_log_config(quiet) };
-    });
+    quiet();
     let read = || MjModel::from_xml_string(mjcf);
     let mut model = read()
         .or_else(|cause| match cause.to_string().contains(SPURIOUS) {

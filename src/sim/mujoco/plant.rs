@@ -47,7 +47,7 @@ impl Plant {
         let joints = model.nv() as usize;
         let driven = model.nq() as usize == joints && model.nu() as usize == joints;
         if !driven || joints > MAX_JOINTS {
-            return Err(Fault::lacks("one servo for each of at most 7 joints"));
+            return Err(Fault::lacks("one servo for each of at most 8 joints"));
         }
         // Six numbers: the force, then the torque.
         if ![0, 6].contains(&model.nsensordata()) {

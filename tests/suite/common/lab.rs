@@ -1,7 +1,10 @@
 //! An explorer and a simulated robot in separate processes, over ROS 2 or ROS 1, selected by
 //! `PALPATE_ROS`.
 
+use palpate::backend::pace;
 use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::probe::Touch;
 use palpate::robot::arm::ArmSettings;
 use palpate::ros::settings::{BackendKind, BackendSettings};
 use serde_json::Value;
@@ -17,6 +20,9 @@ use std::time::{Duration, Instant};
 /// Experiment that is run over topics.
 pub const EXPERIMENT: &str = "experiments/container_pa10.toml";
 
+/// Experiment with a UR5e and its driver.
+pub const UR_EXPERIMENT: &str = "experiments/real_ur5e.toml";
+
 /// Settings of the container and the cell that a real arm needs.
 pub const CELL: [&str; 3] = [
     "scene.zone.depth_m=[0.59, 0.71]",
@@ -28,10 +34,19 @@ pub const CELL: [&str; 3] = [
 pub struct Network {
     /// Settings of `[backend]` for this network.
     pub settings: BackendSettings,
+    /// Experiment that is run.
+    pub experiment: &'static str,
     master: Option<Child>,
 }
 
 impl Network {
+    /// Creates the ROS 2 network with this number, of a UR5e.
+    pub fn of_ur(number: u16) -> Self {
+        let domain = format!("backend.domain={number}");
+        let experiment = Experiment::load(Path::new(UR_EXPERIMENT), &[domain]).unwrap();
+        Self { settings: experiment.backend, experiment: UR_EXPERIMENT, master: None }
+    }
+
     /// Creates the network with this number.
     pub fn new(number: u16) -> Self {
         let mut settings = BackendSettings { domain: Some(number), ..Default::default() };
@@ -39,7 +54,7 @@ impl Network {
         let is_first = std::env::var("PALPATE_ROS").is_ok_and(|name| name == "ros1");
         if !is_first {
             settings.kind = BackendKind::Ros2;
-            return Self { settings, master: None };
+            return Self { settings, experiment: EXPERIMENT, master: None };
         }
         let port = 11311 + number;
         (settings.kind, settings.master) = (BackendKind::Ros1, format!("http://127.0.0.1:{port}"));
@@ -54,7 +69,7 @@ impl Network {
             assert!(begun.elapsed().as_secs() < 20, "no master at {}", settings.master);
             sleep(Duration::from_millis(50));
         }
-        Self { settings, master: Some(master) }
+        Self { settings, experiment: EXPERIMENT, master: Some(master) }
     }
 
     /// Settings as `--set` options.
@@ -80,10 +95,9 @@ impl Network {
 
     /// The shipped experiment with one trial of one planner; only the backend is changed.
     pub fn run(&self, planner: &str, touches: u32, out: &Path) -> Command {
-        let mut command = self.palpate(&["run", EXPERIMENT, "--no-report"]);
+        let mut command = self.palpate(&["run", self.experiment, "--no-report"]);
         command.arg("--out").arg(out).args(["--set", "trials=1"]);
-        command.args(["--set", &format!("touches={touches}")]);
-        command.args(["--set", &format!("initial_touches={}", touches.min(5))]);
+        command.args(touch_sets(touches).iter().flat_map(|set| ["--set", set]));
         command.args(["--set", &format!("planners=[\"{planner}\"]")]);
         command.args(CELL.iter().flat_map(|set| ["--set", *set]));
         command
@@ -126,8 +140,12 @@ pub struct TwinProcess {
 impl TwinProcess {
     /// Starts the robot of a scene or experiment; it is discovered when this returns.
     pub fn new(network: &Network, path: &str, more: &[&str]) -> Self {
-        let mut child =
-            network.palpate(&["serve", path]).args(more).stdout(Stdio::piped()).spawn().unwrap();
+        Self::spawn(network.palpate(&["serve", path]).args(more))
+    }
+
+    /// Starts a robot that prints one event per line as JSON; it is discovered when this returns.
+    pub fn spawn(command: &mut Command) -> Self {
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let events: Arc<Mutex<Vec<Value>>> = Arc::default();
         let (lines, values) = (BufReader::new(child.stdout.take().unwrap()), Arc::clone(&events));
         let reader = std::thread::spawn(move || {
@@ -136,7 +154,7 @@ impl TwinProcess {
             }
         });
         let twin = Self { child, events, reader: Some(reader) };
-        twin.wait_for(|event| event == "serving", 20.0);
+        twin.wait_for(|event| event == "serving", 30.0);
         twin
     }
 
@@ -207,6 +225,118 @@ impl Drop for TwinProcess {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Values for `--set` of a trial of so many touches.
+pub fn touch_sets(touches: u32) -> [String; 2] {
+    [format!("touches={touches}"), format!("initial_touches={}", touches.min(5))]
+}
+
+/// Returns the number in this environment variable.
+pub fn count(name: &str, usual: u32) -> u32 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+/// Ways in which the planner of a moving arm ends.
+#[derive(Clone, Copy, Debug)]
+pub enum End {
+    Kill,
+    Stop,
+    Cut,
+}
+
+/// Ends the planners of a moving robot, `times` times, in travel and approach. `run` returns the
+/// command that makes this many touches into `out`. Each time the robot comes to rest by itself, no
+/// touch is lost, and the same command continues.
+pub fn end_planners(
+    end: End,
+    times: u32,
+    twin: &TwinProcess,
+    out: &Path,
+    run: impl Fn(u32) -> Command,
+) {
+    let touches = times + 3;
+    let mut rests_ms = Vec::new();
+    let mut kept = 0;
+    for i in 0..times {
+        twin.events.lock().unwrap().clear();
+        let mut explorer = run(touches).stderr(Stdio::piped()).spawn().unwrap();
+        twin.wait_for(|event| event == "moving", 30.0);
+        sleep(Duration::from_secs_f64(0.2 + 0.37 * f64::from(i % 10)));
+        // Not at rest between two movements.
+        while twin.rest_s().is_some() {
+            assert!(explorer.try_wait().unwrap().is_none(), "{end:?}: the run ended too early");
+            sleep(Duration::from_millis(2));
+        }
+        match end {
+            End::Kill => signal(&explorer, "KILL"),
+            End::Stop => signal(&explorer, "STOP"),
+            End::Cut => set_network(false),
+        }
+        let at_s = pace::now_s();
+        sleep(Duration::from_millis(700));
+        let rest_s = twin.rest_s().unwrap_or_else(|| panic!("{end:?}: still moving"));
+        rests_ms.push(1e3 * (rest_s - at_s).max(0.0));
+        match end {
+            End::Kill => (),
+            End::Stop => signal(&explorer, "CONT"),
+            End::Cut => set_network(true),
+        }
+        let output = explorer.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let is_reported = matches!(end, End::Kill) || output.status.code() == Some(2);
+        assert!(is_reported, "{end:?}: {:?} {said}", output.status);
+        // The rest of a stopped planner moves nothing.
+        assert!(twin.rest_s().is_some(), "{end:?}: {said}");
+        let found = journal(out).iter().filter(|line| line["touch"].is_object()).count();
+        assert!(found >= kept, "{end:?}: {found} of {kept} touches");
+        kept = found;
+    }
+    let output = run(touches).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let row = row(out);
+    assert_eq!((row.failure, row.touches.len()), (None, touches as usize));
+    rests_ms.sort_by(f64::total_cmp);
+    let [median, worst] = median_and_worst(&rests_ms);
+    println!(
+        "{end:?}: {times} times, at rest after {median:.0} ms (median), {worst:.0} ms (worst)"
+    );
+    assert!(worst <= 150.0, "{end:?}: {rests_ms:?}");
+}
+
+/// Distances, m, ascending, between the contacts of a row and those of the same targets touched in
+/// sequence in this process. A miss must be a miss here too.
+pub fn contacts_off_m(simulation: &Simulation, row: &TrialRow) -> Vec<f64> {
+    let mut probe = simulation.probe(0).unwrap();
+    let mut off_m = Vec::new();
+    for touch in &row.touches {
+        let approach = simulation.task().approach(&touch.target).unwrap();
+        let here = match probe.touch(&approach).unwrap() {
+            Touch::Contact(contact) => Some(contact.p_wc),
+            _ => None,
+        };
+        let there = touch.contact.map(nalgebra::Point3::from);
+        assert_eq!(here.is_some(), there.is_some(), "{:?}", touch.target);
+        off_m.extend(here.zip(there).map(|(here, there)| (here - there).norm()));
+    }
+    off_m.sort_by(f64::total_cmp);
+    off_m
+}
+
+/// Median and largest of ascending values.
+pub fn median_and_worst(ascending: &[f64]) -> [f64; 2] {
+    [ascending[ascending.len() / 2], ascending[ascending.len() - 1]]
+}
+
+/// Sets the network devices of this namespace up or down.
+pub fn set_network(is_up: bool) {
+    let ip = |words: &str| Command::new("ip").args(words.split(' ')).status().unwrap().success();
+    let has_dummy = Path::new("/sys/class/net/dds0").exists();
+    let state = if is_up { "up" } else { "down" };
+    assert!(ip(&format!("link set lo {state}")));
+    assert!(!has_dummy || ip(&format!("link set dds0 {state}")));
+    let device = if has_dummy { "dds0" } else { "lo" };
+    assert!(!is_up || ip(&format!("route replace 224.0.0.0/4 dev {device}")));
 }
 
 /// Sends a signal.

@@ -74,7 +74,8 @@ pub const CASES: &[Case] = &[
         "m",
         (&[0.0, 10.0, 100.0, 900.0], 4),
         |far_m, period_s| {
-            let arm = ArmSettings { base_position_m: [far_m, 0.0, 0.0], ..ArmSettings::default() };
+            let arm =
+                ArmSettings { base_position_m: Some([far_m, 0.0, 0.0]), ..ArmSettings::default() };
             reach(scene(period_s), [far_m, -0.65, 0.5], arm)
         },
     )

@@ -106,7 +106,7 @@ pub fn with_masses(step_s: f64) -> Scene {
 
 /// The finger on a PA-10 at the same distance from the origin as from an object in its own scenes.
 pub fn on_arm(step_s: f64) -> Scene {
-    let arm = ArmSettings { base_position_m: [0.0, 0.65, -0.5], ..ArmSettings::default() };
+    let arm = ArmSettings { base_position_m: Some([0.0, 0.65, -0.5]), ..ArmSettings::default() };
     Scene { arm: Some(arm), ..with_masses(step_s) }
 }
 

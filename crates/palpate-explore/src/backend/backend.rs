@@ -24,6 +24,14 @@ pub struct Capabilities {
     pub resettable: bool,
     /// Whether the backend runs in real time.
     pub real_time: bool,
+    /// Whether a real robot has a tactile sensor.
+    #[serde(default = "has_tactile")]
+    pub tactile: bool,
+}
+
+/// Returns the flag of a recording without one: its robot has the sensor.
+fn has_tactile() -> bool {
+    true
 }
 
 impl Capabilities {
@@ -37,6 +45,7 @@ impl Capabilities {
             period_s,
             resettable: true,
             real_time: false,
+            tactile: true,
         }
     }
 
@@ -87,7 +96,7 @@ pub struct Reading {
     pub wrench: Option<Wrench>,
     /// Samples of the fingertip sensor that arrived during the tick, oldest first.
     pub samples: Vec<Sample>,
-    /// The command as applied after limiting.
+    /// The command as applied after limiting, also by the speed that an operator has set.
     pub applied: Command,
 }
 

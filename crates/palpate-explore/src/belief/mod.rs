@@ -5,6 +5,7 @@ mod quantiles;
 mod reach;
 
 pub use height_field::HeightField;
+pub use quantiles::BAND;
 
 use super::gp_settings::GpSettings;
 use super::probe::{SweptVolume, Touch};

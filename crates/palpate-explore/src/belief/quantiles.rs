@@ -6,6 +6,9 @@ use palpate_gp::batch::Prediction;
 use palpate_gp::math::normal;
 use palpate_gp::posterior::Scratch;
 
+/// Probabilities of the ends of the 95 % band.
+pub const BAND: [f64; 2] = [0.025, 0.975];
+
 /// Margin of the depth limits, above the rounding of a number in a file.
 const ROUNDING_M: f64 = 1e-5;
 
@@ -18,6 +21,12 @@ impl HeightField {
     pub fn quantiles_m(&self, places: &[Vec<f64>], probabilities: &[f64]) -> Option<Vec<Vec<f64>>> {
         let predictions = self.surface.as_ref()?.predict(places.iter().map(Vec::as_slice));
         self.predicted_quantiles_m(places, &predictions, probabilities)
+    }
+
+    /// Returns the ends of the 95 % band at each of `places`, m; `None` before the first fit.
+    pub fn bands_m(&self, places: &[Vec<f64>]) -> Option<Vec<[f64; 2]>> {
+        let ends_m = self.quantiles_m(places, &BAND)?;
+        Some(ends_m.iter().map(|ends_m| [ends_m[0], ends_m[1]]).collect())
     }
 
     /// Returns [`quantiles_m`](Self::quantiles_m) from the predictions of the surface at `places`.

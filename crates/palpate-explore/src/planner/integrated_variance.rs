@@ -7,7 +7,6 @@ use super::search::Search;
 use super::sobol;
 use crate::belief::{Belief, HeightField};
 use crate::whole_object::ImplicitSurface;
-use palpate_gp::posterior::Scratch;
 use palpate_gp::reduction::VarianceReduction;
 use rand::RngExt;
 
@@ -36,9 +35,8 @@ fn in_zone(search: &mut Search, seed: u32, field: &HeightField) -> Plan {
     let Some(posterior) = field.planning_posterior() else { return search.anywhere(field.zone()) };
     let places = sobol::places(field.zone(), search.settings.integrated_variance.places, seed);
     let reduction = VarianceReduction::new(posterior, places.iter().map(Vec::as_slice));
-    let mut scratch = Scratch::default();
     let score = search.with_gradients(field.zone(), |places| {
-        places.iter().map(|place| reduction.at(place, &mut scratch)).collect()
+        reduction.at(&places.iter().map(Vec::as_slice).collect::<Vec<_>>())
     });
     search.plan(field, score)
 }
@@ -46,9 +44,9 @@ fn in_zone(search: &mut Search, seed: u32, field: &HeightField) -> Plan {
 fn around(search: &mut Search, surface: &ImplicitSurface) -> Plan {
     Candidates::plan(surface, &mut search.rng, |candidates| {
         let all = &candidates.all;
-        let places = || all.iter().map(|candidate| candidate.p_w.coords.as_slice());
-        let reduction = VarianceReduction::new(candidates.surface().posterior(), places());
-        let mut scratch = Scratch::default();
-        places().map(|place| reduction.at(place, &mut scratch)).collect()
+        let places = all.iter().map(|candidate| candidate.p_w.coords.as_slice());
+        let places: Vec<&[f64]> = places.collect();
+        let posterior = candidates.surface().posterior();
+        VarianceReduction::new(posterior, places.iter().copied()).at(&places)
     })
 }

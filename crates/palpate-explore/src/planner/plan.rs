@@ -52,8 +52,8 @@ impl Plan {
     }
 }
 
-/// Reasons for a fallback of a planner. The target is then random, because a fixed pattern might
-/// coincide with a pattern of the surface.
+/// Reasons for another target than the planner's. Without an operator it is random, because a fixed
+/// pattern might coincide with a pattern of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fallback {
@@ -66,6 +66,8 @@ pub enum Fallback {
     /// No approach to any candidate on a whole object is free.
     #[serde(alias = "blocked")]
     Unreachable,
+    /// An operator chose another target.
+    Operator,
 }
 
 /// Error of a planner that returned no target.

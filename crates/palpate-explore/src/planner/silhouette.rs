@@ -15,7 +15,7 @@ use super::plan::{Plan, PlannerEntry, zone_planner};
 use super::search::Search;
 use super::sobol;
 use crate::belief::HeightField;
-use palpate_gp::posterior::{Posterior, Scratch};
+use palpate_gp::posterior::Posterior;
 use palpate_gp::reduction::VarianceReduction;
 use rand::RngExt;
 
@@ -46,23 +46,17 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
     let weights: Vec<f64> = places.iter().map(weigh).collect();
     let committee: Vec<Posterior> =
         COMMITTEE.iter().filter_map(|scale| posterior.scaled(*scale).ok()).collect();
-    let reductions: Vec<VarianceReduction> = (committee.iter())
-        .map(|member| {
-            let places = places.iter().map(Vec::as_slice);
-            VarianceReduction::new(member, places).weighted(weights.clone())
-        })
-        .collect();
-    let mut scratch = Scratch::default();
-    let mut value = |place: &[f64]| -> f64 {
-        match silhouette.hit_probability(place) {
-            0.0 => 0.0,
-            chance => {
-                let falls = reductions.iter().map(|fall| fall.at(place, &mut scratch));
-                chance * falls.sum::<f64>()
-            }
-        }
-    };
     let candidates = search.spread_places(belief.zone(), search.settings.silhouette.candidates);
+    let chances = candidates.into_iter().map(|place| (silhouette.hit_probability(&place), place));
+    let (chances, candidates): (Vec<f64>, Vec<Vec<f64>>) =
+        chances.filter(|(chance, _)| *chance > 0.0).unzip();
+    let tried: Vec<&[f64]> = candidates.iter().map(Vec::as_slice).collect();
+    let mut falls = vec![0.0; tried.len()];
+    for member in &committee {
+        let places = places.iter().map(Vec::as_slice);
+        let reduction = VarianceReduction::new(member, places).weighted(weights.clone());
+        falls.iter_mut().zip(reduction.at(&tried)).for_each(|(sum, fall)| *sum += fall);
+    }
     // Time in units of a touch that begins where the last one ended.
     let time = |place: &[f64]| {
         let way = search.settings.silhouette.travel_cost_m.zip(belief.targets().last());
@@ -70,9 +64,10 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
             |here: &[f64]| here.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         1.0 + way.map_or(0.0, |(travel_cost_m, here)| travel_m(here) / travel_cost_m)
     };
-    let valued = candidates.into_iter().map(|place| (value(&place) / time(&place), place));
-    match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((_, place)) => search.plan_at(belief, place),
+    let values = falls.iter().zip(&chances).zip(&candidates);
+    let values = values.map(|((fall, chance), place)| chance * fall / time(place));
+    match values.zip(&candidates).max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((_, place)) => search.plan_at(belief, place.clone()),
         None => search.anywhere(belief.zone()),
     }
 }

@@ -154,7 +154,7 @@ fn reduction_is_what_a_refit_with_the_candidate_finds() {
                     posterior.variance(at, &mut scratch) - after.variance(at, &mut scratch)
                 });
                 let twin = falls.sum::<f64>() / references.len() as f64;
-                let found = reduction.at(&place, &mut scratch);
+                let found = reduction.at(&[&place])[0];
                 assert!((found - twin).abs() < 1e-8 * signal2, "{found} {twin}");
             }
         }
@@ -252,7 +252,7 @@ fn integrated_variance_finds_the_largest_fall() {
     finds("integrated_variance", |belief, grid| {
         let places = grid.iter().step_by(7).map(Vec::as_slice);
         let reduction = VarianceReduction::new(belief.planning_posterior().unwrap(), places);
-        Box::new(move |place, scratch| reduction.at(place, scratch))
+        Box::new(move |place, _| reduction.at(&[place])[0])
     });
 }
 

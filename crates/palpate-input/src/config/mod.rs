@@ -164,6 +164,20 @@ impl Loader {
         self.table_mut(tables)?.remove(last)
     }
 
+    /// Inserts `value` under the dotted key, unless it has a value or leads through one.
+    pub fn set_default(&mut self, key: &str, value: Value) {
+        let mut parts = steps(key).peekable();
+        let mut table = &mut self.table;
+        while let Some(part) = parts.next() {
+            let is_last = parts.peek().is_none();
+            let inner = if is_last { value.clone() } else { Value::Table(Table::new()) };
+            match table.entry(part).or_insert(inner) {
+                Value::Table(inner) if !is_last => table = inner,
+                _ => return,
+            }
+        }
+    }
+
     /// Inserts `value` under the dotted key, whose table exists.
     fn insert(&mut self, key: &str, value: Value) {
         let (tables, last) = split(key);

@@ -24,11 +24,16 @@ impl Rules {
         rules.record.unwrap_or_default()
     }
 
-    /// Whether `checked` satisfies all rules.
-    pub fn is_satisfied(checked: &impl Validate) -> bool {
+    /// Returns key, value and allowed values of the first violation in `checked`.
+    pub fn first_violation(checked: &impl Validate) -> Option<(String, String, String)> {
         let mut rules = Self::default();
         checked.check(&mut rules);
-        rules.violation.is_none()
+        rules.violation
+    }
+
+    /// Whether `checked` satisfies all rules.
+    pub fn is_satisfied(checked: &impl Validate) -> bool {
+        Self::first_violation(checked).is_none()
     }
 
     fn note(&mut self, key: &str, allowed: impl FnOnce() -> String) {

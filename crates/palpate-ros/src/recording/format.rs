@@ -2,6 +2,7 @@
 
 use crate::definition::{Definition, HasDefinition};
 use crate::message::{BioTacHand, JointState, JointTrajectory, Marker, WrenchStamped};
+use crate::view::TFMessage;
 use byteorder::LittleEndian;
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::{Capabilities, Command, IdealContact, Reading, Sample, Wrench};
@@ -113,10 +114,22 @@ pub(super) enum RecordingChannel {
     Touch,
     Belief,
     Contacts,
+    Approach,
+    Limits,
+    Frames,
+}
+
+impl RecordingChannel {
+    /// Returns the channel of the shapes of this name.
+    pub(super) fn of_shape(name: &str) -> Option<Self> {
+        let all = [Self::Belief, Self::Contacts, Self::Approach, Self::Limits];
+        let topic = |channel: &Self| TOPICS[*channel as usize].0.strip_prefix("/palpate/");
+        all.into_iter().find(|channel| topic(channel) == Some(name))
+    }
 }
 
 /// Name and message of each channel.
-pub const TOPICS: [(&str, &Definition); 8] = [
+pub const TOPICS: [(&str, &Definition); 11] = [
     ("/joint_states", &JointState::DEFINITION),
     ("/palpate/applied", &JointTrajectory::DEFINITION),
     ("/wrench", &WrenchStamped::DEFINITION),
@@ -125,6 +138,9 @@ pub const TOPICS: [(&str, &Definition); 8] = [
     ("/palpate/touch", &TouchMessage::DEFINITION),
     ("/palpate/belief", &Marker::DEFINITION),
     ("/palpate/contacts", &Marker::DEFINITION),
+    ("/palpate/approach", &Marker::DEFINITION),
+    ("/palpate/limits", &Marker::DEFINITION),
+    ("/tf_static", &TFMessage::DEFINITION),
 ];
 
 /// `palpate_msgs/Tick`: a command and the subsequent reading, or a reset and the subsequent

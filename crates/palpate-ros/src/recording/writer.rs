@@ -9,6 +9,7 @@ use crate::message::{
     JointTrajectoryPoint, Marker, Time, WrenchStamped,
 };
 use crate::tactile::fill;
+use crate::view::TFMessage;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Compression, McapResult, WriteOptions, Writer};
@@ -80,27 +81,38 @@ impl Recording {
         Ok(Self(Arc::new(Mutex::new(sheet))))
     }
 
-    /// Adds a finished touch, with `shapes` that show the belief and the contacts at that time. The
-    /// recording so far is passed to the operating system.
+    /// Adds a finished touch. The recording so far is passed to the operating system.
     ///
     /// # Errors
     /// [`Fault::RecordingFailed`] if it cannot be written.
-    pub fn touched(
-        &self,
-        touch: &TouchMessage,
-        [belief, contacts]: [Marker; 2],
-    ) -> Result<(), Fault> {
+    pub fn touched(&self, touch: &TouchMessage) -> Result<(), Fault> {
         let mut sheet = self.sheet();
         sheet.put(RecordingChannel::Touch, touch.time_s, touch)?;
-        for (topic, mut shape) in
-            [(RecordingChannel::Belief, belief), (RecordingChannel::Contacts, contacts)]
-        {
-            if !shape.points.is_empty() {
-                shape.header.stamp = Time::from_s(touch.time_s);
-                sheet.put(topic, touch.time_s, &shape)?;
+        sheet.write(touch.time_s, |writer| writer.flush())
+    }
+
+    /// Adds shapes for viewers, each to the channel of its name.
+    ///
+    /// # Errors
+    /// [`Fault::RecordingFailed`] if they cannot be written.
+    pub fn show(&self, time_s: f64, shapes: &[Marker]) -> Result<(), Fault> {
+        let mut sheet = self.sheet();
+        for shape in shapes.iter().filter(|shape| !shape.points.is_empty()) {
+            if let Some(channel) = RecordingChannel::of_shape(&shape.ns) {
+                let mut shape = shape.clone();
+                shape.header.stamp = Time::from_s(time_s);
+                sheet.put(channel, time_s, &shape)?;
             }
         }
-        sheet.write(touch.time_s, |writer| writer.flush())
+        Ok(())
+    }
+
+    /// Adds the frames of the robot.
+    ///
+    /// # Errors
+    /// [`Fault::RecordingFailed`] if they cannot be written.
+    pub fn show_frames(&self, frames: &TFMessage) -> Result<(), Fault> {
+        self.sheet().put(RecordingChannel::Frames, 0.0, frames)
     }
 
     /// Ends the file with the reason why the trial ended before its last touch, if so.

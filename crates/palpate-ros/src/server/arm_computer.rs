@@ -1,10 +1,57 @@
 //! Simulated arm computer between the network and the servos: accepts recent, complete velocity
 //! commands, stops the arm when they cease, and brakes.
 
+use super::failure::FailureEffect;
 use crate::joints::JointNames;
 use crate::settings::CLOCK_AHEAD_S;
 use crate::status::ArmStatus;
+use crate::topics::Service;
 use crate::transport::Packet;
+use palpate_explore::backend::Reading;
+
+/// A message of an arm about its state.
+pub struct StatePacket {
+    /// Message.
+    pub packet: Packet,
+    /// Rate at which it is published, Hz; `None` for changes only.
+    pub rate_hz: Option<f64>,
+}
+
+/// Computer of a simulated arm, between network and servos. Times are seconds of a monotonic clock.
+pub trait ArmComputer: Send {
+    /// Processes a command that arrived at `now_s`, at `wall_s` since 1970.
+    fn receive(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64);
+
+    /// Answers the call of a service.
+    ///
+    /// # Errors
+    /// A refusal, in words.
+    fn call(&mut self, service: &Service, now_s: f64) -> Result<(), String>;
+
+    /// Starts or ends a failure of the arm.
+    fn fail(&mut self, effect: &FailureEffect, is_on: bool, now_s: f64);
+
+    /// Reports a command that cannot be read.
+    fn alarm(&mut self, words: &str, now_s: f64);
+
+    /// Returns the joint velocities for the next tick, after the reading of the last one.
+    fn advance(&mut self, now_s: f64, reading: &Reading) -> &[f64];
+
+    /// Returns the state.
+    fn status(&self) -> ArmStatus;
+
+    /// Returns the messages that report the state of `device`, without stamps.
+    fn state(&self, device: &str) -> Vec<StatePacket>;
+
+    /// Sets the number of overruns.
+    fn set_overruns(&mut self, overruns: u64);
+
+    /// Returns the number of refused commands, and why the last one was refused.
+    fn refused(&self) -> (u64, &str);
+}
+
+/// Rate of the status, Hz; a heuristic.
+const STATUS_HZ: f64 = 50.0;
 
 /// Time from the expiry of the last command to the stop of the arm, s; a heuristic: two periods at
 /// 250 Hz.
@@ -63,16 +110,6 @@ impl SimulatedArmComputer {
     /// Returns the reported status.
     pub fn status(&self) -> &ArmStatus {
         &self.status
-    }
-
-    /// Returns the number of refused commands.
-    pub fn refused(&self) -> u64 {
-        self.refused
-    }
-
-    /// Sets the number of overruns.
-    pub fn set_overruns(&mut self, overruns: u64) {
-        self.status.overruns = overruns;
     }
 
     /// Presses or releases the emergency stop.
@@ -206,5 +243,55 @@ impl SimulatedArmComputer {
             self.commanded_s = None;
             (self.status.servo_on, self.status.brake) = (false, true);
         }
+    }
+}
+
+impl ArmComputer for SimulatedArmComputer {
+    fn receive(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64) {
+        self.receive(packet, sender, now_s, wall_s);
+    }
+
+    fn call(&mut self, service: &Service, now_s: f64) -> Result<(), String> {
+        match service {
+            Service::Hold => self.set_hold(true, now_s),
+            Service::Unhold => self.set_hold(false, now_s),
+            Service::Stop => self.alarm("stopped by call", now_s),
+            Service::ClearFault => self.clear(),
+            _ => (),
+        }
+        Ok(())
+    }
+
+    fn fail(&mut self, effect: &FailureEffect, is_on: bool, _now_s: f64) {
+        match effect {
+            FailureEffect::Estop => self.set_estop(is_on),
+            FailureEffect::Deadman => self.set_deadman(!is_on),
+            _ => (),
+        }
+    }
+
+    fn alarm(&mut self, words: &str, now_s: f64) {
+        self.alarm(&format!("command refused: {words}"), now_s);
+    }
+
+    fn advance(&mut self, now_s: f64, _reading: &Reading) -> &[f64] {
+        self.advance(now_s)
+    }
+
+    fn status(&self) -> ArmStatus {
+        self.status.clone()
+    }
+
+    fn state(&self, device: &str) -> Vec<StatePacket> {
+        let packet = Packet::Status(self.status.message(0.0, device));
+        vec![StatePacket { packet, rate_hz: Some(STATUS_HZ) }]
+    }
+
+    fn set_overruns(&mut self, overruns: u64) {
+        self.status.overruns = overruns;
+    }
+
+    fn refused(&self) -> (u64, &str) {
+        (self.refused, &self.refusal)
     }
 }

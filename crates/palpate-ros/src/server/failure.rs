@@ -2,6 +2,7 @@
 
 use crate::link::Link;
 use crate::message::{DiagnosticStatus, JointState, Time};
+use crate::profile::Profile;
 use crate::topics::Topic;
 use crate::transport::Packet;
 use palpate_gp::math::seed;
@@ -20,6 +21,19 @@ pub struct Failure {
     pub act: FailureEffect,
 }
 
+impl Failure {
+    /// Whether a robot with this driver can have the failure.
+    pub fn applies_to(&self, profile: Profile) -> bool {
+        match profile {
+            Profile::Ur => !matches!(self.act, FailureEffect::Flags(..) | FailureEffect::NoFlags),
+            Profile::Palpate => !matches!(
+                self.act,
+                FailureEffect::ProtectiveStop | FailureEffect::ProgramStop | FailureEffect::Slow(_)
+            ),
+        }
+    }
+}
+
 /// Effect of a failure.
 #[derive(Clone, Copy)]
 pub enum FailureEffect {
@@ -33,12 +47,20 @@ pub enum FailureEffect {
     Change(fn(&mut Packet, &mut FailureState)),
     /// Writes the flag of this name in a status, or all flags, as one of these texts: off, on.
     Flags(Option<&'static str>, [&'static str; 2]),
+    /// Removes all values of a status.
+    NoFlags,
     /// Delays packets by this time, s.
     Delay(f64),
     /// Presses the emergency stop.
     Estop,
     /// Releases the dead-man switch.
     Deadman,
+    /// Causes a protective stop.
+    ProtectiveStop,
+    /// Ends the driver's program on the robot.
+    ProgramStop,
+    /// Reduces the speed to this fraction.
+    Slow(f64),
 }
 
 /// State of the failures.
@@ -99,7 +121,7 @@ pub static FAILURES: &[Failure] = &[
         FailureEffect::Change(add_spike),
     ),
     failure("nan", "a joint position is NaN", FailureEffect::Change(spoil_position)),
-    failure("six_names", "joint states contain six joints", FailureEffect::Change(drop_seventh)),
+    failure("six_names", "joint states lack the last joint", FailureEffect::Change(drop_last)),
     failure(
         "swapped_names",
         "the names of the first two joints are swapped",
@@ -123,6 +145,21 @@ pub static FAILURES: &[Failure] = &[
     failure("estop", "the emergency stop is pressed", FailureEffect::Estop),
     failure("deadman", "the dead-man switch is released", FailureEffect::Deadman),
     failure(
+        "protective_stop",
+        "the arm makes a protective stop (profile ur)",
+        FailureEffect::ProtectiveStop,
+    ),
+    failure(
+        "program_stop",
+        "the driver's program on the robot ends (profile ur)",
+        FailureEffect::ProgramStop,
+    ),
+    failure(
+        "slow",
+        "the arm moves at 50 % of the commanded speed (profile ur)",
+        FailureEffect::Slow(0.5),
+    ),
+    failure(
         "hold",
         "the status reports a hold, but the arm follows commands",
         FailureEffect::Flags(Some("hold"), ["true"; 2]),
@@ -142,13 +179,18 @@ pub static FAILURES: &[Failure] = &[
         "the flags of the status are numbers: 1, 0",
         FailureEffect::Flags(None, ["0", "1"]),
     ),
-    failure("no_flags", "the status has no values", FailureEffect::Change(clear_flags)),
+    failure("no_flags", "the status has no values", FailureEffect::NoFlags),
     failure(
         "unknown_flag",
         "the status reports the emergency stop as \"unknown\"",
         FailureEffect::Flags(Some("estop"), ["unknown"; 2]),
     ),
 ];
+
+/// Returns the failures that a robot with this driver can have.
+pub fn failures_of(profile: Profile) -> impl Iterator<Item = &'static Failure> {
+    FAILURES.iter().filter(move |failure| failure.applies_to(profile))
+}
 
 /// Returns the index of the failure of a name.
 pub fn by_name(name: &str) -> Option<usize> {
@@ -203,11 +245,11 @@ fn spoil_position(packet: &mut Packet, _: &mut FailureState) {
     with_joints(packet, |message| message.position[0] = f64::NAN);
 }
 
-fn drop_seventh(packet: &mut Packet, _: &mut FailureState) {
+fn drop_last(packet: &mut Packet, _: &mut FailureState) {
     with_joints(packet, |message| {
-        message.name.truncate(6);
-        message.position.truncate(6);
-        message.velocity.truncate(6);
+        message.name.pop();
+        message.position.pop();
+        message.velocity.pop();
     });
 }
 
@@ -228,10 +270,6 @@ fn statuses(packet: &mut Packet) -> &mut [DiagnosticStatus] {
         Packet::Status(message) => &mut message.status,
         _ => &mut [],
     }
-}
-
-fn clear_flags(packet: &mut Packet, _: &mut FailureState) {
-    statuses(packet).iter_mut().for_each(|status| status.values.clear());
 }
 
 fn write_flags(packet: &mut Packet, key: Option<&str>, texts: [&str; 2]) {
@@ -287,6 +325,9 @@ impl FailureInjector {
                 }
                 FailureEffect::Change(change) => change(&mut packet, &mut self.memory),
                 FailureEffect::Flags(key, texts) => write_flags(&mut packet, key, texts),
+                FailureEffect::NoFlags => {
+                    statuses(&mut packet).iter_mut().for_each(|status| status.values.clear());
+                }
                 FailureEffect::Delay(by_s) => delay_s += by_s,
                 _ => (),
             }

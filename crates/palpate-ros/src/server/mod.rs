@@ -7,3 +7,5 @@
 pub mod arm_computer;
 pub mod failure;
 pub mod serve;
+pub mod ur_computer;
+pub mod ur_trajectory;

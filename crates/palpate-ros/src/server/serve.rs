@@ -1,11 +1,13 @@
 //! Loop of a simulated robot: receives commands, runs one tick, sends readings, in real
 //! time.
 
-use super::arm_computer::SimulatedArmComputer;
-use super::failure::{FAILURES, FailureEffect, FailureInjector, by_name};
+use super::arm_computer::{ArmComputer, SimulatedArmComputer};
+use super::failure::{FAILURES, FailureInjector, by_name, failures_of};
+use super::ur_computer::UrComputer;
 use crate::joints::JointNames;
 use crate::link::Link;
-use crate::message::{Header, TriggerResponse, Wrench as WrenchMessage, WrenchStamped};
+use crate::message::{Header, Time, TriggerResponse, Wrench as WrenchMessage, WrenchStamped};
+use crate::profile::Profile;
 use crate::settings::BackendSettings;
 use crate::status::ArmStatus;
 use crate::tactile;
@@ -15,6 +17,7 @@ use nalgebra::Isometry3;
 use palpate_explore::backend::pace::{self, RealTimePacer};
 use palpate_explore::backend::{Backend, Command, Fault, Reading, Wrench};
 use palpate_explore::robot::arm::Chain;
+use palpate_input::error::InputError;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -26,10 +29,12 @@ const REST: f64 = 2e-3;
 /// Largest delay that the simulated robot catches up with, ticks; a longer one is skipped.
 const SLACK_TICKS: u32 = 10;
 
-/// Rate at which the arm's state, joints and force are published, Hz, as by drivers.
-const STATUS_HZ: f64 = 50.0;
+/// Rates at which joints and force are published, Hz, as by drivers of a PA-10 and its sensor.
 const JOINTS_HZ: f64 = 250.0;
 const WRENCH_HZ: f64 = 500.0;
+
+/// Rate of both for a UR of the e-Series, Hz (`update_rate` of its driver).
+const UR_HZ: f64 = 500.0;
 
 /// Event reported by a running simulated robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -50,6 +55,8 @@ pub enum Event {
     },
     /// The reported status has changed.
     Status(ArmStatus),
+    /// A command was refused, for this reason.
+    Refused(String),
     /// The explorer called a service.
     Called(Service),
 }
@@ -65,18 +72,20 @@ pub struct Injection {
     pub for_s: Option<f64>,
 }
 
-/// Returns the services of a simulated robot.
-pub fn services() -> Vec<Service> {
-    let own = FAILURES.iter().map(|failure| Service::Twin(failure.name));
-    Service::COMMON.into_iter().chain(own).collect()
+/// Returns the services of a simulated robot with this driver.
+pub fn services(profile: Profile) -> Vec<Service> {
+    let own = failures_of(profile).map(|failure| Service::Twin(failure.name));
+    profile.services().into_iter().chain(own).collect()
 }
 
 /// Simulated arm behind topics.
 pub struct SimulatedRobotServer {
     body: Box<dyn Backend>,
+    /// Reading of the last tick.
+    reading: Reading,
     settings: BackendSettings,
     names: JointNames,
-    pc: SimulatedArmComputer,
+    pc: Box<dyn ArmComputer>,
     /// Deliveries, queued for the loop.
     inbox: Receiver<Delivery>,
     link: Link,
@@ -91,6 +100,10 @@ pub struct SimulatedRobotServer {
     moved_s: Option<f64>,
     is_moving: bool,
     values: ArmStatus,
+    /// Messages about the arm's state as last published.
+    published: [Option<Packet>; Topic::ALL.len()],
+    /// Rates of joints and force, Hz.
+    rates_hz: [f64; 2],
     tick: u64,
     period_s: f64,
     /// Events that `run` has not reported yet, with their time since 1970.
@@ -110,21 +123,43 @@ impl SimulatedRobotServer {
         injections: Vec<Injection>,
         seed: u64,
     ) -> Result<Self, Fault> {
-        body.reset(seed)?;
+        for injection in &injections {
+            let failure = &FAILURES[injection.failure];
+            if !failure.applies_to(settings.profile) {
+                let names: Vec<&str> = failures_of(settings.profile).map(|it| it.name).collect();
+                let (name, names) = (failure.name, names.join(", "));
+                let words = format!("failure {name} needs another driver; allowed are {names}");
+                let cause = InputError::new(words).into();
+                return Err(Fault::Link { time_s: 0.0, cause });
+            }
+        }
+        let reading = body.reset(seed)?.clone();
         let names = settings.joint_names(chain);
         let (sink, inbox) = channel();
         // The loop polls at its own rate; the link only passes deliveries on.
         let take = move |delivery| drop(sink.send(delivery));
         let link = Link::open(connect, Duration::from_millis(20), take, || None)?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
-        let pc =
-            SimulatedArmComputer::new(names.clone(), limits, settings.topics.command.max_age_s);
+        let (period_s, named) = (body.capabilities().period_s, names.clone());
+        let pc: Box<dyn ArmComputer> = match settings.profile {
+            Profile::Palpate => {
+                let valid_s = settings.topics.command.max_age_s;
+                Box::new(SimulatedArmComputer::new(named, limits, valid_s))
+            }
+            Profile::Ur => Box::new(UrComputer::new(named, period_s, settings.controller())),
+        };
         Ok(Self {
-            period_s: body.capabilities().period_s,
+            period_s,
+            reading,
+            published: Default::default(),
+            rates_hz: match settings.profile {
+                Profile::Palpate => [JOINTS_HZ, WRENCH_HZ],
+                Profile::Ur => [UR_HZ; 2],
+            },
             events: Vec::new(),
             body,
             settings: settings.clone(),
-            values: pc.status().clone(),
+            values: pc.status(),
             pc,
             names,
             inbox,
@@ -162,12 +197,12 @@ impl SimulatedRobotServer {
             self.fail(now_s);
             self.pc.set_overruns(pace.overruns());
             command.qdot.clear();
-            command.qdot.extend_from_slice(self.pc.advance(now_s));
+            command.qdot.extend_from_slice(self.pc.advance(now_s, &self.reading));
             if self.pc.status().brake {
                 self.body.brake();
             }
-            let reading = self.body.step(&command)?.clone();
-            let is_moving = reading.qdot.iter().any(|qdot| qdot.abs() > REST);
+            self.reading.copy_from(self.body.step(&command)?);
+            let is_moving = self.reading.qdot.iter().any(|qdot| qdot.abs() > REST);
             if is_moving != self.is_moving {
                 self.is_moving = is_moving;
                 self.tell(if is_moving { Event::Moving } else { Event::AtRest });
@@ -175,7 +210,7 @@ impl SimulatedRobotServer {
             if is_moving {
                 self.moved_s.get_or_insert(now_s);
             }
-            self.publish(&reading, now_s);
+            self.publish(now_s);
             self.publish_status(now_s);
             self.sender.send_due(&self.link, now_s);
             self.tick += 1;
@@ -195,7 +230,7 @@ impl SimulatedRobotServer {
 
     /// Returns the number of refused commands.
     pub fn refused(&self) -> u64 {
-        self.pc.refused()
+        self.pc.refused().0
     }
 
     fn listen(&mut self, now_s: f64) {
@@ -204,12 +239,15 @@ impl SimulatedRobotServer {
                 Delivery::Packet { packet, sender, received } => {
                     if packet.topic() == Topic::Command {
                         let at_s = received.saturating_duration_since(self.since).as_secs_f64();
+                        let refused = self.refused();
                         self.pc.receive(&packet, sender, at_s.min(now_s), pace::now_s());
+                        if self.refused() > refused {
+                            let words = self.pc.refused().1.to_owned();
+                            self.tell(Event::Refused(words));
+                        }
                     }
                 }
-                Delivery::Malformed { words, .. } => {
-                    self.pc.alarm(&format!("command refused: {words}"), now_s);
-                }
+                Delivery::Malformed { words, .. } => self.pc.alarm(&words, now_s),
                 Delivery::Call { service, call } => {
                     let answer = self.serve(&service, now_s);
                     self.tell(Event::Called(service.clone()));
@@ -221,32 +259,26 @@ impl SimulatedRobotServer {
     }
 
     fn serve(&mut self, service: &Service, now_s: f64) -> TriggerResponse {
-        let mut message = "done".to_owned();
-        match service {
-            Service::Hold => self.pc.set_hold(true, now_s),
-            Service::Unhold => self.pc.set_hold(false, now_s),
-            Service::Stop => self.pc.alarm("stopped by call", now_s),
-            Service::ClearFault => self.pc.clear(),
-            Service::Bias => self.wants_bias = true,
-            Service::Twin(name) => {
-                if let Some(failure) = by_name(name) {
-                    let is_on = !self.sender.is_on(failure);
-                    self.set(failure, is_on);
-                    message = format!("{name} {}", if is_on { "begins" } else { "ends" });
-                }
+        let done = match service {
+            Service::Bias | Service::ZeroFtSensor => {
+                self.wants_bias = true;
+                Ok("done".into())
             }
-        }
-        TriggerResponse { success: true, message }
+            Service::Twin(name) => Ok(by_name(name).map_or_else(String::new, |failure| {
+                let is_on = !self.sender.is_on(failure);
+                self.set(failure, is_on, now_s);
+                format!("{name} {}", if is_on { "begins" } else { "ends" })
+            })),
+            other => self.pc.call(other, now_s).map(|()| "done".into()),
+        };
+        let success = done.is_ok();
+        TriggerResponse { success, message: done.unwrap_or_else(|words| words) }
     }
 
-    fn set(&mut self, failure: usize, is_on: bool) {
+    fn set(&mut self, failure: usize, is_on: bool, now_s: f64) {
         let Some(entry) = FAILURES.get(failure) else { return };
         self.sender.set(failure, is_on);
-        match entry.act {
-            FailureEffect::Estop => self.pc.set_estop(is_on),
-            FailureEffect::Deadman => self.pc.set_deadman(!is_on),
-            _ => (),
-        }
+        self.pc.fail(&entry.act, is_on, now_s);
         self.tell(Event::Failure { name: entry.name, is_on });
     }
 
@@ -258,35 +290,44 @@ impl SimulatedRobotServer {
             let since_s = now_s - moved_s - at_s;
             let is_due = since_s >= 0.0 && for_s.is_none_or(|for_s| since_s < for_s);
             if since_s >= 0.0 && is_due != self.sender.is_on(failure) {
-                self.set(failure, is_due);
+                self.set(failure, is_due, now_s);
             }
         }
     }
 
-    /// Publishes the arm's state at its rate, and immediately when it changes.
+    /// Publishes the arm's state at its rates, and immediately when it changes.
     fn publish_status(&mut self, now_s: f64) {
-        let status = self.pc.status().clone();
-        let is_new = ArmStatus { overruns: self.values.overruns, ..status.clone() } != self.values;
-        if !is_new && !self.is_due(STATUS_HZ) {
-            return;
-        }
-        if is_new {
+        let status = self.pc.status();
+        if (ArmStatus { overruns: self.values.overruns, ..status.clone() }) != self.values {
             self.tell(Event::Status(status.clone()));
         }
         self.values = status;
-        let message = self.values.message(pace::now_s(), self.settings.topics.device());
-        self.send(Packet::Status(message), now_s);
+        for state in self.pc.state(self.settings.topics.device()) {
+            let mut packet = state.packet;
+            let published = &mut self.published[packet.topic() as usize];
+            let is_new = published.as_ref() != Some(&packet);
+            if is_new {
+                *published = Some(packet.clone());
+            }
+            if is_new || state.rate_hz.is_some_and(|rate_hz| self.is_due(rate_hz)) {
+                let stamp = Time::from_s(pace::now_s());
+                packet.stamp_mut().into_iter().for_each(|zero| *zero = stamp);
+                self.send(packet, now_s);
+            }
+        }
     }
 
-    /// Publishes joints, force and tactile frames of a reading.
-    fn publish(&mut self, reading: &Reading, now_s: f64) {
+    /// Publishes joints, force and tactile frames of the last tick.
+    fn publish(&mut self, now_s: f64) {
         let stamp_s = pace::now_s();
-        if self.is_due(JOINTS_HZ) {
+        let [joints_hz, wrench_hz] = self.rates_hz;
+        let reading = self.reading.clone();
+        if self.is_due(joints_hz) {
             let message = self.names.state(stamp_s, &reading.q, &reading.qdot);
             self.send(Packet::Joints(message), now_s);
         }
         if let Some(wrench) = reading.wrench.map(|wrench| wrench.moved(&self.x_mt)) {
-            if self.is_due(WRENCH_HZ) {
+            if self.is_due(wrench_hz) {
                 let message = WrenchMessage {
                     force: (wrench.force_n - self.bias.force_n).into(),
                     torque: (wrench.torque_nm - self.bias.torque_nm).into(),

@@ -2,7 +2,7 @@
 
 use palpate_ros::joints::JointNames;
 use palpate_ros::message::{JointTrajectory, JointTrajectoryPoint};
-use palpate_ros::server::arm_computer::SimulatedArmComputer;
+use palpate_ros::server::arm_computer::{ArmComputer, SimulatedArmComputer};
 use palpate_ros::topics::CommandTopic;
 use palpate_ros::transport::Packet;
 use proptest::prelude::*;
@@ -79,7 +79,7 @@ fn old_commands_move_nothing_neither_before_nor_after_a_stop() {
         pc.receive(&names().command(sent_s, &[0.3; 3], &topic()), 1, 1.0, 1.0);
         assert_eq!(pc.advance(1.0 + f64::from(i) * 1e-4), [0.0; 3]);
     }
-    assert_eq!(pc.refused(), 200, "those of the last 20 ms are timely, but not to stand still");
+    assert_eq!(pc.refused().0, 200, "those of the last 20 ms are timely, but not to stand still");
 }
 
 #[test]

@@ -4,3 +4,4 @@ mod arm_pc;
 mod former_keys;
 mod net_ft;
 mod ros_messages;
+mod ur;

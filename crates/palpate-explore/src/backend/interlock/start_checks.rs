@@ -62,7 +62,9 @@ pub fn check_start(
     readings.iter().try_for_each(Reading::check)?;
     check_joints(&readings, chain)?;
     check_force(&readings, settings.drift_n)?;
-    check_electrodes(&readings, settings.noise_counts, body.capabilities().real_time)?;
+    if body.capabilities().tactile {
+        check_electrodes(&readings, settings.noise_counts, body.capabilities().real_time)?;
+    }
     Ok(())
 }
 

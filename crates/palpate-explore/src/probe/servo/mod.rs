@@ -16,15 +16,11 @@ use crate::task::{Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use reach::PathSegment;
-use trajectory::{Path, paths_around};
+use trajectory::{ARRIVED_M, Path, paths_around};
 
 pub use crate::task::approach::BEYOND_M;
 pub use reach::{ArmReach, check_reach};
 pub(super) use reach::{standoff, turning_point};
-
-/// Position tolerance at the end of a movement; a
-/// heuristic: below what a touch resolves.
-const ARRIVED_M: f64 = 5e-5;
 
 /// Distance beyond the stand-off up to which a finger moves there directly; a heuristic: smaller
 /// than the height of any object.
@@ -44,6 +40,8 @@ pub struct Servo {
     command: Command,
     /// Time of the last reading.
     time_s: f64,
+    /// Part of the last command that a real robot applied.
+    applied_ratio: f64,
     q: Vec<f64>,
     swept: Option<SweptVolume>,
     /// Pose of the tip at the reading of the last contact.
@@ -78,6 +76,7 @@ impl Servo {
             control,
             settings,
             time_s,
+            applied_ratio: 1.0,
             q,
             swept: None,
             tip: None,
@@ -101,6 +100,14 @@ impl Servo {
         self.body.capabilities().period_s
     }
 
+    /// Returns the time by which a path advances in a tick, s: less than a period if a real robot
+    /// applied less than the last command, at a reduced speed or a limit, or else it would fall
+    /// behind.
+    fn passed_s(&self) -> f64 {
+        let is_real = self.body.capabilities().real_time;
+        self.period_s() * if is_real { self.applied_ratio } else { 1.0 }
+    }
+
     /// Runs one tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
         let motion = self.control.step(&self.q, goal);
@@ -115,6 +122,7 @@ impl Servo {
         reading.check()?;
         self.time_s = reading.time_s;
         self.q.clone_from(&reading.q);
+        self.applied_ratio = applied_ratio(&self.command, &reading.applied);
         self.monitor.push(reading);
         match self.monitor.last_sample_s() {
             Some(heard_s) if self.time_s - heard_s > SILENCE_S => {
@@ -144,15 +152,12 @@ impl Servo {
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
         let to = path.to;
-        // The deadline counts from the first reading: the clock of a real arm runs on while the
-        // next touch is planned.
-        let mut deadline_s = None;
-        let period_s = self.period_s();
+        let mut deadline = Deadline::default();
         loop {
-            let goal = path.advance(period_s);
+            let passed_s = self.passed_s();
+            let goal = path.advance(passed_s);
             self.tick(&goal)?;
-            let time_s = self.time_s;
-            let deadline_s = *deadline_s.get_or_insert(time_s + path.pace.connect_timeout_s());
+            let is_late = deadline.is_over(self, path.pace.timeout_s(), passed_s);
             if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
                 return Ok(Some(end));
             }
@@ -161,7 +166,7 @@ impl Servo {
             if path.pace.is_done() && away.norm() < ARRIVED_M && path.has_turned(&here) {
                 return Ok(None);
             }
-            if time_s > deadline_s {
+            if is_late {
                 return Err(self.timeout_fault(phase, &to));
             }
         }
@@ -227,21 +232,21 @@ impl Servo {
         let q = self.robot.chain.joints_from(&self.q);
         let line = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.line_home(&q, around));
         let mut line = line.ok_or_else(|| self.no_way())?;
-        let period_s = self.period_s();
-        let mut deadline_s = None;
+        let mut deadline = Deadline::default();
         loop {
-            let posture = line.advance(period_s);
+            let passed_s = self.passed_s();
+            let posture = line.advance(passed_s);
             let qdot = self.control.step_posture(&self.q, &posture);
             let qdot = qdot.map_err(|cause| Fault::no_command(self.time_s, cause))?;
             self.carry_out(&qdot)?;
             let (time_s, q) = (self.time_s, &self.q);
-            let deadline_s = *deadline_s.get_or_insert(time_s + line.pace.connect_timeout_s());
+            let is_late = deadline.is_over(self, line.pace.timeout_s(), passed_s);
             let home = self.robot.chain.start();
             let is_home = q.iter().zip(home).all(|(q, home)| (q - home).abs() < HOME_RAD);
             if line.pace.is_done() && is_home {
                 return Ok(());
             }
-            if time_s > deadline_s {
+            if is_late {
                 return Err(Fault::Timeout { goal: "home", time_s, q: q.clone() });
             }
         }
@@ -306,7 +311,9 @@ impl Servo {
     fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
         let until_s = self.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
-        let press_m = if self.robot.is_soft { self.settings.press_m } else { 0.0 };
+        // A force that locates the contact must remain while it is read.
+        let is_pressed = self.robot.is_soft || !self.body.capabilities().tactile;
+        let press_m = if is_pressed { self.settings.press_m } else { 0.0 };
         held.translation.vector += approach.direction_w().scale(press_m);
         while self.time_s < until_s {
             self.tick(&Goal::at_rest(held))?;
@@ -323,6 +330,29 @@ impl Servo {
             Contact { p_wc: x_wt * p_tc, normal_w: x_wt.rotation * normal_t }
         }))
     }
+}
+
+/// Deadline of a movement. It counts from the first reading, because the clock of a real arm runs
+/// on while the next touch is planned.
+#[derive(Default)]
+struct Deadline(Option<f64>);
+
+impl Deadline {
+    /// Whether the servo's last reading is after the deadline, which is `timeout_s` after the first
+    /// reading. A tick in which the path advanced by less than a period, by `passed_s`, postpones
+    /// it by the difference.
+    fn is_over(&mut self, servo: &Servo, timeout_s: f64, passed_s: f64) -> bool {
+        let deadline_s = self.0.get_or_insert(servo.time_s + timeout_s);
+        *deadline_s += servo.period_s() - passed_s;
+        servo.time_s > *deadline_s
+    }
+}
+
+/// Returns the part of `command` that was applied, from 0 to 1.
+fn applied_ratio(command: &Command, applied: &Command) -> f64 {
+    let norm = |command: &Command| command.qdot.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let (wanted, found) = (norm(command), norm(applied));
+    if found >= wanted || applied.qdot.is_empty() { 1.0 } else { found / wanted }
 }
 
 /// Indentation of the skin during which the finger can still stop; a heuristic: the fluid's gap.

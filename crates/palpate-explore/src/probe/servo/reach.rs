@@ -3,12 +3,12 @@
 //! complete the approach, and return home, within the joints' limits, without collision with itself
 //! or the object.
 
-use super::trajectory::{ArcPath, JointLine, Path, paths_around};
+use super::trajectory::{ARRIVED_M, ArcPath, JointLine, Path, paths_around};
 use crate::backend::interlock::defaults;
 use crate::control::{Controller, posture};
 use crate::robot::Robot;
 use crate::robot::arm::chain::MAX_JOINTS;
-use crate::robot::arm::{ArmError, JointType, Joints, LinkCapsule, RobotPart};
+use crate::robot::arm::{ArmError, Chain, JointType, Joints, LinkCapsule, RobotPart};
 use crate::task::approach::BEYOND_M;
 use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball, DIRECTIONS, Task};
@@ -66,38 +66,88 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), InputError> {
     };
     let places = zone.grid(TRIED_PER_SIDE);
     let of = places.len();
-    let mut missed = Vec::new();
-    for place in places {
-        let Some(approach) = task.approach(&place.clone().into()) else { continue };
-        let poses = [
-            ("the stand-off", standoff(robot, task.touch().standoff_m, &approach)),
-            ("the farthest depth", turning_point(robot, &approach)),
-        ];
-        missed.extend(poses.into_iter().find_map(|(phase, x_wt)| {
-            match posture(&robot.chain, &x_wt) {
-                Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
-                    Some((place.clone(), phase, distance_m, angle_rad))
-                }
-                _ => None,
-            }
-        }));
-    }
+    let missed: Vec<_> =
+        places.iter().filter_map(|place| Some((place, miss(robot, task, place)?))).collect();
+    let by = |(_, miss): &(_, Miss)| miss.distance_m + miss.angle_rad;
     let count = missed.len();
-    let by = |(_, _, distance_m, angle_rad): &(_, _, f64, f64)| distance_m + angle_rad;
-    match missed.into_iter().max_by(|a, b| by(a).total_cmp(&by(b))) {
-        Some((place, phase, distance_m, angle_rad)) => {
-            let away = format!("{:.0} mm and {:.0} deg", 1e3 * distance_m, angle_rad.to_degrees());
-            Err(InputError::new(format!(
-                "the arm does not reach {count} of {of} places of the zone: at {place:?} the tip \
-                 misses {phase} by {away}"
-            ))
-            .remedy(
-                "move the object and the zone closer (object.position_m, zone), move \
-                 arm.base_position_m, or make the zone smaller",
-            ))
+    let Some((place, miss)) = missed.into_iter().max_by(|a, b| by(a).total_cmp(&by(b))) else {
+        return Ok(());
+    };
+    let away =
+        format!("{:.2} mm and {:.1} deg", 1e3 * miss.distance_m, miss.angle_rad.to_degrees());
+    let found = match nearest_base(robot, task, &zone.grid(2)) {
+        Some(by_w) => format!(
+            "set arm.base_position_m to {:?}, or subtract {:?} from the positions of object and \
+             zone: then the arm reaches the zone's corners",
+            (robot.chain.base.translation.vector + by_w).as_slice(),
+            by_w.as_slice()
+        ),
+        None => "move the object and the zone closer (object.position_m, zone), move \
+                 arm.base_position_m, or make the zone smaller"
+            .into(),
+    };
+    Err(InputError::new(format!(
+        "the arm does not reach {count} of {of} places of the zone: at {place:?} the tip misses {} by \
+         {away}",
+        miss.phase
+    ))
+    .remedy(found))
+}
+
+/// Pose of an approach that a robot does not reach, and how far its closest pose is away.
+struct Miss {
+    phase: &'static str,
+    distance_m: f64,
+    angle_rad: f64,
+}
+
+/// Returns the pose that `robot` misses in the approach to `place`.
+fn miss(robot: &Robot, task: &Task, place: &[f64]) -> Option<Miss> {
+    let approach = task.approach(&place.to_vec().into())?;
+    let poses = [
+        ("the stand-off", standoff(robot, task.touch().standoff_m, &approach)),
+        ("the farthest depth", turning_point(robot, &approach)),
+    ];
+    let missed = poses.iter().find_map(|(phase, x_wt)| match posture(&robot.chain, x_wt) {
+        Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
+            Some(Miss { phase, distance_m, angle_rad })
         }
-        None => Ok(()),
-    }
+        _ => None,
+    });
+    missed.or_else(|| {
+        // An arm may reach a pose, and still stop on its way at the limit of a joint.
+        let chain = &robot.chain;
+        let (mut q, mut from) = (chain.home, chain.forward(&chain.home));
+        let speeds_m_s = [task.touch().travel_m_s, task.touch().approach_m_s];
+        let ways = ["the stand-off on the way from home", "the farthest depth on the approach"];
+        for ((way, (_, to)), speed_m_s) in ways.into_iter().zip(&poses).zip(speeds_m_s) {
+            let path = Path::straight(from.translation.vector, *to, speed_m_s);
+            match rehearse(chain, q, path, |_, _| true) {
+                Ok(there) => (q, from) = (there, *to),
+                Err((distance_m, angle_rad)) => {
+                    return Some(Miss { phase: way, distance_m, angle_rad });
+                }
+            }
+        }
+        None
+    })
+}
+
+/// Distances by which a better base is searched along each axis, m; a heuristic: up to half the
+/// reach of a table-mounted arm.
+const MOVES_M: [f64; 7] = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
+
+/// Returns the smallest move of the base along an axis of `W` after which `robot` reaches `places`.
+fn nearest_base(robot: &Robot, task: &Task, places: &[Vec<f64>]) -> Option<Vector3<f64>> {
+    let axes = [Vector3::y(), Vector3::z(), Vector3::x()];
+    let moves = MOVES_M
+        .into_iter()
+        .flat_map(|move_m| axes.into_iter().flat_map(move |axis| [axis * move_m, axis * -move_m]));
+    moves.into_iter().find(|by_w| {
+        let mut moved = robot.clone();
+        moved.chain.base.translation.vector += by_w;
+        places.iter().all(|place| miss(&moved, task, place).is_none())
+    })
 }
 
 /// Fractions of an approach from which the path home is checked, since contact may occur anywhere:
@@ -255,11 +305,6 @@ const PERIOD_S: f64 = 0.05;
 const LAG_M: f64 = 0.1;
 const LAG_RAD: f64 = 1.0;
 
-/// Tolerance at the end of a path, and the number of ticks to reach it; heuristics.
-const NEAR_M: f64 = 1e-3;
-const NEAR_RAD: f64 = 0.01;
-const TICKS_TO_END: usize = 40;
-
 /// Margins to the joints' limits, and between links in addition to the clearance, since the actual
 /// motion differs from the checked one; heuristics.
 const SLACK_RAD: f64 = 0.1;
@@ -277,6 +322,40 @@ const GRAIN_M: f64 = 2e-3;
 /// Delay from a command until the joints begin to brake, as a multiple of the interlocks' value.
 // heuristic: one tick more.
 const REACTION: f64 = 2.0;
+
+/// Moves `chain` from `q` along `path` on its kinematics, as long as `holds` for the joints and
+/// their velocities. It has to arrive as near and as soon as a movement of the servo.
+///
+/// # Errors
+/// If it does not get to the end: the distance, m, and the angle, rad, to the goal at that time.
+fn rehearse(
+    chain: &Chain,
+    mut q: Joints,
+    mut path: Path,
+    holds: impl Fn(&Joints, &Joints) -> bool,
+) -> Result<Joints, (f64, f64)> {
+    let nowhere = (f64::INFINITY, f64::INFINITY);
+    let mut control = Controller::new(chain.clone(), PERIOD_S).map_err(|_| nowhere)?;
+    let count = chain.joints.len();
+    let mut time_s = 0.0;
+    loop {
+        let goal = path.advance(PERIOD_S);
+        let motion = control.step(&q.as_slice()[..count], &goal).map_err(|_| nowhere)?;
+        q = chain.clamp(&(q + motion.qdot * PERIOD_S));
+        let x_wt = control.x_wt(&q.as_slice()[..count]).map_err(|_| nowhere)?;
+        let (away_m, away_rad) = apart(&x_wt, &goal.x_wt);
+        if away_m > LAG_M || away_rad > LAG_RAD || !holds(&q, &motion.qdot) {
+            return Err((away_m, away_rad));
+        }
+        if path.pace.is_done() && away_m < ARRIVED_M && path.has_turned(&x_wt) {
+            return Ok(q);
+        }
+        time_s += PERIOD_S;
+        if time_s > path.pace.timeout_s() {
+            return Err((away_m, away_rad));
+        }
+    }
+}
 
 /// Clearance constraints of a checked motion.
 #[derive(Clone, Copy)]
@@ -324,37 +403,12 @@ impl ArmReach {
         paths.into_iter().try_fold(q, |q, path| self.follow_one(q, path, clear))
     }
 
-    fn follow_one(
-        &self,
-        mut q: Joints,
-        mut path: Path,
-        clear: &ClearanceConstraints,
-    ) -> Option<Joints> {
-        let mut control = Controller::new(self.robot.chain.clone(), PERIOD_S).ok()?;
-        let count = self.robot.chain.joints.len();
+    fn follow_one(&self, q: Joints, path: Path, clear: &ClearanceConstraints) -> Option<Joints> {
         let is_approach = path.is_straight();
-        let mut waited = 0;
-        loop {
-            let goal = path.advance(PERIOD_S);
-            let motion = control.step(&q.as_slice()[..count], &goal).ok()?;
-            q = self.robot.chain.clamp(&(q + motion.qdot * PERIOD_S));
-            let x_wt = control.x_wt(&q.as_slice()[..count]).ok()?;
-            let (away_m, away_rad) = apart(&x_wt, &goal.x_wt);
-            let is_stuck = away_m > LAG_M || away_rad > LAG_RAD;
-            let stops = self.stops(&q, &motion.qdot);
-            if is_stuck || !self.is_clear(&q, clear, is_approach) || !self.is_apart(&stops, clear) {
-                return None;
-            }
-            if path.pace.is_done() {
-                if away_m < NEAR_M && away_rad < NEAR_RAD {
-                    return Some(q);
-                }
-                waited += 1;
-                if waited > TICKS_TO_END {
-                    return None;
-                }
-            }
-        }
+        let rehearsed = rehearse(&self.robot.chain, q, path, |q, qdot| {
+            self.is_clear(q, clear, is_approach) && self.is_apart(&self.stops(q, qdot), clear)
+        });
+        rehearsed.ok()
     }
 
     /// Whether the whole `line` is clear; joints that brake together stay on the line.
@@ -457,7 +511,7 @@ mod tests {
     fn a_line_of_the_joints_through_the_object_is_refused_and_the_tip_goes_around() {
         let (reach, approach) = reach();
         let around = approach.obstacle.unwrap();
-        let q = Joints::from([-0.819, 0.695, 0.609, 1.266, 1.593, 1.768, -0.887]);
+        let q = Joints::from([-0.819, 0.695, 0.609, 1.266, 1.593, 1.768, -0.887, 0.0]);
         let (from, ball) = (reach.robot.chain.forward(&q), around.centre_w);
         assert!((from.translation.vector - ball.coords).norm() > around.radius_m - 1e-3);
         assert!(reach.line_home(&q, &around).is_none());
@@ -469,7 +523,7 @@ mod tests {
     #[test]
     fn joints_are_home_in_the_end_on_whichever_side_the_elbow_was() {
         let (reach, approach) = reach();
-        let q = [1.322, -0.724, -1.416, 1.894, -1.630, -0.712, 1.747];
+        let q = [1.322, -0.724, -1.416, 1.894, -1.630, -0.712, 1.747, 0.0];
         let legs = reach.homeward(&Joints::from(q), &approach, MARGIN_CURRENT).unwrap();
         assert!(matches!(legs[..], [PathSegment::Around(_), .., PathSegment::Home]), "{legs:?}");
         let mut wound = reach.robot.chain.home;

@@ -6,6 +6,9 @@ use crate::robot::arm::{Chain, Joints};
 use crate::task::Ball;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3, Vector6};
 
+/// Position tolerance at the end of a movement; a heuristic: below what a touch resolves.
+pub(super) const ARRIVED_M: f64 = 5e-5;
+
 /// Distance from the wrist's centre to the fingertip: while turning, the wrist moves no faster than
 /// the tip may, and no joint turns faster than that; a heuristic, as in the controller.
 const LEVER_M: f64 = 0.2;
@@ -109,7 +112,7 @@ impl VelocityProfile {
     }
 
     /// Timeout of the movement, s; a heuristic: four times its planned duration.
-    pub(super) fn connect_timeout_s(&self) -> f64 {
+    pub(super) fn timeout_s(&self) -> f64 {
         let least_s = self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2;
         4.0 * least_s + 2.0
     }
@@ -344,7 +347,8 @@ mod tests {
             to in prop::array::uniform7(-1.5..1.5f64),
         ) {
             let chain = ArmSettings::default().chain().unwrap();
-            let (from, to) = (Joints::from(from), Joints::from(to));
+            let joints = |q: [f64; 7]| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
+            let (from, to) = (joints(from), joints(to));
             let mut line = JointLine::new(&chain, &from, &to, 0.1);
             let tip = chain.flange * chain.tool;
             let moved_m = |a: &Joints, b: &Joints| {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 /// Largest number of joints of a chain.
-pub const MAX_JOINTS: usize = 7;
+pub const MAX_JOINTS: usize = 8;
 
 /// One number per joint: rad or m, or their rates; entries beyond the chain's joints are zero.
 pub type Joints = SVector<f64, MAX_JOINTS>;
@@ -98,6 +98,10 @@ pub struct LinkCapsule {
     pub folds: bool,
 }
 
+/// Smallest number of joints between two links that can collide; closer ones touch where they are
+/// joined.
+pub const JOINTS_APART: usize = 3;
+
 impl LinkCapsule {
     /// Returns the capsule in `W` for the pose `x_wl` of its link's frame.
     pub fn at(&self, x_wl: &Isometry3<f64>) -> Capsule {
@@ -110,7 +114,7 @@ impl LinkCapsule {
     /// [`folds`](Self::folds) is checked against the tool and finger.
     pub fn can_collide(&self, other: &Self) -> bool {
         let (near, far) = if self.link < other.link { (self, other) } else { (other, self) };
-        far.link >= near.link + 3 || (near.folds && far.is_carried())
+        far.link >= near.link + JOINTS_APART || (near.folds && far.is_carried())
     }
 
     /// Whether the capsule lies beyond the flange: on the tool or the finger.

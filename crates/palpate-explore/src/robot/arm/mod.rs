@@ -2,8 +2,10 @@
 
 pub mod chain;
 pub mod model;
+pub mod parts;
 pub mod settings;
 pub mod stage;
+mod urdf;
 
 pub use chain::{ArmError, Chain, Jacobian, Joint, JointType, Joints, LinkCapsule, RobotPart};
 pub use model::ArmModel;

@@ -9,10 +9,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Built-in arms by name: model and MJCF.
-pub const MODELS: [(&str, [&str; 2]); 2] = [
-    ("pa10", [include_str!("../../../pa10/c.toml"), include_str!("../../../pa10/c.xml")]),
-    ("pa10_a", [include_str!("../../../pa10/a.toml"), include_str!("../../../pa10/a.xml")]),
+/// Built-in arms by name: model, and MJCF for a dynamic simulation.
+pub const MODELS: [(&str, &str, Option<&str>); 5] = [
+    ("pa10", include_str!("../../../pa10/c.toml"), Some(include_str!("../../../pa10/c.xml"))),
+    ("pa10_a", include_str!("../../../pa10/a.toml"), Some(include_str!("../../../pa10/a.xml"))),
+    ("ur5e", include_str!("../../../arms/ur5e.toml"), None),
+    ("fr3", include_str!("../../../arms/fr3.toml"), None),
+    ("iiwa14", include_str!("../../../arms/iiwa14.toml"), None),
 ];
 
 /// Model of an arm as described by its file. Frames of all links are parallel at q = 0.
@@ -29,6 +32,9 @@ pub struct ArmModel {
     /// Name of the joint at the elbow, which the workspace interlock monitors besides the tip.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<String>,
+    /// Position of the base in `W`, m, for scenes without `arm.base_position_m`.
+    #[serde(default)]
+    pub base_position_m: [f64; 3],
     /// Origin of the flange in the last joint's frame, m. The tool points along the flange's +z.
     pub flange_m: [f64; 3],
     /// Rotation of the flange about the fixed axes x, then y, then z of that frame, deg.
@@ -61,6 +67,9 @@ pub enum JointModel {
         acceleration_deg_s2: f64,
         /// Position at home, deg.
         home_deg: f64,
+        /// Masses and motor.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        dynamics: Option<JointDynamics>,
     },
     /// Prismatic joint: translates along its axis.
     Prismatic {
@@ -78,7 +87,33 @@ pub enum JointModel {
         acceleration_m_s2: f64,
         /// Position at home, m.
         home_m: f64,
+        /// Masses and motor.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        dynamics: Option<JointDynamics>,
     },
+}
+
+/// Mass of the link that a joint moves, and the joint's motor, for a dynamic simulation. Efforts
+/// are torques (N·m) of a revolute and forces (N) of a prismatic joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointDynamics {
+    /// Mass of the link, kg.
+    pub mass_kg: f64,
+    /// Its centre in the joint's frame, m.
+    pub centre_m: [f64; 3],
+    /// Inertia about the centre: xx, yy, zz, xy, xz, yz, kg·m².
+    pub inertia_kg_m2: [f64; 6],
+    /// Inertia of the rotor behind the gear, kg·m² or kg.
+    pub armature: f64,
+    /// Largest effort of the motor.
+    pub effort_limit: f64,
+    /// Effort against a motion per speed.
+    #[serde(default)]
+    pub damping: f64,
+    /// Effort against any motion.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 /// A collision capsule in an arm model file.
@@ -105,7 +140,7 @@ pub struct CapsuleModel {
 }
 
 /// Name of the fixed link.
-const BASE: &str = "base";
+pub const BASE: &str = "base";
 
 impl ArmModel {
     /// Loads the built-in model of this name, or the file `model`.
@@ -113,8 +148,8 @@ impl ArmModel {
     /// # Errors
     /// If the file cannot be read or does not describe an arm.
     pub fn load(model: &str) -> Result<Self, ConfigError> {
-        match MODELS.iter().find(|(name, _)| *name == model) {
-            Some((name, [text, _])) => Loader::from_text(Path::new(name), (*text).into())?.finish(),
+        match MODELS.iter().find(|(name, ..)| *name == model) {
+            Some((name, text, _)) => Loader::from_text(Path::new(name), (*text).into())?.finish(),
             None => Loader::read(Path::new(model))?.finish(),
         }
     }
@@ -168,16 +203,17 @@ impl ArmModel {
     }
 }
 
-/// Returns the MJCF of the arm `model`, if it has one.
+/// Returns the MJCF of the arm `model`, read from the file `file` or built in with this name, if it
+/// has one.
 ///
 /// # Errors
 /// If its file cannot be read.
-pub fn mjcf(model: &str) -> Result<Option<String>, ConfigError> {
-    if let Some((_, [_, mjcf])) = MODELS.iter().find(|(name, _)| *name == model) {
-        return Ok(Some((*mjcf).into()));
+pub fn mjcf(file: &str, model: &ArmModel) -> Result<Option<String>, ConfigError> {
+    if let Some((.., mjcf)) = MODELS.iter().find(|(name, ..)| *name == file) {
+        return Ok(mjcf.map(str::to_owned));
     }
-    let Some(file) = ArmModel::load(model)?.mjcf else { return Ok(None) };
-    let path = Path::new(model).with_file_name(file);
+    let Some(mjcf) = &model.mjcf else { return Ok(None) };
+    let path = Path::new(file).with_file_name(mjcf);
     let text = files::text(&path, files::TEXT_MAX);
     text.map(Some).map_err(|cause| ConfigError::unreadable(&path, &cause))
 }
@@ -187,6 +223,12 @@ impl JointModel {
     pub fn name(&self) -> &str {
         let (Self::Revolute { name, .. } | Self::Prismatic { name, .. }) = self;
         name
+    }
+
+    /// Masses and motor, if known.
+    pub fn dynamics(&self) -> Option<&JointDynamics> {
+        let (Self::Revolute { dynamics, .. } | Self::Prismatic { dynamics, .. }) = self;
+        dynamics.as_ref()
     }
 
     /// Origin and axis in the frame of the previous joint.
@@ -218,6 +260,18 @@ impl JointModel {
     }
 }
 
+impl JointDynamics {
+    fn check(&self, rules: &mut Rules, key: &str) {
+        rules.number(&format!("{key}.mass_kg"), self.mass_kg, 1e-6..=1e4);
+        rules.numbers(&format!("{key}.centre_m"), &self.centre_m, -FAR_M..=FAR_M);
+        rules.numbers(&format!("{key}.inertia_kg_m2"), &self.inertia_kg_m2, -1e4..=1e4);
+        rules.number(&format!("{key}.armature"), self.armature, 1e-6..=1e4);
+        rules.number(&format!("{key}.effort_limit"), self.effort_limit, 1e-3..=1e6);
+        rules.number(&format!("{key}.damping"), self.damping, 0.0..=1e6);
+        rules.number(&format!("{key}.friction"), self.friction, 0.0..=1e6);
+    }
+}
+
 impl CapsuleModel {
     /// Returns the capsule on the link that `link` joints move.
     fn on(&self, link: usize) -> LinkCapsule {
@@ -246,6 +300,7 @@ impl Validate for ArmModel {
         rules.require("namespace", &self.namespace, self.namespace.starts_with('/'), || {
             "a name that begins with a slash".into()
         });
+        rules.numbers("base_position_m", &self.base_position_m, -1e3..=1e3);
         rules.numbers("flange_m", &self.flange_m, -FAR_M..=FAR_M);
         rules.numbers("flange_rotation_deg", &self.flange_rotation_deg, -360.0..=360.0);
         let names: Vec<&str> = self.joint.iter().map(JointModel::name).collect();
@@ -289,6 +344,9 @@ impl Validate for ArmModel {
                         1e-3..=1e3,
                     );
                 }
+            }
+            if let Some(dynamics) = joint.dynamics() {
+                dynamics.check(rules, &format!("{key}.dynamics"));
             }
             let (origin_m, axis) = joint.placement();
             rules.numbers(&format!("{key}.origin_m"), origin_m, -FAR_M..=FAR_M);

@@ -2,9 +2,12 @@
 
 use super::chain::{Chain, JointType};
 use super::model::{ArmModel, MODELS};
+use super::parts::ArmParts;
+use super::urdf;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{ConfigError, Origin, Rules, Validate};
+use palpate_input::config::{Rules, Validate};
+use palpate_input::error::InputError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -14,15 +17,21 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSettings {
-    /// Arm model: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), or a file such as
-    /// `models/pa10/c.toml`.
+    /// Arm model: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), `"ur5e"`, `"fr3"`, `"iiwa14"`,
+    /// or a file: an arm model (`.toml`), a URDF or an MJCF (`.xml`).
     #[serde(alias = "links", deserialize_with = "model")]
     pub model: String,
-    /// Position of the base in `W`, m.
-    pub base_position_m: [f64; 3],
+    /// Link (URDF), body or site (MJCF) that carries the tool along its +z; default: the only end
+    /// of the file's robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip: Option<String>,
+    /// Position of the base in `W`, m; default: the model's. A URDF or MJCF has none: the origin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub base_position_m: Option<[f64; 3]>,
     /// Rotation of the base about the fixed axes x, then y, then z of `W`, deg.
     pub base_rotation_deg: [f64; 3],
-    /// Home posture, one number per joint, deg or m (prismatic); default: the model's.
+    /// Home posture, one number per joint, deg or m (prismatic); default: the model's. A URDF or
+    /// MJCF has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home_deg: Option<Vec<f64>>,
     /// Distance from the flange along its axis to the origin of `T`, m.
@@ -37,6 +46,9 @@ pub struct ArmSettings {
     pub tool_kg: f64,
 }
 
+/// Endings of the files that describe an arm.
+pub const FILE_ENDINGS: [&str; 3] = [".toml", ".urdf", ".xml"];
+
 /// Mass of adapter and finger beyond the force/torque sensor; a heuristic.
 pub const TOOL_KG: f64 = 0.15;
 
@@ -47,7 +59,8 @@ impl Default for ArmSettings {
     fn default() -> Self {
         Self {
             model: MODELS[0].0.into(),
-            base_position_m: [0.0; 3],
+            tip: None,
+            base_position_m: None,
             base_rotation_deg: [0.0; 3],
             home_deg: None,
             mount_m: 0.12,
@@ -65,32 +78,89 @@ impl ArmSettings {
         (!is_there).then(|| pose(self.tool_position_m, self.tool_rotation_deg))
     }
 
-    /// Sets an omitted home posture to that of the model; an unreadable model is reported where the
-    /// arm is built.
+    /// Sets omitted home posture and base to those of the model; an unreadable model is reported
+    /// where the arm is built.
     pub fn complete(&mut self) {
-        if let (None, Ok(model)) = (&self.home_deg, ArmModel::load(&self.model)) {
-            self.home_deg = Some(model.home());
+        if let Ok(model) = ArmModel::load(&self.model) {
+            self.home_deg.get_or_insert_with(|| model.home());
+            self.base_position_m.get_or_insert(model.base_position_m);
         }
     }
 
     /// Whether its model is a file instead of one of [`MODELS`].
     pub fn is_file(&self) -> bool {
-        Path::new(&self.model).extension().is_some_and(|extension| extension == "toml")
+        FILE_ENDINGS.iter().any(|ending| self.model.ends_with(ending))
+    }
+
+    /// Returns the model, and what was assumed because its file lacks it, in words. An MJCF needs
+    /// MuJoCo, which this crate does not use.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or does not describe an arm.
+    pub fn model(&self) -> Result<(ArmModel, Vec<String>), InputError> {
+        let path = Path::new(&self.model);
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("urdf") => self.assembled(urdf::read(path, self.tip.as_deref())?),
+            Some("xml") => {
+                Err(InputError::new("an MJCF needs a program with MuJoCo").at(&self.model))
+            }
+            _ => {
+                let model = ArmModel::load(&self.model);
+                let model = model.map_err(|cause| InputError::new(cause.to_string()))?;
+                Ok((model, Vec::new()))
+            }
+        }
+    }
+
+    /// Returns the model of the parts of a file, as [`model`](Self::model) does.
+    ///
+    /// # Errors
+    /// If `home_deg` is missing or does not have one number per joint, or a number of the file is
+    /// not one of an arm.
+    pub fn assembled(&self, parts: ArmParts) -> Result<(ArmModel, Vec<String>), InputError> {
+        let joints = parts.links.len();
+        match &self.home_deg {
+            Some(home) if home.len() == joints => {
+                let (model, lacks) = parts.model(home);
+                match Rules::first_violation(&model) {
+                    None => Ok((model, lacks)),
+                    Some((key, value, allowed)) => {
+                        Err(InputError::new(key).at(&self.model).value(value).allowed(allowed))
+                    }
+                }
+            }
+            home => Err(InputError::new("arm.home_deg")
+                .at(&self.model)
+                .value(home.as_ref().map_or("missing".into(), |home| format!("{home:?}")))
+                .allowed(format!(
+                    "{joints} numbers, one per joint, deg or m: the file has no home"
+                ))),
+        }
     }
 
     /// Returns the arm as a chain from `W` to `T`.
     ///
     /// # Errors
     /// If its model cannot be read, or `home_deg` is not within the model's limits.
-    pub fn chain(&self) -> Result<Chain, ConfigError> {
-        let model = ArmModel::load(&self.model)?;
+    pub fn chain(&self) -> Result<Chain, InputError> {
+        self.chain_of(&self.model()?.0)
+    }
+
+    /// Returns an arm of this `model` as a chain from `W` to `T`.
+    ///
+    /// # Errors
+    /// If `home_deg` is not within the model's limits.
+    pub fn chain_of(&self, model: &ArmModel) -> Result<Chain, InputError> {
         let home = self.home_deg.clone().unwrap_or_else(|| model.home());
-        self.check_home(&model).map_or(Ok(()), |(key, value, allowed)| {
-            let origin = Origin::File { path: (&self.model).into(), line: None };
-            Err(ConfigError::not_allowed(origin, format!("arm.{key}"), value, allowed))
-        })?;
+        if let Some((key, value, allowed)) = self.check_home(model) {
+            let problem = InputError::new(format!("arm.{key}")).at(&self.model);
+            return Err(problem.value(value).allowed(allowed));
+        }
         Ok(Chain {
-            base: pose(self.base_position_m, self.base_rotation_deg),
+            base: pose(
+                self.base_position_m.unwrap_or(model.base_position_m),
+                self.base_rotation_deg,
+            ),
             joints: model.joints(),
             flange: model.flange(),
             tool: match self.correction() {
@@ -148,12 +218,13 @@ pub(super) fn tool(mount_m: f64) -> Isometry3<f64> {
 
 impl Validate for ArmSettings {
     fn check(&self, rules: &mut Rules) {
-        rules.numbers("base_position_m", &self.base_position_m, -1e3..=1e3);
+        rules.numbers("base_position_m", &self.base_position_m.unwrap_or_default(), -1e3..=1e3);
         rules.numbers("base_rotation_deg", &self.base_rotation_deg, -360.0..=360.0);
-        let is_known = MODELS.iter().any(|(name, _)| *name == self.model);
+        let is_known = MODELS.iter().any(|(name, ..)| *name == self.model);
         rules.require("model", format!("\"{}\"", self.model), is_known || self.is_file(), || {
-            let names: Vec<String> = MODELS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-            format!("{}, or a file ending in .toml", names.join(", "))
+            let names: Vec<String> =
+                MODELS.iter().map(|(name, ..)| format!("\"{name}\"")).collect();
+            format!("{}, or a file ending in {}", names.join(", "), FILE_ENDINGS.join(", "))
         });
         // The file is read when the arm is built: the folder of a run can be read without it.
         if let Some(model) = is_known.then(|| ArmModel::load(&self.model).ok()).flatten()

@@ -1,68 +1,56 @@
 //! ROS 2 transport by RustDDS, without an installation of ROS.
 
-use super::definition::HasDefinition;
-use super::message::{
-    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
-    TriggerRequest, TriggerResponse, WrenchStamped,
+mod calls;
+mod endpoint;
+
+use crate::definition::HasDefinition;
+use crate::message::{
+    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
+    JointTrajectory, RobotMode, SafetyMode, TriggerResponse, WrenchStamped,
 };
-use super::network::network;
-use super::settings::{BackendSettings, MappingKind};
-use super::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic, Topics};
-use super::transport::{
+use crate::network::network;
+use crate::settings::{BackendSettings, MappingKind};
+use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic};
+use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
 };
+use crate::view::{MarkerArray, PointCloud2, TFMessage};
+use calls::{OpenService as _, ServiceClient, ServiceServer};
+use endpoint::{WAKE, best_effort, kept, latched, reliable, watch};
 use palpate_input::error::InputError;
-use ros2_client::qos::{Durability, History, WhenFull};
-use ros2_client::request_id::RmwRequestId;
 use ros2_client::{
-    Client, Context, MessageTypeName, Name, Node, NodeName, NodeOptions, QosProfile, Server,
-    ServiceMapping, ServiceTypeName,
+    Context, MessageTypeName, Name, Node, NodeName, NodeOptions, QosProfile, ServiceMapping,
 };
 use rustdds::DomainParticipantBuilder;
 use rustdds::mio1;
-use rustdds::mio1::{Events, Interest, Poll, Token};
+use rustdds::mio1::{Events, Poll};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::collections::HashMap;
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-impl ros2_client::Message for TriggerRequest {}
-impl ros2_client::Message for TriggerResponse {}
-
-/// Queue length of a reader or writer; a heuristic: more than arrive while a thread is delayed.
-const DEPTH: usize = 64;
-
-/// Token of the waker; all other sources are read after every wake-up.
-const WAKE: Token = Token(0);
-
 /// Passes on the messages received on a topic.
 type Reader = Box<dyn Fn(&mut dyn FnMut(Delivery))>;
 /// Publishes a packet if its topic and type match.
 type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
-/// A client with its time of creation.
-type MadeClient = (Client<TriggerRequest, TriggerResponse>, Instant);
-
 /// One side in a ROS 2 network.
 pub struct Ros2 {
     context: Context,
     node: Node,
-    topics: Topics,
+    settings: BackendSettings,
     side: Endpoint,
     poll: Poll,
     events: Events,
     waker: Arc<mio1::Waker>,
     readers: Vec<Reader>,
     writers: Vec<Writer>,
-    mapping: MappingKind,
-    /// Services with their clients and creation times, once servers are found.
-    clients: Vec<(Service, Option<MadeClient>)>,
+    /// Services with their clients, once servers are found.
+    clients: Vec<(Service, Option<ServiceClient>)>,
     /// Time of the last search for servers.
     looked: Instant,
-    servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
-    calls: HashMap<u64, RmwRequestId>,
+    servers: Vec<ServiceServer>,
     call_count: u64,
 }
 
@@ -76,24 +64,6 @@ const SETTLE: Duration = Duration::from_millis(200);
 /// Vendor id of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3;
 /// list of vendors of the DDS Foundation).
 const CYCLONE: [u8; 2] = [0x01, 0x10];
-
-/// QoS of a writer: compatible with all readers, and never blocking.
-fn reliable() -> QosProfile {
-    QosProfile::publisher_default()
-        .reliability_reliable(WhenFull::Fail)
-        .durability(Durability::Volatile)
-        .history(History::KeepLast { depth: DEPTH })
-}
-
-/// QoS of a reader: compatible with sensor drivers.
-fn best_effort() -> QosProfile {
-    QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH })
-}
-
-/// QoS of a reader that also receives the last message published before its creation.
-fn latched() -> QosProfile {
-    reliable().durability(Durability::TransientLocal)
-}
 
 /// Returns the network interfaces of this machine with their IPv4 addresses.
 fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
@@ -133,18 +103,16 @@ impl Ros2 {
         let mut end = Self {
             context,
             node,
-            topics: settings.topics.clone(),
+            settings: settings.clone(),
             side,
             poll,
             events: Events::with_capacity(64),
             waker: Arc::new(waker),
             readers: Vec::new(),
             writers: Vec::new(),
-            mapping: settings.service_mapping,
             clients: Vec::new(),
             looked: Instant::now(),
             servers: Vec::new(),
-            calls: HashMap::new(),
             call_count: 0,
         };
         end.topics()?;
@@ -158,19 +126,36 @@ impl Ros2 {
     }
 
     fn topics(&mut self) -> Result<(), InputError> {
-        self.topic::<JointState>(Topic::Joints)?;
-        self.topic::<WrenchStamped>(Topic::Wrench)?;
-        self.topic::<DiagnosticArray>(Topic::Status)?;
+        let tactile = self.settings.topics.tactile.message;
+        for &topic in self.settings.profile.topics() {
+            match topic {
+                Topic::Joints => self.topic::<JointState>(topic)?,
+                Topic::Wrench => self.topic::<WrenchStamped>(topic)?,
+                Topic::Tactile if tactile == TactileMessage::Fingers => {
+                    self.topic::<BiotacAll>(topic)?;
+                }
+                Topic::Tactile => self.topic::<BioTacHand>(topic)?,
+                Topic::Status => {
+                    self.topic::<DiagnosticArray>(topic)?;
+                    if self.side == Endpoint::Explorer {
+                        // A status that is published on change may have been published before
+                        // this side started.
+                        self.subscribe::<DiagnosticArray>(topic, latched())?;
+                    }
+                }
+                Topic::RobotMode => self.topic::<RobotMode>(topic)?,
+                Topic::SafetyMode => self.topic::<SafetyMode>(topic)?,
+                Topic::ProgramRunning => self.topic::<Bool>(topic)?,
+                Topic::SpeedScaling => self.topic::<Float64>(topic)?,
+                Topic::Command | Topic::Markers | Topic::Points | Topic::Frames => (),
+            }
+        }
         if self.side == Endpoint::Explorer {
-            // A status that is published on change may have been published before this side
-            // started.
-            self.subscribe::<DiagnosticArray>(Topic::Status, latched())?;
+            self.topic::<MarkerArray>(Topic::Markers)?;
+            self.topic::<PointCloud2>(Topic::Points)?;
+            self.topic::<TFMessage>(Topic::Frames)?;
         }
-        match self.topics.tactile.message {
-            TactileMessage::Fingers => self.topic::<BiotacAll>(Topic::Tactile)?,
-            TactileMessage::Hand => self.topic::<BioTacHand>(Topic::Tactile)?,
-        }
-        match self.topics.command.message {
+        match self.settings.topics.command.message {
             CommandMessage::Velocities => self.topic::<Float64MultiArray>(Topic::Command),
             CommandMessage::Trajectory => self.topic::<JointTrajectory>(Topic::Command),
         }
@@ -182,12 +167,14 @@ impl Ros2 {
     where
         M: PacketMessage + HasDefinition + Serialize + DeserializeOwned + Clone + 'static,
     {
+        let is_kept = topic != Topic::Status && self.settings.is_on_change(topic);
         if topic.publisher() != self.side {
-            return self.subscribe::<M>(topic, best_effort());
+            return self.subscribe::<M>(topic, if is_kept { latched() } else { best_effort() });
         }
-        let (name, dds) = self.dds_topic::<M>(topic, &reliable())?;
+        let qos = if is_kept { kept() } else { reliable() };
+        let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let publisher =
-            self.node.create_publisher::<M>(&dds, Some(reliable())).map_err(cannot_open(&name))?;
+            self.node.create_publisher::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
         self.writers.push(Box::new(move |packet| {
             let message = M::in_packet(packet)?;
             Some(match publisher.publish(message.clone()) {
@@ -204,7 +191,7 @@ impl Ros2 {
         topic: Topic,
         qos: &QosProfile,
     ) -> Result<(String, rustdds::Topic), InputError> {
-        let name = self.topics.name(topic);
+        let name = self.settings.topics.name(topic);
         let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
         let path = Name::parse(&name).map_err(cannot_open(&name))?;
         let dds = self.node.create_topic(&path, type_name, qos).map_err(cannot_open(&name))?;
@@ -219,7 +206,7 @@ impl Ros2 {
         let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let mut subscription =
             self.node.create_subscription::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
-        self.watch(&mut subscription, &name)?;
+        watch(&self.poll, &mut subscription, &name)?;
         let hashes = BuildHasherDefault::<DefaultHasher>::new();
         self.readers.push(Box::new(move |take| {
             loop {
@@ -241,22 +228,24 @@ impl Ros2 {
     }
 
     fn serve(&mut self, service: Service) -> Result<(), InputError> {
-        let name = service.name(self.topics.namespace());
-        let path = Name::parse(&name).map_err(cannot_open(&name))?;
+        let name = self.service_name(&service);
         // The client's vendor is not known in advance: the default mapping, unless set.
-        let mapping = mapping(self.mapping, [0, 0]);
-        let mut server = self
-            .node
-            .create_server(mapping, &path, &trigger(), reliable(), reliable())
-            .map_err(cannot_open(&name))?;
-        self.watch(&mut server, &name)?;
-        self.servers.push((service, server));
+        let mapping = mapping(self.settings.service_mapping, [0, 0]);
+        let place = (&mut self.node, &self.poll, mapping, &*name);
+        self.servers.push(ServiceServer::open(place, service, self.settings.release)?);
         Ok(())
     }
 
+    fn service_name(&self, service: &Service) -> String {
+        service.name(self.settings.topics.namespace())
+    }
+
     /// Returns the client of a service whose server was found.
-    fn client(&self, service: &Service) -> Option<&MadeClient> {
-        self.clients.iter().find(|(other, _)| other == service)?.1.as_ref()
+    fn client(&mut self, service: &Service) -> Option<&mut ServiceClient> {
+        let name = self.service_name(service);
+        let namespace = self.settings.topics.namespace();
+        let mut found = self.clients.iter_mut();
+        found.find(|(other, _)| other.name(namespace) == name)?.1.as_mut()
     }
 
     /// Creates clients for newly found servers.
@@ -269,7 +258,7 @@ impl Ros2 {
         let readers = self.context.domain_participant().discovered_readers();
         for i in 0..self.clients.len() {
             let (service, None) = &self.clients[i] else { continue };
-            let name = service.name(self.topics.namespace());
+            let name = self.service_name(service);
             // Name of the topic of a service's requests, as in rmw.
             let requests = format!("rq{name}Request");
             let is_server = |topic: &str| topic == requests;
@@ -277,26 +266,13 @@ impl Ros2 {
                 readers.iter().find(|one| is_server(&one.subscription_topic_data.topic_name));
             let Some(server) = server else { continue };
             let guid = server.reader_proxy.remote_reader_guid.to_bytes();
-            let mapping = mapping(self.mapping, [guid[0], guid[1]]);
-            let Ok(path) = Name::parse(&name) else { continue };
-            let made = self.node.create_client(mapping, &path, &trigger(), reliable(), reliable());
+            let mapping = mapping(self.settings.service_mapping, [guid[0], guid[1]]);
+            let (service, release) = (service.clone(), self.settings.release);
+            let place = (&mut self.node, &self.poll, mapping, &*name);
             // If it fails, the server stays unfound, and the caller's timeout reports it.
-            let Ok(mut client) = made else { continue };
-            if self.watch(&mut client, &name).is_ok() {
-                self.clients[i].1 = Some((client, Instant::now()));
-            }
+            self.clients[i].1 = ServiceClient::open(place, service, release).ok();
         }
     }
-
-    /// Registers `source` with the poll.
-    fn watch(&self, source: &mut impl mio1::event::Source, name: &str) -> Result<(), InputError> {
-        let token = Token(WAKE.0 + 1);
-        self.poll.registry().register(source, token, Interest::READABLE).map_err(cannot_open(name))
-    }
-}
-
-fn trigger() -> ServiceTypeName {
-    ServiceTypeName::new("std_srvs", "Trigger")
 }
 
 /// Returns the mapping of a service for a server of this vendor.
@@ -320,43 +296,39 @@ impl Transport for Ros2 {
     fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
         let sent = sent.unwrap_or(Err("this side does not publish the topic".into()));
-        sent.map_err(|words| cannot_send(&self.topics.name(packet.topic()), words))
+        sent.map_err(|words| cannot_send(&self.settings.topics.name(packet.topic()), words))
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
         // Interruptions of a wait are ignored.
         let _ = self.poll.poll(&mut self.events, Some(timeout));
         self.readers.iter().for_each(|reader| reader(take));
-        for (service, server) in &self.servers {
-            while let Ok(Some((id, _))) = server.receive_request() {
+        for server in &mut self.servers {
+            while let Some(service) = server.take(self.call_count + 1) {
                 self.call_count += 1;
-                self.calls.insert(self.call_count, id);
-                take(Delivery::Call { service: service.clone(), call: self.call_count });
+                take(Delivery::Call { service, call: self.call_count });
             }
         }
         self.look_for_servers();
-        for (service, open) in &self.clients {
-            let Some((client, _)) = open else { continue };
-            while let Ok(Some((_, answer))) = client.receive_response() {
-                take(Delivery::Response { service: service.clone(), answer });
+        for client in self.clients.iter().filter_map(|(_, client)| client.as_ref()) {
+            while let Some((service, answer)) = client.take() {
+                take(Delivery::Response { service, answer });
             }
         }
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
-        self.node.publisher_count(&self.topics.name(topic))
+        self.node.publisher_count(&self.settings.topics.name(topic))
     }
 
     fn is_served(&mut self, service: &Service) -> bool {
-        self.client(service).is_some_and(|(_, since)| since.elapsed() > SETTLE)
+        self.client(service).is_some_and(|client| client.since.elapsed() > SETTLE)
     }
 
     fn call(&mut self, service: &Service) -> Result<(), InputError> {
-        let name = service.name(self.topics.namespace());
-        let (client, _) =
-            self.client(service).ok_or_else(|| cannot_send(&name, "no server found"))?;
-        let sent = client.send_request(TriggerRequest::default());
-        sent.map(drop).map_err(|error| cannot_send(&name, error))
+        let name = self.service_name(service);
+        let client = self.client(service).ok_or_else(|| cannot_send(&name, "no server found"))?;
+        client.send(service).map_err(|words| cannot_send(&name, words))
     }
 
     fn answer(
@@ -365,11 +337,10 @@ impl Transport for Ros2 {
         call: u64,
         answer: TriggerResponse,
     ) -> Result<(), InputError> {
-        let name = service.name(self.topics.namespace());
-        let server = self.servers.iter().find(|(other, _)| other == service);
-        let (Some((_, server)), Some(id)) = (server, self.calls.remove(&call)) else {
-            return Err(cannot_send(&name, "the call is unknown or already answered"));
-        };
-        server.send_response(id, answer).map_err(|error| cannot_send(&name, error))
+        let name = self.service_name(service);
+        let mut servers = self.servers.iter_mut();
+        let sent = servers.find_map(|server| server.answer(call, &answer));
+        let sent = sent.unwrap_or(Err("the call is unknown or already answered".into()));
+        sent.map_err(|words| cannot_send(&name, words))
     }
 }

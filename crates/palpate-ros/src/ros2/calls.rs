@@ -1,0 +1,291 @@
+//! Clients and servers of the services, each with the types of its messages.
+
+use super::endpoint::{reliable, watch};
+use crate::message::{
+    Duration, SwitchControllerHumbleRequest, SwitchControllerHumbleResponse,
+    SwitchControllerRequest, SwitchControllerResponse, TriggerRequest, TriggerResponse,
+};
+use crate::profile::Release;
+use crate::topics::{Service, Switch};
+use crate::transport::cannot_open;
+use palpate_input::error::InputError;
+use ros2_client::request_id::RmwRequestId;
+use ros2_client::{Client, Message, Name, Node, Server, ServiceMapping, ServiceTypeName};
+use rustdds::mio1::Poll;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::time::Instant;
+
+/// A type of request, and that of its response.
+pub(super) trait Request: Message + Default + Clone + 'static {
+    /// Type of the response.
+    type Response: Answer;
+
+    /// Returns the request that calls `service`.
+    fn of(service: &Service) -> Self;
+
+    /// Returns the call of a server of `service` by this request.
+    fn call(self, service: &Service) -> Service;
+}
+
+/// A type of response.
+pub(super) trait Answer: Message + Clone + 'static {
+    /// Returns the response that contains `answer`.
+    fn of(answer: &TriggerResponse) -> Self;
+
+    /// Returns the answer that it contains.
+    fn answer(self) -> TriggerResponse;
+}
+
+impl Message for TriggerRequest {}
+impl Message for TriggerResponse {}
+impl Message for SwitchControllerRequest {}
+impl Message for SwitchControllerResponse {}
+impl Message for SwitchControllerHumbleRequest {}
+impl Message for SwitchControllerHumbleResponse {}
+
+impl Request for TriggerRequest {
+    type Response = TriggerResponse;
+
+    fn of(_: &Service) -> Self {
+        Self::default()
+    }
+
+    fn call(self, service: &Service) -> Service {
+        service.clone()
+    }
+}
+
+impl Answer for TriggerResponse {
+    fn of(answer: &TriggerResponse) -> Self {
+        answer.clone()
+    }
+
+    fn answer(self) -> TriggerResponse {
+        self
+    }
+}
+
+/// Strictness of a switch: as far as possible, or all or none.
+const STRICTNESS: [i32; 2] = [1, 2];
+
+/// Timeout of a switch.
+// heuristic: many cycles of the controller manager.
+const TIMEOUT: Duration = Duration { sec: 2, nanosec: 0 };
+
+fn switch_of(service: &Service) -> Switch {
+    match service {
+        Service::SwitchController(switch) => switch.clone(),
+        _ => Switch::default(),
+    }
+}
+
+impl Request for SwitchControllerRequest {
+    type Response = SwitchControllerResponse;
+
+    fn of(service: &Service) -> Self {
+        let Switch { activate, deactivate, is_strict } = switch_of(service);
+        Self {
+            activate_controllers: activate,
+            deactivate_controllers: deactivate,
+            strictness: STRICTNESS[usize::from(is_strict)],
+            activate_asap: true,
+            timeout: TIMEOUT,
+        }
+    }
+
+    fn call(self, _: &Service) -> Service {
+        Service::SwitchController(Switch {
+            activate: self.activate_controllers,
+            deactivate: self.deactivate_controllers,
+            is_strict: self.strictness == STRICTNESS[1],
+        })
+    }
+}
+
+impl Answer for SwitchControllerResponse {
+    fn of(answer: &TriggerResponse) -> Self {
+        Self { ok: answer.success, message: answer.message.clone() }
+    }
+
+    fn answer(self) -> TriggerResponse {
+        TriggerResponse { success: self.ok, message: self.message }
+    }
+}
+
+impl Request for SwitchControllerHumbleRequest {
+    type Response = SwitchControllerHumbleResponse;
+
+    fn of(service: &Service) -> Self {
+        let request = SwitchControllerRequest::of(service);
+        Self {
+            activate_controllers: request.activate_controllers,
+            deactivate_controllers: request.deactivate_controllers,
+            strictness: request.strictness,
+            activate_asap: request.activate_asap,
+            timeout: request.timeout,
+            ..Self::default()
+        }
+    }
+
+    fn call(self, _: &Service) -> Service {
+        // The former names of both lists count too.
+        Service::SwitchController(Switch {
+            activate: [self.activate_controllers, self.start_controllers].concat(),
+            deactivate: [self.deactivate_controllers, self.stop_controllers].concat(),
+            is_strict: self.strictness == STRICTNESS[1],
+        })
+    }
+}
+
+impl Answer for SwitchControllerHumbleResponse {
+    fn of(answer: &TriggerResponse) -> Self {
+        Self { ok: answer.success }
+    }
+
+    fn answer(self) -> TriggerResponse {
+        let message = if self.ok { "" } else { "the controller manager refuses" };
+        TriggerResponse { success: self.ok, message: message.into() }
+    }
+}
+
+/// Node, poll, mapping and name with which a service is opened.
+pub(super) type Place<'a> = (&'a mut Node, &'a Poll, ServiceMapping, &'a str);
+
+fn type_name(service: &Service) -> ServiceTypeName {
+    let name = service.type_name();
+    let package = name.split('/').next().unwrap_or_default();
+    ServiceTypeName::new(package, name.rsplit('/').next().unwrap_or_default())
+}
+
+/// A client or a server of a service.
+pub(super) trait OpenService: Sized {
+    /// Creates one with requests of type `R`.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    fn typed<R: Request>(place: Place, service: Service) -> Result<Self, InputError>;
+
+    /// Creates one for calls of the kind of `service`, as laid out in `release`.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    fn open(place: Place, service: Service, release: Release) -> Result<Self, InputError> {
+        match (&service, release) {
+            (Service::SwitchController(_), Release::Humble) => {
+                Self::typed::<SwitchControllerHumbleRequest>(place, service)
+            }
+            (Service::SwitchController(_), Release::Jazzy) => {
+                Self::typed::<SwitchControllerRequest>(place, service)
+            }
+            _ => Self::typed::<TriggerRequest>(place, service),
+        }
+    }
+}
+
+/// Sends a request that calls a service.
+type Send = Box<dyn Fn(&Service) -> Result<(), String>>;
+/// Sends the response to a request.
+type Respond = Box<dyn Fn(RmwRequestId, &TriggerResponse) -> Result<(), String>>;
+
+/// A client of a service.
+pub(super) struct ServiceClient {
+    send: Send,
+    take: Box<dyn Fn() -> Option<TriggerResponse>>,
+    /// Last call, which the next response answers.
+    called: RefCell<Service>,
+    /// Time of creation.
+    pub(super) since: Instant,
+}
+
+impl OpenService for ServiceClient {
+    fn typed<R: Request>(
+        (node, poll, mapping, name): Place,
+        service: Service,
+    ) -> Result<Self, InputError> {
+        let path = Name::parse(name).map_err(cannot_open(name))?;
+        let mut client: Client<R, R::Response> = node
+            .create_client(mapping, &path, &type_name(&service), reliable(), reliable())
+            .map_err(cannot_open(name))?;
+        watch(poll, &mut client, name)?;
+        let client = Rc::new(client);
+        let responses = Rc::clone(&client);
+        Ok(Self {
+            send: Box::new(move |service| {
+                let sent = client.send_request(R::of(service));
+                sent.map(drop).map_err(|error| error.to_string())
+            }),
+            take: Box::new(move || {
+                let response = responses.receive_response().ok().flatten();
+                response.map(|(_, response)| response.answer())
+            }),
+            called: RefCell::new(service),
+            since: Instant::now(),
+        })
+    }
+}
+
+impl ServiceClient {
+    /// Sends a request.
+    pub(super) fn send(&self, service: &Service) -> Result<(), String> {
+        self.called.replace(service.clone());
+        (self.send)(service)
+    }
+
+    /// Returns the next received response, with the call that it answers.
+    pub(super) fn take(&self) -> Option<(Service, TriggerResponse)> {
+        (self.take)().map(|answer| (self.called.borrow().clone(), answer))
+    }
+}
+
+/// A server of a service.
+pub(super) struct ServiceServer {
+    take: Box<dyn Fn() -> Option<(RmwRequestId, Service)>>,
+    answer: Respond,
+    /// Calls that wait for their answers.
+    calls: HashMap<u64, RmwRequestId>,
+}
+
+impl OpenService for ServiceServer {
+    fn typed<R: Request>(
+        (node, poll, mapping, name): Place,
+        service: Service,
+    ) -> Result<Self, InputError> {
+        let path = Name::parse(name).map_err(cannot_open(name))?;
+        let mut server: Server<R, R::Response> = node
+            .create_server(mapping, &path, &type_name(&service), reliable(), reliable())
+            .map_err(cannot_open(name))?;
+        watch(poll, &mut server, name)?;
+        let server = Rc::new(server);
+        let requests = Rc::clone(&server);
+        Ok(Self {
+            take: Box::new(move || {
+                let (id, request) = requests.receive_request().ok().flatten()?;
+                Some((id, request.call(&service)))
+            }),
+            answer: Box::new(move |id, answer| {
+                server.send_response(id, R::Response::of(answer)).map_err(|error| error.to_string())
+            }),
+            calls: HashMap::new(),
+        })
+    }
+}
+
+impl ServiceServer {
+    /// Returns the next received call, to be answered under the number `call`.
+    pub(super) fn take(&mut self, call: u64) -> Option<Service> {
+        let (id, service) = (self.take)()?;
+        self.calls.insert(call, id);
+        Some(service)
+    }
+
+    /// Answers a call; returns `None` if it is none of this server.
+    pub(super) fn answer(
+        &mut self,
+        call: u64,
+        answer: &TriggerResponse,
+    ) -> Option<Result<(), String>> {
+        self.calls.remove(&call).map(|id| (self.answer)(id, answer))
+    }
+}

@@ -1,0 +1,274 @@
+//! Arm of Universal Robots behind `ur_robot_driver`: its state, and its commands as trajectories.
+
+use super::joints::JointNames;
+use super::message::{Duration as Span, Header, JointTrajectory, JointTrajectoryPoint};
+use super::status::ArmStatus;
+use super::transport::Packet;
+use std::time::{Duration, Instant};
+
+/// Mode in which the robot moves (`ur_dashboard_msgs/RobotMode`).
+pub const RUNNING: i8 = 7;
+
+/// Mode with closed brakes.
+pub const IDLE: i8 = 5;
+
+/// Names of the robot's modes from -1 on (`ur_dashboard_msgs/RobotMode`).
+const ROBOT_MODES: [&str; 10] = [
+    "NO_CONTROLLER",
+    "DISCONNECTED",
+    "CONFIRM_SAFETY",
+    "BOOTING",
+    "POWER_OFF",
+    "POWER_ON",
+    "IDLE",
+    "BACKDRIVE",
+    "RUNNING",
+    "UPDATING_FIRMWARE",
+];
+
+/// Safety modes (`ur_dashboard_msgs/SafetyMode`).
+pub mod safety {
+    /// Normal operation.
+    pub const NORMAL: u8 = 1;
+    /// Reduced speed.
+    pub const REDUCED: u8 = 2;
+    /// Protective stop.
+    pub const PROTECTIVE_STOP: u8 = 3;
+    /// Joints outside their limits.
+    pub const RECOVERY: u8 = 4;
+    /// Safeguard stop.
+    pub const SAFEGUARD_STOP: u8 = 5;
+    /// Emergency stop of the cell.
+    pub const SYSTEM_EMERGENCY_STOP: u8 = 6;
+    /// Emergency stop of the robot.
+    pub const ROBOT_EMERGENCY_STOP: u8 = 7;
+    /// Safeguard stop in automatic mode.
+    pub const AUTOMATIC_MODE_SAFEGUARD_STOP: u8 = 12;
+    /// Three-position switch released.
+    pub const THREE_POSITION_STOP: u8 = 13;
+}
+
+/// State of a UR as received: each part is published when it changes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UrState {
+    /// Mode of the robot.
+    pub robot_mode: Option<i8>,
+    /// Safety mode.
+    pub safety_mode: Option<u8>,
+    /// Whether the driver's program runs on the robot.
+    pub is_program_running: Option<bool>,
+}
+
+impl UrState {
+    /// Stores a part of the state; returns whether `packet` is one.
+    pub fn read(&mut self, packet: &Packet) -> bool {
+        match packet {
+            Packet::RobotMode(message) => self.robot_mode = Some(message.mode),
+            Packet::SafetyMode(message) => self.safety_mode = Some(message.mode),
+            Packet::ProgramRunning(message) => self.is_program_running = Some(message.data),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Returns the state as that of any arm, once all parts are known.
+    pub fn status(&self) -> Option<ArmStatus> {
+        let mode = self.robot_mode?;
+        let safety_mode = self.safety_mode?;
+        let is_running = self.is_program_running?;
+        let alarm = match safety_mode {
+            safety::NORMAL | safety::REDUCED => match (mode, is_running) {
+                (RUNNING, true) => String::new(),
+                (RUNNING, false) => "the program External Control does not run on the robot; \
+                                     start it on the pendant"
+                    .into(),
+                _ => format!(
+                    "the robot is {}; switch it on and release its brakes on the pendant, then start \
+                     External Control",
+                    robot_mode_name(mode)
+                ),
+            },
+            safety::SYSTEM_EMERGENCY_STOP
+            | safety::ROBOT_EMERGENCY_STOP
+            | safety::THREE_POSITION_STOP => String::new(),
+            safety::PROTECTIVE_STOP => "protective stop; remove its cause, enable the robot on \
+                                        the pendant, then start External Control"
+                .into(),
+            safety::SAFEGUARD_STOP | safety::AUTOMATIC_MODE_SAFEGUARD_STOP => {
+                "safeguard stop; close the safeguard and reset it, then start External Control"
+                    .into()
+            }
+            safety::RECOVERY => "a joint is outside its limits (safety mode RECOVERY); move it \
+                                 back on the pendant"
+                .into(),
+            other => format!("safety mode {other}; see the robot's log on the pendant"),
+        };
+        Some(ArmStatus {
+            servo_on: mode == RUNNING,
+            brake: mode != RUNNING,
+            estop: matches!(
+                safety_mode,
+                safety::SYSTEM_EMERGENCY_STOP | safety::ROBOT_EMERGENCY_STOP
+            ),
+            deadman: safety_mode != safety::THREE_POSITION_STOP,
+            hold: !is_running,
+            alarm,
+            overruns: 0,
+        })
+    }
+}
+
+/// Returns the name of a mode of the robot.
+fn robot_mode_name(mode: i8) -> String {
+    let name = usize::try_from(i32::from(mode) + 1).ok().and_then(|i| ROBOT_MODES.get(i));
+    name.map_or_else(|| format!("in mode {mode}"), |name| (*name).to_owned())
+}
+
+/// Interval between trajectories. A new one begins at the measured position, which trails the
+/// desired one: replaced at every tick, the arm would fall behind by many times its own lag.
+// heuristic: eight cycles of the robot's controller (500 Hz).
+const SEND: Duration = Duration::from_millis(16);
+
+/// Longest time from a trajectory's start to its first point, in which the commanded velocity is
+/// kept, s.
+// heuristic: two intervals, for late messages; the arm trails by more if it is longer.
+const LEAD_S: f64 = 0.032;
+
+/// Longest duration of a trajectory, s.
+// heuristic: a robot that needs another 80 ms to follow is at rest within 150 ms.
+const SPAN_S: f64 = 0.055;
+
+/// Deceleration to rest, rad/s²: that of the robot's own stop (`STOPJ_ACCELERATION` in
+/// `external_control.urscript` of `ur_client_library`).
+pub const STOP_RAD_S2: f64 = 4.0;
+
+/// Shortest and longest duration of the stop, s.
+// heuristic: eight cycles of the robot's controller; the rest of the span after 1.5 intervals.
+const STOP_S: [f64; 2] = [0.016, 0.03];
+
+/// Largest distance of the reference from the measured position: an angle, and a time at the
+/// commanded velocity.
+// heuristic: beyond the lag of a robot that follows, and small to catch up.
+const AHEAD: (f64, f64) = (0.01, 0.15);
+
+/// Time without commands after which the reference begins again at the measured position, and one
+/// command is skipped.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Smallest speed for which times are scaled; a slower robot takes longer to stop.
+const SLOWEST: f64 = 0.1;
+
+/// Returns the duration of the stop from the velocities `qdot`, rad/s.
+fn stop_s(qdot: &[f64]) -> f64 {
+    (fastest(qdot) / STOP_RAD_S2).clamp(STOP_S[0], STOP_S[1])
+}
+
+fn fastest(qdot: &[f64]) -> f64 {
+    qdot.iter().fold(0.0, |most, qdot| most.max(qdot.abs()))
+}
+
+/// Returns a point of a trajectory, at rest without velocities.
+fn point(positions: Vec<f64>, velocities: Option<&[f64]>, time_s: f64) -> JointTrajectoryPoint {
+    let velocities = velocities.map_or_else(|| vec![0.0; positions.len()], <[f64]>::to_vec);
+    JointTrajectoryPoint {
+        positions,
+        velocities,
+        time_from_start: Span::from_s(time_s),
+        ..JointTrajectoryPoint::default()
+    }
+}
+
+/// Returns the fraction of the velocities `qdot`, rad/s, from which the arm can stop in time.
+pub fn stoppable_share(qdot: &[f64]) -> f64 {
+    (STOP_RAD_S2 * STOP_S[1] / fastest(qdot)).min(1.0)
+}
+
+/// Joint velocities as a stream of short trajectories, each of which ends at rest: an arm that
+/// receives no more comes to rest by itself.
+///
+/// A trajectory keeps the commanded velocity for a while, then decelerates. Its positions
+/// follow a reference, the integral of the commands, so that errors do not accumulate.
+#[derive(Debug, Default)]
+pub struct TrajectoryStream {
+    /// Joint positions up to which motion was commanded, rad.
+    reference: Vec<f64>,
+    commanded: Option<Instant>,
+    sent: Option<Instant>,
+    /// Velocities of the last trajectory, rad/s; none if it stays at one place.
+    moving: Option<Vec<f64>>,
+}
+
+impl TrajectoryStream {
+    /// Adds the command `qdot`, rad/s, of an arm measured at `q`, rad, which moves at `scale` times
+    /// the commanded speed; returns the trajectory, if one is due.
+    pub fn next(
+        &mut self,
+        qdot: &[f64],
+        q: &[f64],
+        scale: f64,
+        now: Instant,
+        names: &JointNames,
+    ) -> Option<Packet> {
+        let since = self.commanded.map(|last| now.saturating_duration_since(last));
+        self.commanded = Some(now);
+        match since.filter(|since| *since < PAUSE && self.reference.len() == q.len()) {
+            // After a pause the command may be computed from old readings: the process may have
+            // been stopped. The next one comes after they were checked.
+            None => {
+                (self.reference, self.moving) = (q.to_vec(), None);
+                return None;
+            }
+            Some(since) => {
+                for ((reference, qdot), q) in self.reference.iter_mut().zip(qdot).zip(q) {
+                    let ahead = AHEAD.0 + AHEAD.1 * qdot.abs();
+                    let next = *reference + qdot * scale * since.as_secs_f64();
+                    *reference = next.clamp(q - ahead, q + ahead);
+                }
+            }
+        }
+        // The driver's clock of a trajectory runs at the robot's speed; with times scaled likewise
+        // a stop takes as long at any speed.
+        let scale = scale.clamp(SLOWEST, 1.0);
+        // A slower command does not wait: the arm may be pressing on something.
+        let is_slower = self.moving.as_ref().is_some_and(|m| fastest(qdot) < 0.5 * fastest(m));
+        let is_late = self.sent.is_none_or(|sent| now.saturating_duration_since(sent) >= SEND);
+        let is_due = is_late || is_slower;
+        let is_resting = qdot.iter().all(|qdot| *qdot == 0.0);
+        let points = match self.moving.take() {
+            Some(moving) if is_resting => self.stop(&moving, scale),
+            _ if is_due => self.lead(qdot, scale),
+            moving => {
+                self.moving = moving;
+                return None;
+            }
+        };
+        self.sent = Some(now);
+        self.moving = (!is_resting).then(|| qdot.into());
+        Some(Packet::Command(JointTrajectory {
+            // A stamp of zero means now, by the clock of the driver's computer.
+            header: Header::default(),
+            joint_names: names.names().into(),
+            points,
+        }))
+    }
+
+    /// Returns points that keep the velocities `qdot` for a while, and then end at rest.
+    fn lead(&self, qdot: &[f64], scale: f64) -> Vec<JointTrajectoryPoint> {
+        let lead_s = LEAD_S.min(SPAN_S - stop_s(qdot)) * scale;
+        let stop_s = stop_s(qdot) * scale;
+        let end = point(self.moved(qdot, lead_s + 0.5 * stop_s), None, lead_s + stop_s);
+        vec![point(self.moved(qdot, lead_s), Some(qdot), lead_s), end]
+    }
+
+    /// Returns the point at which the arm, moving with the velocities `qdot`, comes to rest.
+    fn stop(&mut self, qdot: &[f64], scale: f64) -> Vec<JointTrajectoryPoint> {
+        let stop_s = stop_s(qdot) * scale;
+        self.reference = self.moved(qdot, 0.5 * stop_s);
+        vec![point(self.reference.clone(), None, stop_s)]
+    }
+
+    /// Returns the reference moved with the velocities `qdot` for `time_s`.
+    fn moved(&self, qdot: &[f64], time_s: f64) -> Vec<f64> {
+        self.reference.iter().zip(qdot).map(|(q, qdot)| q + qdot * time_s).collect()
+    }
+}

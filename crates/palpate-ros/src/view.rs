@@ -1,0 +1,127 @@
+//! Messages that viewers draw: shapes, points with their uncertainty, and frames.
+
+use super::definition::{Definition, HasDefinition, messages};
+use super::message::{Header, Marker, Quaternion, Time, Vector3};
+use nalgebra::{Isometry3, Point3};
+use serde::{Deserialize, Serialize};
+
+messages! {
+    /// Shapes of several names.
+    visualization_msgs/MarkerArray {
+        /// Shapes.
+        visualization_msgs/Marker[] markers,
+    }
+
+    /// A field of each point of a cloud.
+    sensor_msgs/PointField {
+        "uint8 FLOAT32=7\n"
+        /// Name.
+        string name,
+        /// Offset from the point's start, bytes.
+        uint32 offset,
+        /// Type of the number; 7: `f32`.
+        uint8 datatype,
+        /// Numbers in the field.
+        uint32 count,
+    }
+
+    /// Points with fields.
+    sensor_msgs/PointCloud2 {
+        /// Time and frame.
+        std_msgs/Header header,
+        /// 1 for an unordered cloud.
+        uint32 height,
+        /// Number of points.
+        uint32 width,
+        /// Fields of a point.
+        sensor_msgs/PointField[] fields,
+        /// Whether numbers are big-endian.
+        bool is_bigendian,
+        /// Length of a point, bytes.
+        uint32 point_step,
+        /// Length of a row, bytes.
+        uint32 row_step,
+        /// Points, one after another.
+        uint8[] data,
+        /// Whether no point is invalid.
+        bool is_dense,
+    }
+
+    /// Translation and rotation.
+    #[derive(Copy)]
+    geometry_msgs/Transform {
+        /// Translation, m.
+        geometry_msgs/Vector3 translation,
+        /// Rotation.
+        geometry_msgs/Quaternion rotation,
+    }
+
+    /// Pose of a frame in another.
+    geometry_msgs/TransformStamped {
+        /// Time, and the other frame.
+        std_msgs/Header header,
+        /// Name of the frame.
+        string child_frame_id,
+        /// Pose.
+        geometry_msgs/Transform transform,
+    }
+
+    /// Poses of frames.
+    tf2_msgs/TFMessage {
+        /// Poses.
+        geometry_msgs/TransformStamped[] transforms,
+    }
+}
+
+/// Names of the fields of a point: its coordinates and standard deviation, m.
+const FIELDS: [&str; 4] = ["x", "y", "z", "sd"];
+
+/// Number of the type `f32` in a [`PointField`].
+const FLOAT32: u8 = 7;
+
+impl PointCloud2 {
+    /// Creates a cloud of points in `W`, each with its standard deviation, m.
+    pub fn new(points: &[(Point3<f64>, f64)]) -> Self {
+        let size = FIELDS.len() as u32 * 4;
+        let field = |(i, name): (usize, &&str)| PointField {
+            name: (*name).into(),
+            offset: 4 * i as u32,
+            datatype: FLOAT32,
+            count: 1,
+        };
+        let numbers = points.iter().flat_map(|(p_w, sd_m)| [p_w.x, p_w.y, p_w.z, *sd_m]);
+        Self {
+            header: Header::new(0.0, "W"),
+            height: 1,
+            width: points.len() as u32,
+            fields: FIELDS.iter().enumerate().map(field).collect(),
+            is_bigendian: false,
+            point_step: size,
+            row_step: size * points.len() as u32,
+            data: numbers.flat_map(|number| (number as f32).to_le_bytes()).collect(),
+            is_dense: true,
+        }
+    }
+}
+
+impl TFMessage {
+    /// Returns the pose of `W` in the frame `base_frame` of the robot's base, whose pose in `W` is
+    /// `x_wb`.
+    pub fn of_base(base_frame: &str, x_wb: &Isometry3<f64>) -> Self {
+        let x_bw = x_wb.inverse();
+        let turn = x_bw.rotation;
+        let transform = Transform {
+            translation: x_bw.translation.vector.into(),
+            rotation: Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w },
+        };
+        let header = Header::new(0.0, base_frame);
+        Self {
+            transforms: vec![TransformStamped { header, child_frame_id: "W".into(), transform }],
+        }
+    }
+
+    /// Sets the time of all poses.
+    pub fn set_stamp(&mut self, stamp: Time) {
+        self.transforms.iter_mut().for_each(|pose| pose.header.stamp = stamp);
+    }
+}

@@ -1,0 +1,241 @@
+//! Tests of commands to a UR as trajectories, against the simulated computer of such an arm: it
+//! follows, and comes to rest by itself whenever they cease.
+
+use palpate_explore::backend::{Command, Reading};
+use palpate_ros::joints::JointNames;
+use palpate_ros::message::{Duration as Span, JointTrajectory, JointTrajectoryPoint, Time};
+use palpate_ros::profile::UR_CONTROLLERS;
+use palpate_ros::server::arm_computer::ArmComputer;
+use palpate_ros::server::failure::FailureEffect;
+use palpate_ros::server::ur_computer::UrComputer;
+use palpate_ros::server::ur_trajectory::Trajectory;
+use palpate_ros::topics::{Service, Switch};
+use palpate_ros::transport::Packet;
+use palpate_ros::ur::{TrajectoryStream, stoppable_share};
+use proptest::prelude::*;
+use std::time::{Duration, Instant};
+
+/// Periods of the robot and of the explorer, s.
+const ROBOT_S: f64 = 0.002;
+const TICK_S: f64 = 0.004;
+
+/// A robot of one joint whose servo follows velocities with a lag.
+struct Robot {
+    names: JointNames,
+    computer: UrComputer,
+    reading: Reading,
+    lag_s: f64,
+    time_s: f64,
+}
+
+impl Robot {
+    fn new(lag_s: f64) -> Self {
+        let names = JointNames::new(vec!["a".into()]);
+        let computer = UrComputer::new(names.clone(), ROBOT_S, UR_CONTROLLERS[0].into());
+        let reading = Reading { q: vec![0.5], qdot: vec![0.0], ..Reading::default() };
+        Self { names, computer, reading, lag_s, time_s: 0.0 }
+    }
+
+    fn tick(&mut self) {
+        let wanted = self.computer.advance(self.time_s, &self.reading)[0];
+        let share = 1.0 - (-ROBOT_S / self.lag_s).exp();
+        self.reading.qdot[0] += (wanted - self.reading.qdot[0]) * share;
+        self.reading.q[0] += self.reading.qdot[0] * ROBOT_S;
+        self.reading.applied = Command { qdot: vec![wanted] };
+        self.time_s += ROBOT_S;
+    }
+}
+
+/// Commands `speed(t)` for `span_s` and then nothing for a second; returns the robot's positions
+/// at its ticks, and the integral of the commands at the end of each.
+fn drive(lag_s: f64, span_s: f64, speed: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
+    let mut robot = Robot::new(lag_s);
+    let (mut stream, begun) = (TrajectoryStream::default(), Instant::now());
+    let mut commanded = robot.reading.q[0];
+    let mut rows = Vec::new();
+    let ticks = ((span_s + 1.0) / TICK_S) as u32;
+    for tick in 0..ticks {
+        let time_s = f64::from(tick) * TICK_S;
+        if time_s < span_s {
+            let qdot = [speed(time_s)];
+            let now = begun + Duration::from_secs_f64(time_s);
+            let sent = stream.next(&qdot, &robot.reading.q, 1.0, now, &robot.names);
+            if let Some(packet) = sent {
+                robot.computer.receive(&packet, 0, time_s, 0.0);
+            }
+            commanded += qdot[0] * TICK_S;
+        }
+        for _ in 0..2 {
+            robot.tick();
+            rows.push([robot.reading.q[0], commanded]);
+        }
+    }
+    assert_eq!(robot.computer.refused().0, 0, "{}", robot.computer.refused().1);
+    rows
+}
+
+/// Speed of a movement: acceleration at 1.4 rad/s² to `speed`, and deceleration before `span_s`.
+fn movement(speed: f64, span_s: f64) -> impl Fn(f64) -> f64 {
+    move |time_s| {
+        let ramp = 1.4 * time_s.min(span_s - time_s).max(0.0);
+        speed.signum() * speed.abs().min(ramp)
+    }
+}
+
+fn last_speed(rows: &[[f64; 2]], tick: usize) -> f64 {
+    ((rows[tick][0] - rows[tick - 1][0]) / ROBOT_S).abs()
+}
+
+proptest! {
+    /// A movement ends where the commands do, within what the controller's feedback removes.
+    #[test]
+    fn the_arm_moves_as_far_as_commanded(
+        speed in -0.12..0.12_f64,
+        span_s in 0.4..2.0,
+        lag_s in prop::sample::select(vec![0.001, 0.01, 0.02]),
+    ) {
+        let rows = drive(lag_s, span_s, movement(speed, span_s));
+        let [q, commanded] = rows[rows.len() - 1];
+        prop_assert!((q - commanded).abs() < 1e-3, "{q} {commanded}");
+        // It never trails or leads by more than a tenth of a second of movement.
+        let far = rows.iter().map(|[q, commanded]| (q - commanded).abs()).fold(0.0, f64::max);
+        prop_assert!(far < 0.1 * speed.abs() + 1e-3, "{far} {speed}");
+    }
+
+    /// An arm whose commands cease at any moment is at rest within 150 ms, and stays there.
+    #[test]
+    fn an_arm_without_commands_comes_to_rest(
+        speed in -0.12..0.12_f64,
+        end_s in 0.2..0.6,
+        lag_s in prop::sample::select(vec![0.001, 0.01, 0.02]),
+    ) {
+        let rows = drive(lag_s, end_s, movement(speed, 2.0));
+        let rest = ((end_s + 0.15) / ROBOT_S) as usize;
+        for tick in rest..rows.len() {
+            prop_assert!(last_speed(&rows, tick) < 2e-3, "{tick} {}", last_speed(&rows, tick));
+        }
+    }
+
+    #[test]
+    fn speeds_from_which_an_arm_cannot_stop_in_time_are_scaled(speed in 0.01..3.0_f64) {
+        let share = stoppable_share(&[speed, -0.5 * speed]);
+        prop_assert!((0.12 / speed).min(1.0) - share < 1e-12 && share * speed < 0.12 + 1e-12);
+    }
+}
+
+/// Returns a trajectory of one joint with points of position, velocity and time.
+fn trajectory(points: &[(f64, f64, f64)]) -> JointTrajectory {
+    let point = |&(q, qdot, time_s): &(f64, f64, f64)| JointTrajectoryPoint {
+        positions: vec![q],
+        velocities: vec![qdot],
+        time_from_start: Span::from_s(time_s),
+        ..JointTrajectoryPoint::default()
+    };
+    JointTrajectory {
+        joint_names: vec!["a".into()],
+        points: points.iter().map(point).collect(),
+        ..JointTrajectory::default()
+    }
+}
+
+#[test]
+fn what_the_controller_would_refuse_is_refused() {
+    let good = trajectory(&[(0.1, 0.2, 0.1), (0.2, 0.0, 0.3)]);
+    let names = JointNames::new(vec!["a".into()]);
+    assert!(Trajectory::read(&good, &names, 0.0).is_ok());
+    let mut other = good.clone();
+    other.joint_names = vec!["b".into()];
+    let mut old = good.clone();
+    old.header.stamp = Time::from_s(99.0);
+    let mut bare = good.clone();
+    bare.points[0].positions.clear();
+    for (message, words) in [
+        (trajectory(&[]), "without points"),
+        (trajectory(&[(0.1, 0.2, 0.1)]), "last point is not zero"),
+        (trajectory(&[(0.1, 0.2, 0.1), (0.2, 0.0, 0.1)]), "do not increase"),
+        (trajectory(&[(f64::NAN, 0.0, 0.1)]), "finite"),
+        (other, "not those of the arm"),
+        (old, "ended before"),
+        (bare, "no positions"),
+    ] {
+        let error = Trajectory::read(&message, &names, 100.0).err().unwrap();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+/// Only the active controller moves the arm, and one at a time is active.
+#[test]
+fn controllers_are_switched_as_by_the_controller_manager() {
+    let mut robot = Robot::new(0.01);
+    let switch = |activate: &[usize], deactivate: &[usize], is_strict| {
+        let name = |i: &usize| UR_CONTROLLERS[*i].to_owned();
+        Service::SwitchController(Switch {
+            activate: activate.iter().map(name).collect(),
+            deactivate: deactivate.iter().map(name).collect(),
+            is_strict,
+        })
+    };
+    for (activate, deactivate, is_strict, is_granted) in [
+        (&[0][..], &[][..], true, false), // active already
+        (&[2], &[], true, false),         // the first one commands the same joints
+        (&[2], &[], false, false),
+        (&[0], &[2], false, true), // nothing to do
+        (&[2], &[0], true, true),
+        (&[0], &[], true, false),
+        (&[], &[2], false, true),
+        (&[], &[2], true, false), // not active
+        (&[0], &[], true, true),
+    ] {
+        let done = robot.computer.call(&switch(activate, deactivate, is_strict), 0.0);
+        assert_eq!(done.is_ok(), is_granted, "{activate:?} {deactivate:?} {is_strict}: {done:?}");
+    }
+    robot.computer.call(&switch(&[], &[0], false), 0.0).unwrap();
+    robot.tick();
+    let message = Packet::Command(trajectory(&[(0.6, 0.0, 0.1)]));
+    robot.computer.receive(&message, 0, 0.0, 0.0);
+    assert!(robot.computer.refused().1.contains("not active"));
+    robot.computer.call(&switch(&[0], &[], true), 0.0).unwrap();
+    robot.computer.receive(&message, 0, 0.0, 0.0);
+    (0..400).for_each(|_| robot.tick());
+    assert!((robot.reading.q[0] - 0.6).abs() < 1e-3, "{}", robot.reading.q[0]);
+}
+
+/// A protective stop ends the movement and the program; commands are refused until it has ended.
+#[test]
+fn a_protective_stop_stops_the_arm_and_says_what_to_do() {
+    let mut robot = Robot::new(0.01);
+    robot.tick();
+    let message = Packet::Command(trajectory(&[(1.5, 0.0, 2.0)]));
+    robot.computer.receive(&message, 0, 0.0, 0.0);
+    (0..200).for_each(|_| robot.tick());
+    robot.computer.fail(&FailureEffect::ProtectiveStop, true, 0.0);
+    let words = robot.computer.status().refusal().unwrap();
+    assert!(words.contains("protective stop") && words.contains("pendant"), "{words}");
+    (0..300).for_each(|_| robot.tick());
+    let q = robot.reading.q[0];
+    robot.computer.receive(&message, 0, 0.0, 0.0);
+    (0..100).for_each(|_| robot.tick());
+    assert!((robot.reading.q[0] - q).abs() < 1e-4 && q < 1.0, "{q}");
+    robot.computer.fail(&FailureEffect::ProtectiveStop, false, 0.0);
+    assert_eq!(robot.computer.status().refusal(), None);
+}
+
+/// At half speed the arm takes twice as long for the same trajectory.
+#[test]
+fn the_speed_slider_stretches_time() {
+    let arrival = |slow: Option<f64>| {
+        let mut robot = Robot::new(0.001);
+        robot.tick();
+        slow.iter().for_each(|s| robot.computer.fail(&FailureEffect::Slow(*s), true, 0.0));
+        let message = Packet::Command(trajectory(&[(0.7, 0.0, 1.0)]));
+        robot.computer.receive(&message, 0, 0.0, 0.0);
+        let mut ticks = 0;
+        while (robot.reading.q[0] - 0.7).abs() > 1e-3 {
+            robot.tick();
+            ticks += 1;
+        }
+        f64::from(ticks)
+    };
+    let ratio = arrival(Some(0.5)) / arrival(None);
+    assert!((ratio - 2.0).abs() < 0.05, "{ratio}");
+}
