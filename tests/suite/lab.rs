@@ -1,7 +1,9 @@
 //! Tests of an arm over topics, run in a network namespace by `make test-ros2` and `make
 //! test-ros1`. They are ignored otherwise, because DDS multicasts to the local network.
 
-use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, contacts_off_m, count, row};
+use crate::common::lab::{
+    CELL, EXPERIMENT, Network, TwinProcess, contacts_off_m, count, row, touch_sets,
+};
 use palpate::backend::pace;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::format::counted;
@@ -75,7 +77,7 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
     println!("a peer of another implementation heard of the explorer: {}", heard.trim());
 
     let sets = ["trials=1", "planners=[\"active\",\"random\"]"].map(String::from);
-    let sets = [&sets[..], &[format!("touches={}", touches()), CELL[0].into()]].concat();
+    let sets = [&sets[..], &touch_sets(touches()), &[CELL[0].into()]].concat();
     let experiment = Experiment::load(Path::new(EXPERIMENT), &sets).unwrap();
     let simulation = Simulation::new(experiment).unwrap();
     let mut far = Vec::new();

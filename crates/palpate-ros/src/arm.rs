@@ -10,7 +10,7 @@ use super::settings::{BackendKind, BackendSettings};
 use super::status::ArmStatus;
 use super::topics::{Endpoint, Service, Topic};
 use super::transport::{Connect, Packet, cannot_open};
-use super::ur::stoppable_share;
+use super::ur::{TrajectoryStream, stoppable_share};
 use super::view::{MarkerArray, TFMessage};
 use palpate_explore::backend::interlock::check_start;
 use palpate_explore::backend::pace::{self, RealTimePacer};
@@ -471,6 +471,7 @@ impl Backend for RosBackend {
         {
             let mut heard = lab.mailbox.latest();
             heard.since = Some(self.since);
+            heard.stream = TrajectoryStream::default();
             heard.frames.clear();
             (heard.is_engaged, heard.is_ready) = (true, false);
         }
@@ -506,10 +507,19 @@ impl Backend for RosBackend {
         self.sent.qdot.extend(command.qdot.iter().map(|qdot| qdot * share));
         self.lab.command(&self.sent.qdot);
         self.pace.wait(1);
-        let scale = self.lab.mailbox.latest().speed_scale;
-        self.reading.applied.qdot.clear();
-        self.reading.applied.qdot.extend(self.sent.qdot.iter().map(|qdot| qdot * scale));
-        self.read()
+        let before_s = self.reading.time_s;
+        self.read()?;
+        let applied = &mut self.reading.applied.qdot;
+        let heard = &mut *self.lab.mailbox.latest();
+        if is_stream {
+            heard.stream.take_motion(&heard.q, Instant::now(), applied);
+            let passed_s = (self.reading.time_s - before_s).max(f64::MIN_POSITIVE);
+            applied.iter_mut().for_each(|motion| *motion /= passed_s);
+        } else {
+            applied.clear();
+            applied.extend(self.sent.qdot.iter().map(|qdot| qdot * heard.speed_scale));
+        }
+        Ok(&self.reading)
     }
 
     /// Calls the arm's stop service, without waiting for its answer.

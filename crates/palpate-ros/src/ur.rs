@@ -187,15 +187,21 @@ pub fn stoppable_share(qdot: &[f64]) -> f64 {
 /// receives no more comes to rest by itself.
 ///
 /// A trajectory keeps the commanded velocity for a while, then decelerates. Its positions
-/// follow a reference, the integral of the commands, so that errors do not accumulate.
+/// follow a reference, the integral of the commands, so that errors do not accumulate. A late
+/// command finds the reference where the trajectory before it ended.
 #[derive(Debug, Default)]
 pub struct TrajectoryStream {
     /// Joint positions up to which motion was commanded, rad.
     reference: Vec<f64>,
-    commanded: Option<Instant>,
+    /// The last command at the robot's speed, rad/s.
+    qdot: Vec<f64>,
+    /// Time up to which the reference follows the commands.
+    followed: Option<Instant>,
     sent: Option<Instant>,
     /// Velocities of the last trajectory, rad/s; none if it stays at one place.
     moving: Option<Vec<f64>>,
+    /// Commanded motion since it was last taken, rad.
+    motion: Vec<f64>,
 }
 
 impl TrajectoryStream {
@@ -209,23 +215,20 @@ impl TrajectoryStream {
         now: Instant,
         names: &JointNames,
     ) -> Option<Packet> {
-        let since = self.commanded.map(|last| now.saturating_duration_since(last));
-        self.commanded = Some(now);
-        match since.filter(|since| *since < PAUSE && self.reference.len() == q.len()) {
-            // After a pause the command may be computed from old readings: the process may have
-            // been stopped. The next one comes after they were checked.
-            None => {
-                (self.reference, self.moving) = (q.to_vec(), None);
-                return None;
-            }
-            Some(since) => {
-                for ((reference, qdot), q) in self.reference.iter_mut().zip(qdot).zip(q) {
-                    let ahead = AHEAD.0 + AHEAD.1 * qdot.abs();
-                    let next = *reference + qdot * scale * since.as_secs_f64();
-                    *reference = next.clamp(q - ahead, q + ahead);
-                }
-            }
+        let since = self.followed.map(|last| now.saturating_duration_since(last));
+        self.follow(q, now);
+        self.qdot.clear();
+        // After a pause the command may be computed from old readings: the process may have been
+        // stopped. The next one comes after they were checked.
+        if since.is_none_or(|since| since >= PAUSE) || self.reference.len() != q.len() {
+            self.moving = None;
+            self.qdot.resize(q.len(), 0.0);
+            self.motion.resize(q.len(), 0.0);
+            self.reference.clear();
+            self.reference.extend(q);
+            return None;
         }
+        self.qdot.extend(qdot.iter().map(|qdot| qdot * scale));
         // The driver's clock of a trajectory runs at the robot's speed; with times scaled likewise
         // a stop takes as long at any speed.
         let scale = scale.clamp(SLOWEST, 1.0);
@@ -264,7 +267,35 @@ impl TrajectoryStream {
     fn stop(&mut self, qdot: &[f64], scale: f64) -> Vec<JointTrajectoryPoint> {
         let stop_s = stop_s(qdot) * scale;
         self.reference = self.moved(qdot, 0.5 * stop_s);
+        self.motion.iter_mut().zip(qdot).for_each(|(sum, qdot)| *sum += qdot * 0.5 * stop_s);
         vec![point(self.reference.clone(), None, stop_s)]
+    }
+
+    /// Moves the reference of an arm measured at `q`, rad, by the last command until `now`, or until
+    /// the trajectory that carries it has ended.
+    fn follow(&mut self, q: &[f64], now: Instant) {
+        let Some(from) = self.followed.replace(now) else { return };
+        let span_s = self.moving.as_ref().map_or(0.0, |moving| {
+            let stop_s = stop_s(moving);
+            LEAD_S.min(SPAN_S - stop_s) + 0.5 * stop_s
+        });
+        let end = self.sent.map_or(from, |sent| sent + Duration::from_secs_f64(span_s));
+        let moved_s = now.min(end).saturating_duration_since(from).as_secs_f64();
+        for (i, qdot) in self.qdot.iter().enumerate().take(q.len()) {
+            let ahead = AHEAD.0 + AHEAD.1 * qdot.abs();
+            let next = self.reference[i] + qdot * moved_s;
+            self.reference[i] = next.clamp(q[i] - ahead, q[i] + ahead);
+            self.motion[i] += qdot * moved_s;
+        }
+    }
+
+    /// Writes the motion commanded since the last call, until `now`, of an arm measured at `q` to
+    /// `motion`, all in rad: that of the trajectories, less than that of the commands if these are
+    /// late.
+    pub fn take_motion(&mut self, q: &[f64], now: Instant, motion: &mut Vec<f64>) {
+        self.follow(q, now);
+        motion.clone_from(&self.motion);
+        self.motion.fill(0.0);
     }
 
     /// Returns the reference moved with the velocities `qdot` for `time_s`.

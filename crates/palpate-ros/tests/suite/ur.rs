@@ -116,6 +116,38 @@ proptest! {
         }
     }
 
+    /// The motion that the stream reports is that of the arm, however late its commands are.
+    #[test]
+    fn the_arm_moves_as_far_as_late_commands_say(
+        waits in prop::collection::vec(prop_oneof![9 => Just(4), 1 => 4..95_u32], 200),
+        speed in 0.02..0.12_f64,
+        scale in prop::sample::select(vec![0.3, 1.0]),
+    ) {
+        let mut robot = Robot::new(0.005);
+        robot.computer.fail(&FailureEffect::Slow(scale), true, 0.0);
+        let (mut stream, begun) = (TrajectoryStream::default(), Instant::now());
+        let (mut reported, mut motion) = (robot.reading.q[0], Vec::new());
+        for (tick, wait) in waits.iter().enumerate() {
+            let now = |time_s: f64| begun + Duration::from_secs_f64(time_s);
+            // Forward and back in pieces, each with an abrupt end, as at a contact.
+            let qdot = [speed * [1.0, 0.0, -1.0, 0.4][tick / 20 % 4]];
+            let time_s = robot.time_s;
+            let sent = stream.next(&qdot, &robot.reading.q, scale, now(time_s), &robot.names);
+            if let Some(packet) = sent {
+                robot.computer.receive(&packet, 0, time_s, 0.0);
+            }
+            (0..wait.div_ceil(2)).for_each(|_| robot.tick());
+            stream.take_motion(&robot.reading.q, now(robot.time_s), &mut motion);
+            reported += motion[0];
+            let off = (robot.reading.q[0] - reported).abs();
+            prop_assert!(off < 0.06 * speed + 1e-4, "tick {tick}: {off}");
+        }
+        (0..500).for_each(|_| robot.tick());
+        stream.take_motion(&robot.reading.q, Instant::now() + Duration::from_secs(60), &mut motion);
+        let off = (robot.reading.q[0] - reported - motion[0]).abs();
+        prop_assert!(off < 1e-4 + 0.01 * speed, "{off}");
+    }
+
     #[test]
     fn speeds_from_which_an_arm_cannot_stop_in_time_are_scaled(speed in 0.01..3.0_f64) {
         let share = stoppable_share(&[speed, -0.5 * speed]);
