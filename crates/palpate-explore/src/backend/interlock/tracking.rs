@@ -41,9 +41,12 @@ pub const VELOCITY: InterlockEntry = InterlockEntry {
 pub const POSITION: InterlockEntry = InterlockEntry {
     name: "position tracking error",
     make: |_, settings, capabilities| {
-        let span = |step_s: f64| Span::new(step_s, settings.tracking_lag_s);
-        let tracking =
-            Tracking { spans: STEPS_S.map(span), commanded: Joints::zeros(), time_s: 0.0 };
+        let tracking = Tracking {
+            spans: STEPS_S.map(Span::new),
+            recent: Recent::new(settings.tracking_lag_s),
+            commanded: Joints::zeros(),
+            time_s: 0.0,
+        };
         capabilities.real_time.then(|| Box::new(tracking) as _)
     },
 };
@@ -118,6 +121,11 @@ const STEPS_S: [f64; 5] = [0.0025, 0.01, 0.04, 0.16, 0.64];
 /// per step.
 const SPAN_STEPS: usize = 100;
 
+/// Number of lags at which commands are compared, from none to the longest.
+// heuristic: of the usual lag of 0.1 s a step is 7 ms, in which a finger at 0.1 m/s moves by less
+// than the allowed error.
+const LAGS: usize = 16;
+
 /// Pause between readings after which the robot was at rest and all spans restart.
 const PAUSE_S: f64 = 0.1;
 
@@ -130,28 +138,24 @@ const FLOOR_M: f64 = 2e-3;
 // heuristic: steady-state error of a velocity servo.
 const SHARE: f64 = 0.05;
 
-/// A joint's position and the integral of its commands at one time.
-#[derive(Clone, Copy)]
+/// A joint's position at one time, and the integrals of its commands then and at each lag before.
+#[derive(Clone, Copy, Debug)]
 struct Sample {
     time_s: f64,
     q: Joints,
-    commanded: Joints,
+    commanded: [Joints; LAGS],
 }
 
 /// Commands and positions over a span that ends now.
 struct Span {
     step_s: f64,
-    lag_steps: usize,
     /// Samples at steps of `step_s`, oldest first, within a fixed capacity.
     samples: VecDeque<Sample>,
-    most: usize,
 }
 
 impl Span {
-    fn new(step_s: f64, lag_s: f64) -> Self {
-        let lag_steps = (lag_s / step_s).ceil() as usize;
-        let most = SPAN_STEPS + lag_steps + 1;
-        Self { step_s, lag_steps, samples: VecDeque::with_capacity(most), most }
+    fn new(step_s: f64) -> Self {
+        Self { step_s, samples: VecDeque::with_capacity(SPAN_STEPS + 1) }
     }
 
     /// Adds a sample if a step has passed since the last one; returns whether it was added.
@@ -161,30 +165,58 @@ impl Span {
         if self.samples.back().is_some_and(|last| sample.time_s - last.time_s < due_s) {
             return false;
         }
-        if self.samples.len() == self.most {
+        if self.samples.len() == SPAN_STEPS + 1 {
             self.samples.pop_front();
         }
         self.samples.push_back(sample);
         true
     }
 
-    /// Returns the movement of the joints, and the smallest and largest commanded movement. The
-    /// robot was at rest before the first sample.
-    fn moved(&self) -> [Joints; 3] {
-        let last = self.samples.len() - 1;
-        let steps = SPAN_STEPS.min(last);
-        let at = |back: usize| &self.samples[last.saturating_sub(back)];
-        let commanded = |lag: usize| at(lag).commanded - at(lag + steps).commanded;
-        let first = commanded(0);
-        let spans = (1..=self.lag_steps).map(commanded);
-        let [low, high] =
-            spans.fold([first; 2], |[low, high], span| [low.inf(&span), high.sup(&span)]);
-        [at(0).q - at(steps).q, low, high]
+    /// Returns the movement of the joints up to `now`, and the smallest and largest commanded
+    /// movement.
+    fn moved(&self, now: &Sample) -> [Joints; 3] {
+        let from = self.samples.front().unwrap_or(now);
+        let lags = now.commanded.iter().zip(&from.commanded);
+        let first = now.commanded[0] - from.commanded[0];
+        let [low, high] = lags.fold([first; 2], |[low, high], (now, from)| {
+            let moved = now - from;
+            [low.inf(&moved), high.sup(&moved)]
+        });
+        [now.q - from.q, low, high]
+    }
+}
+
+/// Integrals of the commands at lags in equal steps, the newest first.
+struct Recent {
+    step_s: f64,
+    time_s: f64,
+    commanded: [Joints; LAGS],
+}
+
+impl Recent {
+    fn new(lag_s: f64) -> Self {
+        let step_s = lag_s / (LAGS - 2) as f64;
+        Self { step_s, time_s: f64::NEG_INFINITY, commanded: [Joints::zeros(); LAGS] }
+    }
+
+    /// Sets the newest integral.
+    fn push(&mut self, time_s: f64, commanded: Joints) {
+        if time_s - self.time_s >= self.step_s {
+            self.commanded.copy_within(..LAGS - 1, 1);
+            self.time_s = time_s;
+        }
+        self.commanded[0] = commanded;
+    }
+
+    /// Forgets all integrals but `commanded`: the robot was at rest.
+    fn restart(&mut self, commanded: Joints) {
+        self.commanded = [commanded; LAGS];
     }
 }
 
 struct Tracking {
     spans: [Span; STEPS_S.len()],
+    recent: Recent,
     /// Integral of the applied commands.
     commanded: Joints,
     /// Time of the last reading.
@@ -198,15 +230,17 @@ impl Interlock for Tracking {
         let Some(applied) = now.chain.joints_from(&reading.applied.qdot) else { return Ok(()) };
         if !(0.0..PAUSE_S).contains(&passed_s) {
             self.spans.iter_mut().for_each(|span| span.samples.clear());
+            self.recent.restart(self.commanded);
             return Ok(());
         }
         self.commanded += applied * passed_s;
-        let sample = Sample { time_s: now.time_s, q: now.q, commanded: self.commanded };
+        self.recent.push(now.time_s, self.commanded);
+        let sample = Sample { time_s: now.time_s, q: now.q, commanded: self.recent.commanded };
         for span in &mut self.spans {
             if !span.push(sample, now.period_s) {
                 continue;
             }
-            let [moved, low, high] = span.moved();
+            let [moved, low, high] = span.moved(&sample);
             for (i, joint) in now.chain.joints.iter().enumerate() {
                 let reach_m = now.reaches_m[i];
                 let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
