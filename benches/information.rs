@@ -54,11 +54,11 @@ impl Probe for Estimating {
         let (moved, turned) = (PLACE_SD_M * self.normals(), TILT_RAD * self.normals());
         Ok(match touch {
             none @ (Touch::Miss | Touch::Overload) => none,
-            Touch::Contact(Contact { p_wc, normal_w }) => {
+            Touch::Contact(Contact { p_wc, normal_w, .. }) => {
                 let tangent = turned - normal_w * turned.dot(&normal_w);
                 let (axis, angle) = Unit::new_and_get(tangent);
                 let normal_w = Rotation3::from_axis_angle(&axis, angle) * normal_w;
-                Touch::Contact(Contact { p_wc: p_wc + moved, normal_w })
+                Touch::Contact(Contact::new(p_wc + moved, normal_w))
             }
         })
     }

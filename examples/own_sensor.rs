@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use palpate::backend::{Sample, Wrench};
 use palpate::explore::probe::{Probe, Touch, servo::Servo};
 use palpate::robot::Finger;
-use palpate::robot::sensor::{SensedContact, Sensor};
+use palpate::robot::sensor::{Doubt, SensedContact, Sensor};
 use palpate::sim::{Environment, Scene, simulator::Simulator};
 
 /// Switch that closes at 0.5 N above the force at rest, and reports the foremost point of the tip
@@ -31,9 +31,9 @@ impl Sensor for Switch {
     fn is_touching(&self) -> Option<bool> {
         Some((self.force_n? - self.rest_n?).norm() > 0.5)
     }
-    fn locate(&self, finger: &Finger) -> Option<SensedContact> {
+    fn locate(&self, finger: &Finger, _moved_m: f64) -> Result<SensedContact, Doubt> {
         let ahead_t = finger.direction_t();
-        Some(SensedContact { p_tc: (ahead_t * finger.radius_m).into(), normal_t: -ahead_t })
+        Ok(SensedContact::new((ahead_t * finger.radius_m).into(), -ahead_t))
     }
 }
 

@@ -311,9 +311,12 @@ impl Scene {
 /// Outcomes of a touch.
 const OUTCOMES: [&str; 3] = ["contact", "miss", "overload"];
 
-/// Version, target, outcome, contact point and normal, place and height, and time of a touch.
+/// Contact point and normal, and the standard deviation along it.
+type ContactState = ([[f64; 3]; 2], Option<f64>);
+
+/// Version, target, outcome, contact, place and height, and time of a touch.
 type TouchState =
-    (Version, Vec<f64>, &'static str, Option<[[f64; 3]; 2]>, Option<(Vec<f64>, f64)>, Option<f64>);
+    (Version, Vec<f64>, &'static str, Option<ContactState>, Option<(Vec<f64>, f64)>, Option<f64>);
 
 /// Result of a touch.
 #[pyclass(frozen, module = "palpate")]
@@ -367,22 +370,23 @@ impl Touch {
         version: Version,
         target: Vec<f64>,
         outcome: &str,
-        contact: Option<[[f64; 3]; 2]>,
+        contact: Option<ContactState>,
         place: Option<(Vec<f64>, f64)>,
         time_s: Option<f64>,
     ) -> PyResult<Self> {
         pickle::check(&version, "Touch")?;
         let outcome = OUTCOMES.into_iter().find(|known| *known == outcome);
-        let contact = contact.map(|[p_wc, normal_w]| probe::Contact {
+        let contact = contact.map(|([p_wc, normal_w], sd_m)| probe::Contact {
             p_wc: p_wc.into(),
             normal_w: normal_w.into(),
+            sd_m,
         });
         Ok(Self { target, outcome: outcome.unwrap_or_default(), contact, place, time_s })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, TouchState>> {
         let Self { target, outcome, contact, place, time_s } = slf.get();
-        let contact = contact.as_ref().map(|it| [it.p_wc.into(), it.normal_w.into()]);
+        let contact = contact.as_ref().map(|it| ([it.p_wc.into(), it.normal_w.into()], it.sd_m));
         let state = (pickle::version(), target.clone(), *outcome, contact, place.clone(), *time_s);
         pickle::reduced(slf, state)
     }

@@ -224,10 +224,8 @@ pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyho
     Ok(match touch.contact.map(Point3::from) {
         Some(p_wc) => {
             let normal_w = touch.normal.map(Vector3::from).or(normal_w);
-            Touch::Contact(Contact {
-                p_wc,
-                normal_w: normal_w.context("a recorded contact has no normal")?,
-            })
+            let normal_w = normal_w.context("a recorded contact has no normal")?;
+            Touch::Contact(Contact { p_wc, normal_w, sd_m: touch.contact_sd_m })
         }
         None if touch.overload => Touch::Overload,
         None => Touch::Miss,

@@ -4,6 +4,7 @@ use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::sim::finger::Fingertip;
+use crate::sim::finger::effects::wrench::WrenchEffect;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
 use palpate_explore::robot::Robot;
@@ -163,7 +164,7 @@ impl Environment {
             ));
         }
         let fingertip =
-            scene.effects.skin.is_some().then(|| Fingertip::new(&scene.finger, &scene.effects));
+            scene.effects.has_load().then(|| Fingertip::new(&scene.finger, &scene.effects));
         Ok(Self { scene, shape, task, arm, arm_mjcf, fingertip, notices })
     }
 
@@ -202,8 +203,7 @@ impl Environment {
 
     /// Returns the arm or stage with its finger; `None` for a function.
     pub fn robot(&self) -> Option<Robot> {
-        let (finger, is_soft) = (self.scene.finger.clone(), self.fingertip.is_some());
-        Some(Robot { chain: self.chain()?, finger, is_soft })
+        Some(robot(&self.scene, self.chain()?))
     }
 
     /// Returns the kinematic chain that carries the finger: the scene's arm, or a stage whose home
@@ -496,8 +496,7 @@ fn whole_object_task(
     let around = ball.keep_out(finger, touch.standoff_m);
     let task = Task::new(ball, touch.clone(), finger).map_err(invalid)?;
     let Some(arm) = arm.filter(|_| scene.simulator.moves_finger()) else { return Ok(task) };
-    let robot =
-        Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.skin.is_some() };
+    let robot = robot(scene, arm.clone());
     let home_w: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let inside_m = around.depth_m(&home_w);
     if inside_m > 0.0 {
@@ -511,4 +510,12 @@ fn whole_object_task(
         Some(reach) => task.within(move |approach: &Approach| reach.reaches(approach)),
         None => task,
     })
+}
+
+/// Returns the robot of a scene, whose finger `chain` carries.
+fn robot(scene: &Scene, chain: Chain) -> Robot {
+    let effects = &scene.effects;
+    let accuracy = effects.wrench.as_ref().map(WrenchEffect::accuracy);
+    let robot = Robot::new(chain, scene.finger.clone(), effects.skin.is_some());
+    Robot { sensor: scene.sensor.kind, accuracy, ..robot }
 }

@@ -35,10 +35,9 @@ impl Probe for ExactProbe {
             let place = zone.place(&approach.p_near_w);
             let x_m = place[0];
             let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
-            return Ok(Touch::Contact(Contact {
-                p_wc: zone.point(&place, function.height_m(x_m)),
-                normal_w: zone.x_wz().rotation * normal_z,
-            }));
+            let p_wc = zone.point(&place, function.height_m(x_m));
+            let normal_w = zone.x_wz().rotation * normal_z;
+            return Ok(Touch::Contact(Contact::new(p_wc, normal_w)));
         }
         let found = resting_pose(environment, approach);
         let turned_w = || {
@@ -51,7 +50,7 @@ impl Probe for ExactProbe {
             .as_ref()
             .map(|rest| Isometry3::from_parts(rest.p_wt.coords.into(), approach.r_wt()));
         Ok(found.map_or(Touch::Miss, |RestingPose { hit, .. }| {
-            Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal })
+            Touch::Contact(Contact::new(hit.point, hit.normal))
         }))
     }
 

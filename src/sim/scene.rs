@@ -9,6 +9,7 @@ use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::arm::settings::FILE_ENDINGS;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::robot::finger::profile::Profile;
+use palpate_explore::robot::sensor::{SensorKind, SensorSettings};
 use palpate_explore::task::WholeObject;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::zone::Zone;
@@ -43,6 +44,9 @@ pub struct Scene {
     /// Finger; not used by `simulator = "analytic"`.
     #[serde(default)]
     pub finger: Finger,
+    /// Sensor that locates the contacts.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub sensor: SensorSettings,
     /// Arm that carries the finger; default: a three-axis linear stage, with a wrist for a whole
     /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -340,11 +344,26 @@ impl Validate for Scene {
                     .into()
             });
         }
-        let is_rigid =
-            self.simulator == SimulatorKind::Kinematic && self.effective_effects().skin.is_none();
-        let allowed = "a table, because simulator = \"kinematic\" needs a soft skin (for a rigid finger \
-                       use simulator = \"swept\"; without any [effects] the skin is a BioTac's)";
-        lacks(rules, "effects.skin", is_rigid, allowed);
+        let effects = self.effective_effects();
+        let is_bare = self.simulator == SimulatorKind::Kinematic && !effects.has_load();
+        let allowed = "a table, because simulator = \"kinematic\" needs a soft skin or a [rigid_tip] \
+                       (for an exact rigid finger use simulator = \"swept\"; without any [effects] the \
+                       skin is a BioTac's)";
+        lacks(rules, "effects.skin", is_bare, allowed);
+        let is_twofold = effects.skin.is_some() && effects.rigid_tip.is_some();
+        given(rules, "effects.rigid_tip", is_twofold, "either this or [effects.skin], not both");
+        let kind = self.sensor.kind;
+        let named = format!("\"{}\"", kind.name());
+        rules.require(
+            "sensor.kind",
+            &named,
+            kind == SensorKind::Automatic || self.simulator.moves_finger(),
+            || format!("\"automatic\", because simulator = \"{body}\" has no sensor"),
+        );
+        let is_blind = kind == SensorKind::ForceTorqueTip && effects.wrench.is_none();
+        rules.require("sensor.kind", &named, !is_blind, || {
+            "another kind, or a table [effects.wrench]: the tip is on a force/torque sensor".into()
+        });
         let bumps = self.simulator != SimulatorKind::Dynamic && self.effects.collision.is_some();
         let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
         given(rules, "effects.collision", bumps, allowed);
@@ -395,13 +414,16 @@ impl Scene {
         })
     }
 
-    /// Returns the effects in use: those of the scene, or those of a BioTac (skin, fluid and
-    /// electrodes with their defaults) if a `kinematic` scene names no effects.
+    /// Returns the effects in use: those of the scene; if a `kinematic` scene names none, those of
+    /// its sensor, a BioTac (skin, fluid and electrodes with their defaults) by default.
     pub fn effective_effects(&self) -> Cow<'_, Effects> {
-        match self.simulator == SimulatorKind::Kinematic && self.effects == Effects::default() {
-            true => Cow::Owned(Effects::biotac()),
-            false => Cow::Borrowed(&self.effects),
+        if self.simulator != SimulatorKind::Kinematic || self.effects != Effects::default() {
+            return Cow::Borrowed(&self.effects);
         }
+        Cow::Owned(match self.sensor.kind {
+            SensorKind::Automatic => Effects::biotac(),
+            SensorKind::ForceTorqueTip | SensorKind::Contact => Effects::rigid(self.sensor.kind),
+        })
     }
 
     /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin model

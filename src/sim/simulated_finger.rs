@@ -5,9 +5,10 @@ use crate::sim::environment::ObjectShape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::WrenchSensor;
 use crate::sim::finger::{ContactLoad, Fingertip, FingertipState};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
 use palpate_explore::robot::finger::TipMotion;
+use palpate_explore::robot::sensor::SensorKind;
 use palpate_gp::math::seed;
 use std::sync::Arc;
 
@@ -25,7 +26,10 @@ pub struct SimulatedFinger {
     gauge: Option<WrenchSensor>,
     registration_error: Option<Registration>,
     load: ContactLoad,
-    /// Whether the scene has both fluid (detects contact) and electrodes (locate it).
+    /// Place of the tip after the last step.
+    p_wt: Point3<f64>,
+    /// Whether the scene has a sensor of its own: a named one, or both fluid (detects contact) and
+    /// electrodes (locate it).
     has_sensor: bool,
 }
 
@@ -68,7 +72,9 @@ impl SimulatedFinger {
                 .map(|effect| WrenchSensor::new(effect, stream("wrench"))),
             registration_error: misplaced,
             load: ContactLoad::default(),
-            has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
+            p_wt: Point3::origin(),
+            has_sensor: scene.sensor.kind != SensorKind::Automatic
+                || effects.fluid.is_some() && effects.electrodes.is_some(),
             environment,
         })
     }
@@ -91,6 +97,7 @@ impl SimulatedFinger {
         let (Some(tip), ObjectShape::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
             return Ok(Wrench::default());
         };
+        self.p_wt = motion.x_wt.translation.vector.into();
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
         self.load = state.step(tip, bvh, &motion, dt_s)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
@@ -102,10 +109,16 @@ impl SimulatedFinger {
         reading.samples.clear();
         reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));
         reading.samples.extend(self.true_contact().map(Sample::Ideal));
-        let effect = self.environment.scene().effects.wrench.as_ref();
-        reading.wrench = self.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
-            gauge.read(effect, &mount.moved(&self.x_mt), period_s).moved(&self.x_mt.inverse())
-        });
+        let scene = self.environment.scene();
+        if scene.sensor.kind == SensorKind::Contact {
+            let is_touching = self.load.force_n.norm() > scene.touch.detection_n;
+            reading.samples.push(Sample::Flag(is_touching));
+        }
+        reading.wrench =
+            self.gauge.as_mut().zip(scene.effects.wrench.as_ref()).map(|(gauge, effect)| {
+                let load = mount.moved(&self.x_mt);
+                gauge.read(effect, &load, &self.p_wt, period_s).moved(&self.x_mt.inverse())
+            });
     }
 
     /// Returns the true load, if no sensor measures it.

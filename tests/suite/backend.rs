@@ -49,7 +49,7 @@ fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
 }
 
 fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> InterlockedBackend {
-    let robot = Robot { chain: chain.clone(), finger: Finger::default(), is_soft: true };
+    let robot = Robot::new(chain.clone(), Finger::default(), true);
     let (touch_force_n, travel_m_s) = (15.0, 0.1);
     let site = SafetyContext {
         robot,

@@ -32,7 +32,7 @@ fn believe(places: &[(f64, f64)], band: BandName) -> HeightField {
     for (x, z) in places {
         let height_m = 0.1 * x + 0.004 * (60.0 * z).sin();
         let p_wc = zone().point(&[*x, *z], height_m);
-        belief.observe(&[*x, *z], &Touch::Contact(Contact { p_wc, normal_w: Vector3::y() }));
+        belief.observe(&[*x, *z], &Touch::Contact(Contact::new(p_wc, Vector3::y())));
         let p_wt = p_wc + Vector3::y() * finger.radius_m;
         belief.observe_swept(&SweptVolume { finger: finger.clone(), p_wt });
     }

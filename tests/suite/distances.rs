@@ -75,7 +75,7 @@ proptest! {
 
 pub fn robot(model: &str) -> Robot {
     let chain = ArmSettings { model: model.into(), ..ArmSettings::default() }.chain().unwrap();
-    Robot { chain, finger: Finger::default(), is_soft: true }
+    Robot::new(chain, Finger::default(), true)
 }
 
 /// Reads `key="a b c"` of a tag.

@@ -87,7 +87,7 @@ fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
             for x in [-0.04, 0.04] {
                 let z = -0.04 + 0.02 * f64::from(i);
                 let p_wc = SQUARE.point(&[x, z], 0.03 + 0.2 * x * x);
-                let contact = Contact { p_wc, normal_w: Vector3::y() };
+                let contact = Contact::new(p_wc, Vector3::y());
                 belief.observe(&[x, z], &Touch::Contact(contact));
             }
         }
@@ -129,7 +129,7 @@ fn normals_tilt_the_belief_and_grazing_ones_are_dropped() {
         let settings = GpSettings { normals: true, ..GpSettings::default() };
         let mut belief = HeightField::new(SQUARE, settings);
         let p_wc = SQUARE.point(&[0.0, 0.0], 0.02);
-        let contact = Contact { p_wc, normal_w: normal_w.normalize() };
+        let contact = Contact::new(p_wc, normal_w.normalize());
         belief.observe(&[0.0, 0.0], &Touch::Contact(contact));
         let (_, surface) = belief.refit().unwrap();
         let mut gradient = [0.0; 2];
@@ -180,7 +180,7 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
         for touch in &read.touches {
             let p_wc = Point3::from(touch.contact.unwrap());
             let normal_w = touch.normal.map_or(Vector3::y(), Vector3::from);
-            belief.observe(&touch.target.numbers(), &Touch::Contact(Contact { p_wc, normal_w }));
+            belief.observe(&touch.target.numbers(), &Touch::Contact(Contact::new(p_wc, normal_w)));
             if let Some(tip) = touch.tip {
                 let finger = experiment.scene.finger.clone();
                 belief.observe_swept(&SweptVolume { finger, p_wt: Point3::from(tip) });

@@ -83,6 +83,7 @@ mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
+mod rigid_tip;
 mod scenes;
 mod seeking;
 mod sensor_file;

@@ -24,7 +24,7 @@ fn zone() -> Zone {
 /// Adds a touch at a target to the belief, with or without contact.
 fn touch(belief: &mut HeightField, zone: &Zone, target: &[f64], meets: bool) {
     let p_wt = zone.point(target, 0.0);
-    let contact = Contact { p_wc: p_wt, normal_w: Vector3::y() };
+    let contact = Contact::new(p_wt, Vector3::y());
     belief.observe(target, &if meets { Touch::Contact(contact) } else { Touch::Miss });
     belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
 }
@@ -73,7 +73,7 @@ fn touches_speak_for_their_surroundings() {
     let beyond = |offset: f64| {
         let mut belief = HeightField::new(zone.clone(), GpSettings::default());
         let p_wc = zone.point(&[0.05 - offset * radius_m, 0.05], 0.0);
-        let contact = Contact { p_wc, normal_w: Vector3::y() };
+        let contact = Contact::new(p_wc, Vector3::y());
         belief.observe(&[0.05, 0.05], &Touch::Contact(contact));
         let p_wt = zone.point(&[0.05, 0.05], 0.0);
         belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
@@ -102,7 +102,7 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
         let target = row.target.place().unwrap();
         let p_wt = zone.x_wz() * zone.local(target, -far_m);
         let touch = row.contact.map_or(Touch::Miss, |p_w| {
-            Touch::Contact(Contact { p_wc: Point3::from(p_w), normal_w: Vector3::y() })
+            Touch::Contact(Contact::new(Point3::from(p_w), Vector3::y()))
         });
         belief.observe(target, &touch);
         belief.observe_swept(&SweptVolume { finger: finger.clone(), p_wt });

@@ -74,7 +74,7 @@ fn a_line_is_fitted_with_its_covariance() {
 }
 
 fn pa10(is_soft: bool) -> Robot {
-    Robot { chain: ArmSettings::default().chain().unwrap(), finger: Finger::default(), is_soft }
+    Robot::new(ArmSettings::default().chain().unwrap(), Finger::default(), is_soft)
 }
 
 const BALL: CalibrationBody =
@@ -208,7 +208,7 @@ fn what_touches_do_not_determine_is_said_and_not_invented() {
 fn a_stage_is_refused_before_it_touches() {
     let finger = Finger::default();
     let home = Point3::new(0.0, -0.6, 0.5);
-    let robot = Robot { chain: stage(home, finger.r_at()), finger, is_soft: true };
+    let robot = Robot::new(stage(home, finger.r_at()), finger, true);
     let mut random = seed::stream(0, 0, "design");
     let touch = TouchSettings::default();
     let refused =

@@ -63,7 +63,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_place() {
     }
     for (set, said) in [
         ("effects.sensor=none.toml", "allowed is a readable file"),
-        ("effects.sensor=takktile", "\"takktile\": allowed is \"biotac\", or a file"),
+        ("effects.sensor=takktile", "\"takktile\": allowed is \"biotac\", \"ati_gamma\""),
         ("effects.flex={}", "removed: use model = \"columns\" or model = \"shell\""),
     ] {
         let error = scene(&[set]).unwrap_err();

@@ -93,7 +93,7 @@ pub fn task_and_robot() -> Result<(Task, Robot), palpate_input::error::InputErro
     zone.depth_m = Some([-0.03, 0.03]);
     let task = Task::new(zone, TouchSettings::default(), &finger)?;
     let chain = stage(Point3::new(0.0, 0.08, 0.0), finger.r_at());
-    Ok((task, Robot { chain, finger, is_soft: false }))
+    Ok((task, Robot::new(chain, finger, false)))
 }
 
 /// Explores with `touches` touches; returns the belief and the largest error of a contact.

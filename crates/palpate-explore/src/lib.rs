@@ -32,7 +32,7 @@
 //! let mut heights = HeightField::new(zone.clone(), GpSettings::default());
 //! let touch_at = |x_m: f64| {
 //!     let p_wc = zone.point(&[x_m], 0.1 * x_m * x_m);
-//!     Touch::Contact(Contact { p_wc, normal_w: Vector3::y() })
+//!     Touch::Contact(Contact::new(p_wc, Vector3::y()))
 //! };
 //! for x_m in [-0.09, -0.02, 0.05] {
 //!     heights.observe(&[x_m], &touch_at(x_m));

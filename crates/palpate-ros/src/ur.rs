@@ -271,8 +271,8 @@ impl TrajectoryStream {
         vec![point(self.reference.clone(), None, stop_s)]
     }
 
-    /// Moves the reference of an arm measured at `q`, rad, by the last command until `now`, or until
-    /// the trajectory that carries it has ended.
+    /// Moves the reference of an arm measured at `q`, rad, by the last command until `now`, or
+    /// until the trajectory that carries it has ended.
     fn follow(&mut self, q: &[f64], now: Instant) {
         let Some(from) = self.followed.replace(now) else { return };
         let span_s = self.moving.as_ref().map_or(0.0, |moving| {

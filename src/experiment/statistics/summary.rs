@@ -6,8 +6,10 @@ use crate::experiment::statistics::{mean, mean_and_error, median};
 use crate::experiment::trial::row::{TouchRow, TrialRow, planner_rows};
 use nalgebra::Point3;
 use palpate_explore::planner::Fallback;
+use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Zone;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Statistics of one planner's trials after a number of touches.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +62,9 @@ pub struct EventCounts {
     pub misses: usize,
     /// Aborted touches: force limit exceeded, or contact not located.
     pub overloads: usize,
+    /// Touches by the sensor's doubt about them.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub doubts: BTreeMap<Doubt, usize>,
     /// Plans that fell back because the belief had no variance at the best place.
     pub no_variance: usize,
     /// Plans that fell back because they repeated a target.
@@ -144,6 +149,9 @@ pub fn events(rows: &[TrialRow], planner: &str) -> EventCounts {
         events.failures += usize::from(row.failure.is_some());
         events.misses += count(|touch| touch.contact.is_none() && !touch.overload);
         events.overloads += count(|touch| touch.overload);
+        for doubt in row.touches.iter().filter_map(|touch| touch.doubt) {
+            *events.doubts.entry(doubt).or_default() += 1;
+        }
         events.no_variance += count(|touch| touch.fallback == Some(Fallback::NoVariance));
         events.duplicate_target += count(|touch| touch.fallback == Some(Fallback::DuplicateTarget));
     }

@@ -149,7 +149,11 @@ fn run_touches(
             target: plan.target,
             contact: contact.map(|contact| contact.p_wc.coords.into()),
             overload: touch == Touch::Overload,
-            normal: contact.filter(|_| writes_normals).map(|contact| contact.normal_w.into()),
+            normal: contact
+                .filter(|contact| writes_normals || contact.sd_m.is_some())
+                .map(|contact| contact.normal_w.into()),
+            contact_sd_m: contact.and_then(|contact| contact.sd_m),
+            doubt: probe.doubt(),
             tip: swept.map(|swept| swept.p_wt.coords.into()),
             time_s: probe.time_s(),
             planned_sd_m: plan.sd_m,

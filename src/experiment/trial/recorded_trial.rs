@@ -9,6 +9,7 @@ use palpate_explore::backend::Fault;
 use palpate_explore::planner::PlannerFactory;
 use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
+use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Approach;
 use palpate_ros::recording::{self, Recording, RecordingBackend, RecordingMetadata, TrialEnd};
 use palpate_ros::view::TFMessage;
@@ -177,7 +178,7 @@ fn touch(row: &TouchRow, approach: &Approach) -> Touch {
             // A normal that the belief does not use is not stored.
             let against = -approach.direction_w().into_inner();
             let normal_w = row.normal.map_or(against, Vector3::from);
-            Touch::Contact(Contact { p_wc: Point3::from(contact), normal_w })
+            Touch::Contact(Contact { p_wc: contact.into(), normal_w, sd_m: row.contact_sd_m })
         }
         (None, true) => Touch::Overload,
         (None, false) => Touch::Miss,
@@ -205,6 +206,13 @@ impl Probe for ResumedProbe<'_> {
                 Some(SweptVolume { finger: self.finger.with_pitch(row.target.pitch_deg())?, p_wt })
             }
             None => self.probe.swept_volume(),
+        }
+    }
+
+    fn doubt(&self) -> Option<Doubt> {
+        match &self.last {
+            Some((row, _)) => row.doubt,
+            None => self.probe.doubt(),
         }
     }
 

@@ -5,6 +5,7 @@ use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::Fallback;
+use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Target;
 use palpate_gp::fit::Fit;
 use schemars::JsonSchema;
@@ -49,6 +50,12 @@ pub struct TouchRow {
     /// Contact normal in `W`; written if the belief uses it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
+    /// Standard deviation of the contact along its normal, as the sensor states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_sd_m: Option<f64>,
+    /// Reason why the contact is less certain than usual, or was not located.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<Doubt>,
     /// Centre of the fingertip's hemisphere in `W` at the approach's end; written for misses, and
     /// for contacts if used.
     #[serde(default, skip_serializing_if = "Option::is_none")]

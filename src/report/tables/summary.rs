@@ -164,5 +164,8 @@ fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
             _ => counted(count, what) + rest,
         })
         .collect();
+    let doubts = (events.doubts.iter())
+        .map(|(doubt, count)| format!("{}: {doubt}", counted(*count, "touch")));
+    let found: Vec<String> = found.into_iter().chain(doubts).collect();
     (!found.is_empty()).then(|| format!("{planner}: {}", found.join("; ")))
 }

@@ -26,6 +26,8 @@ const LONGEST_STEP_S: f64 = 1.0;
 #[derive(Clone, Debug)]
 pub struct Fingertip {
     skin: Option<Skin>,
+    /// Hull of a rigid tip.
+    hull: Finger,
     electrodes: Option<Electrodes>,
     shear: Option<ShearCoupling>,
     effects: Effects,
@@ -45,6 +47,7 @@ impl Fingertip {
             shear: sheared.map(|(electrodes, samples)| ShearCoupling::new(electrodes, samples)),
             skin,
             electrodes,
+            hull: finger.clone(),
             effects: effects.clone(),
         }
     }
@@ -128,17 +131,17 @@ impl FingertipState {
         if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
             return Err(diverged());
         }
-        let mut load = match (&tip.skin, &mut self.pressed) {
-            (Some(skin), Some(pressed)) => {
-                skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
-                    PressError::NotFinite => diverged(),
-                    PressError::Inside => {
-                        Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
-                    }
-                })?
-            }
-            _ => ContactLoad::default(),
+        let loaded = match (&tip.skin, &mut self.pressed, &tip.effects.rigid_tip) {
+            (Some(skin), Some(pressed), _) => skin.press(object, &motion.x_wt, pressed),
+            (.., Some(rigid)) => rigid.press(&tip.hull, object, &motion.x_wt),
+            _ => Ok(ContactLoad::default()),
         };
+        let mut load = loaded.map_err(|error| match error {
+            PressError::NotFinite => diverged(),
+            PressError::Inside => {
+                Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
+            }
+        })?;
         self.time_s += dt_s;
         self.effects.on_load(&tip.effects, motion, dt_s, &mut load);
         let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));

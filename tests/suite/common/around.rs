@@ -65,7 +65,7 @@ pub fn meet(
     p_wt: Point3<f64>,
 ) {
     let touch =
-        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact { p_wc, normal_w }));
+        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact::new(p_wc, normal_w)));
     let radius_m = belief.scope().radius_m;
     let swept = SweptVolume { finger: Finger { radius_m, ..Finger::default() }, p_wt };
     let approach = approach(belief, aim);

@@ -121,6 +121,8 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         target: target.into(),
         overload: false,
         normal: None,
+        contact_sd_m: None,
+        doubt: None,
         time_s: None,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         fallback: None,

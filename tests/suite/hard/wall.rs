@@ -137,6 +137,7 @@ pub fn scene(period_s: f64) -> Scene {
         zone: Some(Zone::new([-0.05, 0.05], Some([-0.05, 0.05]))),
         object: None,
         finger: Finger::default(),
+        sensor: Default::default(),
         arm: None,
         effects,
         touch: TouchSettings { period_s: Some(period_s), ..TouchSettings::default() },

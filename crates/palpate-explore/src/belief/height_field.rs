@@ -2,7 +2,7 @@
 
 use crate::free_space::FreeSpaceBound;
 use crate::gp_settings::{Band, BandName, GpSettings};
-use crate::probe::{SweptVolume, Touch};
+use crate::probe::{Contact, SweptVolume, Touch};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
@@ -23,6 +23,11 @@ const REACHED_WITHIN: f64 = 1e-3;
 /// Smallest y of a normal in the zone that is used: below it the slope is nearly infinite, and a
 /// small error of the normal changes its sign; a heuristic, 87° from the approach.
 const NORMAL_Y_MIN: f64 = 0.05;
+
+/// Standard deviation of a contact up to which it counts as exact, m, if no noise is given: the
+/// noise, which the belief fits, is in its units.
+// heuristic: below it the kernel's misfit to a surface is larger.
+const SD_UNIT_M: f64 = 1e-4;
 
 /// Belief of a height field over a zone.
 #[derive(Clone, Serialize, Deserialize)]
@@ -99,7 +104,8 @@ impl HeightField {
                 let slope = self.slope(&contact.normal_w);
                 let slope =
                     slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
-                self.contacts.push(&Observation { place: &place, height, noise: 1.0, slope });
+                let noise = self.noise(contact);
+                self.contacts.push(&Observation { place: &place, height, noise, slope });
                 self.zone.distance(&place, target) <= REACHED_WITHIN
             }
             Touch::Miss | Touch::Overload => false,
@@ -107,6 +113,15 @@ impl HeightField {
         if !reached {
             self.unreached.push(target.into());
         }
+    }
+
+    /// Returns the noise of a contact's height relative to that of an exact one: the deviation of
+    /// its surface along the normal, over the normal's part along the heights.
+    fn noise(&self, contact: &Contact) -> f64 {
+        let normal_y = self.zone.x_wz().inverse_transform_vector(&contact.normal_w).y;
+        let sd_m = contact.sd_m.unwrap_or(0.0) / normal_y.max(NORMAL_Y_MIN);
+        let given_m = self.settings.noise_sd_m.or(self.settings.noise_sd_min_m);
+        (sd_m / given_m.unwrap_or(SD_UNIT_M)).max(1.0)
     }
 
     /// Adds the volume swept by the last touch: the surface is below it after a contact, and absent

@@ -5,6 +5,7 @@ pub mod servo;
 
 use crate::backend::Fault;
 use crate::robot::Finger;
+use crate::robot::sensor::Doubt;
 use crate::task::{Approach, Zone};
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,16 @@ pub struct Contact {
     pub p_wc: Point3<f64>,
     /// Unit normal in `W`, from the surface towards the finger.
     pub normal_w: Vector3<f64>,
+    /// Standard deviation of the surface along the normal, m, if the sensor states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd_m: Option<f64>,
+}
+
+impl Contact {
+    /// Creates a contact without a statement about its error.
+    pub fn new(p_wc: Point3<f64>, normal_w: Vector3<f64>) -> Self {
+        Self { p_wc, normal_w, sd_m: None }
+    }
 }
 
 /// A robot, real or simulated, that can make touches.
@@ -45,6 +56,11 @@ pub trait Probe: Send {
     /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the last contact;
     /// `None` for a probe without a finger, or before a contact.
     fn tip(&self) -> Option<Isometry3<f64>> {
+        None
+    }
+
+    /// Reason why the last touch is less certain than usual, or why its contact was not located.
+    fn doubt(&self) -> Option<Doubt> {
         None
     }
 

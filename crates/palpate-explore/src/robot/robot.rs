@@ -2,6 +2,7 @@
 
 use super::arm::{Chain, LinkCapsule, RobotPart};
 use super::finger::Finger;
+use super::sensor::{SensorKind, WrenchAccuracy};
 use nalgebra::Point3;
 
 /// An arm with a finger.
@@ -13,9 +14,18 @@ pub struct Robot {
     pub finger: Finger,
     /// Whether the finger has a soft skin.
     pub is_soft: bool,
+    /// Kind of the finger's sensor.
+    pub sensor: SensorKind,
+    /// Accuracy of the force/torque sensor, if known.
+    pub accuracy: Option<WrenchAccuracy>,
 }
 
 impl Robot {
+    /// Creates a robot with the sensors that its backend has.
+    pub fn new(chain: Chain, finger: Finger, is_soft: bool) -> Self {
+        Self { chain, finger, is_soft, sensor: SensorKind::Automatic, accuracy: None }
+    }
+
     /// Returns the collision capsules of its arm, adapter and finger.
     pub fn capsules(&self) -> Vec<LinkCapsule> {
         let Self { chain, finger, .. } = self;

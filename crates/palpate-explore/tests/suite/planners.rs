@@ -31,7 +31,7 @@ fn belief(zone: &Zone, trial: u64, count: usize, elsewhere: usize) -> HeightFiel
         if i % elsewhere == 0 {
             p_wc.x += extent * 0.05 * rng.random_range(-1.0..1.0);
         }
-        belief.observe(&target, &Touch::Contact(Contact { p_wc, normal_w: Vector3::y() }));
+        belief.observe(&target, &Touch::Contact(Contact::new(p_wc, Vector3::y())));
     }
     belief.refit().unwrap();
     belief
@@ -102,7 +102,7 @@ fn a_belief_that_is_sure_everywhere_is_a_stall() {
     for i in 0..60 {
         let x = -2.0 + 4.0 * f64::from(i) / 59.0;
         let p_wc = Point3::new(x, 1.0, 0.0);
-        belief.observe(&[x], &Touch::Contact(Contact { p_wc, normal_w: Vector3::y() }));
+        belief.observe(&[x], &Touch::Contact(Contact::new(p_wc, Vector3::y())));
     }
     belief.refit().unwrap();
     let plan = make("active").plan(&belief);

@@ -17,7 +17,7 @@ fn believe(finger: Finger, height_m: impl Fn(f64, f64) -> f64) -> HeightField {
         for j in 0..16 {
             let place = [i, j].map(|k| SIDE_M * f64::from(k) / 15.0);
             let p_wc = zone.point(&place, height_m(place[0], place[1]));
-            let contact = Contact { p_wc, normal_w: Vector3::y() };
+            let contact = Contact::new(p_wc, Vector3::y());
             belief.observe(&place, &Touch::Contact(contact));
         }
     }

@@ -35,7 +35,7 @@ fn beliefs(task: &Task, count: usize, centre_w: Point3<f64>, gp: &GpSettings) ->
         let touch = match i % 5 {
             3 => Touch::Miss,
             4 => Touch::Overload,
-            _ => Touch::Contact(Contact { p_wc, normal_w: outward }),
+            _ => Touch::Contact(Contact::new(p_wc, outward)),
         };
         let swept = SweptVolume { finger: finger.clone(), p_wt: p_wc + outward * finger.radius_m };
         belief.observe(&target, &approach, (&touch, (i != 2).then_some(&swept)));

@@ -9,7 +9,13 @@ use std::sync::LazyLock;
 use toml::{Table, Value};
 
 /// Sensors included in Palpate: names and files.
-pub const SENSORS: [(&str, &str); 1] = [("biotac", include_str!("../../../../models/biotac.toml"))];
+pub const SENSORS: [(&str, &str); 5] = [
+    ("biotac", include_str!("../../../../models/biotac.toml")),
+    ("ati_gamma", include_str!("../../../../models/sensors/ati_gamma.toml")),
+    ("ati_mini40", include_str!("../../../../models/sensors/ati_mini40.toml")),
+    ("ur5e", include_str!("../../../../models/sensors/ur5e.toml")),
+    ("fr3", include_str!("../../../../models/sensors/fr3.toml")),
+];
 
 /// Tables of the BioTac's file.
 pub(super) static BIOTAC: LazyLock<Table> =

@@ -51,6 +51,8 @@ pub enum Requirement {
     Nothing,
     /// A skin.
     Skin,
+    /// A skin or a rigid tip.
+    Load,
     /// A tactile frame with at least one channel.
     Frames,
 }

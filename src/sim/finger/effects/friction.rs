@@ -6,7 +6,7 @@
 //! the fluid vibrate.
 
 use super::constants::effect;
-use super::effect::{Effect, LoadHook};
+use super::effect::{Effect, LoadHook, Requirement};
 use crate::sim::finger::load::ContactLoad;
 use nalgebra::Vector3;
 use palpate_explore::robot::finger::TipMotion;
@@ -30,6 +30,8 @@ effect! {
 
 impl Effect for FrictionEffect {
     type State = FrictionState;
+
+    const REQUIRES: Requirement = Requirement::Load;
 
     const ON_LOAD: Option<LoadHook<Self>> =
         Some(|effect, bristle, motion, dt_s, load| bristle.step(effect, motion, dt_s, load));

@@ -12,6 +12,7 @@ pub mod electrodes;
 pub mod fluid;
 pub mod friction;
 pub mod registration;
+pub mod rigid_tip;
 pub mod sensor;
 pub mod skin;
 mod table;
@@ -23,12 +24,15 @@ pub mod wrench;
 use super::load::ContactLoad;
 use effect::{Effect, EffectSwitch, Requirement};
 use palpate_explore::robot::finger::TipMotion;
+use palpate_explore::robot::sensor::SensorKind;
 use palpate_input::config::{Rules, Validate};
 
 // An effect comes after those that it requires.
 table::effects! {
     /// Soft skin; without it there is no load and no tactile frame.
     skin: skin::SkinEffect,
+    /// Rigid tip instead of the skin.
+    rigid_tip: rigid_tip::RigidTipEffect,
     /// Liquid under the skin with its pressure; without it the finger is dry and the skin's points
     /// are independent.
     fluid: fluid::FluidEffect,
@@ -63,11 +67,31 @@ impl Effects {
         }
     }
 
+    /// Returns the minimal effects of a rigid tip with a sensor of this kind.
+    pub fn rigid(kind: SensorKind) -> Self {
+        Self {
+            rigid_tip: Some(rigid_tip::RigidTipEffect::default()),
+            wrench: (kind == SensorKind::ForceTorqueTip).then(wrench::WrenchEffect::default),
+            ..Self::default()
+        }
+    }
+
+    /// Returns every effect with its defaults, except those that another one excludes.
+    pub fn all() -> Self {
+        Self { rigid_tip: None, ..Self::each() }
+    }
+
+    /// Returns whether a model computes the load of the object on the finger.
+    pub fn has_load(&self) -> bool {
+        self.skin.is_some() || self.rigid_tip.is_some()
+    }
+
     /// Returns whether the requirement `needs` is met.
     fn meets(&self, needs: Requirement) -> bool {
         match needs {
             Requirement::Nothing => true,
             Requirement::Skin => self.skin.is_some(),
+            Requirement::Load => self.has_load(),
             Requirement::Frames => self.sends_frames(),
         }
     }
@@ -82,6 +106,7 @@ fn missing(name: &str, needs: Requirement, filling: &[(&str, bool)]) -> String {
             let (last, others) = keys.split_last().map_or(("", &[][..]), |(l, o)| (l.as_str(), o));
             format!("no [{name}] without {} or {last}", others.join(", "))
         }
+        Requirement::Load => format!("no [{name}] without a [skin] or a [rigid_tip]"),
         Requirement::Nothing | Requirement::Skin => format!("no [{name}] without a [skin]"),
     }
 }

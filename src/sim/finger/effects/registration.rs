@@ -1,7 +1,7 @@
 //! Registration errors: the finger on its mount and the object in the world deviate from their
 //! nominal poses.
 
-use super::effect::Effect;
+use super::effect::{Effect, Requirement};
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_explore::robot::finger::TipMotion;
@@ -77,6 +77,8 @@ impl RegistrationEffect {
 
 impl Effect for RegistrationEffect {
     type State = ();
+
+    const REQUIRES: Requirement = Requirement::Load;
 }
 
 /// Registration errors of one trial.

@@ -43,12 +43,14 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
 
 /// Returns the constants in the file `name`, or those of an included sensor.
 fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
-    if SENSORS.iter().any(|(known, _)| *known == name) {
-        return Ok(Table::new());
+    if let Some((_, text)) = SENSORS.iter().find(|(known, _)| *known == name) {
+        return Ok(toml::from_str(text).unwrap_or_default());
     }
     let shown = format!("\"{name}\"");
     if !name.ends_with(".toml") {
-        return Err(loader.not_allowed(key, &shown, "\"biotac\", or a file ending in .toml"));
+        let names: Vec<String> = SENSORS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+        let allowed = format!("{}, or a file ending in .toml", names.join(", "));
+        return Err(loader.not_allowed(key, &shown, &allowed));
     }
     let path = Path::new(name);
     let text = files::text(path, files::TEXT_MAX).map_err(|cause| {

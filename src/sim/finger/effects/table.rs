@@ -9,8 +9,8 @@ macro_rules! effects {
         #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct Effects {
-            /// Constants of the sensor: `"biotac"`, a file like `models/biotac.toml`, or a table of
-            /// constants that differ.
+            /// Constants of the sensor: `"biotac"`, `"ati_gamma"`, `"ati_mini40"`, `"ur5e"`,
+            /// `"fr3"`, a file like `models/biotac.toml`, or a table of constants that differ.
             ///
             /// Reading a scene copies them into the effects.
             pub sensor: Option<String>,
@@ -44,7 +44,7 @@ macro_rules! effects {
 
         impl Effects {
             /// Returns every effect with its defaults.
-            pub fn all() -> Self {
+            fn each() -> Self {
                 Self { $($name: Some(<$Effect>::full_settings()),)* ..Self::default() }
             }
 

@@ -1,20 +1,29 @@
 //! Contact monitor: combines the finger's sensors during a touch.
 
 use crate::backend::Reading;
+use crate::robot::Robot;
 use crate::robot::finger::Finger;
-use crate::robot::sensor::{BioTac, ForceTorqueTip, IdealSensor, SensedContact, Sensor};
+use crate::robot::sensor::{
+    BioTac, ContactSwitch, Doubt, ForceTorqueTip, IdealSensor, SensedContact, Sensor, SensorKind,
+};
 use crate::task::touch::TouchSettings;
 use nalgebra::Vector3;
 
 /// Returns the sensors of a touch in order of priority: the first that the backend has locates the
 /// contacts.
-fn sensors(settings: &TouchSettings, finger: &Finger) -> Vec<Box<dyn Sensor>> {
+fn sensors(settings: &TouchSettings, robot: &Robot) -> Vec<Box<dyn Sensor>> {
     let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
-    vec![
-        Box::new(IdealSensor::default()),
-        Box::new(BioTac::new(finger, detection.clone(), *point, *pressure_limit_counts)),
-        Box::new(ForceTorqueTip::default()),
-    ]
+    let Robot { finger, chain, accuracy, .. } = robot;
+    let wrench = || Box::new(ForceTorqueTip::new(accuracy.clone(), chain.tool));
+    match robot.sensor {
+        SensorKind::Automatic => vec![
+            Box::new(IdealSensor::default()),
+            Box::new(BioTac::new(finger, detection.clone(), *point, *pressure_limit_counts)),
+            wrench(),
+        ],
+        SensorKind::ForceTorqueTip => vec![wrench()],
+        SensorKind::Contact => vec![Box::new(ContactSwitch::default())],
+    }
 }
 
 /// Event that ends an approach.
@@ -38,10 +47,10 @@ pub(super) struct ContactMonitor {
 }
 
 impl ContactMonitor {
-    pub(super) fn new(settings: &TouchSettings, finger: &Finger) -> Self {
+    pub(super) fn new(settings: &TouchSettings, robot: &Robot) -> Self {
         Self {
             settings: settings.clone(),
-            sensors: sensors(settings, finger),
+            sensors: sensors(settings, robot),
             force_n: 0.0,
             force_at_rest_n: None,
             forces: (Vector3::zeros(), 0.0),
@@ -110,8 +119,9 @@ impl ContactMonitor {
     }
 
     /// Returns the contact in `T`, from the samples since the last clearing of the first
-    /// sensor that the backend has.
-    pub(super) fn contact(&self, finger: &Finger) -> Option<SensedContact> {
-        self.sensors.iter().find(|sensor| sensor.is_present())?.locate(finger)
+    /// sensor that the backend has, after a motion of `moved_m` since it was tared.
+    pub(super) fn contact(&self, finger: &Finger, moved_m: f64) -> Result<SensedContact, Doubt> {
+        let present = self.sensors.iter().find(|sensor| sensor.is_present());
+        present.ok_or(Doubt::NoSignal)?.locate(finger, moved_m)
     }
 }

@@ -10,7 +10,7 @@ use crate::control::{Controller, Goal, posture};
 use crate::robot::Robot;
 use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
-use crate::robot::sensor::{SensedContact, Sensor};
+use crate::robot::sensor::{Doubt, Sensor};
 use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
@@ -46,6 +46,8 @@ pub struct Servo {
     swept: Option<SweptVolume>,
     /// Pose of the tip at the reading of the last contact.
     tip: Option<Isometry3<f64>>,
+    /// Doubt about the last touch.
+    doubt: Option<Doubt>,
     /// Reach of an arm, which checks each path around an object before moving.
     reach: Option<ArmReach>,
 }
@@ -69,7 +71,7 @@ impl Servo {
         let (time_s, q) = (reading.time_s, reading.q.clone());
         let reach = ArmReach::new(&robot, &settings);
         Ok(Self {
-            monitor: ContactMonitor::new(&settings, &robot.finger),
+            monitor: ContactMonitor::new(&settings, &robot),
             command: Command { qdot: vec![0.0; robot.chain.joints.len()] },
             robot,
             body,
@@ -80,6 +82,7 @@ impl Servo {
             q,
             swept: None,
             tip: None,
+            doubt: None,
             reach,
         })
     }
@@ -308,7 +311,11 @@ impl Servo {
 
     /// Stops at the point of detection, settles and reads the contact. The overrun while the servos
     /// stop the finger is reversed, so that the depth does not depend on them.
-    fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
+    fn read(
+        &mut self,
+        approach: &Approach,
+        tared: &Isometry3<f64>,
+    ) -> Result<Option<Contact>, Fault> {
         let until_s = self.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
         // A force that locates the contact must remain while it is read.
@@ -326,8 +333,13 @@ impl Servo {
         }
         let x_wt = self.x_wt();
         self.tip = Some(x_wt);
-        Ok(self.monitor.contact(&self.robot.finger).map(|SensedContact { p_tc, normal_t }| {
-            Contact { p_wc: x_wt * p_tc, normal_w: x_wt.rotation * normal_t }
+        let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
+        let located = self.monitor.contact(&self.robot.finger, moved_m);
+        self.doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
+        Ok(located.ok().map(|sensed| Contact {
+            p_wc: x_wt * sensed.p_tc,
+            normal_w: x_wt.rotation * sensed.normal_t,
+            sd_m: sensed.sd_m(),
         }))
     }
 }
@@ -366,6 +378,7 @@ impl Probe for Servo {
     /// Moves the centre of the fingertip's hemisphere to the stand-off and along the approach.
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         check_finite(approach)?;
+        self.doubt = None;
         let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
         match &approach.obstacle {
@@ -387,7 +400,7 @@ impl Probe for Servo {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
             Some(ApproachEnd::Contact) => {
-                self.read(approach)?.map_or(Touch::Overload, Touch::Contact)
+                self.read(approach, &above)?.map_or(Touch::Overload, Touch::Contact)
             }
         };
         let here_w = self.x_wt().translation.vector;
@@ -403,6 +416,10 @@ impl Probe for Servo {
 
     fn tip(&self) -> Option<Isometry3<f64>> {
         self.tip
+    }
+
+    fn doubt(&self) -> Option<Doubt> {
+        self.doubt
     }
 
     fn time_s(&self) -> Option<f64> {

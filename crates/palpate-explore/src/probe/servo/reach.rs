@@ -496,7 +496,7 @@ mod tests {
             home_deg: Some(vec![0.0, -19.0, 0.0, 102.0, 0.0, 22.0, 0.0]),
             ..ArmSettings::default()
         };
-        let robot = Robot { chain: arm.chain().unwrap(), finger: Finger::default(), is_soft: true };
+        let robot = Robot::new(arm.chain().unwrap(), Finger::default(), true);
         let touch = TouchSettings::default();
         let ball =
             Ball { centre_w: Point3::new(0.0, -0.6, 0.6), radius_m: 0.11, lowest_m: Some(0.5) };

@@ -372,7 +372,7 @@ mod tests {
 
     fn robot() -> Robot {
         let finger = Finger::default();
-        Robot { chain: stage(Point3::origin(), finger.r_at()), finger, is_soft: true }
+        Robot::new(stage(Point3::origin(), finger.r_at()), finger, true)
     }
 
     /// Returns an aim from a direction and a point of the unit ball.

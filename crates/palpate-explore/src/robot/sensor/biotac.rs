@@ -1,7 +1,7 @@
 //! BioTac sensor: detects contact by the fluid's pressure and locates it by the electrodes.
 
 use super::sample::{Sample, Wrench};
-use super::{SensedContact, Sensor};
+use super::{Doubt, SensedContact, Sensor};
 use crate::robot::finger::contact_point::{self, ContactEstimate};
 use crate::robot::finger::plane_fit::PlaneFit;
 use crate::robot::finger::{Detection, Detector, Finger, Frame};
@@ -93,17 +93,18 @@ impl Sensor for BioTac {
         rest.zip(now).is_some_and(|(rest, now)| now - rest > self.pressure_limit_counts)
     }
 
-    fn locate(&self, finger: &Finger) -> Option<SensedContact> {
+    fn locate(&self, finger: &Finger, _: f64) -> Result<SensedContact, Doubt> {
         let mean = Frame::mean(&self.frames);
-        let tare = self.tare.as_ref()?;
-        let mut found = contact_point::locate(finger, tare, &mean)?;
-        if let Some(plane_fit) = &self.plane_fit {
-            found = plane_fit.locate(tare, &mean)?;
-        }
+        let tare = self.tare.as_ref().ok_or(Doubt::NoSignal)?;
+        let found = contact_point::locate(finger, tare, &mean).ok_or(Doubt::NoSignal)?;
+        let found = match &self.plane_fit {
+            Some(plane_fit) => plane_fit.locate(tare, &mean).ok_or(Doubt::NoSignal)?,
+            None => found,
+        };
         let p_tc = match self.estimate {
             ContactEstimate::Skin | ContactEstimate::Plane => found.surface_t,
             ContactEstimate::Electrodes => found.centroid_t,
         };
-        Some(SensedContact { p_tc, normal_t: -found.normal_t })
+        Ok(SensedContact::new(p_tc, -found.normal_t))
     }
 }

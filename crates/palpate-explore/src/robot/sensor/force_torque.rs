@@ -1,113 +1,309 @@
-//! Rigid fingertip on a force-torque sensor: intrinsic contact sensing.
+//! Rigid fingertip on a force/torque sensor: intrinsic contact sensing.
 
+use super::contact_switch::foremost;
+use super::doubt::Doubt;
 use super::sample::{Sample, Wrench};
+use super::settings::WrenchAccuracy;
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3, Vector6};
+use palpate_geometry::primitives::nearest_on_segment;
+use std::f64::consts::PI;
 
-/// Smallest force whose line of action locates a contact.
+/// Smallest force whose line of action locates a contact, if the sensor's accuracy is unknown.
 // heuristic: below it, the noise of a common sensor turns the force by more than 30°.
 const LEAST_N: f64 = 0.1;
+
+/// Largest standard deviation of the contact's direction from the tip's centre, rad.
+// heuristic: about that of a contact of which nothing is known but the approach.
+const TURNED_RAD: f64 = 0.25;
+
+/// Number of standard deviations beyond which a reading contradicts a contact.
+// heuristic: one false alarm in several thousand touches per test.
+const SIGMAS: f64 = 4.0;
+
+/// Largest moment about the force, as a fraction of force times radius, and distance of the force
+/// from the tip as a fraction of the radius, without noise.
+// heuristic: a hard contact's friction against spinning, and a tip that is not perfectly round.
+const MOMENT: f64 = 0.05;
+
+/// Relative rounding of a reading that was transformed back and forth.
+const ROUNDING: f64 = 1e-9;
+
+/// Change of the force during a reading that shows slip, as a fraction of it.
+// heuristic: far above the relaxation of a servo at rest.
+const SLIPPED: f64 = 0.1;
+
+/// Standard deviation along the normal of a point on a sphere whose direction is uncertain, times
+/// radius / variance across the normal: with it the ellipsoid of three dimensions that holds 95 %
+/// of a normal distribution holds 95 % of such points. Their offset along the normal is e² / 2r
+/// for an error e across it; at e²/σ² = 5.99, which 95 % of two dimensions stay below, both
+/// parts of the squared Mahalanobis distance add up to 7.81.
+const CURVED: f64 = 2.22;
 
 /// Locates contacts by the wrench relative to that of the finger at rest.
 #[derive(Clone, Debug, Default)]
 pub struct ForceTorqueTip {
-    at_rest: Option<Wrench>,
-    sum: Wrench,
-    count: f64,
+    accuracy: Option<WrenchAccuracy>,
+    /// Pose of `T` in the sensor's frame.
+    x_mt: Isometry3<f64>,
+    at_rest: Option<Window>,
+    now: Window,
 }
 
-/// Returns the point of a sphere of `radius_m` about the origin at which a pure, inward force
-/// produces the wrench `(f, τ)`: `p = (f × τ) / |f|² − λ f` with `|p| = radius` (Bicchi, Salisbury
-/// & Brock 1993, Int. J. Robotics Research 12, contact with friction). If measurement error
-/// makes the line of action miss the sphere, returns the sphere's nearest point. Returns `None` for
-/// a force of less than 0.1 N.
-pub fn point_on_sphere(radius_m: f64, wrench: &Wrench) -> Option<Point3<f64>> {
-    let Wrench { force_n: f, torque_nm } = wrench;
-    let squared = f.norm_squared();
-    if squared < LEAST_N * LEAST_N || !squared.is_finite() {
+/// Sums of the readings of a time span, in the sensor's frame.
+#[derive(Clone, Debug, Default)]
+struct Window {
+    count: f64,
+    /// Time of the first reading.
+    begun_s: f64,
+    /// Sums of the time since then, of its square, and of time times reading.
+    time_s: f64,
+    time_s2: f64,
+    moved: Vector6<f64>,
+    sum: Vector6<f64>,
+    first: Vector6<f64>,
+    /// Axes whose reading has changed.
+    varies: [bool; 6],
+    largest: Vector6<f64>,
+}
+
+impl Window {
+    fn push(&mut self, time_s: f64, reading: &Vector6<f64>) {
+        if self.count == 0.0 {
+            (self.begun_s, self.first) = (time_s, *reading);
+        }
+        let since_s = time_s - self.begun_s;
+        self.count += 1.0;
+        self.time_s += since_s;
+        self.time_s2 += since_s * since_s;
+        self.moved += reading * since_s;
+        self.sum += reading;
+        for (i, varies) in self.varies.iter_mut().enumerate() {
+            *varies |= (reading[i] - self.first[i]).abs() > ROUNDING * self.first.amax();
+        }
+        self.largest = self.largest.sup(&reading.abs());
+    }
+
+    fn mean(&self) -> Vector6<f64> {
+        self.sum / self.count
+    }
+
+    /// Time of the middle of the readings, s.
+    fn middle_s(&self) -> f64 {
+        self.begun_s + self.time_s / self.count
+    }
+
+    /// Returns the change of the readings over the window by linear regression, and its standard
+    /// deviation in units of a reading's noise.
+    fn change(&self) -> Option<(Vector6<f64>, f64)> {
+        let spread = self.time_s2 - self.time_s * self.time_s / self.count;
+        let slope = (self.moved - self.sum * (self.time_s / self.count)) / spread;
+        // Evenly spaced: the span is √12 standard deviations of the times.
+        let span_s = (12.0 * spread / self.count).sqrt();
+        (self.count > 2.0 && spread > 0.0).then(|| (slope * span_s, span_s / spread.sqrt()))
+    }
+}
+
+/// Returns the point of a capsule, the hull of `finger`, at which a pure, inward force produces
+/// the wrench `(f, τ)`, and the outward normal there. The force's line of action passes through
+/// `(f × τ) / |f|²`, and leaves the hull against the force's direction at the contact (Bicchi,
+/// Salisbury & Brock 1993, Int. J. Robotics Research 12, contact with friction). If measurement
+/// error makes the line miss the hull, returns the nearest point of the hemisphere. Returns `None`
+/// for a force that is zero or not finite.
+pub fn point_on_hull(finger: &Finger, wrench: &Wrench) -> Option<(Point3<f64>, Vector3<f64>)> {
+    let (foot, force_n) = (wrench.foot(), wrench.force_n.norm());
+    if force_n == 0.0 || !foot.norm_squared().is_finite() {
         return None;
     }
-    let foot = f.cross(torque_nm) / squared;
-    let back = ((radius_m * radius_m - foot.norm_squared()).max(0.0) / squared).sqrt();
-    let p = foot - f * back;
-    Some(Point3::from(p.try_normalize(0.0)? * radius_m))
+    let out = -wrench.force_n / force_n;
+    let r2 = finger.radius_m.powi(2);
+    let tail = Vector3::new(-finger.length_m, 0.0, 0.0);
+    // Distance along the line at which it leaves a ball.
+    let ball = |centre: Vector3<f64>| {
+        let off = foot - centre;
+        let along = off.dot(&out);
+        let left2 = r2 - (off.norm_squared() - along * along);
+        (left2 >= 0.0).then(|| left2.sqrt() - along)
+    };
+    // The cylinder between them, seen along its axis.
+    let across2 = out.y * out.y + out.z * out.z;
+    let along = foot.y * out.y + foot.z * out.z;
+    let left2 = along * along - across2 * (foot.y * foot.y + foot.z * foot.z - r2);
+    let side = (across2 > 0.0 && left2 >= 0.0).then(|| (left2.sqrt() - along) / across2);
+    let side = side.filter(|s| (-finger.length_m..=0.0).contains(&(foot.x + s * out.x)));
+    let exits = [ball(Vector3::zeros()), side, ball(tail).filter(|_| finger.length_m > 0.0)];
+    let p = match exits.into_iter().flatten().reduce(f64::max) {
+        Some(exit) => foot + out * exit,
+        None => (foot - out * foot.dot(&out)).try_normalize(0.0)? * finger.radius_m,
+    };
+    let axis = nearest_on_segment(&p.into(), &Point3::from(tail), &Point3::origin());
+    let normal = (p - axis.coords).try_normalize(0.0)?;
+    Some((axis + normal * finger.radius_m, normal))
+}
+
+/// Returns the distance of the line of action of a wrench from the hull of `finger`; 0 if it meets
+/// the hull.
+fn beside_m(finger: &Finger, wrench: &Wrench) -> f64 {
+    let (foot, out) = (wrench.foot(), wrench.force_n.normalize());
+    // Nearest point of the axis to the line.
+    let off = Vector3::x() - out * out.x;
+    let share = if off.norm_squared() > 0.0 { foot.dot(&off) / off.norm_squared() } else { 0.0 };
+    let axis = Vector3::x() * share.clamp(-finger.length_m, 0.0);
+    let away = foot - axis;
+    ((away - out * away.dot(&out)).norm() - finger.radius_m).max(0.0)
 }
 
 impl Sensor for ForceTorqueTip {
-    fn push(&mut self, _: f64, _: &[Sample], wrench: Option<&Wrench>) {
+    fn push(&mut self, time_s: f64, _: &[Sample], wrench: Option<&Wrench>) {
         if let Some(wrench) = wrench {
-            self.sum.force_n += wrench.force_n;
-            self.sum.torque_nm += wrench.torque_nm;
-            self.count += 1.0;
+            self.now.push(time_s, &wrench.moved(&self.x_mt).stacked());
         }
     }
 
     fn clear_samples(&mut self) {
-        (self.sum, self.count) = (Wrench::default(), 0.0);
+        self.now = Window::default();
     }
 
     fn tare(&mut self) {
-        self.at_rest = self.mean();
+        self.at_rest = (self.now.count > 0.0).then(|| self.now.clone());
     }
 
     fn is_present(&self) -> bool {
         self.at_rest.is_some()
     }
 
-    /// Locates the contact on the hemisphere, with the sphere's normal there.
-    fn locate(&self, finger: &Finger) -> Option<SensedContact> {
-        let (rest, now) = (self.at_rest?, self.mean()?);
-        let load = Wrench {
-            force_n: now.force_n - rest.force_n,
-            torque_nm: now.torque_nm - rest.torque_nm,
+    /// Locates the contact on the hull, with the hull's normal there.
+    fn locate(&self, finger: &Finger, moved_m: f64) -> Result<SensedContact, Doubt> {
+        let rest = self.at_rest.as_ref().filter(|_| self.now.count > 0.0);
+        let rest = rest.ok_or(Doubt::NoSignal)?;
+        let load = self.now.mean() - rest.mean();
+        let x_tm = self.x_mt.inverse();
+        let in_tip = |load: &Vector6<f64>| Wrench::from_stacked(load).moved(&x_tm);
+        let wrench = in_tip(&load);
+        let Some(accuracy) = &self.accuracy else {
+            if wrench.force_n.norm() < LEAST_N {
+                return Err(Doubt::TooLight);
+            }
+            let (p_tc, normal) = point_on_hull(finger, &wrench).ok_or(Doubt::NoSignal)?;
+            return Ok(SensedContact::new(p_tc, -normal));
         };
-        let p_tc = point_on_sphere(finger.radius_m, &load)?;
-        Some(SensedContact { p_tc, normal_t: -p_tc.coords.try_normalize(0.0)? })
+        accuracy.check_readings(rest, &self.now)?;
+        let sds = accuracy.sds(rest, &self.now, moved_m);
+        let force_n = wrench.force_n.norm();
+        let force_sd_n = sds.fixed_rows::<3>(0).max();
+        // The load with a reading that is off by its standard deviation.
+        let off_by = |i: usize, sign: f64| {
+            let mut load = load;
+            load[i] += sign * sds[i];
+            in_tip(&load)
+        };
+        let too_light = || Ok(foremost(finger, Some(Doubt::TooLight)));
+        if force_n <= SIGMAS * force_sd_n || force_n == 0.0 {
+            return too_light();
+        }
+        let along_n = wrench.force_n.dot(&finger.direction_t());
+        if along_n > SIGMAS * force_sd_n {
+            return Err(Doubt::Pulled);
+        }
+        // Moment about the force, and its distance from the hull, with their standard deviations.
+        let moment_nm = |w: &Wrench| w.force_n.dot(&w.torque_nm) / w.force_n.norm();
+        let spread = |value: &dyn Fn(&Wrench) -> f64| {
+            let ends = (0..6).map(|i| {
+                let [low, high] = [-1.0, 1.0].map(|sign| value(&off_by(i, sign)));
+                0.25 * (high - low).powi(2)
+            });
+            ends.sum::<f64>().sqrt()
+        };
+        let radius_m = finger.radius_m;
+        let free_nm = MOMENT * force_n * radius_m;
+        if moment_nm(&wrench).abs() > free_nm + SIGMAS * spread(&moment_nm) {
+            return Err(Doubt::Unbalanced);
+        }
+        // Spread of the line of action; unlike the contact, it does not end at the hull.
+        let feet = (0..6).map(|i| (off_by(i, 1.0).foot() - off_by(i, -1.0).foot()) * 0.5);
+        let line_sd_m = (feet.map(|off| off.norm_squared()).sum::<f64>() / 2.0).sqrt();
+        if beside_m(finger, &wrench) > MOMENT * radius_m + SIGMAS * line_sd_m {
+            return Err(Doubt::BesideTip);
+        }
+        let (p_tc, normal) = point_on_hull(finger, &wrench).ok_or(Doubt::NoSignal)?;
+        let mut across = Matrix3::zeros();
+        let flat = Matrix3::identity() - normal * normal.transpose();
+        for i in 0..6 {
+            let ends = [-1.0, 1.0].map(|sign| point_on_hull(finger, &off_by(i, sign)));
+            let [Some((low, _)), Some((high, _))] = ends else { return too_light() };
+            let off = flat * (high - low) * 0.5;
+            across += off * off.transpose();
+        }
+        let variance_m2 = across.trace() / 2.0;
+        if variance_m2.sqrt().max(line_sd_m) > TURNED_RAD * radius_m {
+            return too_light();
+        }
+        let offset_m = CURVED * variance_m2 / radius_m;
+        let doubt = self.now.change().and_then(|(change, sds)| {
+            let noise_n = accuracy.noise_n.iter().copied().fold(0.0, f64::max);
+            let limit_n = SLIPPED * force_n + SIGMAS * sds * noise_n;
+            (change.fixed_rows::<3>(0).norm() > limit_n).then_some(Doubt::Slipping)
+        });
+        Ok(SensedContact {
+            p_tc,
+            normal_t: -normal,
+            covariance_t: Some(across + normal * normal.transpose() * offset_m.powi(2)),
+            doubt,
+        })
     }
 }
 
 impl ForceTorqueTip {
-    /// Returns the mean of the wrenches since [`clear_samples`](Sensor::clear_samples).
-    fn mean(&self) -> Option<Wrench> {
-        let Self { sum, count, .. } = self;
-        let mean = |sum: Vector3<f64>| sum / *count;
-        (*count > 0.0)
-            .then(|| Wrench { force_n: mean(sum.force_n), torque_nm: mean(sum.torque_nm) })
+    /// Creates the sensor; without its `accuracy` it states no covariance and doubts nothing but
+    /// forces below 0.1 N.
+    /// `x_mt` is the pose of `T` in the sensor's frame.
+    pub fn new(accuracy: Option<WrenchAccuracy>, x_mt: Isometry3<f64>) -> Self {
+        Self { accuracy, x_mt, ..Self::default() }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
+impl WrenchAccuracy {
+    fn noise(&self) -> Vector6<f64> {
+        stacked(&self.noise_n, &self.noise_nm)
+    }
 
-    proptest! {
-        /// A force at a point of the sphere, within its friction cone, is located at that point.
-        #[test]
-        fn a_force_is_found_where_it_acts(
-            outward in prop::array::uniform3(-1f64..1.0),
-            slip in prop::array::uniform3(-1f64..1.0),
-            force_n in 0.2f64..20.0,
-            radius_m in 1e-3f64..0.05,
-        ) {
-            let outward = Vector3::from(outward);
-            prop_assume!(outward.norm() > 0.01);
-            let n = outward.normalize();
-            let across = Vector3::from(slip) - n * n.dot(&Vector3::from(slip));
-            let force = (-n + 0.4 * across).normalize() * force_n;
-            let p = n * radius_m;
-            let wrench = Wrench { force_n: force, torque_nm: p.cross(&force) };
-            let found = point_on_sphere(radius_m, &wrench).unwrap();
-            prop_assert!((found.coords - p).norm() < 1e-9 * (1.0 + 1.0 / force_n));
+    /// Returns the doubt that the readings raise by themselves.
+    fn check_readings(&self, rest: &Window, now: &Window) -> Result<(), Doubt> {
+        let largest = rest.largest.sup(&now.largest);
+        let range = stacked(&self.range_n, &self.range_nm);
+        let is_beyond = |i: usize| range[i] > 0.0 && largest[i] >= (1.0 - ROUNDING) * range[i];
+        if (0..6).any(is_beyond) {
+            return Err(Doubt::Saturated);
         }
+        let (noise, step) = (self.noise(), stacked(&self.resolution_n, &self.resolution_nm));
+        // A coarse sensor repeats its value without a defect.
+        let is_frozen =
+            |i: usize| noise[i] > step[i] && now.count > 2.0 && !now.varies[i] && !rest.varies[i];
+        if (0..6).any(is_frozen) { Err(Doubt::FrozenAxis) } else { Ok(()) }
     }
 
-    /// A force along the finger's axis is located at the tip; a zero force gives no contact.
-    #[test]
-    fn the_tip_is_pressed_by_a_force_along_the_axis() {
-        let wrench = Wrench { force_n: -Vector3::x(), torque_nm: Vector3::zeros() };
-        assert_eq!(point_on_sphere(0.007, &wrench).unwrap(), Point3::new(0.007, 0.0, 0.0));
-        assert!(point_on_sphere(0.007, &Wrench::default()).is_none());
+    /// Returns the standard deviations of the difference of the means of two windows, between which
+    /// the tip has moved by `moved_m`.
+    fn sds(&self, rest: &Window, now: &Window, moved_m: f64) -> Vector6<f64> {
+        let parts = 1.0 / rest.count + 1.0 / now.count;
+        let (noise, step) = (self.noise(), stacked(&self.resolution_n, &self.resolution_nm));
+        let wait_s = (now.middle_s() - rest.middle_s()).max(0.0);
+        Vector6::from_fn(|i, _| {
+            // Noise carries the reading over the steps, so that their rounding averages out
+            // (Widrow & Kollár 2008, Quantization Noise).
+            let steps = if step[i] > 0.0 { noise[i] / step[i] } else { f64::INFINITY };
+            let kept = (-4.0 * PI * PI * steps * steps).exp();
+            let rounding = step[i] * step[i] / 12.0;
+            let varying = noise[i] * noise[i] + rounding * (1.0 - kept);
+            let still = self.drift_n_sqrt_s.get(i).map_or(0.0, |drift| drift * drift * wait_s);
+            let turned = if i < 3 { self.posture_n_m * moved_m } else { 0.0 };
+            let variance = varying * parts + 2.0 * rounding * kept;
+            (variance + still + turned * turned).sqrt()
+        })
     }
+}
+
+fn stacked(force: &[f64; 3], torque: &[f64; 3]) -> Vector6<f64> {
+    Vector6::from_fn(|i, _| if i < 3 { force[i] } else { torque[i - 3] })
 }

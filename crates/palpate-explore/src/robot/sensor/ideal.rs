@@ -1,7 +1,7 @@
 //! Ideal sensor of a simulated finger, for scenes without a simulated tactile sensor.
 
 use super::sample::{IdealContact, Sample, Wrench};
-use super::{SensedContact, Sensor};
+use super::{Doubt, SensedContact, Sensor};
 use crate::robot::finger::Finger;
 
 /// Returns the exact contacts of the simulator.
@@ -30,7 +30,8 @@ impl Sensor for IdealSensor {
         self.contact.map(|contact| contact.force_n)
     }
 
-    fn locate(&self, _: &Finger) -> Option<SensedContact> {
-        self.contact.map(|IdealContact { p_tc, normal_t, .. }| SensedContact { p_tc, normal_t })
+    fn locate(&self, _: &Finger, _: f64) -> Result<SensedContact, Doubt> {
+        let IdealContact { p_tc, normal_t, .. } = self.contact.ok_or(Doubt::NoSignal)?;
+        Ok(SensedContact::new(p_tc, normal_t))
     }
 }

@@ -1,17 +1,23 @@
 //! Fingertip sensors: their samples, and the trait that turns samples into contacts.
 
 mod biotac;
+mod contact_switch;
+mod doubt;
 mod force_torque;
 mod ideal;
 mod sample;
+mod settings;
 
 pub use biotac::BioTac;
-pub use force_torque::{ForceTorqueTip, point_on_sphere};
+pub use contact_switch::ContactSwitch;
+pub use doubt::Doubt;
+pub use force_torque::{ForceTorqueTip, point_on_hull};
 pub use ideal::IdealSensor;
 pub use sample::{Channels, IdealContact, Sample, Wrench};
+pub use settings::{SensorKind, SensorSettings, WrenchAccuracy};
 
 use super::finger::Finger;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A contact located by a sensor, in the fingertip's frame `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +26,23 @@ pub struct SensedContact {
     pub p_tc: Point3<f64>,
     /// Unit normal of the object there, from the object towards the finger.
     pub normal_t: Vector3<f64>,
+    /// Covariance of the point, m²; `None` if the sensor does not state it.
+    pub covariance_t: Option<Matrix3<f64>>,
+    /// Reason why the contact is less certain than usual.
+    pub doubt: Option<Doubt>,
+}
+
+impl SensedContact {
+    /// Creates a contact without a statement about its error.
+    pub fn new(p_tc: Point3<f64>, normal_t: Vector3<f64>) -> Self {
+        Self { p_tc, normal_t, covariance_t: None, doubt: None }
+    }
+
+    /// Standard deviation of the surface along its normal, m, if the covariance is known.
+    pub fn sd_m(&self) -> Option<f64> {
+        let variance = |covariance: &Matrix3<f64>| self.normal_t.dot(&(covariance * self.normal_t));
+        self.covariance_t.as_ref().map(|covariance| variance(covariance).max(0.0).sqrt())
+    }
 }
 
 /// A fingertip sensor: turns samples of a backend into contacts.
@@ -71,6 +94,10 @@ pub trait Sensor: Send {
     }
 
     /// Locates the contact with `finger` from the samples collected since
-    /// [`clear_samples`](Self::clear_samples). Returns `None` if they do not determine it.
-    fn locate(&self, finger: &Finger) -> Option<SensedContact>;
+    /// [`clear_samples`](Self::clear_samples); the tip has moved by `moved_m` since the sensor was
+    /// tared.
+    ///
+    /// # Errors
+    /// The reason why they do not determine it.
+    fn locate(&self, finger: &Finger, moved_m: f64) -> Result<SensedContact, Doubt>;
 }

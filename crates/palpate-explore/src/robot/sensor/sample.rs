@@ -1,7 +1,7 @@
 //! Samples: messages of the fingertip sensors of a backend.
 
 use crate::robot::finger::Frame;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// One message of a fingertip sensor.
@@ -14,6 +14,8 @@ pub enum Sample {
     BioTac(Frame),
     /// The exact contact of a simulator, for scenes without a simulated tactile sensor.
     Ideal(IdealContact),
+    /// Whether a switch at the tip is closed.
+    Flag(bool),
     /// Channels of a custom sensor.
     Channels(Channels),
 }
@@ -48,6 +50,22 @@ pub struct Wrench {
 }
 
 impl Wrench {
+    /// Point of the force's line of action nearest to the origin, m.
+    pub fn foot(&self) -> Vector3<f64> {
+        self.force_n.cross(&self.torque_nm) / self.force_n.norm_squared()
+    }
+
+    /// Returns force and torque below each other.
+    pub fn stacked(&self) -> Vector6<f64> {
+        Vector6::from_fn(|i, _| if i < 3 { self.force_n[i] } else { self.torque_nm[i - 3] })
+    }
+
+    /// Creates the wrench from force and torque below each other.
+    pub fn from_stacked(numbers: &Vector6<f64>) -> Self {
+        let [force_n, torque_nm] = [0, 3].map(|row| numbers.fixed_rows::<3>(row).into());
+        Self { force_n, torque_nm }
+    }
+
     /// Transforms the same load from frame A, about A's origin, to frame B, about B's origin;
     /// `x_ba` is the pose of A in B.
     pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
