@@ -276,7 +276,7 @@ test-python: install-python
 	cd python && $(abspath $(PYTHON)) -m mypy
 	cd python/tests && $(abspath $(PYTHON)) -m mypy.stubtest --ignore-disjoint-bases palpate._palpate
 	# Runs outside the source folder, so that the installed package is tested.
-	cd python/tests && $(abspath $(DEPS)/python/bin/pytest)
+	cd python/tests && $(abspath $(DEPS)/python/bin/pytest) --numprocesses auto --dist loadfile
 	$(PYTHON) tests/wheel.py target/wheels-dev
 
 # Builds the guides and the references of Python and Rust as a site in target/docs-site; a broken link is an error.
