@@ -15,6 +15,7 @@ use palpate_geometry::bvh::MeshBvh;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Readings per window, 0.01 s apart.
@@ -92,7 +93,7 @@ proptest! {
     #[test]
     fn a_force_is_found_where_it_acts(
         along in 0.0..1.0_f64,
-        turn in 0.0..6.28_f64,
+        turn in 0.0..TAU,
         slip in prop::array::uniform3(-1.0..1.0_f64),
         force_n in 0.01..50.0_f64,
         radius_m in 1e-3..0.05_f64,

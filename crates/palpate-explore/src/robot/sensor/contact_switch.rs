@@ -35,11 +35,11 @@ pub(super) fn foremost(finger: &Finger, doubt: Option<Doubt>) -> SensedContact {
 
 impl Sensor for ContactSwitch {
     fn push(&mut self, _: f64, samples: &[Sample], _: Option<&Wrench>) {
-        let flags = samples.iter().filter_map(|sample| match sample {
+        let mut flags = samples.iter().filter_map(|sample| match sample {
             Sample::Flag(is_touching) => Some(*is_touching),
             _ => None,
         });
-        self.is_touching = flags.last().or(self.is_touching);
+        self.is_touching = flags.next_back().or(self.is_touching);
     }
 
     fn clear_samples(&mut self) {}
