@@ -48,6 +48,7 @@ class SceneSettings(TypedDict, total=False):
     finger: _Table
     arm: _Table
     effects: _Table
+    sensor: _Table
     solver: _Table
     touch: _Table
 
