@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-windows bench contacts detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-features bench contacts detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -189,11 +189,11 @@ messages: setup
 lint: setup
 	cargo fmt --all --check
 	cargo clippy --locked --all-targets --features $(FEATURES) -- -D warnings
-	cargo clippy --locked --lib --bins --no-default-features --features $(FEATURES) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace --features $(FEATURES)
 
-# Code for windows and rendering, whose packages take long to check.
-lint-windows: setup
+# Code with other features, whose packages take long to check.
+lint-features: setup
+	cargo clippy --locked --lib --bins --no-default-features --features $(FEATURES) -- -D warnings
 	cargo clippy --locked --lib --bins --features render,viewer -- -D warnings
 
 bench: setup
