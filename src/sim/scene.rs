@@ -426,10 +426,10 @@ impl Scene {
         })
     }
 
-    /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin model
-    /// computes the contact force.
+    /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin or
+    /// rigid tip computes the contact force.
     pub fn collides(&self) -> bool {
-        self.simulator == SimulatorKind::Dynamic && self.effects.skin.is_none()
+        self.simulator == SimulatorKind::Dynamic && !self.effects.has_load()
     }
 
     /// Returns the fastest approach at which contact is detected before skin and fluid in front of

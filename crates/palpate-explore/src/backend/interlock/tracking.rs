@@ -43,7 +43,7 @@ pub const POSITION: InterlockEntry = InterlockEntry {
     make: |_, settings, capabilities| {
         let tracking = Tracking {
             spans: STEPS_S.map(Span::new),
-            recent: Recent::new(settings.tracking_lag_s),
+            recent: Recent::new(settings.tracking_lag_s, capabilities.period_s),
             commanded: Joints::zeros(),
             time_s: 0.0,
         };
@@ -188,24 +188,32 @@ impl Span {
 
 /// Integrals of the commands at lags in equal steps, the newest first.
 struct Recent {
-    step_s: f64,
-    time_s: f64,
+    /// Number of ticks per step, and since the last one.
+    step_ticks: u32,
+    ticks: u32,
+    /// Number of lags in use; the others repeat the newest.
+    count: usize,
     commanded: [Joints; LAGS],
 }
 
 impl Recent {
-    fn new(lag_s: f64) -> Self {
-        let step_s = lag_s / (LAGS - 2) as f64;
-        Self { step_s, time_s: f64::NEG_INFINITY, commanded: [Joints::zeros(); LAGS] }
+    /// The oldest integral is always at least `lag_s` old, and at most a step more.
+    fn new(lag_s: f64, period_s: f64) -> Self {
+        let step_ticks = (lag_s / period_s / (LAGS - 2) as f64).ceil().max(1.0);
+        let steps = (lag_s / (step_ticks * period_s)).ceil() as usize;
+        let count = if steps == 0 { 1 } else { steps.saturating_add(2).min(LAGS) };
+        let commanded = [Joints::zeros(); LAGS];
+        Self { step_ticks: step_ticks as u32, ticks: 0, count, commanded }
     }
 
     /// Sets the newest integral.
-    fn push(&mut self, time_s: f64, commanded: Joints) {
-        if time_s - self.time_s >= self.step_s {
-            self.commanded.copy_within(..LAGS - 1, 1);
-            self.time_s = time_s;
+    fn push(&mut self, commanded: Joints) {
+        if self.ticks == 0 {
+            self.commanded.copy_within(..self.count - 1, 1);
         }
+        self.ticks = (self.ticks + 1) % self.step_ticks;
         self.commanded[0] = commanded;
+        self.commanded[self.count..].fill(commanded);
     }
 
     /// Forgets all integrals but `commanded`: the robot was at rest.
@@ -234,7 +242,7 @@ impl Interlock for Tracking {
             return Ok(());
         }
         self.commanded += applied * passed_s;
-        self.recent.push(now.time_s, self.commanded);
+        self.recent.push(self.commanded);
         let sample = Sample { time_s: now.time_s, q: now.q, commanded: self.recent.commanded };
         for span in &mut self.spans {
             if !span.push(sample, now.period_s) {
@@ -249,5 +257,34 @@ impl Interlock for Tracking {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The integrals reach back over the lag and at most two steps beyond; without a lag only the newest counts.
+    #[test]
+    fn integrals_reach_back_over_the_lag() {
+        for lag_s in [0.0, 0.003, 0.02, 0.1, 0.13, 1.0] {
+            for period_s in [5e-4, 2e-3, 4e-3, 0.01] {
+                let mut recent = Recent::new(lag_s, period_s);
+                let step_s = f64::from(recent.step_ticks) * period_s;
+                for tick in 0..5000 {
+                    let now_s = f64::from(tick) * period_s;
+                    recent.push(Joints::repeat(now_s));
+                    if now_s < 3.0 * lag_s + 0.1 {
+                        continue;
+                    }
+                    let ages_s = recent.commanded.map(|at| now_s - at[0]);
+                    let oldest_s = ages_s.into_iter().fold(0.0, f64::max);
+                    assert!(ages_s.iter().all(|age_s| *age_s >= 0.0));
+                    assert!(oldest_s > lag_s - 1e-9, "{lag_s} {period_s}: {oldest_s}");
+                    let most_s = if lag_s == 0.0 { 0.0 } else { lag_s + 2.0 * step_s };
+                    assert!(oldest_s < most_s + 1e-9, "{lag_s} {period_s}: {oldest_s}");
+                }
+            }
+        }
     }
 }

@@ -1,6 +1,5 @@
 //! Settings of a finger's sensor: its kind, and what is known of its accuracy.
 
-use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,10 +9,6 @@ use serde::{Deserialize, Serialize};
 pub struct SensorSettings {
     /// Kind of the sensor.
     pub kind: SensorKind,
-}
-
-impl Validate for SensorSettings {
-    fn check(&self, _: &mut Rules) {}
 }
 
 /// Kind of a fingertip sensor.
