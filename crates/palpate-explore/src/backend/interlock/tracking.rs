@@ -264,7 +264,8 @@ impl Interlock for Tracking {
 mod tests {
     use super::*;
 
-    /// The integrals reach back over the lag and at most two steps beyond; without a lag only the newest counts.
+    /// The integrals reach back over the lag and at most two steps beyond; without a lag only the
+    /// newest counts.
     #[test]
     fn integrals_reach_back_over_the_lag() {
         for lag_s in [0.0, 0.003, 0.02, 0.1, 0.13, 1.0] {
