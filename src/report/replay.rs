@@ -10,7 +10,7 @@ use crate::report::table::digits;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::HeightField;
-use palpate_explore::probe::{Contact, SweptVolume, Touch};
+use palpate_explore::probe::{SweptVolume, Touch};
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -221,11 +221,10 @@ pub fn heights_m<'a>(
 /// # Errors
 /// If there is a contact without a normal.
 pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyhow::Result<Touch> {
-    Ok(match touch.contact.map(Point3::from) {
-        Some(p_wc) => {
-            let normal_w = touch.normal.map(Vector3::from).or(normal_w);
-            let normal_w = normal_w.context("a recorded contact has no normal")?;
-            Touch::Contact(Contact { p_wc, normal_w, sd_m: touch.contact_sd_m })
+    Ok(match touch.contact {
+        Some(_) => {
+            let contact = touch.contact(normal_w);
+            Touch::Contact(contact.context("a recorded contact has no normal")?)
         }
         None if touch.overload => Touch::Overload,
         None => Touch::Miss,

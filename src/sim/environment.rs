@@ -4,6 +4,7 @@ use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::sim::finger::Fingertip;
+use crate::sim::finger::effects::gel::GelEffect;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
@@ -517,5 +518,6 @@ fn robot(scene: &Scene, chain: Chain) -> Robot {
     let effects = &scene.effects;
     let accuracy = effects.wrench.as_ref().map(WrenchEffect::accuracy);
     let robot = Robot::new(chain, scene.finger.clone(), effects.skin.is_some());
-    Robot { sensor: scene.sensor.kind, accuracy, ..robot }
+    let pad = effects.gel.as_ref().map(GelEffect::pad);
+    Robot { sensor: scene.sensor.kind, accuracy, pad, ..robot }
 }

@@ -346,12 +346,16 @@ impl Validate for Scene {
         }
         let effects = self.effective_effects();
         let is_bare = self.simulator == SimulatorKind::Kinematic && !effects.has_load();
-        let allowed = "a table, because simulator = \"kinematic\" needs a soft skin or a [rigid_tip] \
-                       (for an exact rigid finger use simulator = \"swept\"; without any [effects] the \
+        let allowed = "a table, because simulator = \"kinematic\" needs a soft skin, a [rigid_tip] \
+                       or a [gel] (for an exact rigid finger use simulator = \"swept\"; without any [effects] the \
                        skin is a BioTac's)";
         lacks(rules, "effects.skin", is_bare, allowed);
         let is_twofold = effects.skin.is_some() && effects.rigid_tip.is_some();
         given(rules, "effects.rigid_tip", is_twofold, "either this or [effects.skin], not both");
+        let is_other = effects.skin.is_some() || effects.rigid_tip.is_some();
+        let is_twofold = effects.gel.is_some() && is_other;
+        let allowed = "either this or [effects.skin] or [effects.rigid_tip], not both";
+        given(rules, "effects.gel", is_twofold, allowed);
         let kind = self.sensor.kind;
         let named = format!("\"{}\"", kind.name());
         rules.require(
@@ -363,6 +367,10 @@ impl Validate for Scene {
         let is_blind = kind == SensorKind::ForceTorqueTip && effects.wrench.is_none();
         rules.require("sensor.kind", &named, !is_blind, || {
             "another kind, or a table [effects.wrench]: the tip is on a force/torque sensor".into()
+        });
+        let is_blind = kind == SensorKind::DepthPatch && effects.gel.is_none();
+        rules.require("sensor.kind", &named, !is_blind, || {
+            "another kind, or a table [effects.gel]: the pad that gives the depths".into()
         });
         let bumps = self.simulator != SimulatorKind::Dynamic && self.effects.collision.is_some();
         let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
@@ -420,10 +428,7 @@ impl Scene {
         if self.simulator != SimulatorKind::Kinematic || self.effects != Effects::default() {
             return Cow::Borrowed(&self.effects);
         }
-        Cow::Owned(match self.sensor.kind {
-            SensorKind::Automatic => Effects::biotac(),
-            SensorKind::ForceTorqueTip | SensorKind::Contact => Effects::rigid(self.sensor.kind),
-        })
+        Cow::Owned(Effects::minimal(self.sensor.kind))
     }
 
     /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin or

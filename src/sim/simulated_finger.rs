@@ -4,6 +4,7 @@ use crate::sim::Environment;
 use crate::sim::environment::ObjectShape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::WrenchSensor;
+use crate::sim::finger::gel::GelState;
 use crate::sim::finger::{ContactLoad, Fingertip, FingertipState};
 use nalgebra::{Isometry3, Point3};
 use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
@@ -106,14 +107,22 @@ impl SimulatedFinger {
 
     /// Writes the sensor data of a control tick of `period_s` into `reading`.
     pub fn write_reading(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
-        reading.samples.clear();
+        for sample in reading.samples.drain(..) {
+            if let (Sample::Depth(image), Some(pad)) = (sample, self.state.gel()) {
+                pad.reuse(image);
+            }
+        }
+        reading.samples.extend(self.state.gel().and_then(GelState::image).map(Sample::Depth));
         reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));
         reading.samples.extend(self.true_contact().map(Sample::Ideal));
         let scene = self.environment.scene();
-        if scene.sensor.kind == SensorKind::Contact {
-            let is_touching = self.load.force_n.norm() > scene.touch.detection_n;
-            reading.samples.push(Sample::Flag(is_touching));
-        }
+        // The arm that carries a pad notices a load beside it.
+        let felt = match scene.sensor.kind {
+            SensorKind::Contact => Some(self.load.force_n.norm() > scene.touch.detection_n),
+            SensorKind::DepthPatch => Some(self.load.is_core_loaded),
+            SensorKind::Automatic | SensorKind::ForceTorqueTip => None,
+        };
+        reading.samples.extend(felt.map(Sample::Flag));
         reading.wrench =
             self.gauge.as_mut().zip(scene.effects.wrench.as_ref()).map(|(gauge, effect)| {
                 let load = mount.moved(&self.x_mt);

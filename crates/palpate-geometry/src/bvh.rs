@@ -199,6 +199,27 @@ impl MeshBvh {
         touched
     }
 
+    /// Passes to `visit` the corners of every triangle within `radius_m` of `centre`, and of some
+    /// that are farther.
+    pub fn triangles_near(
+        &self,
+        centre: &Point3<f64>,
+        radius_m: f64,
+        mut visit: impl FnMut([Point3<f64>; 3]),
+    ) {
+        let ball = SingleBall::new(&(centre - self.centre));
+        let reach = (radius_m * radius_m).next_up();
+        self.visit(
+            &MeshParts::WHOLE,
+            reach,
+            |node| ball.distance_squared(node),
+            |triangle, limit| {
+                visit(self.corners(triangle));
+                limit
+            },
+        );
+    }
+
     /// Whether the mesh intersects `capsule`.
     pub fn intersects(&self, capsule: &Capsule) -> bool {
         self.overlap(capsule).is_some()

@@ -153,6 +153,7 @@ fn run_touches(
                 .filter(|contact| writes_normals || contact.sd_m.is_some())
                 .map(|contact| contact.normal_w.into()),
             contact_sd_m: contact.and_then(|contact| contact.sd_m),
+            patch: contact.map(TouchRow::patch_of).unwrap_or_default(),
             doubt: probe.doubt(),
             tip: swept.map(|swept| swept.p_wt.coords.into()),
             time_s: probe.time_s(),

@@ -4,10 +4,10 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::experiment::trial::{TrialEvent, TrialObserver, view};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::PlannerFactory;
-use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch};
+use palpate_explore::probe::{Probe, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Approach;
@@ -173,13 +173,10 @@ impl<'a> ResumedProbe<'a> {
 
 /// Outcome of a touch, read from its row.
 fn touch(row: &TouchRow, approach: &Approach) -> Touch {
-    match (row.contact, row.overload) {
-        (Some(contact), _) => {
-            // A normal that the belief does not use is not stored.
-            let against = -approach.direction_w().into_inner();
-            let normal_w = row.normal.map_or(against, Vector3::from);
-            Touch::Contact(Contact { p_wc: contact.into(), normal_w, sd_m: row.contact_sd_m })
-        }
+    // A normal that the belief does not use is not stored.
+    let against = -approach.direction_w().into_inner();
+    match (row.contact(Some(against)), row.overload) {
+        (Some(contact), _) => Touch::Contact(contact),
         (None, true) => Touch::Overload,
         (None, false) => Touch::Miss,
     }

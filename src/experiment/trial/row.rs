@@ -3,8 +3,10 @@
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
+use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::Fallback;
+use palpate_explore::probe::Contact;
 use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Target;
 use palpate_gp::fit::Fit;
@@ -53,6 +55,10 @@ pub struct TouchRow {
     /// Standard deviation of the contact along its normal, as the sensor states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_sd_m: Option<f64>,
+    /// Further points of the surface that the same touch shows: place, normal and standard
+    /// deviation along it, all in `W`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub patch: Vec<[f64; 7]>,
     /// Reason why the contact is less certain than usual, or was not located.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<Doubt>,
@@ -158,6 +164,29 @@ impl TrialRow {
 }
 
 impl TouchRow {
+    /// Returns the contact; `normal_w` replaces a normal that was not written.
+    pub fn contact(&self, normal_w: Option<Vector3<f64>>) -> Option<Contact> {
+        let normal_w = self.normal.map(Vector3::from).or(normal_w)?;
+        let further = |[x, y, z, a, b, c, sd_m]: &[f64; 7]| Contact {
+            sd_m: Some(*sd_m),
+            ..Contact::new(Point3::new(*x, *y, *z), Vector3::new(*a, *b, *c))
+        };
+        Some(Contact {
+            sd_m: self.contact_sd_m,
+            patch: self.patch.iter().map(further).collect(),
+            ..Contact::new(self.contact?.into(), normal_w)
+        })
+    }
+
+    /// Returns the further points of a contact as a row has them.
+    pub(super) fn patch_of(contact: &Contact) -> Vec<[f64; 7]> {
+        let numbers = |point: &Contact| {
+            let ([x, y, z], [a, b, c]) = (point.p_wc.coords.into(), point.normal_w.into());
+            [x, y, z, a, b, c, point.sd_m.unwrap_or(0.0)]
+        };
+        contact.patch.iter().map(numbers).collect()
+    }
+
     /// Position of the finger for [travel](TrialRow::path_m).
     fn place(&self) -> &[f64] {
         match (&self.target, &self.contact) {

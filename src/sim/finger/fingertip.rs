@@ -6,6 +6,7 @@ use super::effects::skin::{Skin, SkinState};
 use super::effects::timing::{Channel, channel};
 use super::effects::variation::SensorVariation;
 use super::effects::{EffectStates, Effects};
+use super::gel::{Gel, GelState};
 use super::load::{ContactLoad, PressError};
 use super::noise::normal;
 use palpate_explore::backend::Fault;
@@ -30,6 +31,7 @@ pub struct Fingertip {
     hull: Finger,
     electrodes: Option<Electrodes>,
     shear: Option<ShearCoupling>,
+    gel: Option<Gel>,
     effects: Effects,
 }
 
@@ -45,6 +47,7 @@ impl Fingertip {
         let sheared = effects.friction.as_ref().and(electrodes.as_ref()).zip(samples);
         Self {
             shear: sheared.map(|(electrodes, samples)| ShearCoupling::new(electrodes, samples)),
+            gel: effects.gel.as_ref().map(|effect| Gel::new(finger, effect)),
             skin,
             electrodes,
             hull: finger.clone(),
@@ -84,6 +87,7 @@ impl Fingertip {
 pub struct FingertipState {
     time_s: f64,
     pressed: Option<SkinState>,
+    gel: Option<GelState>,
     effects: EffectStates,
     converter: Option<AdConverter>,
 }
@@ -94,6 +98,7 @@ impl FingertipState {
         let mut state = Self {
             time_s: 0.0,
             pressed: tip.skin.as_ref().map(Skin::relaxed),
+            gel: (tip.effects.gel.as_ref()).map(|effect| GelState::new(effect, stream(rng, 6))),
             effects: EffectStates::new(&tip.effects),
             converter: None,
         };
@@ -131,10 +136,14 @@ impl FingertipState {
         if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
             return Err(diverged());
         }
-        let loaded = match (&tip.skin, &mut self.pressed, &tip.effects.rigid_tip) {
-            (Some(skin), Some(pressed), _) => skin.press(object, &motion.x_wt, pressed),
-            (.., Some(rigid)) => rigid.press(&tip.hull, object, &motion.x_wt),
-            _ => Ok(ContactLoad::default()),
+        let loaded = if let (Some(skin), Some(pressed)) = (&tip.skin, &mut self.pressed) {
+            skin.press(object, &motion.x_wt, pressed)
+        } else if let (Some(gel), Some(state)) = (&tip.gel, &mut self.gel) {
+            gel.step(object, &motion.x_wt, time_s + dt_s, state)
+        } else if let Some(rigid) = &tip.effects.rigid_tip {
+            rigid.press(&tip.hull, object, &motion.x_wt)
+        } else {
+            Ok(ContactLoad::default())
         };
         let mut load = loaded.map_err(|error| match error {
             PressError::NotFinite => diverged(),
@@ -154,7 +163,8 @@ impl FingertipState {
     /// Returns the bytes held by this trial's state; effects that are off hold none.
     pub fn bytes(&self) -> usize {
         let pressed = self.pressed.as_ref().map_or(0, SkinState::bytes);
-        pressed + self.effects.bytes() + self.converter.as_ref().map_or(0, AdConverter::bytes)
+        let gel = self.gel.as_ref().map_or(0, GelState::bytes);
+        pressed + gel + self.effects.bytes() + self.converter.as_ref().map_or(0, AdConverter::bytes)
     }
 
     /// Returns the oldest tactile frame that has arrived and was not read yet.
@@ -162,6 +172,11 @@ impl FingertipState {
         let converter = self.converter.as_mut()?;
         converter.ready = converter.ready.checked_sub(1)?;
         converter.queue.pop_front()
+    }
+
+    /// Returns the state of the pad.
+    pub fn gel(&mut self) -> Option<&mut GelState> {
+        self.gel.as_mut()
     }
 
     fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
@@ -230,11 +245,7 @@ struct AdConverter {
 
 impl AdConverter {
     fn new(tip: &Fingertip, before: Signals, rng: &ChaCha8Rng) -> Self {
-        let stream = |number| {
-            let mut rng = rng.clone();
-            rng.set_stream(number);
-            rng
-        };
+        let stream = |number| stream(rng, number);
         let mut electrodes_rng = stream(1);
         let first = |electrodes: &Electrodes| {
             electrodes.next(&CommonNoise::default(), 0.0, &mut electrodes_rng)
@@ -375,6 +386,13 @@ impl AdConverter {
             self.ready = self.queue.len();
         }
     }
+}
+
+/// Returns one of the independent random streams of a trial.
+fn stream(rng: &ChaCha8Rng, number: u64) -> ChaCha8Rng {
+    let mut rng = rng.clone();
+    rng.set_stream(number);
+    rng
 }
 
 /// Returns the number of frames that arrive together.

@@ -12,6 +12,7 @@ pub mod calibration;
 pub mod effects;
 pub mod fingertip;
 pub mod foundation;
+pub mod gel;
 pub mod load;
 pub(crate) mod noise;
 mod patches;

@@ -122,6 +122,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         overload: false,
         normal: None,
         contact_sd_m: None,
+        patch: Vec::new(),
         doubt: None,
         time_s: None,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),

@@ -99,20 +99,24 @@ impl HeightField {
         let reached = match touch {
             Touch::Contact(contact) => {
                 self.presence.add_contact(target, &contact.p_wc);
-                let place = self.zone.place(&contact.p_wc);
-                let height = self.zone.height_m(&contact.p_wc);
-                let slope = self.slope(&contact.normal_w);
-                let slope =
-                    slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
-                let noise = self.noise(contact);
-                self.contacts.push(&Observation { place: &place, height, noise, slope });
-                self.zone.distance(&place, target) <= REACHED_WITHIN
+                contact.points().for_each(|point| self.add(point));
+                self.zone.distance(&self.zone.place(&contact.p_wc), target) <= REACHED_WITHIN
             }
             Touch::Miss | Touch::Overload => false,
         };
         if !reached {
             self.unreached.push(target.into());
         }
+    }
+
+    /// Adds a point of the surface.
+    fn add(&mut self, contact: &Contact) {
+        let place = self.zone.place(&contact.p_wc);
+        let height = self.zone.height_m(&contact.p_wc);
+        let slope = self.slope(&contact.normal_w);
+        let slope = slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
+        let noise = self.noise(contact);
+        self.contacts.push(&Observation { place: &place, height, noise, slope });
     }
 
     /// Returns the noise of a contact's height relative to that of an exact one: the deviation of

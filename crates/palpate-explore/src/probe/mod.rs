@@ -5,7 +5,7 @@ pub mod servo;
 
 use crate::backend::Fault;
 use crate::robot::Finger;
-use crate::robot::sensor::Doubt;
+use crate::robot::sensor::{Doubt, SensedContact};
 use crate::task::{Approach, Zone};
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -31,12 +31,30 @@ pub struct Contact {
     /// Standard deviation of the surface along the normal, m, if the sensor states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd_m: Option<f64>,
+    /// Further points of the surface that the same touch shows.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub patch: Vec<Contact>,
 }
 
 impl Contact {
     /// Creates a contact without a statement about its error.
     pub fn new(p_wc: Point3<f64>, normal_w: Vector3<f64>) -> Self {
-        Self { p_wc, normal_w, sd_m: None }
+        Self { p_wc, normal_w, sd_m: None, patch: Vec::new() }
+    }
+
+    /// Creates a contact from what a sensor has located with the fingertip at `x_wt`.
+    pub fn sensed(x_wt: &Isometry3<f64>, sensed: &SensedContact) -> Self {
+        Self {
+            p_wc: x_wt * sensed.p_tc,
+            normal_w: x_wt.rotation * sensed.normal_t,
+            sd_m: sensed.sd_m(),
+            patch: sensed.patch.iter().map(|further| Self::sensed(x_wt, further)).collect(),
+        }
+    }
+
+    /// Returns the contact and the further points of its patch.
+    pub fn points(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.patch)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::arm::{Chain, LinkCapsule, RobotPart};
 use super::finger::Finger;
-use super::sensor::{SensorKind, WrenchAccuracy};
+use super::sensor::{GelPad, SensorKind, WrenchAccuracy};
 use nalgebra::Point3;
 
 /// An arm with a finger.
@@ -18,12 +18,15 @@ pub struct Robot {
     pub sensor: SensorKind,
     /// Accuracy of the force/torque sensor, if known.
     pub accuracy: Option<WrenchAccuracy>,
+    /// Pad of a `depth_patch`.
+    pub pad: Option<GelPad>,
 }
 
 impl Robot {
     /// Creates a robot with the sensors that its backend has.
     pub fn new(chain: Chain, finger: Finger, is_soft: bool) -> Self {
-        Self { chain, finger, is_soft, sensor: SensorKind::Automatic, accuracy: None }
+        let sensor = SensorKind::Automatic;
+        Self { chain, finger, is_soft, sensor, accuracy: None, pad: None }
     }
 
     /// Returns the collision capsules of its arm, adapter and finger.

@@ -70,7 +70,9 @@ impl TouchEvidence {
     ) {
         let places = match touch {
             Touch::Contact(contact) => {
-                self.contacts.push(contact.clone());
+                let points = contact.points();
+                self.contacts
+                    .extend(points.map(|point| Contact { patch: Vec::new(), ..point.clone() }));
                 places
             }
             Touch::Miss => 2 * places,
@@ -116,7 +118,7 @@ impl TouchEvidence {
         noise_m: f64,
     ) -> Observations {
         let mut all = Observations::new(3);
-        for Contact { p_wc: p_w, normal_w, sd_m } in &self.contacts {
+        for Contact { p_wc: p_w, normal_w, sd_m, .. } in &self.contacts {
             let field = prior.field(p_w);
             let gradient = normal_w - field.gradient;
             let slope = normals.then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });

@@ -9,21 +9,27 @@ use std::sync::LazyLock;
 use toml::{Table, Value};
 
 /// Sensors included in Palpate: names and files.
-pub const SENSORS: [(&str, &str); 5] = [
+pub const SENSORS: [(&str, &str); 7] = [
     ("biotac", include_str!("../../../../models/biotac.toml")),
     ("ati_gamma", include_str!("../../../../models/sensors/ati_gamma.toml")),
     ("ati_mini40", include_str!("../../../../models/sensors/ati_mini40.toml")),
     ("ur5e", include_str!("../../../../models/sensors/ur5e.toml")),
     ("fr3", include_str!("../../../../models/sensors/fr3.toml")),
+    ("gelsight_mini", include_str!("../../../../models/sensors/gelsight_mini.toml")),
+    ("digit", include_str!("../../../../models/sensors/digit.toml")),
 ];
 
-/// Tables of the BioTac's file.
-pub(super) static BIOTAC: LazyLock<Table> =
-    LazyLock::new(|| toml::from_str(SENSORS[0].1).unwrap_or_default());
+/// Default constants: the tables of the BioTac's file, and the pad of a GelSight Mini.
+pub(super) static DEFAULTS: LazyLock<Table> = LazyLock::new(|| {
+    let table = |i: usize| toml::from_str::<Table>(SENSORS[i].1).unwrap_or_default();
+    let mut all = table(0);
+    all.extend(table(5));
+    all
+});
 
-/// Returns a constant of the BioTac's file, by the dotted name of its table and its key.
+/// Returns a default constant, by the dotted name of its table and its key.
 pub(super) fn constant<T: DeserializeOwned + Default>(table: &str, key: &str) -> T {
-    let table = table.split('.').try_fold(&*BIOTAC, |table, part| table.get(part)?.as_table());
+    let table = table.split('.').try_fold(&*DEFAULTS, |table, part| table.get(part)?.as_table());
     let value = table.and_then(|table| table.get(key)).cloned();
     value.and_then(|value| value.try_into().ok()).unwrap_or_default()
 }
@@ -95,7 +101,7 @@ pub(super) use effect;
 
 /// Splits the tables of effects into settings and the constants that differ from the BioTac's.
 pub(super) fn split(effects: Table) -> (Table, Table) {
-    split_by(effects, &BIOTAC)
+    split_by(effects, &DEFAULTS)
 }
 
 fn split_by(effects: Table, biotac: &Table) -> (Table, Table) {

@@ -11,6 +11,7 @@ pub mod effect;
 pub mod electrodes;
 pub mod fluid;
 pub mod friction;
+pub mod gel;
 pub mod registration;
 pub mod rigid_tip;
 pub mod sensor;
@@ -33,6 +34,8 @@ table::effects! {
     skin: skin::SkinEffect,
     /// Rigid tip instead of the skin.
     rigid_tip: rigid_tip::RigidTipEffect,
+    /// Elastomer pad with a camera behind it, instead of the skin.
+    gel: gel::GelEffect,
     /// Liquid under the skin with its pressure; without it the finger is dry and the skin's points
     /// are independent.
     fluid: fluid::FluidEffect,
@@ -67,10 +70,15 @@ impl Effects {
         }
     }
 
-    /// Returns the minimal effects of a rigid tip with a sensor of this kind.
-    pub fn rigid(kind: SensorKind) -> Self {
+    /// Returns the minimal effects of a finger with a sensor of this kind.
+    pub fn minimal(kind: SensorKind) -> Self {
+        if kind == SensorKind::Automatic {
+            return Self::biotac();
+        }
+        let is_pad = kind == SensorKind::DepthPatch;
         Self {
-            rigid_tip: Some(rigid_tip::RigidTipEffect::default()),
+            gel: is_pad.then(gel::GelEffect::default),
+            rigid_tip: (!is_pad).then(rigid_tip::RigidTipEffect::default),
             wrench: (kind == SensorKind::ForceTorqueTip).then(wrench::WrenchEffect::default),
             ..Self::default()
         }
@@ -78,12 +86,12 @@ impl Effects {
 
     /// Returns every effect with its defaults, except those that another one excludes.
     pub fn all() -> Self {
-        Self { rigid_tip: None, ..Self::each() }
+        Self { rigid_tip: None, gel: None, ..Self::each() }
     }
 
     /// Returns whether a model computes the load of the object on the finger.
     pub fn has_load(&self) -> bool {
-        self.skin.is_some() || self.rigid_tip.is_some()
+        self.skin.is_some() || self.rigid_tip.is_some() || self.gel.is_some()
     }
 
     /// Returns whether the requirement `needs` is met.
@@ -106,7 +114,7 @@ fn missing(name: &str, needs: Requirement, filling: &[(&str, bool)]) -> String {
             let (last, others) = keys.split_last().map_or(("", &[][..]), |(l, o)| (l.as_str(), o));
             format!("no [{name}] without {} or {last}", others.join(", "))
         }
-        Requirement::Load => format!("no [{name}] without a [skin] or a [rigid_tip]"),
+        Requirement::Load => format!("no [{name}] without a [skin], a [rigid_tip] or a [gel]"),
         Requirement::Nothing | Requirement::Skin => format!("no [{name}] without a [skin]"),
     }
 }

@@ -1,7 +1,7 @@
 //! Sensor of a scene: a file with the constants that differ from the BioTac's, or the table
 //! `[effects.sensor]` with them.
 
-use super::constants::{BIOTAC, SENSORS};
+use super::constants::{DEFAULTS, SENSORS};
 use crate::sim::finger::Effects;
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::files;
@@ -30,9 +30,17 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
         _ => Table::new(),
     };
     let Some(table) = loader.table_mut(effects) else { return Ok(Vec::new()) };
+    let is_used = |name: &String| table.contains_key(name);
+    let differs = |(name, is): (String, &Value)| value(&DEFAULTS, &name) != Some(is);
+    if !sensor.keys().any(is_used) && values(&sensor, "").into_iter().any(differs) {
+        let shown = table.get("sensor").map(Value::to_string).unwrap_or_default();
+        let tables: Vec<String> = sensor.keys().map(|name| format!("[{effects}.{name}]")).collect();
+        let allowed = format!("a sensor of an effect in the scene; add {}", tables.join(" or "));
+        return Err(loader.not_allowed(&key, &shown, &allowed));
+    }
     table.remove("sensor");
     let is_moved = |(name, is): &(String, &Value)| {
-        let known = value(&BIOTAC, name);
+        let known = value(&DEFAULTS, name);
         known.is_some_and(|known| value(&sensor, name).unwrap_or(known) != *is)
     };
     let moved = values(table, "").into_iter().filter(is_moved);
@@ -61,10 +69,11 @@ fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
     let Some(table) = file.table_mut("") else { return Ok(Table::new()) };
     let sensor = table.clone();
     // With all effects present, none lacks its requirement.
-    BIOTAC.keys().for_each(|name| {
+    DEFAULTS.keys().for_each(|name| {
         table.entry(name).or_insert_with(|| Value::Table(Table::new()));
     });
-    let setting = values(&sensor, "").into_iter().find(|(name, _)| value(&BIOTAC, name).is_none());
+    let setting =
+        values(&sensor, "").into_iter().find(|(name, _)| value(&DEFAULTS, name).is_none());
     let refused = setting.map(|(key, value)| {
         let allowed = "a constant of the sensor; settings of effects belong in the scene";
         file.not_allowed(&key, &value.to_string(), allowed)

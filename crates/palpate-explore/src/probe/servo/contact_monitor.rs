@@ -4,7 +4,8 @@ use crate::backend::Reading;
 use crate::robot::Robot;
 use crate::robot::finger::Finger;
 use crate::robot::sensor::{
-    BioTac, ContactSwitch, Doubt, ForceTorqueTip, IdealSensor, SensedContact, Sensor, SensorKind,
+    BioTac, ContactSwitch, DepthPatch, Doubt, ForceTorqueTip, IdealSensor, SensedContact, Sensor,
+    SensorKind,
 };
 use crate::task::touch::TouchSettings;
 use nalgebra::Vector3;
@@ -13,7 +14,7 @@ use nalgebra::Vector3;
 /// contacts.
 fn sensors(settings: &TouchSettings, robot: &Robot) -> Vec<Box<dyn Sensor>> {
     let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
-    let Robot { finger, chain, accuracy, .. } = robot;
+    let Robot { finger, chain, accuracy, pad, .. } = robot;
     let wrench = || Box::new(ForceTorqueTip::new(accuracy.clone(), chain.tool));
     match robot.sensor {
         SensorKind::Automatic => vec![
@@ -22,6 +23,9 @@ fn sensors(settings: &TouchSettings, robot: &Robot) -> Vec<Box<dyn Sensor>> {
             wrench(),
         ],
         SensorKind::ForceTorqueTip => vec![wrench()],
+        SensorKind::DepthPatch => {
+            vec![Box::new(DepthPatch::new(pad.clone().unwrap_or_default(), finger))]
+        }
         SensorKind::Contact => vec![Box::new(ContactSwitch::default())],
     }
 }

@@ -309,6 +309,27 @@ impl Servo {
         Ok(None)
     }
 
+    /// Slows down from the approach to rest at `held`. What holds the finger back, held as long as
+    /// the movement's timeout, ends it short of there.
+    fn press(&mut self, held: Isometry3<f64>) -> Result<Option<ApproachEnd>, Fault> {
+        let from = self.x_wt().translation.vector;
+        let mut path = Path::straight(from, held, self.settings.approach_m_s).moving();
+        let mut deadline = Deadline::default();
+        loop {
+            let passed_s = self.passed_s();
+            let goal = path.advance(passed_s);
+            self.tick(&goal)?;
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
+                return Ok(Some(ApproachEnd::Overload));
+            }
+            let away = self.x_wt().translation.vector - held.translation.vector;
+            let is_there = path.pace.is_done() && away.norm() < ARRIVED_M;
+            if is_there || deadline.is_over(self, path.pace.timeout_s(), passed_s) {
+                return Ok(None);
+            }
+        }
+    }
+
     /// Stops at the point of detection, settles and reads the contact. The overrun while the servos
     /// stop the finger is reversed, so that the depth does not depend on them.
     fn read(
@@ -316,12 +337,16 @@ impl Servo {
         approach: &Approach,
         tared: &Isometry3<f64>,
     ) -> Result<Option<Contact>, Fault> {
-        let until_s = self.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
         // A force that locates the contact must remain while it is read.
         let is_pressed = self.robot.is_soft || !self.body.capabilities().tactile;
-        let press_m = if is_pressed { self.settings.press_m } else { 0.0 };
-        held.translation.vector += approach.direction_w().scale(press_m);
+        if is_pressed && self.settings.press_m > 0.0 {
+            held.translation.vector += approach.direction_w().scale(self.settings.press_m);
+            if self.press(held)? == Some(ApproachEnd::Overload) {
+                return Ok(None);
+            }
+        }
+        let until_s = self.time_s + self.settings.settle_s;
         while self.time_s < until_s {
             self.tick(&Goal::at_rest(held))?;
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
@@ -336,11 +361,7 @@ impl Servo {
         let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
         let located = self.monitor.contact(&self.robot.finger, moved_m);
         self.doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
-        Ok(located.ok().map(|sensed| Contact {
-            p_wc: x_wt * sensed.p_tc,
-            normal_w: x_wt.rotation * sensed.normal_t,
-            sd_m: sensed.sd_m(),
-        }))
+        Ok(located.ok().map(|sensed| Contact::sensed(&x_wt, &sensed)))
     }
 }
 

@@ -30,6 +30,7 @@ pub(super) fn foremost(finger: &Finger, doubt: Option<Doubt>) -> SensedContact {
         normal_t: -ahead_t,
         covariance_t: Some(spread * finger.radius_m.powi(2)),
         doubt,
+        patch: Vec::new(),
     }
 }
 

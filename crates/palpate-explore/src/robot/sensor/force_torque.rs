@@ -250,6 +250,7 @@ impl Sensor for ForceTorqueTip {
             normal_t: -normal,
             covariance_t: Some(across + normal * normal.transpose() * offset_m.powi(2)),
             doubt,
+            patch: Vec::new(),
         })
     }
 }

@@ -2,6 +2,7 @@
 
 mod biotac;
 mod contact_switch;
+mod depth_patch;
 mod doubt;
 mod force_torque;
 mod ideal;
@@ -10,6 +11,7 @@ mod settings;
 
 pub use biotac::BioTac;
 pub use contact_switch::ContactSwitch;
+pub use depth_patch::{DepthImage, DepthPatch, GelPad};
 pub use doubt::Doubt;
 pub use force_torque::{ForceTorqueTip, point_on_hull};
 pub use ideal::IdealSensor;
@@ -20,7 +22,7 @@ use super::finger::Finger;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// A contact located by a sensor, in the fingertip's frame `T`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SensedContact {
     /// The point of contact.
     pub p_tc: Point3<f64>,
@@ -30,12 +32,14 @@ pub struct SensedContact {
     pub covariance_t: Option<Matrix3<f64>>,
     /// Reason why the contact is less certain than usual.
     pub doubt: Option<Doubt>,
+    /// Further points of the object that the same touch shows.
+    pub patch: Vec<SensedContact>,
 }
 
 impl SensedContact {
     /// Creates a contact without a statement about its error.
     pub fn new(p_tc: Point3<f64>, normal_t: Vector3<f64>) -> Self {
-        Self { p_tc, normal_t, covariance_t: None, doubt: None }
+        Self { p_tc, normal_t, covariance_t: None, doubt: None, patch: Vec::new() }
     }
 
     /// Standard deviation of the surface along its normal, m, if the covariance is known.

@@ -1,5 +1,6 @@
 //! Samples: messages of the fingertip sensors of a backend.
 
+use super::depth_patch::DepthImage;
 use crate::robot::finger::Frame;
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,8 @@ pub enum Sample {
     Ideal(IdealContact),
     /// Whether a switch at the tip is closed.
     Flag(bool),
+    /// A depth image of a pad.
+    Depth(DepthImage),
     /// Channels of a custom sensor.
     Channels(Channels),
 }

@@ -21,6 +21,8 @@ pub enum SensorKind {
     Automatic,
     /// Rigid tip on a force/torque sensor: the wrench locates the contact.
     ForceTorqueTip,
+    /// Elastomer pad with a camera behind it: depth images locate a patch of the surface.
+    DepthPatch,
     /// A flag or a force that tells contact, and nothing of its place on the tip.
     Contact,
 }
@@ -31,6 +33,7 @@ impl SensorKind {
         match self {
             Self::Automatic => "automatic",
             Self::ForceTorqueTip => "force_torque_tip",
+            Self::DepthPatch => "depth_patch",
             Self::Contact => "contact",
         }
     }
