@@ -29,6 +29,7 @@ mod replay;
 mod report;
 mod run;
 mod scan;
+mod sensors;
 mod serve;
 mod setting_tip;
 mod show;
@@ -89,6 +90,8 @@ enum Command {
     Export(export::Args),
     /// Compare planners over several runs.
     Compare(compare::Args),
+    /// Compare fingertip sensors on the same experiments.
+    Sensors(sensors::Args),
     /// Run a fixed protocol over many objects and rank planners, your own too.
     Benchmark(benchmark::Args),
     /// Test planners for regressions against a stored baseline.
@@ -118,7 +121,7 @@ enum Command {
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "report", "show", "export"]),
-    ("Evaluate", &["compare", "benchmark", "check", "accuracy", "calibrate-band"]),
+    ("Evaluate", &["compare", "sensors", "benchmark", "check", "accuracy", "calibrate-band"]),
     ("Robot", &["serve", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
@@ -188,6 +191,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Show(args) => show::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
         Command::Compare(args) => compare::run(&args),
+        Command::Sensors(args) => sensors::run(&args, talk),
         Command::Benchmark(args) => benchmark::run(&args, talk, host),
         Command::Check(args) => check::run(&args, talk, host),
         Command::Accuracy(args) => accuracy::run(&args, talk),

@@ -24,6 +24,7 @@ pub mod reliability;
 pub mod relief;
 pub mod replay;
 pub mod scan;
+pub mod sensors;
 pub mod solid;
 pub mod style;
 pub mod table;

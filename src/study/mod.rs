@@ -6,9 +6,11 @@
 //! * [`benchmark`]: fixed protocol of objects, planners and touches, with its results.
 //! * [`check`]: regression test of planners against a stored baseline.
 //! * [`compare`](mod@compare): comparison of planners over several runs.
+//! * [`sensors`]: the same experiment with every kind of fingertip.
 
 pub mod accuracy;
 pub mod band;
 pub mod benchmark;
 pub mod check;
 pub mod compare;
+pub mod sensors;

@@ -45,6 +45,7 @@ mod former_names;
 mod franka;
 mod fuzz;
 mod gates;
+mod gel;
 mod geometry;
 mod guides;
 mod hard;

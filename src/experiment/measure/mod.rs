@@ -76,7 +76,7 @@ pub static MEASURES: &[Measure] = &[
     measure(Minimise, "path_m", "lateral travel", METRES)
         .from(Source::Trial(TrialRow::path_m))
         .drawn(PanelAxis::Linear),
-    measure(Minimise, "time_s", "robot time", SECONDS).from(Source::Touch(|it| it.time_s)),
+    ROBOT_TIME,
     VERIFICATION_RMSE,
     measure(Minimise, "verification_nlpd", "NLPD at verification touches", PLAIN)
         .from(Source::Trial(|row, n| nlpd(predicted(row, n)?.map(|(error, sd)| (error, sd * sd))))),
@@ -124,6 +124,10 @@ pub const EDGE_RMSE: Measure = measure(Minimise, "edge_rmse_m", "RMSE in the out
 const UNREACHABLE_RMSE: Measure = measure(Minimise, "unreachable_rmse_m", "RMSE, unreachable", MM)
     .from(Source::Metrics(|it| it.unreachable_rmse_m))
     .aggregated(Aggregate::Median);
+
+/// Time of the simulated or real robot since the start of a trial.
+pub const ROBOT_TIME: Measure =
+    measure(Minimise, "time_s", "robot time", SECONDS).from(Source::Touch(|it| it.time_s));
 
 /// Share of the truth inside the 95 % band.
 pub const COVERAGE: Measure = measure(Undirected, "coverage", "coverage of the 95 % band", SHARE)

@@ -61,9 +61,9 @@ impl HalfSpace {
             for (to_row, to) in displaced.chunks_exact_mut(columns).enumerate() {
                 let wide = 2 * columns - 1;
                 let row = &self.influence[from_row.abs_diff(to_row) * wide..][..wide];
-                for (column, to) in to.iter_mut().enumerate() {
+                for (column, p) in from.iter().enumerate().filter(|(_, p)| **p != 0.0) {
                     let by = &row[columns - 1 - column..][..columns];
-                    *to += by.iter().zip(from).map(|(by, p)| by * p).sum::<f64>();
+                    to.iter_mut().zip(by).for_each(|(to, by)| *to += by * p);
                 }
             }
         }
@@ -84,14 +84,15 @@ impl HalfSpace {
         let cells = demanded().filter(|d| *d > 0.0).count();
         let own = self.influence[self.counts[0] - 1] * cells as f64;
         p.iter_mut().zip(demanded()).for_each(|(p, d)| *p = d.max(0.0) / own);
-        let (mut last, mut conjugate) = (1.0, 0.0);
+        let (mut last, mut is_conjugate) = (1.0, false);
         for _ in 0..STEPS {
             self.displace(p, residual_m);
-            residual_m.iter_mut().zip(demanded()).for_each(|(rest, d)| *rest -= d);
+            residual_m.iter_mut().zip(demanded()).for_each(|(rest, d)| *rest -= d.max(0.0));
             let rests = residual_m.iter().zip(p.iter()).filter(|(_, p)| **p > 0.0);
             let squares: f64 = rests.map(|(rest, _)| rest * rest).sum();
+            let kept = if is_conjugate { squares / last } else { 0.0 };
             for ((way, rest), p) in way_pa.iter_mut().zip(&*residual_m).zip(&*p) {
-                *way = if *p > 0.0 { rest + conjugate * squares / last * *way } else { 0.0 };
+                *way = if *p > 0.0 { rest + kept * *way } else { 0.0 };
             }
             last = squares.max(f64::MIN_POSITIVE);
             self.displace(way_pa, bent_m);
@@ -101,7 +102,7 @@ impl HalfSpace {
                 break;
             }
             let length = above / below;
-            conjugate = 1.0;
+            is_conjugate = true;
             let (mut change, mut sum) = (0.0, 0.0);
             for (i, p) in p.iter_mut().enumerate().filter(|(i, _)| demanded_m[*i] > 0.0) {
                 let before = *p;
@@ -109,7 +110,7 @@ impl HalfSpace {
                 // A cell without pressure that the body has not reached joins the contact.
                 if *p == 0.0 && residual_m[i] < 0.0 {
                     *p = -length * residual_m[i];
-                    conjugate = 0.0;
+                    is_conjugate = false;
                 }
                 change += (*p - before).abs();
                 sum += *p;
@@ -168,7 +169,13 @@ mod tests {
     /// Force and contact radius of a sphere, and displacement around it, against Hertz.
     #[test]
     fn a_sphere_is_that_of_hertz() {
-        let (radius_m, depth_m, modulus_pa) = (4e-3_f64, 0.5e-3_f64, 2e5);
+        for (radius_m, depth_m) in [(4e-3, 0.5e-3), (3e-3, 0.3e-3), (12e-3, 1e-3), (0.05, 1e-5)] {
+            presses_as_hertz_says(radius_m, depth_m);
+        }
+    }
+
+    fn presses_as_hertz_says(radius_m: f64, depth_m: f64) {
+        let modulus_pa = 2e5;
         let contact_m = (radius_m * depth_m).sqrt();
         let space = HalfSpace::new(COUNTS);
         // The window holds all that the undeformed surface would touch, √2 times the contact.

@@ -253,14 +253,14 @@ impl Gel {
         for (index, depth_m) in depths_m.iter_mut().enumerate() {
             let at = pixels.centre_m(index);
             let inside_m = self.pad.surface_m(at) - heights_m[index];
-            let is_pressed = !self.effect.spread || window.is_positive(&found.pressure_pa, at);
-            *depth_m = match inside_m > 0.0 && is_pressed {
-                true => inside_m,
-                false => {
-                    let around_m = window.interpolate(&found.displaced_m, at);
-                    around_m.unwrap_or_else(|| self.beside_m(&blocks, at)).max(inside_m).max(0.0)
-                }
-            } as f32;
+            let is_pressed = inside_m > 0.0 && window.is_positive(&found.pressure_pa, at);
+            let around_m = match self.effect.spread && !is_pressed {
+                true => window
+                    .interpolate(&found.displaced_m, at)
+                    .unwrap_or_else(|| self.beside_m(&blocks, at)),
+                false => 0.0,
+            };
+            *depth_m = inside_m.max(around_m) as f32;
         }
     }
 

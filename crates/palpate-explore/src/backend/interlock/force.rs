@@ -10,9 +10,12 @@ pub const FORCE: InterlockEntry = InterlockEntry {
         let force_n = settings.force_n(site.touch_force_n);
         let finger = &site.robot.finger;
         let lever_m = finger.length_m + finger.radius_m + SPARE_M;
+        let mount_m = site.robot.chain.tool.translation.vector.norm();
+        let noise_nm = site.robot.accuracy.as_ref().map_or(0.0, |it| it.torque_sd_nm(mount_m));
+        let default_nm = force_n * lever_m + SIGMAS * noise_nm;
         Some(Box::new(Force {
             force_n,
-            torque_nm: settings.torque_limit_nm.unwrap_or(force_n * lever_m),
+            torque_nm: settings.torque_limit_nm.unwrap_or(default_nm),
             above: [0; 2],
             before: None,
         }))
@@ -34,6 +37,10 @@ pub const RETRACT_RISE_N: f64 = 2.0;
 /// Length added to the finger's length and radius for the lever of the default torque limit, m.
 // heuristic: allowance for adapter and skin.
 const SPARE_M: f64 = 0.01;
+
+/// Standard deviations of the sensor's torque noise that the default torque limit leaves.
+// heuristic: two readings in sequence beyond it are one in a billion.
+const SIGMAS: f64 = 5.0;
 
 /// Consecutive readings above a limit; a single one may be a disturbance.
 const SAMPLES: u32 = 2;

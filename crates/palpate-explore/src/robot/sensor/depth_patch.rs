@@ -5,7 +5,8 @@ use super::sample::{Sample, Wrench};
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3, Vector6,
+    Isometry3, Matrix3, Matrix6, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector2, Vector3,
+    Vector6,
 };
 use serde::{Deserialize, Serialize};
 
@@ -67,24 +68,28 @@ impl GelPad {
 // heuristic: three quarters of the radius of a sphere's contact.
 const SHARE: f64 = 0.7;
 
-/// Standard deviation of the surface where the gel may be free, as a fraction of how much less
-/// than the deepest indentation it is indented.
-// heuristic: a third of it, so that three deviations reach from the gel to the object.
-const FREE: f64 = 0.3;
+/// Distance that a point of a patch keeps from gel that is less indented, m.
+// heuristic: beside a face of 10 mm the gel's indentation falls to `SHARE` within 0.6 mm.
+const INSIDE_M: f64 = 0.6e-3;
+
+/// Half the side of the square of pixels that determine a point of a patch, m.
+// heuristic: small enough that a quadratic surface fits edges rounder than 1 mm.
+const AROUND_M: f64 = 0.6e-3;
 
 /// Standard deviations of the noise that count as indentation.
 const SIGMAS: f64 = 5.0;
 
 /// Fewest indented pixels of a contact.
-// heuristic: a quadratic surface has six parameters.
+// heuristic: a millimetre across on a usual pad.
 const LEAST: usize = 8;
 
-/// Pixels at the border in which an indentation shows that the rim is pressed.
-const BORDER: usize = 1;
+/// Place of the middle of an indentation, as a fraction of the way from the pad's middle to its
+/// side, beyond which the pad's rim is pressed.
+// heuristic: more than half of the contact is beside the pad.
+const RIM: f64 = 0.8;
 
-/// Largest number of further points of a patch.
-// heuristic: with four points a bird's face needs as few touches as with eight.
-const FURTHER: usize = 3;
+/// Largest number of points of a patch.
+const POINTS: usize = 4;
 
 /// Shortest distance between points of a patch, m.
 // heuristic: nearer points tell a belief nothing new; a tenth of a usual pad.
@@ -100,7 +105,9 @@ pub struct DepthPatch {
     /// Sums of the depths since the last clearing.
     sums_m: Vec<f64>,
     count: usize,
+    /// Means at rest, and their number of images.
     rest_m: Vec<f64>,
+    rest_count: usize,
     is_indented: bool,
     is_pressed: bool,
     is_overloaded: bool,
@@ -117,6 +124,7 @@ impl DepthPatch {
             sums_m: Vec::new(),
             count: 0,
             rest_m: Vec::new(),
+            rest_count: 0,
             is_indented: false,
             is_pressed: false,
             is_overloaded: false,
@@ -176,6 +184,7 @@ impl Sensor for DepthPatch {
     fn tare(&mut self) {
         if self.count > 0 {
             let count = self.count as f64;
+            self.rest_count = self.count;
             self.rest_m = self.sums_m.iter().map(|sum| sum / count).collect();
         }
         (self.is_indented, self.is_overloaded) = (false, false);
@@ -206,171 +215,168 @@ impl Sensor for DepthPatch {
             return Err(Doubt::NoSignal);
         }
         let depths_m = self.depths_m();
-        let mean_noise_m = self.pad.noise_m / (self.count as f64).sqrt();
-        let mut sorted: Vec<f64> = depths_m.clone();
+        let smooth_m = self.smoothed(&depths_m);
+        let mut sorted = smooth_m.clone();
         sorted.sort_by(|a, b| b.total_cmp(a));
         // One bright pixel is no contact.
         let deepest_m = sorted.get(LEAST - 1).copied().unwrap_or(0.0);
-        if deepest_m <= SIGMAS * mean_noise_m {
-            return Err(Doubt::BesideTip);
+        if deepest_m <= SIGMAS * self.mean_noise_m() {
+            return Err(if self.is_pressed { Doubt::BesideTip } else { Doubt::TooLight });
         }
-        let shown: Vec<usize> =
-            (0..depths_m.len()).filter(|i| depths_m[*i] >= SHARE * deepest_m).collect();
-        let points = self.points(&depths_m, deepest_m, &shown);
-        let shape = QuadraticSurface::fit(&points).ok_or(Doubt::NoSignal)?;
-        let [columns, rows] = self.pixels;
-        let at_border = |i: &usize| {
-            let [column, row] = [i % columns, i / columns];
-            column.min(columns - 1 - column).min(row).min(rows - 1 - row) < BORDER
-        };
-        // One noisy pixel is no pressed rim.
-        let is_on_rim = shown.iter().filter(|i| at_border(i)).count() >= LEAST.div_ceil(2);
-        let chosen = spread(&points, 1 + FURTHER);
-        let count = chosen.len() as f64;
-        let contact = |i: &usize| {
-            let point = &points[*i];
-            let normal_p = shape.normal_at([point.p.x, point.p.y]);
-            // An error that all points of a patch have in common does not average out over them.
-            let common_m = self.pad.scale_sd * point.depth_m;
-            let free_m = FREE * (deepest_m - point.depth_m).max(0.0);
-            let variance_m2 = mean_noise_m * mean_noise_m / point.averaged
-                + count * common_m * common_m
-                + free_m * free_m;
-            let normal_t = -(self.x_tp.rotation * normal_p.into_inner());
-            let pitch_m = self.pad.size_m[0] / columns as f64;
-            let along = normal_t * normal_t.transpose();
-            let across = (Matrix3::identity() - along) * (pitch_m * pitch_m / 12.0);
-            SensedContact {
-                p_tc: self.x_tp * point.p,
-                normal_t,
-                covariance_t: Some(along * variance_m2 + across),
-                doubt: is_on_rim.then_some(Doubt::OnRim),
-                patch: Vec::new(),
-            }
-        };
-        let mut contacts = chosen.iter().map(contact);
+        let is_shown: Vec<bool> = smooth_m.iter().map(|m| *m >= SHARE * deepest_m).collect();
+        let shown: Vec<usize> = (0..is_shown.len()).filter(|i| is_shown[*i]).collect();
+        let doubt = self.is_on_rim(&shown).then_some(Doubt::OnRim);
+        let is_inside = |i: &usize| self.square(*i, INSIDE_M).all(|near| is_shown[near]);
+        let mut inside: Vec<usize> = shown.iter().copied().filter(is_inside).collect();
+        if inside.is_empty() {
+            inside = shown;
+        }
+        let chosen = self.spread(&inside);
+        let mut contacts = chosen.iter().filter_map(|i| {
+            let shape = QuadraticSurface::fit(self.square(*i, AROUND_M).map(|near| {
+                let [x, y] = self.pad.pixel_m(self.pixels, near);
+                [x, y, self.pad.surface_m([x, y]) - depths_m[near]]
+            }))?;
+            Some(self.contact(self.pad.pixel_m(self.pixels, *i), &shape, doubt))
+        });
         let first = contacts.next().ok_or(Doubt::NoSignal)?;
         Ok(SensedContact { patch: contacts.collect(), ..first })
     }
 }
 
-/// A point of a patch in `P`.
-struct PatchPoint {
-    p: Point3<f64>,
-    depth_m: f64,
-    /// Number of pixels whose mean it is.
-    averaged: f64,
-}
-
 impl DepthPatch {
-    /// Returns the surface at the pixels `shown`, each averaged with its neighbours among them.
-    fn points(&self, depths_m: &[f64], deepest_m: f64, shown: &[usize]) -> Vec<PatchPoint> {
-        let [columns, rows] = self.pixels;
-        let point = |&i: &usize| {
-            let (column, row) = (i % columns, i / columns);
-            let (mut sum_m, mut averaged) = (0.0, 0.0);
-            // As many on both sides, so that a slope has no influence.
-            for offset in NEIGHBOURS {
-                let both = [1, -1].map(|sign: isize| {
-                    let [x, y] = [
-                        column.checked_add_signed(sign * offset[0]).filter(|x| *x < columns)?,
-                        row.checked_add_signed(sign * offset[1]).filter(|y| *y < rows)?,
-                    ];
-                    let depth_m = depths_m[y * columns + x];
-                    (depth_m >= SHARE * deepest_m).then_some(depth_m)
-                });
-                if let [Some(a), Some(b)] = both {
-                    sum_m += a + b;
-                    averaged += 2.0;
-                }
-            }
-            let depth_m = (sum_m + depths_m[i]) / (averaged + 1.0);
-            let [x, y] = self.pad.pixel_m(self.pixels, i);
-            let p = Point3::new(x, y, self.pad.surface_m([x, y]) - depth_m);
-            PatchPoint { p, depth_m, averaged: averaged + 1.0 }
+    /// Standard deviation of the noise of a pixel's mean, relative to that at rest.
+    fn mean_noise_m(&self) -> f64 {
+        let parts = [self.count, self.rest_count].map(|count| 1.0 / count.max(1) as f64);
+        self.pad.noise_m * (parts[0] + parts[1]).sqrt()
+    }
+
+    /// Returns the contact on `shape` at (x, y) of `P`.
+    fn contact(
+        &self,
+        [x, y]: [f64; 2],
+        shape: &QuadraticSurface,
+        doubt: Option<Doubt>,
+    ) -> SensedContact {
+        let (z, share) = shape.height([x, y]);
+        let scale_m = self.pad.scale_sd * (self.pad.surface_m([x, y]) - z);
+        let variance_m2 = self.mean_noise_m().powi(2) * share + scale_m * scale_m;
+        let normal_t = -(self.x_tp.rotation * shape.normal([x, y]).into_inner());
+        let pitch_m = self.pad.size_m[0] / self.pixels[0] as f64;
+        let along = normal_t * normal_t.transpose();
+        let across = (Matrix3::identity() - along) * (pitch_m * pitch_m / 12.0);
+        SensedContact {
+            p_tc: self.x_tp * Point3::new(x, y, z),
+            normal_t,
+            covariance_t: Some(along * variance_m2 + across),
+            doubt,
+            patch: Vec::new(),
+        }
+    }
+
+    /// Whether the middle of some pixels is near the pad's rim.
+    fn is_on_rim(&self, pixels: &[usize]) -> bool {
+        let places = pixels.iter().map(|i| Vector2::from(self.pad.pixel_m(self.pixels, *i)));
+        let middle = places.sum::<Vector2<f64>>() / pixels.len() as f64;
+        (0..2).any(|axis| middle[axis].abs() > RIM * 0.5 * self.pad.size_m[axis])
+    }
+
+    /// Returns the pixels of the square of this half side, at least one pixel, about a pixel.
+    fn square(&self, i: usize, half_m: f64) -> impl Iterator<Item = usize> + Clone {
+        let columns = self.pixels[0];
+        let range = |axis: usize, at: usize| {
+            let pitch_m = self.pad.size_m[axis] / self.pixels[axis] as f64;
+            let half = (half_m / pitch_m).round().max(1.0) as usize;
+            at.saturating_sub(half)..(at + half + 1).min(self.pixels[axis])
         };
-        shown.iter().map(point).collect()
+        let (across, along) = (range(0, i % columns), range(1, i / columns));
+        along.flat_map(move |row| across.clone().map(move |column| row * columns + column))
+    }
+
+    /// Returns the mean of each pixel and its neighbours.
+    fn smoothed(&self, depths_m: &[f64]) -> Vec<f64> {
+        let mean = |i: usize| {
+            let (mut sum_m, mut count) = (0.0, 0.0);
+            for near in self.square(i, 0.0) {
+                sum_m += depths_m[near];
+                count += 1.0;
+            }
+            sum_m / count
+        };
+        (0..depths_m.len()).map(mean).collect()
+    }
+
+    /// Returns some of the pixels `among`: the one nearest to their mean, then always the farthest
+    /// from the chosen ones, as long as it is `APART_M` from them.
+    fn spread(&self, among: &[usize]) -> Vec<usize> {
+        let places: Vec<Vector2<f64>> =
+            among.iter().map(|i| self.pad.pixel_m(self.pixels, *i).into()).collect();
+        let mean = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
+        let mut away_m: Vec<f64> = places.iter().map(|place| -(place - mean).norm()).collect();
+        let mut chosen: Vec<usize> = Vec::new();
+        while chosen.len() < POINTS {
+            let next = (0..places.len()).max_by(|a, b| away_m[*a].total_cmp(&away_m[*b]));
+            let is_first = chosen.is_empty();
+            let Some(next) = next.filter(|next| is_first || away_m[*next] >= APART_M) else {
+                break;
+            };
+            chosen.push(among[next]);
+            for (away_m, place) in away_m.iter_mut().zip(&places) {
+                let from_m = (place - places[next]).norm();
+                *away_m = if is_first { from_m } else { away_m.min(from_m) };
+            }
+        }
+        chosen
     }
 }
 
-/// Half of the eight neighbours of a pixel; the others are opposite.
-const NEIGHBOURS: [[isize; 2]; 4] = [[1, 0], [0, 1], [1, 1], [1, -1]];
-
-/// Returns up to `count` points: the one nearest to the mean, then always the farthest from the
-/// chosen ones, as long as it is `APART_M` from them.
-fn spread(points: &[PatchPoint], count: usize) -> Vec<usize> {
-    let mean =
-        points.iter().map(|point| point.p.coords).sum::<Vector3<f64>>() / points.len() as f64;
-    let mut nearest_m: Vec<f64> =
-        points.iter().map(|point| -(point.p.coords - mean).norm()).collect();
-    let mut chosen = Vec::new();
-    while chosen.len() < count {
-        let next = (0..points.len()).max_by(|a, b| nearest_m[*a].total_cmp(&nearest_m[*b]));
-        let Some(next) = next else { break };
-        if !chosen.is_empty() && nearest_m[next] < APART_M {
-            break;
-        }
-        let is_first = chosen.is_empty();
-        chosen.push(next);
-        for (nearest_m, point) in nearest_m.iter_mut().zip(points) {
-            let away_m = (point.p - points[next].p).norm();
-            *nearest_m = if is_first { away_m } else { nearest_m.min(away_m) };
-        }
-    }
-    chosen
-}
-
-/// The surface z = c · (1, x, y, x², xy, y²) through the points of a patch.
+/// The surface z = c · (1, x, y, x², xy, y²) through some points.
 struct QuadraticSurface {
     coefficients: Vector6<f64>,
-    middle: [f64; 2],
+    /// Inverse of the normal matrix.
+    covariance: Matrix6<f64>,
+    middle: Vector2<f64>,
     scale_m: f64,
 }
 
 impl QuadraticSurface {
-    /// Fits by least squares, with a slight preference for a plane where the points leave the
-    /// curvature open.
-    fn fit(points: &[PatchPoint]) -> Option<Self> {
-        let count = points.len() as f64;
+    /// Fits by least squares; `None` if the points do not determine a surface.
+    fn fit(points: impl Iterator<Item = [f64; 3]> + Clone) -> Option<Self> {
+        let count = points.clone().count() as f64;
         let middle =
-            [0, 1].map(|axis| points.iter().map(|point| point.p[axis]).sum::<f64>() / count);
-        let squares: f64 = points
-            .iter()
-            .map(|point| (point.p.x - middle[0]).powi(2) + (point.p.y - middle[1]).powi(2))
-            .sum();
-        let scale_m = (squares / count).sqrt();
-        if points.len() < LEAST || scale_m <= 0.0 {
-            return None;
-        }
-        let mut fitted = Self { coefficients: Vector6::zeros(), middle, scale_m };
+            points.clone().map(|[x, y, _]| Vector2::new(x, y)).sum::<Vector2<f64>>() / count;
+        let squares = points.clone().map(|[x, y, _]| (Vector2::new(x, y) - middle).norm_squared());
+        let scale_m = (squares.sum::<f64>() / count).sqrt();
+        let mut fitted =
+            Self { coefficients: Vector6::zeros(), covariance: Matrix6::zeros(), middle, scale_m };
         let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
-        for point in points {
-            let row = fitted.terms([point.p.x, point.p.y]);
+        for [x, y, z] in points {
+            let row = fitted.terms([x, y]);
             normal += row * row.transpose();
-            right += row * point.p.z;
+            right += row * z;
         }
-        for i in 0..6 {
-            normal[(i, i)] += RIDGE * count;
-        }
-        fitted.coefficients = normal.cholesky()?.solve(&right);
-        Some(fitted)
+        fitted.covariance = normal.try_inverse()?;
+        fitted.coefficients = fitted.covariance * right;
+        fitted.coefficients.iter().all(|c| c.is_finite()).then_some(fitted)
     }
 
     fn terms(&self, at_m: [f64; 2]) -> Vector6<f64> {
-        let [x, y] = [0, 1].map(|axis| (at_m[axis] - self.middle[axis]) / self.scale_m);
+        let [x, y] = ((Vector2::from(at_m) - self.middle) / self.scale_m).into();
         Vector6::new(1.0, x, y, x * x, x * y, y * y)
     }
 
+    /// Returns the height at (x, y), and its variance in units of a point's.
+    fn height(&self, at_m: [f64; 2]) -> (f64, f64) {
+        let row = self.terms(at_m);
+        (row.dot(&self.coefficients), row.dot(&(self.covariance * row)))
+    }
+
     /// Unit normal at (x, y), outwards of the pad.
-    fn normal_at(&self, at_m: [f64; 2]) -> UnitVector3<f64> {
-        let [x, y] = [0, 1].map(|axis| (at_m[axis] - self.middle[axis]) / self.scale_m);
+    fn normal(&self, at_m: [f64; 2]) -> UnitVector3<f64> {
+        let [x, y] = ((Vector2::from(at_m) - self.middle) / self.scale_m).into();
         let c = &self.coefficients;
         let slope_x = (c[1] + 2.0 * c[3] * x + c[4] * y) / self.scale_m;
         let slope_y = (c[2] + c[4] * x + 2.0 * c[5] * y) / self.scale_m;
         UnitVector3::new_normalize(Vector3::new(-slope_x, -slope_y, 1.0))
     }
 }
-
-/// Weight of the preference for a plane per point.
-// heuristic: far below the information of any patch that determines a curvature.
-const RIDGE: f64 = 1e-9;

@@ -27,7 +27,7 @@ pub enum Doubt {
     Unbalanced,
     /// The force passes beside the tip, or the load beside the pad.
     BesideTip,
-    /// The rim of the pad is pressed: the object goes on beside it.
+    /// The rim of the pad is pressed: most of the contact may be beside it.
     OnRim,
 }
 
@@ -49,7 +49,7 @@ impl fmt::Display for Doubt {
                 "the torque does not fit one point of contact; check the axes of the \
                  force/torque sensor and whether something else touches the finger"
             }
-            Self::OnRim => "the rim of the pad was pressed; the object goes on beside it",
+            Self::OnRim => "the rim of the pad was pressed; most of the contact may be beside it",
             Self::BesideTip => {
                 "the force acts beside the tip; check finger.radius_m, the sensor's axes, \
                  and whether something touches the wrist"

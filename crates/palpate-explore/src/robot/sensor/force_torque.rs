@@ -265,6 +265,12 @@ impl ForceTorqueTip {
 }
 
 impl WrenchAccuracy {
+    /// Standard deviation of the noise of the torque about a point `lever_m` from the sensor.
+    pub fn torque_sd_nm(&self, lever_m: f64) -> f64 {
+        let largest = |noise: &[f64; 3]| noise.iter().copied().fold(0.0, f64::max);
+        largest(&self.noise_nm).hypot(largest(&self.noise_n) * lever_m)
+    }
+
     fn noise(&self) -> Vector6<f64> {
         stacked(&self.noise_n, &self.noise_nm)
     }
