@@ -122,18 +122,28 @@ impl Observations {
     /// Returns every `step`th observation.
     pub fn subsample(&self, step: usize) -> Self {
         let mut some = Self::new(self.dimension());
-        for i in (0..self.len()).step_by(step.max(1)) {
-            let place: Vec<f64> = self.place(i).collect();
-            let noise = self.slope_noise2[i].sqrt();
-            let gradient = self.slope(i);
-            some.push(&Observation {
-                place: &place,
-                height: self.heights[i],
-                noise: self.height_noise2[i].sqrt(),
-                slope: (!gradient.is_empty()).then_some(Slope { gradient, noise }),
-            });
-        }
+        (0..self.len()).step_by(step.max(1)).for_each(|i| some.push_from(self, i));
         some
+    }
+
+    /// Returns these observations and then `others`.
+    pub fn followed_by(&self, others: &Self) -> Self {
+        let mut all = self.clone();
+        (0..others.len()).for_each(|i| all.push_from(others, i));
+        all
+    }
+
+    /// Adds observation `i` of `others`.
+    fn push_from(&mut self, others: &Self, i: usize) {
+        let place: Vec<f64> = others.place(i).collect();
+        let noise = others.slope_noise2[i].sqrt();
+        let gradient = others.slope(i);
+        self.push(&Observation {
+            place: &place,
+            height: others.heights[i],
+            noise: others.height_noise2[i].sqrt(),
+            slope: (!gradient.is_empty()).then_some(Slope { gradient, noise }),
+        });
     }
 
     /// Returns heights of 0 at the places of the observations `indices`.

@@ -37,6 +37,10 @@ pub struct HeightField {
     kernels: KernelSelection,
     pub(super) settings: GpSettings,
     pub(super) contacts: Observations,
+    /// Further heights that touches have shown. They condition the belief and do not fit it, so
+    /// that a fit takes no longer than without them.
+    #[serde(default)]
+    patches: Observations,
     /// Upper bound from free space, if that is enabled.
     ceiling: Option<FreeSpaceBound>,
     presence: SurfaceEvidence,
@@ -77,6 +81,7 @@ impl HeightField {
             finger: None,
             zone,
             settings,
+            patches: contacts.clone(),
             contacts,
             targets: Vec::new(),
             unreached: Vec::new(),
@@ -99,24 +104,24 @@ impl HeightField {
         let reached = match touch {
             Touch::Contact(contact) => {
                 self.presence.add_contact(target, &contact.p_wc);
-                contact.points().for_each(|point| self.add(point));
-                self.zone.distance(&self.zone.place(&contact.p_wc), target) <= REACHED_WITHIN
+                let place = self.zone.place(&contact.p_wc);
+                let slope = self.slope(&contact.normal_w);
+                let slope =
+                    slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
+                let (height, noise) = (self.zone.height_m(&contact.p_wc), self.noise(contact));
+                self.contacts.push(&Observation { place: &place, height, noise, slope });
+                for point in &contact.patch {
+                    let place = self.zone.place(&point.p_wc);
+                    let (height, noise) = (self.zone.height_m(&point.p_wc), self.noise(point));
+                    self.patches.push(&Observation { place: &place, height, noise, slope: None });
+                }
+                self.zone.distance(&place, target) <= REACHED_WITHIN
             }
             Touch::Miss | Touch::Overload => false,
         };
         if !reached {
             self.unreached.push(target.into());
         }
-    }
-
-    /// Adds a point of the surface.
-    fn add(&mut self, contact: &Contact) {
-        let place = self.zone.place(&contact.p_wc);
-        let height = self.zone.height_m(&contact.p_wc);
-        let slope = self.slope(&contact.normal_w);
-        let slope = slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
-        let noise = self.noise(contact);
-        self.contacts.push(&Observation { place: &place, height, noise, slope });
     }
 
     /// Returns the noise of a contact's height relative to that of an exact one: the deviation of
@@ -174,7 +179,7 @@ impl HeightField {
         if self.settings.band == Band::Named(BandName::LeaveOneOut) {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
-                Posterior::new(self.kernels.kernel(), hyperparameters, self.contacts.clone())?;
+                Posterior::new(self.kernels.kernel(), hyperparameters, self.observations())?;
             posterior.inflate(sd_inflation(&posterior.loo_z_scores()));
             // Conditioned again below, so that the recorded numbers are reproduced to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
@@ -213,6 +218,11 @@ impl HeightField {
         (self.contacts.len() > most).then_some(most)
     }
 
+    /// Returns all observed heights.
+    fn observations(&self) -> Observations {
+        self.contacts.followed_by(&self.patches)
+    }
+
     /// Returns the posterior given all contacts, and the residual standard deviation of an
     /// approximate posterior.
     fn posterior(
@@ -221,10 +231,15 @@ impl HeightField {
     ) -> Result<(Posterior, Option<f64>), CovarianceError> {
         let kernel = self.kernels.kernel();
         let (mut posterior, left_sd) = match self.inducing() {
-            None => (Posterior::new(kernel, hyperparameters, self.contacts.clone())?, None),
+            None => (Posterior::new(kernel, hyperparameters, self.observations())?, None),
             Some(most) => {
                 let InducingPosterior { posterior, nystrom_residual_sd: left_sd } =
-                    Posterior::with_inducing_points(most, kernel, hyperparameters, &self.contacts)?;
+                    Posterior::with_inducing_points(
+                        most,
+                        kernel,
+                        hyperparameters,
+                        &self.observations(),
+                    )?;
                 (posterior, Some(left_sd))
             }
         };
@@ -241,7 +256,7 @@ impl HeightField {
             _ if self.unreached.is_empty() => None,
             None => Some(surface.fantasize(unreached)?),
             Some(most) => {
-                let mut all = self.contacts.clone();
+                let mut all = self.observations();
                 unreached.for_each(|place| all.push_height(place, 0.0));
                 let hyperparameters = surface.hyperparameters().clone();
                 let kernel = self.kernels.kernel();

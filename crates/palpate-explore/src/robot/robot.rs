@@ -29,6 +29,11 @@ impl Robot {
         Self { chain, finger, is_soft, sensor, accuracy: None, pad: None }
     }
 
+    /// Whether the fingertip yields, so that it can be pressed further on contact.
+    pub fn yields(&self) -> bool {
+        self.is_soft || self.pad.is_some()
+    }
+
     /// Returns the collision capsules of its arm, adapter and finger.
     pub fn capsules(&self) -> Vec<LinkCapsule> {
         let Self { chain, finger, .. } = self;

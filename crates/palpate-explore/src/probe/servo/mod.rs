@@ -339,7 +339,7 @@ impl Servo {
     ) -> Result<Option<Contact>, Fault> {
         let mut held = self.x_wt();
         // A force that locates the contact must remain while it is read.
-        let is_pressed = self.robot.is_soft || !self.body.capabilities().tactile;
+        let is_pressed = self.robot.yields() || !self.body.capabilities().tactile;
         if is_pressed && self.settings.press_m > 0.0 {
             held.translation.vector += approach.direction_w().scale(self.settings.press_m);
             if self.press(held)? == Some(ApproachEnd::Overload) {
