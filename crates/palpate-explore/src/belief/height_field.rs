@@ -37,7 +37,7 @@ pub struct HeightField {
     kernels: KernelSelection,
     pub(super) settings: GpSettings,
     pub(super) contacts: Observations,
-    /// Further heights that touches have shown. They condition the belief and do not fit it, so
+    /// Further points that touches have shown. They condition the belief and do not fit it, so
     /// that a fit takes no longer than without them.
     #[serde(default)]
     patches: Observations,
@@ -104,17 +104,16 @@ impl HeightField {
         let reached = match touch {
             Touch::Contact(contact) => {
                 self.presence.add_contact(target, &contact.p_wc);
-                let place = self.zone.place(&contact.p_wc);
-                let slope = self.slope(&contact.normal_w);
-                let slope =
-                    slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
-                let (height, noise) = (self.zone.height_m(&contact.p_wc), self.noise(contact));
-                self.contacts.push(&Observation { place: &place, height, noise, slope });
-                for point in &contact.patch {
+                for (i, point) in contact.points().enumerate() {
+                    let slope = self.slope(&point.normal_w);
+                    let slope =
+                        slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
                     let place = self.zone.place(&point.p_wc);
                     let (height, noise) = (self.zone.height_m(&point.p_wc), self.noise(point));
-                    self.patches.push(&Observation { place: &place, height, noise, slope: None });
+                    let to = if i == 0 { &mut self.contacts } else { &mut self.patches };
+                    to.push(&Observation { place: &place, height, noise, slope });
                 }
+                let place = self.zone.place(&contact.p_wc);
                 self.zone.distance(&place, target) <= REACHED_WITHIN
             }
             Touch::Miss | Touch::Overload => false,

@@ -39,8 +39,8 @@ pub const RETRACT_RISE_N: f64 = 2.0;
 const SPARE_M: f64 = 0.01;
 
 /// Standard deviations of the sensor's torque noise that the default torque limit leaves.
-// heuristic: two readings in sequence beyond it are one in a billion.
-const SIGMAS: f64 = 5.0;
+// heuristic: seven for three axes that exceed it once in a billion readings, and three for a bias.
+const SIGMAS: f64 = 10.0;
 
 /// Consecutive readings above a limit; a single one may be a disturbance.
 const SAMPLES: u32 = 2;

@@ -32,7 +32,7 @@ pub struct InterlockSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_limit_n: Option<f64>,
     /// Torque limit about the fingertip, N·m; default: the force limit times the finger's
-    /// length.
+    /// length, and ten standard deviations of the sensor's noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
     /// Timeout of joint states, s.
