@@ -9,11 +9,12 @@ use crate::experiment::Experiment;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use crate::sim::{Scene, known_body};
 use anyhow::{Context, bail};
+use palpate_explore::robot::sensor::SensorKind;
 use palpate_ros::connect;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
 use palpate_ros::server::serve::{Injection, SimulatedRobotServer, services};
 use palpate_ros::settings::BackendKind;
-use palpate_ros::topics::Endpoint;
+use palpate_ros::topics::{Endpoint, TactileMessage, Topic};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -104,12 +105,20 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         );
     };
     let effects = &scene.effects;
-    if effects.fluid.is_none() || effects.electrodes.is_none() {
-        bail!(
-            "{}: tactile frames need [effects.skin], [effects.fluid] and [effects.electrodes] in the \
-             scene",
-            args.path.display()
-        );
+    let is_biotac = effects.fluid.is_some() && effects.electrodes.is_some();
+    let (is_there, needed) = match settings.topics.tactile.message {
+        TactileMessage::None => (true, ""),
+        TactileMessage::Flag => {
+            (scene.sensor.kind == SensorKind::Contact, "sensor.kind = \"contact\"")
+        }
+        TactileMessage::Depth => (effects.gel.is_some(), "[effects.gel]"),
+        TactileMessage::Hand | TactileMessage::Fingers => {
+            (is_biotac, "[effects.skin], [effects.fluid] and [effects.electrodes]")
+        }
+    };
+    if !is_there {
+        let (path, name) = (args.path.display(), settings.topics.type_name(Topic::Tactile));
+        bail!("{path}: backend.topics.tactile.type = \"{name}\" needs {needed} in the scene");
     }
     let stop = stop_on_interrupt("ticks")?;
     let open = connect(&settings, Endpoint::Arm, services(settings.profile))?;

@@ -1,8 +1,10 @@
 //! Settings that a real robot needs and that a simulation takes from the mesh.
 
 use crate::experiment::experiment::Experiment;
+use palpate_explore::robot::sensor::SensorKind;
 use palpate_input::error::InputError;
 use palpate_ros::settings::BackendKind;
+use palpate_ros::topics::{TactileMessage, Topic};
 
 /// Checks that `experiment` has the settings that a real robot needs; a simulation needs none. With
 /// `is_known` the touched body is known, so the depths are not needed.
@@ -12,6 +14,7 @@ use palpate_ros::settings::BackendKind;
 pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> {
     let (kind, interlocks) = (experiment.backend.kind, &experiment.backend.interlocks);
     let scene = &experiment.scene;
+    check_samples(experiment)?;
     let mut needed = match &scene.whole_object {
         _ if is_known => Vec::new(),
         Some(around) => vec![
@@ -50,4 +53,34 @@ pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> 
         names.join(", "),
         lines.join("\n")
     )))
+}
+
+/// Checks that the tactile topic of a robot on ROS has the samples of the scene's sensor.
+fn check_samples(experiment: &Experiment) -> Result<(), InputError> {
+    let topics = &experiment.backend.topics;
+    if !matches!(experiment.backend.kind, BackendKind::Ros1 | BackendKind::Ros2) {
+        return Ok(());
+    }
+    let (sensor, message) = (experiment.scene.sensor.kind, topics.tactile.message);
+    let allowed = match sensor {
+        SensorKind::DepthPatch => "\"sensor_msgs/msg/Image\"",
+        SensorKind::Contact => "\"std_msgs/msg/Bool\", or \"none\" for contact by force",
+        SensorKind::ForceTorqueTip => "\"none\", or the type of a sensor that detects contact",
+        SensorKind::Automatic => "a BioTac's, or \"none\" for the force/torque sensor alone",
+    };
+    let fits = match sensor {
+        SensorKind::DepthPatch => message == TactileMessage::Depth,
+        SensorKind::Contact => matches!(message, TactileMessage::Flag | TactileMessage::None),
+        SensorKind::ForceTorqueTip => true,
+        SensorKind::Automatic => message.is_of_biotac() || message == TactileMessage::None,
+    };
+    let name = topics.type_name(Topic::Tactile);
+    let place = "backend.topics.tactile.type";
+    let problem = || {
+        format!(
+            "{place} = \"{name}\"; with sensor.kind = \"{}\" allowed is {allowed}",
+            sensor.name()
+        )
+    };
+    if fits { Ok(()) } else { Err(InputError::new(problem())) }
 }

@@ -180,7 +180,9 @@ fn a_touch_stops_gently_and_keeps_its_limits_and_its_line() {
                 |reading: &Reading| reading.ideal_contact().map_or(0.0, |ideal| ideal.force_n);
             let most_n = readings.iter().map(force).fold(0.0, f64::max);
             let over_n = most_n - detected_n(&environment, &readings);
-            assert!(over_n < 1.0, "{name} {carrier} {target:?}: {over_n} N");
+            // A press of 0.4 mm is about another newton.
+            let allowed_n = if sets.is_empty() { 2.0 } else { 1.0 };
+            assert!(over_n < allowed_n, "{name} {carrier} {target:?}: {over_n} N");
 
             let touched = readings.iter().position(|reading| force(reading) > 0.0).unwrap();
             let aside = readings[..touched]

@@ -16,6 +16,7 @@ use palpate::experiment::trial::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner::{self, PlannerFactory};
 use palpate::robot::finger::Frame;
+use palpate::robot::sensor::{Channels, DepthImage};
 use palpate::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
 use palpate::ros::recording::{
     Marker, RecordedTrial, Recording, RecordingBackend, RecordingMetadata, ReplayBackend, Shape,
@@ -138,6 +139,12 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
     bits
 }
 
+/// The samples of other sensors than a BioTac.
+fn others(reading: &Reading) -> Vec<&Sample> {
+    let is_other = |sample: &&Sample| !matches!(sample, Sample::BioTac(_) | Sample::Ideal(_));
+    reading.samples.iter().filter(is_other).collect()
+}
+
 /// Generates any bit pattern, including NaN and infinity.
 fn any_number() -> impl Strategy<Value = f64> + Clone {
     prop_oneof![any::<u64>().prop_map(f64::from_bits), -10.0..10.0]
@@ -160,13 +167,29 @@ fn any_frame() -> impl Strategy<Value = Frame> {
     )
 }
 
+/// Generates a sample of another sensor than a BioTac.
+fn any_other() -> impl Strategy<Value = Sample> {
+    let depth =
+        prop_oneof![any::<f32>().prop_filter("finite", |it| it.is_finite()), -1e-3f32..1e-3];
+    let depths = (0.0..1e3, proptest::collection::vec(depth, 6));
+    let channels = (0.0..1e3, proptest::collection::vec(-1e9..1e9, 0..5));
+    prop_oneof![
+        any::<bool>().prop_map(Sample::Flag),
+        depths.prop_map(|(time_s, depths_m)| {
+            Sample::Depth(DepthImage { time_s, pixels: [3, 2], depths_m })
+        }),
+        channels.prop_map(|(time_s, values)| Sample::Channels(Channels { time_s, values })),
+    ]
+}
+
 fn any_reading() -> impl Strategy<Value = Reading> {
     let list = || proptest::collection::vec(any_number(), 0..8);
     let six = proptest::option::of(proptest::array::uniform6(any_number()));
     let seven = proptest::option::of(proptest::array::uniform7(any_number()));
     let frames = proptest::collection::vec(any_frame(), 0..4);
-    (any_number(), list(), list(), list(), six, seven, frames).prop_map(
-        |(time_s, q, qdot, applied, wrench, ideal, frames)| Reading {
+    let others = proptest::collection::vec(any_other(), 0..3);
+    (any_number(), list(), list(), list(), six, seven, frames, others).prop_map(
+        |(time_s, q, qdot, applied, wrench, ideal, frames, others)| Reading {
             time_s,
             q,
             qdot,
@@ -179,6 +202,7 @@ fn any_reading() -> impl Strategy<Value = Reading> {
                     let (p_tc, normal_t) = ([a, b, c].into(), [d, e, f].into());
                     Sample::Ideal(IdealContact { p_tc, normal_t, force_n })
                 }))
+                .chain(others)
                 .collect(),
             applied: Command { qdot: applied },
         },
@@ -229,6 +253,7 @@ proptest! {
             for ((reading, _), command) in ticks.iter().zip(commands()) {
                 let played = player.step(&command).unwrap();
                 prop_assert_eq!(bits(played), bits(reading));
+                prop_assert_eq!(others(played), others(reading));
             }
             let fault = player.step(&Command::default()).unwrap_err();
             prop_assert_eq!(fault.to_string(), lost.to_string());
@@ -310,7 +335,7 @@ fn without_slips(bytes: &[u8]) -> Vec<u8> {
                 if header.name == "palpate_msgs/msg/Tick" {
                     tick = Some(header.id);
                     let from = text.find("# Of each frame whether the skin slipped").unwrap();
-                    let to = from + text[from..].find("slips\n").unwrap() + "slips\n".len();
+                    let to = from + text[from..].find("samples\n").unwrap() + "samples\n".len();
                     text.replace_range(from..to, "");
                 }
                 let id = writer.add_schema(&header.name, "ros2msg", text.as_bytes()).unwrap();
@@ -325,7 +350,11 @@ fn without_slips(bytes: &[u8]) -> Vec<u8> {
             Record::Message { header, data } => {
                 let (channel_id, is_tick) = channels[&header.channel_id];
                 let end = match is_tick {
-                    true => data.len() - 4 - decoded::<TickMessage>(&data).unwrap().slips.len(),
+                    true => {
+                        // The slips' count and themselves, padding, and an empty string.
+                        let slips = decoded::<TickMessage>(&data).unwrap().slips.len();
+                        data.len() - 4 - slips.next_multiple_of(4) - 5
+                    }
                     false => data.len(),
                 };
                 let header = MessageHeader { channel_id, ..header };

@@ -15,7 +15,7 @@
 //! hull passed without contact. The length scale is the most likely one of a few. The optimistic
 //! probability has c = 0.
 
-use super::probe::SweptVolume;
+use super::probe::{Contact, SweptVolume};
 use crate::robot::Finger;
 use crate::task::Zone;
 use nalgebra::{Point3, Vector2};
@@ -36,6 +36,10 @@ use std::cell::OnceCell;
 const BEYOND_A_FACE: f64 = 0.95;
 const LESS_AT_THE_RIM: f64 = 0.9;
 
+/// Difference of a contact's normal from the round hull's there, up to which it touched the hull.
+// heuristic: half a radian.
+const ROUND: f64 = 0.5;
+
 /// Number of evidence points along a missed hull; two and five perform the same.
 const MISS_PLACES: usize = 3;
 
@@ -44,6 +48,9 @@ const MISS_PLACES: usize = 3;
 pub struct SurfaceEvidence {
     /// For each contact, the target of the hull and the place of contact.
     contacts: Vec<[Vector2<f64>; 2]>,
+    /// Lateral part of each contact's normal, if measured.
+    #[serde(default)]
+    normals: Vec<Option<Vector2<f64>>>,
     /// Hull of each contact; of the last touch where it is not known.
     #[serde(default)]
     hulls: Vec<Option<Stadium>>,
@@ -58,6 +65,7 @@ impl SurfaceEvidence {
     pub(super) fn new(zone: &Zone) -> Self {
         Self {
             contacts: Vec::new(),
+            normals: Vec::new(),
             hulls: Vec::new(),
             misses: Vec::new(),
             hull: None,
@@ -65,11 +73,15 @@ impl SurfaceEvidence {
         }
     }
 
-    /// Adds a contact at `p_w` of a touch at `target`.
-    pub(super) fn add_contact(&mut self, target: &[f64], p_w: &Point3<f64>) {
+    /// Adds the contact of a touch at `target`.
+    pub(super) fn add_contact(&mut self, target: &[f64], contact: &Contact) {
         let target = flat(&self.zone.local(target, 0.0));
-        let contact = flat(&self.zone.x_wz().inverse_transform_point(p_w));
-        self.contacts.push([target, contact]);
+        let x_zw = self.zone.x_wz().inverse();
+        self.contacts.push([target, flat(&(x_zw * contact.p_wc))]);
+        let normal_z = x_zw * contact.normal_w;
+        let lateral = contact.has_normal.then(|| Vector2::new(normal_z.x, normal_z.z));
+        self.normals.resize(self.contacts.len() - 1, None);
+        self.normals.push(lateral);
         self.hulls.resize(self.contacts.len(), None);
     }
 
@@ -99,7 +111,10 @@ impl SurfaceEvidence {
             let hull = self.hulls.get(i).and_then(Option::as_ref).unwrap_or(hull);
             let inwards = hull.moved_to(*target).nearest(contact) - contact;
             let offset = inwards.norm() / hull.radius_m;
-            if offset > 0.0 {
+            // The face of a pad has other normals than the round hull, and shows no edge.
+            let normal = self.normals.get(i).copied().flatten();
+            let is_round = normal.is_none_or(|it| (it - inwards / hull.radius_m).norm() < ROUND);
+            if offset > 0.0 && is_round {
                 let share = BEYOND_A_FACE - LESS_AT_THE_RIM * offset.min(1.0).powi(2);
                 labels.push((contact + inwards / offset, share));
             }

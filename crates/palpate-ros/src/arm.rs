@@ -14,7 +14,7 @@ use super::ur::{TrajectoryStream, stoppable_share};
 use super::view::{MarkerArray, TFMessage};
 use palpate_explore::backend::interlock::check_start;
 use palpate_explore::backend::pace::{self, RealTimePacer};
-use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading, Sample};
+use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
 use palpate_explore::robot::arm::Chain;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
@@ -88,10 +88,15 @@ impl RosArm {
     /// Returns a backend on this arm; use one at a time.
     pub fn backend(self: &Arc<Self>) -> RosBackend {
         let period_s = 1.0 / self.settings().rate_hz;
-        let capabilities = Capabilities::simulated(&self.chain, period_s);
+        let capabilities = Capabilities {
+            resettable: false,
+            real_time: true,
+            tactile: self.settings().topics.tactile.message.is_of_biotac(),
+            ..Capabilities::simulated(&self.chain, period_s)
+        };
         RosBackend {
             lab: Arc::clone(self),
-            capabilities: Capabilities { resettable: false, real_time: true, ..capabilities },
+            capabilities,
             reading: Reading::default(),
             since: Instant::now(),
             pace: RealTimePacer::new(period_s),
@@ -215,7 +220,7 @@ impl RosArm {
                 return Err(refused.clone());
             }
             let state = |topic: &Topic| &heard.topics[*topic as usize];
-            let required = self.settings().profile.topics().iter().copied();
+            let required = self.settings().topics_of_arm();
             let missing: Vec<Topic> = required.filter(|topic| state(topic).at.is_none()).collect();
             if missing.is_empty() {
                 return Ok(());
@@ -283,7 +288,7 @@ impl RosArm {
         if let Some(words) = heard.status.as_ref().and_then(|status| status.refusal()) {
             return Err(LinkFault::Arm(words));
         }
-        for &topic in self.settings().profile.topics() {
+        for topic in self.settings().topics_of_arm() {
             let topics = &self.settings().topics;
             let state = &heard.topics[topic as usize];
             if self.settings().is_on_change(topic) {
@@ -441,7 +446,7 @@ impl RosBackend {
         qdot.clone_from(&heard.qdot);
         *wrench = heard.wrench.map(|wrench| wrench.moved(&self.lab.chain.tool.inverse()));
         samples.clear();
-        samples.extend(heard.frames.drain(..).map(Sample::BioTac));
+        samples.extend(heard.samples.drain(..));
         self.reading.time_s = time_s;
         Ok(())
     }
@@ -472,7 +477,7 @@ impl Backend for RosBackend {
             let mut heard = lab.mailbox.latest();
             heard.since = Some(self.since);
             heard.stream = TrajectoryStream::default();
-            heard.frames.clear();
+            heard.samples.clear();
             (heard.is_engaged, heard.is_ready) = (true, false);
         }
         if let Err(fault) = lab.engage() {

@@ -9,16 +9,15 @@ use super::tactile;
 use super::topics::{Endpoint, Service, Topic};
 use super::transport::{Delivery, Packet};
 use super::ur::{TrajectoryStream, UrState};
-use palpate_explore::backend::{LinkFault, Wrench, pace};
-use palpate_explore::robot::finger::Frame;
+use palpate_explore::backend::{LinkFault, Sample, Wrench, pace};
 use palpate_input::error::InputError;
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Largest number of unread tactile frames.
+/// Largest number of unread samples.
 // heuristic: two and a half batches of five per tenth of a second.
-const FRAMES_MAX: usize = 64;
+const SAMPLES_MAX: usize = 64;
 
 /// Number of periods without a command after which zero velocity is commanded.
 const SILENT_PERIODS: f64 = 1.5;
@@ -32,8 +31,8 @@ pub struct LatestMessages {
     pub qdot: Vec<f64>,
     /// Reading of the force/torque sensor, in its own frame.
     pub wrench: Option<Wrench>,
-    /// Unread tactile frames, oldest first, with the time of receipt since `since`, s.
-    pub frames: VecDeque<Frame>,
+    /// Unread samples of the fingertip, oldest first, with the time of receipt since `since`, s.
+    pub samples: VecDeque<Sample>,
     /// State of the arm.
     pub status: Option<ArmStatus>,
     /// The same as received from a UR.
@@ -55,7 +54,7 @@ pub struct LatestMessages {
     /// Whether the arm has been ready to move since it was engaged; from then on any status that
     /// forbids motion is a fault, however short.
     pub is_ready: bool,
-    /// Time origin of the tactile frames.
+    /// Time origin of the samples.
     pub since: Option<Instant>,
 }
 
@@ -231,19 +230,15 @@ impl TopicReceiver {
                 }
                 heard.speed_scale = scale;
             }
-            Packet::Hand(_) | Packet::Fingers(_) => {
+            Packet::Hand(_) | Packet::Fingers(_) | Packet::Touching(_) | Packet::Depth(_) => {
                 let since_s = |since| received.saturating_duration_since(since).as_secs_f64();
                 let time_s = heard.since.map_or(0.0, since_s);
                 let finger = self.settings.finger;
-                let Some(frame) = tactile::frame(packet, finger.into(), time_s) else {
-                    return Err(refuse(format!(
-                        "the message has no finger {finger} with 19 electrodes"
-                    )));
-                };
-                if heard.frames.len() == FRAMES_MAX {
-                    heard.frames.pop_front();
+                let sample = tactile::sample(packet, finger.into(), time_s).map_err(refuse)?;
+                if heard.samples.len() == SAMPLES_MAX {
+                    heard.samples.pop_front();
                 }
-                heard.frames.push_back(frame);
+                heard.samples.push_back(sample);
             }
             Packet::Command(_)
             | Packet::Velocities(_)

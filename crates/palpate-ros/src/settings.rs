@@ -3,7 +3,7 @@
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
 use super::profile::{Profile, Release};
-use super::topics::{CommandMessage, Topic, Topics};
+use super::topics::{CommandMessage, TactileMessage, Topic, Topics};
 use palpate_explore::backend::interlock::{FORMER_KEYS, InterlockSettings, StartCheckSettings};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
@@ -223,6 +223,13 @@ impl BackendSettings {
             let model = ArmModel::load(&arm.model).ok();
             self.topics.namespace = model.map(|model| model.namespace);
         }
+    }
+
+    /// Returns the topics that the arm publishes and without which it is not moved.
+    pub fn topics_of_arm(&self) -> impl Iterator<Item = Topic> {
+        let is_silent = self.topics.tactile.message == TactileMessage::None;
+        let all = self.profile.topics().iter().copied();
+        all.filter(move |topic| !(is_silent && *topic == Topic::Tactile))
     }
 
     /// Whether messages of `topic` are sent on change only, and kept for later readers.

@@ -1,10 +1,126 @@
-//! Conversion of tactile frames from and to the messages of the two drivers.
+//! Conversion of a fingertip's samples from and to the messages of their drivers.
 
-use super::message::{BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Header, Time};
+use super::definition::{Definition, HasDefinition, messages};
+use super::message::{BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Bool, Header, Time};
 use super::topics::TactileMessage;
 use super::transport::Packet;
+use palpate_explore::backend::Sample;
 use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRATIONS};
+use palpate_explore::robot::sensor::DepthImage;
+use serde::{Deserialize, Serialize};
+
+messages! {
+    /// An image.
+    sensor_msgs/Image {
+        /// Time and frame.
+        std_msgs/Header header,
+        /// Number of rows.
+        uint32 height,
+        /// Number of columns.
+        uint32 width,
+        /// Encoding of a pixel.
+        string encoding,
+        /// Whether numbers are big-endian.
+        uint8 is_bigendian,
+        /// Length of a row, bytes.
+        uint32 step,
+        /// Pixels, row by row.
+        uint8[] data,
+    }
+}
+
+/// `std_msgs/Bool`: whether a switch at the tip is closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Touching {
+    /// Value.
+    pub data: bool,
+}
+
+impl HasDefinition for Touching {
+    const DEFINITION: Definition = Bool::DEFINITION;
+}
+
+/// Encoding of a depth image: metres (REP 118).
+const DEPTHS: &str = "32FC1";
+
+impl Image {
+    /// Creates the message of a depth image.
+    pub fn of(image: &DepthImage, stamp_s: f64) -> Self {
+        let [width, height] = image.pixels.map(|count| count as u32);
+        Self {
+            header: Header::new(stamp_s, "P"),
+            height,
+            width,
+            encoding: DEPTHS.into(),
+            is_bigendian: 0,
+            step: 4 * width,
+            data: image.depths_m.iter().flat_map(|depth_m| depth_m.to_le_bytes()).collect(),
+        }
+    }
+
+    /// Returns the depth image, with the time `time_s`.
+    ///
+    /// # Errors
+    /// If the encoding is another, or the data are shorter than the image.
+    fn depths(&self, time_s: f64) -> Result<DepthImage, String> {
+        let Self { height, width, encoding, step, data, .. } = self;
+        if encoding != DEPTHS {
+            return Err(format!(
+                "encoding \"{encoding}\"; allowed is \"{DEPTHS}\", depths in metres"
+            ));
+        }
+        let (rows, columns) = (*height as usize, *width as usize);
+        let pitch = (*step as usize).max(4 * columns);
+        let is_whole = rows.checked_mul(pitch).is_some_and(|size| data.len() >= size);
+        if !is_whole || rows * columns == 0 {
+            let bytes = data.len();
+            return Err(format!("{width} by {height} pixels of step {step} in {bytes} bytes"));
+        }
+        let number = |bytes: &[u8]| {
+            let bytes = <[u8; 4]>::try_from(bytes).unwrap_or_default();
+            if self.is_bigendian == 0 {
+                f32::from_le_bytes(bytes)
+            } else {
+                f32::from_be_bytes(bytes)
+            }
+        };
+        let row = |row: &[u8]| row[..4 * columns].chunks_exact(4).map(number).collect::<Vec<_>>();
+        let depths_m = data.chunks_exact(pitch).take(rows).flat_map(row).collect();
+        Ok(DepthImage { time_s, pixels: [columns, rows], depths_m })
+    }
+}
+
+/// Reads the sample in a packet of the tactile topic, with the time `time_s`.
+///
+/// # Errors
+/// If the hand lacks this finger, its model differs, or it is no depth image.
+pub fn sample(packet: &Packet, finger: usize, time_s: f64) -> Result<Sample, String> {
+    match packet {
+        Packet::Touching(touching) => Ok(Sample::Flag(touching.data)),
+        Packet::Depth(image) => image.depths(time_s).map(Sample::Depth),
+        packet => frame(packet, finger, time_s)
+            .map(Sample::BioTac)
+            .ok_or_else(|| format!("the message has no finger {finger} with 19 electrodes")),
+    }
+}
+
+/// Returns the packet of a sample, if the topic's messages can have it.
+pub fn packet_of(
+    sample: &Sample,
+    stamp_s: f64,
+    finger: usize,
+    message: TactileMessage,
+) -> Option<Packet> {
+    match (sample, message) {
+        (Sample::BioTac(frame), TactileMessage::Hand | TactileMessage::Fingers) => {
+            Some(packet(frame, stamp_s, finger, message))
+        }
+        (Sample::Flag(data), TactileMessage::Flag) => Some(Touching { data: *data }.into()),
+        (Sample::Depth(image), TactileMessage::Depth) => Some(Image::of(image, stamp_s).into()),
+        _ => None,
+    }
+}
 
 /// Reads the frame of a finger from a packet of the tactile topic, with the time `time_s`. Returns
 /// `None` if the hand lacks this finger, or its model differs.

@@ -5,6 +5,7 @@ use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
     JointTrajectory, RobotMode, SafetyMode, WrenchStamped,
 };
+use super::tactile::{Image, Touching};
 use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
@@ -110,7 +111,7 @@ const USUAL: [(&str, f64); 5] = [
     ("joint_velocity_cmd", 0.03),
 ];
 
-/// Message type of tactile frames.
+/// Message type of the fingertip's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TactileMessage {
     /// Message of the BioTac's own driver.
@@ -120,6 +121,22 @@ pub enum TactileMessage {
     /// Message of a Shadow hand.
     #[serde(rename = "sr_robot_msgs/msg/BiotacAll")]
     Fingers,
+    /// Whether a switch at the tip is closed, for `sensor.kind = "contact"`.
+    #[serde(rename = "std_msgs/msg/Bool")]
+    Flag,
+    /// Depths of a pad in metres, `32FC1`, for `sensor.kind = "depth_patch"`.
+    #[serde(rename = "sensor_msgs/msg/Image")]
+    Depth,
+    /// No samples: a force/torque sensor alone locates or detects the contacts.
+    #[serde(rename = "none")]
+    None,
+}
+
+impl TactileMessage {
+    /// Whether it has the channels of a BioTac.
+    pub fn is_of_biotac(self) -> bool {
+        matches!(self, Self::Hand | Self::Fingers)
+    }
 }
 
 /// Message type of commands.
@@ -222,6 +239,9 @@ impl Topics {
             Topic::Tactile => match self.tactile.message {
                 TactileMessage::Hand => BioTacHand::DEFINITION.name,
                 TactileMessage::Fingers => BiotacAll::DEFINITION.name,
+                TactileMessage::Flag => Touching::DEFINITION.name,
+                TactileMessage::Depth => Image::DEFINITION.name,
+                TactileMessage::None => "none",
             },
             Topic::Status => DiagnosticArray::DEFINITION.name,
             Topic::Command => match self.command.message {

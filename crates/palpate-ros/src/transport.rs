@@ -4,6 +4,7 @@ use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
     JointTrajectory, RobotMode, SafetyMode, Time, TriggerResponse, WrenchStamped,
 };
+use super::tactile::{Image, Touching};
 use super::topics::{Service, Topic};
 use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::error::InputError;
@@ -58,6 +59,10 @@ packets! {
     Hand(Box<BioTacHand>): BioTacHand on Tactile,
     /// Tactile frame of a Shadow hand.
     Fingers(Box<BiotacAll>): BiotacAll on Tactile,
+    /// Whether a switch at the tip is closed.
+    Touching(Touching): Touching on Tactile,
+    /// Depths of a pad.
+    Depth(Box<Image>): Image on Tactile,
     /// State of the arm.
     Status(DiagnosticArray): DiagnosticArray on Status,
     /// Mode of a Universal Robots arm.
@@ -88,9 +93,11 @@ impl Packet {
             Self::Wrench(message) => &mut message.header,
             Self::Hand(message) => &mut message.header,
             Self::Fingers(message) => &mut message.header,
+            Self::Depth(message) => &mut message.header,
             Self::Status(message) => &mut message.header,
             Self::Command(message) => &mut message.header,
-            Self::RobotMode(_)
+            Self::Touching(_)
+            | Self::RobotMode(_)
             | Self::SafetyMode(_)
             | Self::ProgramRunning(_)
             | Self::SpeedScaling(_)

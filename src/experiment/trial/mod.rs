@@ -150,7 +150,7 @@ fn run_touches(
             contact: contact.map(|contact| contact.p_wc.coords.into()),
             overload: touch == Touch::Overload,
             normal: contact
-                .filter(|contact| writes_normals || contact.sd_m.is_some())
+                .filter(|contact| contact.has_normal && (writes_normals || contact.sd_m.is_some()))
                 .map(|contact| contact.normal_w.into()),
             contact_sd_m: contact.and_then(|contact| contact.sd_m),
             patch: contact.map(TouchRow::patch_of).unwrap_or_default(),

@@ -49,7 +49,7 @@ pub struct TouchRow {
     /// Whether the touch was aborted: force limit exceeded, or contact not located.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub overload: bool,
-    /// Contact normal in `W`; written if the belief uses it.
+    /// Contact normal in `W`; written if it was measured and the belief uses it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
     /// Standard deviation of the contact along its normal, as the sensor states it.
@@ -166,12 +166,14 @@ impl TrialRow {
 impl TouchRow {
     /// Returns the contact; `normal_w` replaces a normal that was not written.
     pub fn contact(&self, normal_w: Option<Vector3<f64>>) -> Option<Contact> {
+        let has_normal = self.normal.is_some();
         let normal_w = self.normal.map(Vector3::from).or(normal_w)?;
         let further = |[x, y, z, a, b, c, sd_m]: &[f64; 7]| Contact {
             sd_m: Some(*sd_m),
             ..Contact::new(Point3::new(*x, *y, *z), Vector3::new(*a, *b, *c))
         };
         Some(Contact {
+            has_normal,
             sd_m: self.contact_sd_m,
             patch: self.patch.iter().map(further).collect(),
             ..Contact::new(self.contact?.into(), normal_w)

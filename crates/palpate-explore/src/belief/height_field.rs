@@ -103,9 +103,9 @@ impl HeightField {
         self.has_missed = *touch == Touch::Miss;
         let reached = match touch {
             Touch::Contact(contact) => {
-                self.presence.add_contact(target, &contact.p_wc);
+                self.presence.add_contact(target, contact);
                 for (i, point) in contact.points().enumerate() {
-                    let slope = self.slope(&point.normal_w);
+                    let slope = self.slope(&point.normal_w).filter(|_| point.has_normal);
                     let slope =
                         slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
                     let place = self.zone.place(&point.p_wc);

@@ -28,6 +28,9 @@ pub struct Contact {
     pub p_wc: Point3<f64>,
     /// Unit normal in `W`, from the surface towards the finger.
     pub normal_w: Vector3<f64>,
+    /// Whether the normal was measured; otherwise it points against the approach.
+    #[serde(default = "has_normal")]
+    pub has_normal: bool,
     /// Standard deviation of the surface along the normal, m, if the sensor states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd_m: Option<f64>,
@@ -36,10 +39,15 @@ pub struct Contact {
     pub patch: Vec<Contact>,
 }
 
+/// Returns the flag of a stored contact without one: its normal was measured.
+fn has_normal() -> bool {
+    true
+}
+
 impl Contact {
     /// Creates a contact without a statement about its error.
     pub fn new(p_wc: Point3<f64>, normal_w: Vector3<f64>) -> Self {
-        Self { p_wc, normal_w, sd_m: None, patch: Vec::new() }
+        Self { p_wc, normal_w, has_normal: true, sd_m: None, patch: Vec::new() }
     }
 
     /// Creates a contact from what a sensor has located with the fingertip at `x_wt`.
@@ -47,6 +55,7 @@ impl Contact {
         Self {
             p_wc: x_wt * sensed.p_tc,
             normal_w: x_wt.rotation * sensed.normal_t,
+            has_normal: sensed.has_normal,
             sd_m: sensed.sd_m(),
             patch: sensed.patch.iter().map(|further| Self::sensed(x_wt, further)).collect(),
         }

@@ -24,8 +24,8 @@ pub struct TouchSettings {
     pub detection: Detection,
     /// Force threshold of contact, N, without a pressure sensor or as `detection.by` selects.
     pub detection_n: f64,
-    /// Distance that a soft finger or a pad, or a finger of a real robot without a tactile sensor, is pressed
-    /// beyond the point of detection for reading, m.
+    /// Distance that a soft finger or a pad, or a finger of a real robot without a tactile sensor,
+    /// is pressed beyond the point of detection for reading, m.
     pub press_m: f64,
     /// Time at rest on the object before reading, s.
     pub settle_s: f64,

@@ -118,10 +118,11 @@ impl TouchEvidence {
         noise_m: f64,
     ) -> Observations {
         let mut all = Observations::new(3);
-        for Contact { p_wc: p_w, normal_w, sd_m, .. } in &self.contacts {
+        for Contact { p_wc: p_w, normal_w, has_normal, sd_m, .. } in &self.contacts {
             let field = prior.field(p_w);
             let gradient = normal_w - field.gradient;
-            let slope = normals.then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
+            let slope = (normals && *has_normal)
+                .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
             let place = p_w.coords.as_slice();
             let noise = sd_m.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
             all.push(&Observation { place, height: -field.value, noise, slope });

@@ -170,10 +170,12 @@ pub struct TickMessage<'a> {
     /// Tactile frames of the reading.
     #[serde(with = "frames")]
     pub frames: Cow<'a, [Frame]>,
-    /// Slip state of each of the same frames. It is the last field, so that recordings without it
-    /// are prefixes of such a message.
+    /// Slip state of each of the same frames. Recordings without it and what follows are prefixes
+    /// of such a message.
     #[serde(with = "slips")]
     pub slips: Cow<'a, [Frame]>,
+    /// Samples of other sensors, as JSON; or empty. Recordings without it are prefixes, too.
+    pub samples: Cow<'a, str>,
 }
 
 /// Defines the fields of a tick with `more` at their end.
@@ -202,7 +204,8 @@ impl HasDefinition for TickMessage<'_> {
         name: "palpate_msgs/msg/Tick",
         fields: fields!(
             "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
-             uint8[] slips\n"
+             uint8[] slips\n",
+            "# Samples of other sensors, as JSON; or empty.\nstring samples\n"
         ),
         parts: &[&Definition {
             name: "palpate_msgs/msg/Frame",
@@ -215,7 +218,16 @@ impl HasDefinition for TickMessage<'_> {
 }
 
 impl TickMessage<'_> {
-    /// A tick of a recording without slip states.
+    /// A tick of a recording without samples of other sensors.
+    pub(super) const WITHOUT_SAMPLES: Definition = Definition {
+        fields: fields!(
+            "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
+             uint8[] slips\n"
+        ),
+        ..Self::DEFINITION
+    };
+
+    /// A tick of a recording without slip states either.
     pub(super) const WITHOUT_SLIPS: Definition =
         Definition { fields: fields!(), ..Self::DEFINITION };
 }
@@ -226,10 +238,12 @@ pub(super) struct LoadBuffer {
     wrench: Option<[f64; 6]>,
     ideal: Option<[f64; 7]>,
     frames: Vec<Frame>,
+    /// Other samples, as JSON.
+    samples: String,
 }
 
 impl LoadBuffer {
-    /// Copies the loads and frames of `reading`, without allocating.
+    /// Copies the loads and samples of `reading`; frames without allocating.
     pub(super) fn take(&mut self, reading: &Reading) {
         self.wrench = reading
             .wrench
@@ -240,6 +254,12 @@ impl LoadBuffer {
             });
         self.frames.clear();
         self.frames.extend(reading.frames().cloned());
+        self.samples.clear();
+        let is_other = |sample: &&Sample| !matches!(sample, Sample::BioTac(_) | Sample::Ideal(_));
+        let others: Vec<&Sample> = reading.samples.iter().filter(is_other).collect();
+        if !others.is_empty() {
+            self.samples = serde_json::to_string(&others).unwrap_or_default();
+        }
     }
 }
 
@@ -255,6 +275,7 @@ impl<'a> TickMessage<'a> {
             ideal: loads.ideal.as_ref().map_or(&[][..], |all| all).into(),
             frames: Cow::Borrowed(&loads.frames),
             slips: Cow::Borrowed(&loads.frames),
+            samples: (&*loads.samples).into(),
             ..self
         }
     }
@@ -279,7 +300,9 @@ impl<'a> TickMessage<'a> {
                 force_n: Vector3::new(a, b, c),
                 torque_nm: Vector3::new(d, e, f),
             }),
-            samples: frames.into_iter().map(Sample::BioTac).chain(ideal).collect(),
+            samples: (frames.into_iter().map(Sample::BioTac).chain(ideal))
+                .chain(serde_json::from_str::<Vec<Sample>>(&self.samples).unwrap_or_default())
+                .collect(),
             applied: Command { qdot: self.applied.into_owned() },
         };
     }

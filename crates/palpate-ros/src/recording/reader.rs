@@ -156,13 +156,24 @@ enum Entry {
 /// Decodes a message.
 type Decode = fn(&[u8]) -> Option<Entry>;
 
-/// Definitions of the messages that are read, with their decoders. The slips of a tick are its last
-/// field, so that a tick without them is the prefix of one with an empty list of them.
-const DECODERS: [(Definition, Decode); 3] = [
+/// Definitions of the messages that are read, with their decoders. Slips and samples of a tick are
+/// its last fields, so that a tick without them is the prefix of one where they are empty.
+const DECODERS: [(Definition, Decode); 4] = [
     (TickMessage::DEFINITION, |data| decoded(data).map(Entry::Tick)),
-    (TickMessage::WITHOUT_SLIPS, |data| decoded(&[data, &EMPTY_LIST].concat()).map(Entry::Tick)),
+    (TickMessage::WITHOUT_SAMPLES, |data| decoded(&without_samples(data)).map(Entry::Tick)),
+    (TickMessage::WITHOUT_SLIPS, |data| {
+        decoded(&without_samples(&[data, &EMPTY_LIST].concat())).map(Entry::Tick)
+    }),
     (TouchMessage::DEFINITION, |data| decoded(data).map(Entry::Touch)),
 ];
+
+/// Appends an empty string, which is aligned to its length and ends with a zero.
+fn without_samples(data: &[u8]) -> Vec<u8> {
+    let mut whole = data.to_vec();
+    whole.resize(data.len().next_multiple_of(4), 0);
+    whole.extend([1, 0, 0, 0, 0]);
+    whole
+}
 
 /// Encoding of an empty list: its length; the lists before it keep it aligned.
 const EMPTY_LIST: [u8; 4] = [0; 4];

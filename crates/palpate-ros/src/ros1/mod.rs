@@ -8,6 +8,7 @@ use crate::message::{
     TriggerResponse, WrenchStamped,
 };
 use crate::settings::BackendSettings;
+use crate::tactile::{Image, Touching};
 use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic, Topics};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
@@ -104,6 +105,13 @@ impl Ros1 {
         match self.topics.tactile.message {
             TactileMessage::Fingers => self.headed::<BiotacAll>(side, Topic::Tactile)?,
             TactileMessage::Hand => self.headed::<BioTacHand>(side, Topic::Tactile)?,
+            TactileMessage::Depth => self.headed::<Image>(side, Topic::Tactile)?,
+            TactileMessage::None => (),
+            TactileMessage::Flag => {
+                self.topic::<Touching>(side, Topic::Tactile, Into::into, |packet| {
+                    Touching::in_packet(packet).copied()
+                })?;
+            }
         }
         match self.topics.command.message {
             CommandMessage::Velocities => {

@@ -40,6 +40,9 @@ ros1! {
         "biotac_sensors/BioTacHand", "d96f900cbfb096d61de125081e11dcab";
     SequencedMessage<BiotacAll>: BiotacAll =
         "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37";
+    SequencedMessage<Image>: Image =
+        "sensor_msgs/Image", "060021388200f6f0f447d0fcd9c64743";
+    Touching: Touching = "std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a";
     SequencedMessage<DiagnosticArray>: DiagnosticArray =
         "diagnostic_msgs/DiagnosticArray", "60810da900de1dd6ddd437c3503511da";
     SequencedMessage<JointTrajectory>: JointTrajectory =

@@ -10,6 +10,7 @@ use crate::message::{
 };
 use crate::network::network;
 use crate::settings::{BackendSettings, MappingKind};
+use crate::tactile::{Image, Touching};
 use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
@@ -127,14 +128,17 @@ impl Ros2 {
 
     fn topics(&mut self) -> Result<(), InputError> {
         let tactile = self.settings.topics.tactile.message;
-        for &topic in self.settings.profile.topics() {
+        for topic in self.settings.clone().topics_of_arm() {
             match topic {
                 Topic::Joints => self.topic::<JointState>(topic)?,
                 Topic::Wrench => self.topic::<WrenchStamped>(topic)?,
-                Topic::Tactile if tactile == TactileMessage::Fingers => {
-                    self.topic::<BiotacAll>(topic)?;
-                }
-                Topic::Tactile => self.topic::<BioTacHand>(topic)?,
+                Topic::Tactile => match tactile {
+                    TactileMessage::Fingers => self.topic::<BiotacAll>(topic)?,
+                    TactileMessage::Hand => self.topic::<BioTacHand>(topic)?,
+                    TactileMessage::Flag => self.topic::<Touching>(topic)?,
+                    TactileMessage::Depth => self.topic::<Image>(topic)?,
+                    TactileMessage::None => (),
+                },
                 Topic::Status => {
                     self.topic::<DiagnosticArray>(topic)?;
                     if self.side == Endpoint::Explorer {

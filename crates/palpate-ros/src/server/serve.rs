@@ -340,8 +340,9 @@ impl SimulatedRobotServer {
             }
         }
         let (finger, message) = (self.settings.finger.into(), self.settings.topics.tactile.message);
-        for frame in reading.frames() {
-            self.send(tactile::packet(frame, stamp_s, finger, message), now_s);
+        for sample in &reading.samples {
+            let packet = tactile::packet_of(sample, stamp_s, finger, message);
+            packet.into_iter().for_each(|packet| self.send(packet, now_s));
         }
     }
 

@@ -1,7 +1,12 @@
 //! Tests of the message definitions against the standard ones.
 
+use palpate_explore::backend::Sample;
+use palpate_explore::robot::sensor::DepthImage;
 use palpate_ros::definition::{Definition, HasDefinition};
 use palpate_ros::message::*;
+use palpate_ros::tactile::{Image, Touching, packet_of, sample};
+use palpate_ros::topics::TactileMessage;
+use palpate_ros::transport::Packet;
 use std::collections::BTreeMap;
 
 /// Types of fields that are not messages.
@@ -58,6 +63,8 @@ fn every_message_has_the_fields_of_its_standard_definition() {
         BioTacData::DEFINITION,
         BioTacTime::DEFINITION,
         BioTacHand::DEFINITION,
+        Image::DEFINITION,
+        Touching::DEFINITION,
         Biotac::DEFINITION,
         BiotacAll::DEFINITION,
     ];
@@ -105,4 +112,38 @@ fn a_schema_has_the_definition_of_each_of_its_parts_once() {
 fn defaults_are_those_of_the_definitions() {
     let Quaternion { x, y, z, w } = Marker::default().pose.orientation;
     assert_eq!([x, y, z, w], [0.0, 0.0, 0.0, 1.0]);
+}
+
+/// Depth images and flags arrive as they were sent; another encoding, or too few bytes, is refused.
+#[test]
+fn samples_survive_their_messages() {
+    let image =
+        DepthImage { time_s: 2.0, pixels: [3, 2], depths_m: vec![0.0, 1e-3, -2e-6, 0.5, 1.0, 7.0] };
+    for (sent, message) in [
+        (Sample::Depth(image.clone()), TactileMessage::Depth),
+        (Sample::Flag(true), TactileMessage::Flag),
+    ] {
+        let packet = packet_of(&sent, 1.0, 0, message).unwrap();
+        assert_eq!(sample(&packet, 0, 2.0), Ok(sent.clone()));
+        assert_eq!(packet_of(&sent, 1.0, 0, TactileMessage::Hand), None);
+        assert_eq!(packet_of(&sent, 1.0, 0, TactileMessage::None), None);
+    }
+    let mut message = Image::of(&image, 1.0);
+    let turned = message.data.chunks_exact(4).flat_map(|bytes| bytes.iter().rev().copied());
+    message.data = turned.collect();
+    message.is_bigendian = 1;
+    assert_eq!(sample(&message.clone().into(), 0, 2.0), Ok(Sample::Depth(image)));
+    let wrong: [fn(&mut Image); 4] = [
+        |it| it.encoding = "16UC1".into(),
+        |it| it.height = 3,
+        |it| it.width = u32::MAX,
+        |it| it.width = 0,
+    ];
+    for spoil in wrong {
+        let mut spoilt = message.clone();
+        spoil(&mut spoilt);
+        let refused = sample(&Packet::from(spoilt), 0, 2.0).unwrap_err();
+        println!("{refused}");
+        assert!(refused.contains("32FC1") || refused.contains("pixels"));
+    }
 }

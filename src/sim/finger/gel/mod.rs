@@ -31,7 +31,7 @@ pub struct Gel {
     pad: GelPad,
     x_tp: Isometry3<f64>,
     space: HalfSpace,
-    /// What carries the pad: a rigid hull behind it.
+    /// Rigid hull behind the pad, which carries it.
     core: RigidTipEffect,
     hull: Finger,
 }

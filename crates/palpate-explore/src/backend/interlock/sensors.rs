@@ -1,7 +1,7 @@
 //! Sensor interlocks: timeouts, and implausible electrode values.
 
 use super::interlock::{Interlock, InterlockEntry, RobotState};
-use crate::backend::{Reading, Trip};
+use crate::backend::{Reading, Sample, Trip};
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
 
@@ -54,7 +54,7 @@ impl Interlock for SensorTimeout {
         let news = [
             reading.time_s > self.time_s || self.heard[0].is_none(),
             reading.wrench.is_some() && is_new,
-            reading.frames().next().is_some(),
+            reading.samples.iter().any(|sample| !matches!(sample, Sample::Ideal(_))),
         ];
         (self.time_s, self.force_n) = (reading.time_s, force_n);
         for (i, (heard, is_news)) in self.heard.iter_mut().zip(news).enumerate() {

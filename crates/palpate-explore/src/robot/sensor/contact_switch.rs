@@ -28,6 +28,7 @@ pub(super) fn foremost(finger: &Finger, doubt: Option<Doubt>) -> SensedContact {
     SensedContact {
         p_tc: (ahead_t * finger.radius_m).into(),
         normal_t: -ahead_t,
+        has_normal: false,
         covariance_t: Some(spread * finger.radius_m.powi(2)),
         doubt,
         patch: Vec::new(),

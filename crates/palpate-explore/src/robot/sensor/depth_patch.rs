@@ -1,26 +1,13 @@
 //! Elastomer pad seen by a camera from inside: a depth image gives a patch of the surface.
 
 use super::doubt::Doubt;
-use super::sample::{Sample, Wrench};
+use super::sample::{DepthImage, Sample, Wrench};
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 use nalgebra::{
     Isometry3, Matrix3, Matrix6, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector2, Vector3,
     Vector6,
 };
-use serde::{Deserialize, Serialize};
-
-/// Indentation of a pad at every pixel of its camera.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct DepthImage {
-    /// Sampling time since reset, s.
-    pub time_s: f64,
-    /// Numbers of pixels along width and height.
-    pub pixels: [usize; 2],
-    /// Indentations, rows along the width from the corner of smallest x and y; not finite where the
-    /// camera sees nothing.
-    pub depths_m: Vec<f32>,
-}
 
 /// A pad at the end of the finger: its middle touches the hull's foremost point, and it faces the
 /// approach. Its frame `P` has its origin there, x along the width, which is y of `T`, and z
@@ -268,6 +255,7 @@ impl DepthPatch {
         SensedContact {
             p_tc: self.x_tp * Point3::new(x, y, z),
             normal_t,
+            has_normal: true,
             covariance_t: Some(along * variance_m2 + across),
             doubt,
             patch: Vec::new(),

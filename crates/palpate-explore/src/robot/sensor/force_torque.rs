@@ -248,6 +248,7 @@ impl Sensor for ForceTorqueTip {
         Ok(SensedContact {
             p_tc,
             normal_t: -normal,
+            has_normal: true,
             covariance_t: Some(across + normal * normal.transpose() * offset_m.powi(2)),
             doubt,
             patch: Vec::new(),

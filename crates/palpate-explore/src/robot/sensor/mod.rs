@@ -11,11 +11,11 @@ mod settings;
 
 pub use biotac::BioTac;
 pub use contact_switch::ContactSwitch;
-pub use depth_patch::{DepthImage, DepthPatch, GelPad};
+pub use depth_patch::{DepthPatch, GelPad};
 pub use doubt::Doubt;
 pub use force_torque::{ForceTorqueTip, point_on_hull};
 pub use ideal::IdealSensor;
-pub use sample::{Channels, IdealContact, Sample, Wrench};
+pub use sample::{Channels, DepthImage, IdealContact, Sample, Wrench};
 pub use settings::{SensorKind, SensorSettings, WrenchAccuracy};
 
 use super::finger::Finger;
@@ -28,6 +28,8 @@ pub struct SensedContact {
     pub p_tc: Point3<f64>,
     /// Unit normal of the object there, from the object towards the finger.
     pub normal_t: Vector3<f64>,
+    /// Whether the normal was measured; otherwise it points against the approach.
+    pub has_normal: bool,
     /// Covariance of the point, m²; `None` if the sensor does not state it.
     pub covariance_t: Option<Matrix3<f64>>,
     /// Reason why the contact is less certain than usual.
@@ -39,7 +41,14 @@ pub struct SensedContact {
 impl SensedContact {
     /// Creates a contact without a statement about its error.
     pub fn new(p_tc: Point3<f64>, normal_t: Vector3<f64>) -> Self {
-        Self { p_tc, normal_t, covariance_t: None, doubt: None, patch: Vec::new() }
+        Self {
+            p_tc,
+            normal_t,
+            has_normal: true,
+            covariance_t: None,
+            doubt: None,
+            patch: Vec::new(),
+        }
     }
 
     /// Standard deviation of the surface along its normal, m, if the covariance is known.

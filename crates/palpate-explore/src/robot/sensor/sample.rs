@@ -1,9 +1,8 @@
 //! Samples: messages of the fingertip sensors of a backend.
 
-use super::depth_patch::DepthImage;
 use crate::robot::finger::Frame;
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// One message of a fingertip sensor.
 // Few samples exist at once, and none is moved in a tick; a box would allocate in each tick.
@@ -23,12 +22,36 @@ pub enum Sample {
     Channels(Channels),
 }
 
+/// Indentation of a pad at every pixel of its camera.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DepthImage {
+    /// Sampling time since reset, s.
+    pub time_s: f64,
+    /// Numbers of pixels along width and height.
+    pub pixels: [usize; 2],
+    /// Indentations, rows along the width from the corner of smallest x and y; not finite where the
+    /// camera sees nothing.
+    #[serde(deserialize_with = "with_holes")]
+    pub depths_m: Vec<f32>,
+}
+
+/// Reads numbers; JSON has none that is not finite.
+fn with_holes<'de, D, T>(from: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + From<f32>,
+{
+    let numbers = Vec::<Option<T>>::deserialize(from)?;
+    Ok(numbers.into_iter().map(|number| number.unwrap_or_else(|| f32::NAN.into())).collect())
+}
+
 /// Channels of a custom sensor, interpreted by the program that adds it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Channels {
     /// Sampling time since reset, s.
     pub time_s: f64,
     /// One value per channel.
+    #[serde(deserialize_with = "with_holes")]
     pub values: Vec<f64>,
 }
 
