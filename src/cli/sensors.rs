@@ -18,14 +18,12 @@ use std::sync::atomic::Ordering;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate sensors container                          every sensor on the container
+  palpate sensors container
   palpate sensors bird --sensor biotac --sensor gelsight_mini --set trials=50
-  palpate sensors container bird experiments/suite/six.toml --out runs/sensors
-                                                     the table over eight objects
+  palpate sensors container bird experiments/suite/six.toml
 
-Runs the first planner of each experiment with every sensor on a kinematic stage: same object, initial touches and \
-belief. Prints the error, the touches to the first sensor's error, robot time and cost; writes sensors.csv, sensors.html \
-and the figure sensors.svg. Ctrl-C keeps the finished objects.")]
+Same object, planner, initial touches and belief. Writes sensors.csv, sensors.html and sensors.svg. Ctrl-C keeps the \
+finished objects.")]
 pub(super) struct Args {
     /// Experiments over zones, or names of some in experiments/.
     #[arg(required = true)]

@@ -36,10 +36,6 @@ use std::cell::OnceCell;
 const BEYOND_A_FACE: f64 = 0.95;
 const LESS_AT_THE_RIM: f64 = 0.9;
 
-/// Difference of a contact's normal from the round hull's there, up to which it touched the hull.
-// heuristic: half a radian.
-const ROUND: f64 = 0.5;
-
 /// Number of evidence points along a missed hull; two and five perform the same.
 const MISS_PLACES: usize = 3;
 
@@ -48,9 +44,10 @@ const MISS_PLACES: usize = 3;
 pub struct SurfaceEvidence {
     /// For each contact, the target of the hull and the place of contact.
     contacts: Vec<[Vector2<f64>; 2]>,
-    /// Lateral part of each contact's normal, if measured.
+    /// Whether each was made by a pad, whose face can touch beside the hull's middle without an
+    /// edge.
     #[serde(default)]
-    normals: Vec<Option<Vector2<f64>>>,
+    on_pad: Vec<bool>,
     /// Hull of each contact; of the last touch where it is not known.
     #[serde(default)]
     hulls: Vec<Option<Stadium>>,
@@ -65,7 +62,7 @@ impl SurfaceEvidence {
     pub(super) fn new(zone: &Zone) -> Self {
         Self {
             contacts: Vec::new(),
-            normals: Vec::new(),
+            on_pad: Vec::new(),
             hulls: Vec::new(),
             misses: Vec::new(),
             hull: None,
@@ -78,10 +75,8 @@ impl SurfaceEvidence {
         let target = flat(&self.zone.local(target, 0.0));
         let x_zw = self.zone.x_wz().inverse();
         self.contacts.push([target, flat(&(x_zw * contact.p_wc))]);
-        let normal_z = x_zw * contact.normal_w;
-        let lateral = contact.has_normal.then(|| Vector2::new(normal_z.x, normal_z.z));
-        self.normals.resize(self.contacts.len() - 1, None);
-        self.normals.push(lateral);
+        self.on_pad.resize(self.contacts.len() - 1, false);
+        self.on_pad.push(!contact.patch.is_empty());
         self.hulls.resize(self.contacts.len(), None);
     }
 
@@ -111,10 +106,8 @@ impl SurfaceEvidence {
             let hull = self.hulls.get(i).and_then(Option::as_ref).unwrap_or(hull);
             let inwards = hull.moved_to(*target).nearest(contact) - contact;
             let offset = inwards.norm() / hull.radius_m;
-            // The face of a pad has other normals than the round hull, and shows no edge.
-            let normal = self.normals.get(i).copied().flatten();
-            let is_round = normal.is_none_or(|it| (it - inwards / hull.radius_m).norm() < ROUND);
-            if offset > 0.0 && is_round {
+            let is_on_pad = self.on_pad.get(i).copied().unwrap_or(false);
+            if offset > 0.0 && !is_on_pad {
                 let share = BEYOND_A_FACE - LESS_AT_THE_RIM * offset.min(1.0).powi(2);
                 labels.push((contact + inwards / offset, share));
             }

@@ -105,6 +105,24 @@ messages! {
         bool data,
     }
 
+    /// An image.
+    sensor_msgs/Image {
+        /// Time and frame.
+        std_msgs/Header header,
+        /// Number of rows.
+        uint32 height,
+        /// Number of columns.
+        uint32 width,
+        /// Encoding of a pixel.
+        string encoding,
+        /// Whether numbers are big-endian.
+        uint8 is_bigendian,
+        /// Length of a row, bytes.
+        uint32 step,
+        /// Pixels, row by row.
+        uint8[] data,
+    }
+
     /// A number.
     #[derive(Copy)]
     std_msgs/Float64 {
@@ -442,6 +460,17 @@ messages! {
         /// Description of the result or the error.
         string message,
     }
+}
+
+/// `std_msgs/Bool`: whether a switch at the tip is closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Touching {
+    /// Value.
+    pub data: bool,
+}
+
+impl HasDefinition for Touching {
+    const DEFINITION: Definition = Bool::DEFINITION;
 }
 
 const NANO: f64 = 1e9;

@@ -1,45 +1,14 @@
 //! Conversion of a fingertip's samples from and to the messages of their drivers.
 
-use super::definition::{Definition, HasDefinition, messages};
-use super::message::{BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Bool, Header, Time};
+use super::message::{
+    BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Header, Image, Time, Touching,
+};
 use super::topics::TactileMessage;
 use super::transport::Packet;
 use palpate_explore::backend::Sample;
 use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRATIONS};
 use palpate_explore::robot::sensor::DepthImage;
-use serde::{Deserialize, Serialize};
-
-messages! {
-    /// An image.
-    sensor_msgs/Image {
-        /// Time and frame.
-        std_msgs/Header header,
-        /// Number of rows.
-        uint32 height,
-        /// Number of columns.
-        uint32 width,
-        /// Encoding of a pixel.
-        string encoding,
-        /// Whether numbers are big-endian.
-        uint8 is_bigendian,
-        /// Length of a row, bytes.
-        uint32 step,
-        /// Pixels, row by row.
-        uint8[] data,
-    }
-}
-
-/// `std_msgs/Bool`: whether a switch at the tip is closed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Touching {
-    /// Value.
-    pub data: bool,
-}
-
-impl HasDefinition for Touching {
-    const DEFINITION: Definition = Bool::DEFINITION;
-}
 
 /// Encoding of a depth image: metres (REP 118).
 const DEPTHS: &str = "32FC1";

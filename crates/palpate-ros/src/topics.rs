@@ -2,10 +2,9 @@
 
 use super::definition::HasDefinition;
 use super::message::{
-    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
-    JointTrajectory, RobotMode, SafetyMode, WrenchStamped,
+    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
+    JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
 };
-use super::tactile::{Image, Touching};
 use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;

@@ -1,10 +1,9 @@
 //! Packets, and the transports that carry them: ROS 2, ROS 1, or a channel for tests.
 
 use super::message::{
-    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
-    JointTrajectory, RobotMode, SafetyMode, Time, TriggerResponse, WrenchStamped,
+    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
+    JointTrajectory, RobotMode, SafetyMode, Time, Touching, TriggerResponse, WrenchStamped,
 };
-use super::tactile::{Image, Touching};
 use super::topics::{Service, Topic};
 use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::error::InputError;

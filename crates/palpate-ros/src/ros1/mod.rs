@@ -7,8 +7,8 @@ use crate::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     TriggerResponse, WrenchStamped,
 };
+use crate::message::{Image, Touching};
 use crate::settings::BackendSettings;
-use crate::tactile::{Image, Touching};
 use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic, Topics};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,

@@ -8,9 +8,9 @@ use crate::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
     JointTrajectory, RobotMode, SafetyMode, TriggerResponse, WrenchStamped,
 };
+use crate::message::{Image, Touching};
 use crate::network::network;
 use crate::settings::{BackendSettings, MappingKind};
-use crate::tactile::{Image, Touching};
 use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,

@@ -4,7 +4,7 @@ use palpate_explore::backend::Sample;
 use palpate_explore::robot::sensor::DepthImage;
 use palpate_ros::definition::{Definition, HasDefinition};
 use palpate_ros::message::*;
-use palpate_ros::tactile::{Image, Touching, packet_of, sample};
+use palpate_ros::tactile::{packet_of, sample};
 use palpate_ros::topics::TactileMessage;
 use palpate_ros::transport::Packet;
 use std::collections::BTreeMap;

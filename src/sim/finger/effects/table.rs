@@ -10,7 +10,8 @@ macro_rules! effects {
         #[serde(default, deny_unknown_fields)]
         pub struct Effects {
             /// Constants of the sensor: `"biotac"`, `"ati_gamma"`, `"ati_mini40"`, `"ur5e"`,
-            /// `"fr3"`, `"gelsight_mini"`, `"digit"`, a file like `models/biotac.toml`, or a table of constants that differ.
+            /// `"fr3"`, `"gelsight_mini"`, `"digit"`, a file like `models/biotac.toml`, or a table
+            /// of constants that differ.
             ///
             /// Reading a scene copies them into the effects.
             pub sensor: Option<String>,

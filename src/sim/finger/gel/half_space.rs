@@ -2,9 +2,9 @@
 //!
 //! A uniform pressure on one cell displaces the surface by Love's formula (Love 1929; Johnson 1985,
 //! Contact Mechanics, Eq. 3.25). The pressures p ≥ 0 minimise ½ pᵀKp − pᵀd for the displacements d
-//! that the body demands: where it presses the displacement is d, elsewhere the surface is below the
-//! body. The solver is the conjugate gradient method of Polonsky & Keer 1999 (Wear 231) for a given
-//! approach.
+//! that the body demands: where it presses the displacement is d, elsewhere the surface is below
+//! the body. The solver is the conjugate gradient method of Polonsky & Keer 1999 (Wear 231) for a
+//! given approach.
 
 use super::window::Window;
 use std::f64::consts::PI;
