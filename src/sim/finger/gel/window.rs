@@ -22,8 +22,8 @@ impl Window {
         Self { first_m, step_m, counts }
     }
 
-    /// Creates the smallest grid of `counts` square cells that covers the rectangle between two corners,
-    /// with the same centre.
+    /// Creates the smallest grid of `counts` square cells that covers the rectangle between two
+    /// corners, with the same centre.
     pub fn around(low_m: [f64; 2], high_m: [f64; 2], counts: [usize; 2]) -> Self {
         let side = |axis: usize| (high_m[axis] - low_m[axis]) / counts[axis] as f64;
         let step_m = side(0).max(side(1));
