@@ -205,7 +205,7 @@ fn a_patch_is_on_the_object() {
     }
 }
 
-const TOUCHES: u64 = 150;
+const TOUCHES: u64 = 100;
 
 /// The stated deviation holds 95 % of the contacts at any depth.
 #[test]
@@ -231,9 +231,9 @@ fn the_stated_deviation_holds_95_percent() {
             }
             let share = [0, 1].map(|i| f64::from(held[i]) / f64::from(all[i]));
             println!("{name} {depth_m}: {all:?} points, {share:.3?} held");
-            // Of 150 touches one standard deviation is 1.8 %.
-            let is_honest = (0.91..=0.99).contains(&share[0]);
-            if !is_honest || 3 * all[0] < 2 * TOUCHES as i32 || (all[1] > 50 && share[1] < 0.91) {
+            // Of 100 touches one standard deviation is 2.2 %.
+            let is_honest = (0.89..=0.995).contains(&share[0]);
+            if !is_honest || 3 * all[0] < 2 * TOUCHES as i32 || (all[1] > 50 && share[1] < 0.89) {
                 wrong.push(format!("{name} {depth_m}: {share:.3?}"));
             }
         }
