@@ -311,8 +311,8 @@ impl Scene {
 /// Outcomes of a touch.
 const OUTCOMES: [&str; 3] = ["contact", "miss", "overload"];
 
-/// Contact point and normal, and the standard deviation along it.
-type ContactState = ([[f64; 3]; 2], Option<f64>);
+/// A contact as JSON.
+type ContactState = String;
 
 /// Version, target, outcome, contact, place and height, and time of a touch.
 type TouchState =
@@ -376,17 +376,15 @@ impl Touch {
     ) -> PyResult<Self> {
         pickle::check(&version, "Touch")?;
         let outcome = OUTCOMES.into_iter().find(|known| *known == outcome);
-        let contact = contact.map(|([p_wc, normal_w], sd_m)| probe::Contact {
-            p_wc: p_wc.into(),
-            normal_w: normal_w.into(),
-            sd_m,
-        });
+        let contact = contact.map(|json| serde_json::from_str(&json)).transpose();
+        let contact: Option<probe::Contact> = contact.map_err(errors::other)?;
         Ok(Self { target, outcome: outcome.unwrap_or_default(), contact, place, time_s })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, TouchState>> {
         let Self { target, outcome, contact, place, time_s } = slf.get();
-        let contact = contact.as_ref().map(|it| ([it.p_wc.into(), it.normal_w.into()], it.sd_m));
+        let contact = contact.as_ref().map(serde_json::to_string).transpose();
+        let contact = contact.map_err(errors::other)?;
         let state = (pickle::version(), target.clone(), *outcome, contact, place.clone(), *time_s);
         pickle::reduced(slf, state)
     }
