@@ -8,9 +8,9 @@ use crate::report::canvas::{Canvas, PointPx};
 use crate::report::style;
 use crate::report::table::digits;
 use anyhow::{Context, ensure};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use palpate_explore::belief::HeightField;
-use palpate_explore::probe::{SweptVolume, Touch};
+use palpate_explore::probe::SweptVolume;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -66,9 +66,7 @@ impl<'a> BeliefReplay<'a> {
             let target = target.with_context(|| {
                 format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
-            // A normal that is not recorded was not observed.
-            let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
-            belief.observe(target, &touched);
+            belief.observe(target, &touch.touch(-zone.ahead_w().into_inner()));
             if let Some(swept) = swept(finger, touch) {
                 belief.observe_swept(&swept);
             }
@@ -214,21 +212,6 @@ pub fn heights_m<'a>(
         .flat_map(|row| &row.touches)
         .filter_map(move |touch| Some(contact(run.experiment.scene.zone.as_ref()?, touch)?.1));
     run.truth.heights_m.iter().flatten().copied().chain(touched)
-}
-
-/// Returns a recorded touch as it was observed; `normal_w` replaces a missing normal of a contact.
-///
-/// # Errors
-/// If there is a contact without a normal.
-pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyhow::Result<Touch> {
-    Ok(match touch.contact {
-        Some(_) => {
-            let contact = touch.contact(normal_w);
-            Touch::Contact(contact.context("a recorded contact has no normal")?)
-        }
-        None if touch.overload => Touch::Overload,
-        None => Touch::Miss,
-    })
 }
 
 /// Returns the volume that the finger swept in a recorded touch, if it is known.

@@ -2,7 +2,7 @@
 //! converted to surfaces.
 
 use super::figures::ReportFigure;
-use super::replay::{self, swept, touched};
+use super::replay::{self, swept};
 use super::solid::{self, PlannerSurfaces, SolidTouch, SurfaceFrame, counts};
 use super::table::digits;
 use crate::experiment::Experiment;
@@ -166,7 +166,8 @@ pub fn belief(
         // The roll of the finger does not change its path.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
         let swept = swept(&scene.finger, touch);
-        belief.observe(aim, &approach, (&touched(touch, None)?, swept.as_ref()));
+        let touched = touch.touch(-approach.direction_w().into_inner());
+        belief.observe(aim, &approach, (&touched, swept.as_ref()));
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))

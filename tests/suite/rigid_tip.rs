@@ -4,6 +4,7 @@
 use crate::common::shapes::{box_mesh, point};
 use crate::common::shipped::{contact, environment, scene};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use palpate::experiment::{Experiment, Simulation};
 use palpate::robot::Finger;
 use palpate::robot::sensor::{
     ContactSwitch, Doubt, ForceTorqueTip, Sample, SensedContact, Sensor, Wrench, point_on_hull,
@@ -295,6 +296,28 @@ fn every_sensor_touches_the_container() {
             let off_m = (mesh.closest_point(&touched.p_wc).point - touched.p_wc).norm();
             println!("{sets:?}: {off_m:.6} m, stated {:?}", touched.sd_m);
             assert!(off_m < worst_m && touched.sd_m.is_some(), "{off_m}");
+        }
+    }
+}
+
+/// A normal that was not measured is not written, and read as not measured: against the approach.
+#[test]
+fn an_unknown_normal_stays_unknown_in_a_row() {
+    let against = Vector3::y();
+    for (kind, has_normal) in [("contact", false), ("force_torque_tip", true)] {
+        let kind = format!("sensor.kind=\"{kind}\"");
+        let sets = ["simulator=\"kinematic\"", "touch.detection_n=0.5", &kind];
+        let mut experiment =
+            Experiment::with_defaults(&scene("container.toml", &sets), &["random"], 1, 2);
+        experiment.gp.normals = true;
+        let simulation = Simulation::new(experiment).unwrap();
+        let row = simulation.trial(simulation.planner("random").unwrap(), 0);
+        assert_eq!(row.failure, None);
+        for touch in &row.touches {
+            assert_eq!(touch.normal.is_some(), has_normal, "{kind}");
+            let read = contact(touch.touch(against));
+            assert_eq!(read.has_normal, has_normal, "{kind}");
+            assert!(has_normal || read.normal_w == against);
         }
     }
 }

@@ -171,22 +171,11 @@ impl<'a> ResumedProbe<'a> {
     }
 }
 
-/// Outcome of a touch, read from its row.
-fn touch(row: &TouchRow, approach: &Approach) -> Touch {
-    // A normal that the belief does not use is not stored.
-    let against = -approach.direction_w().into_inner();
-    match (row.contact(Some(against)), row.overload) {
-        (Some(contact), _) => Touch::Contact(contact),
-        (None, true) => Touch::Overload,
-        (None, false) => Touch::Miss,
-    }
-}
-
 impl Probe for ResumedProbe<'_> {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         self.last = self.made.next().map(|row| (row, approach.p_far_w));
         match &self.last {
-            Some((row, _)) => Ok(touch(row, approach)),
+            Some((row, _)) => Ok(row.touch(-approach.direction_w().into_inner())),
             None => {
                 let touch = self.probe.touch(approach);
                 self.fault = touch.as_ref().err().cloned();

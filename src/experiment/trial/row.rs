@@ -6,7 +6,7 @@ use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::Fallback;
-use palpate_explore::probe::Contact;
+use palpate_explore::probe::{Contact, Touch};
 use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Target;
 use palpate_gp::fit::Fit;
@@ -164,20 +164,23 @@ impl TrialRow {
 }
 
 impl TouchRow {
-    /// Returns the contact; `normal_w` replaces a normal that was not written.
-    pub fn contact(&self, normal_w: Option<Vector3<f64>>) -> Option<Contact> {
-        let has_normal = self.normal.is_some();
-        let normal_w = self.normal.map(Vector3::from).or(normal_w)?;
+    /// Returns the touch as it was observed; a contact without a written normal points `against_w`,
+    /// opposite to the approach.
+    pub fn touch(&self, against_w: Vector3<f64>) -> Touch {
         let further = |[x, y, z, a, b, c, sd_m]: &[f64; 7]| Contact {
             sd_m: Some(*sd_m),
             ..Contact::new(Point3::new(*x, *y, *z), Vector3::new(*a, *b, *c))
         };
-        Some(Contact {
-            has_normal,
-            sd_m: self.contact_sd_m,
-            patch: self.patch.iter().map(further).collect(),
-            ..Contact::new(self.contact?.into(), normal_w)
-        })
+        match self.contact {
+            Some(p_wc) => Touch::Contact(Contact {
+                has_normal: self.normal.is_some(),
+                sd_m: self.contact_sd_m,
+                patch: self.patch.iter().map(further).collect(),
+                ..Contact::new(p_wc.into(), self.normal.map_or(against_w, Vector3::from))
+            }),
+            None if self.overload => Touch::Overload,
+            None => Touch::Miss,
+        }
     }
 
     /// Returns the further points of a contact as a row has them.

@@ -178,9 +178,17 @@ pub struct TickMessage<'a> {
     pub samples: Cow<'a, str>,
 }
 
+/// Fields of the slips, byte for byte as in stored recordings.
+macro_rules! slips {
+    () => {
+        "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
+         uint8[] slips\n"
+    };
+}
+
 /// Defines the fields of a tick with `more` at their end.
 macro_rules! fields {
-    ($($more:literal),*) => {
+    ($($more:expr),*) => {
         concat!(
             "# One control tick of a body, every number as it was.\n\
              # Ticks since the reset; 0 is the reset itself.\nuint64 tick\n\
@@ -203,8 +211,7 @@ impl HasDefinition for TickMessage<'_> {
     const DEFINITION: Definition = Definition {
         name: "palpate_msgs/msg/Tick",
         fields: fields!(
-            "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
-             uint8[] slips\n",
+            slips!(),
             "# Samples of other sensors, as JSON; or empty.\nstring samples\n"
         ),
         parts: &[&Definition {
@@ -219,13 +226,8 @@ impl HasDefinition for TickMessage<'_> {
 
 impl TickMessage<'_> {
     /// A tick of a recording without samples of other sensors.
-    pub(super) const WITHOUT_SAMPLES: Definition = Definition {
-        fields: fields!(
-            "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
-             uint8[] slips\n"
-        ),
-        ..Self::DEFINITION
-    };
+    pub(super) const WITHOUT_SAMPLES: Definition =
+        Definition { fields: fields!(slips!()), ..Self::DEFINITION };
 
     /// A tick of a recording without slip states either.
     pub(super) const WITHOUT_SLIPS: Definition =

@@ -21,10 +21,8 @@ pub const SENSORS: [(&str, &str); 7] = [
 
 /// Default constants: the tables of the BioTac's file, and the pad of a GelSight Mini.
 pub(super) static DEFAULTS: LazyLock<Table> = LazyLock::new(|| {
-    let table = |i: usize| toml::from_str::<Table>(SENSORS[i].1).unwrap_or_default();
-    let mut all = table(0);
-    all.extend(table(5));
-    all
+    let texts = SENSORS.iter().filter(|(name, _)| ["biotac", "gelsight_mini"].contains(name));
+    texts.flat_map(|(_, text)| toml::from_str::<Table>(text).unwrap_or_default()).collect()
 });
 
 /// Returns a default constant, by the dotted name of its table and its key.

@@ -153,6 +153,13 @@ impl Indentation {
         self.pressure_pa.is_empty()
     }
 
+    /// Returns the bytes held beside the structure itself.
+    pub fn bytes(&self) -> usize {
+        let Self { pressure_pa, displaced_m, residual_m, way_pa, bent_m } = self;
+        let all = [pressure_pa, displaced_m, residual_m, way_pa, bent_m];
+        all.iter().map(|numbers| numbers.capacity() * size_of::<f64>()).sum()
+    }
+
     /// Removes all pressure.
     pub fn clear(&mut self) {
         self.pressure_pa.clear();

@@ -74,7 +74,8 @@ impl GelState {
     /// Returns the bytes held.
     pub fn bytes(&self) -> usize {
         let numbers = self.heights_m.capacity() + self.demanded_m.capacity();
-        size_of_val(self) + numbers * size_of::<f64>() + self.spare_m.capacity() * size_of::<f32>()
+        let spare = self.spare_m.capacity() * size_of::<f32>();
+        size_of_val(self) + self.found.bytes() + numbers * size_of::<f64>() + spare
     }
 
     /// Returns the last image, if it was not read yet.

@@ -151,9 +151,23 @@ impl Servo {
     fn follow(
         &mut self,
         phase: &'static str,
-        mut path: Path,
+        path: Path,
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
+        let to = path.to;
+        match self.move_along(path, |_| alert)? {
+            PathEnd::Arrived => Ok(None),
+            PathEnd::Stopped(end) => Ok(Some(end)),
+            PathEnd::Late => Err(self.timeout_fault(phase, &to)),
+        }
+    }
+
+    /// Moves along `path` until it has arrived, is late, or meets an end that `stops` it.
+    fn move_along(
+        &mut self,
+        mut path: Path,
+        stops: impl Fn(ApproachEnd) -> bool,
+    ) -> Result<PathEnd, Fault> {
         let to = path.to;
         let mut deadline = Deadline::default();
         loop {
@@ -161,16 +175,16 @@ impl Servo {
             let goal = path.advance(passed_s);
             self.tick(&goal)?;
             let is_late = deadline.is_over(self, path.pace.timeout_s(), passed_s);
-            if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
-                return Ok(Some(end));
+            if let Some(end) = self.monitor.approach_end().filter(|end| stops(*end)) {
+                return Ok(PathEnd::Stopped(end));
             }
             let here = self.x_wt();
             let away = here.translation.vector - to.translation.vector;
             if path.pace.is_done() && away.norm() < ARRIVED_M && path.has_turned(&here) {
-                return Ok(None);
+                return Ok(PathEnd::Arrived);
             }
             if is_late {
-                return Err(self.timeout_fault(phase, &to));
+                return Ok(PathEnd::Late);
             }
         }
     }
@@ -309,25 +323,12 @@ impl Servo {
         Ok(None)
     }
 
-    /// Slows down from the approach to rest at `held`. What holds the finger back, held as long as
-    /// the movement's timeout, ends it short of there.
-    fn press(&mut self, held: Isometry3<f64>) -> Result<Option<ApproachEnd>, Fault> {
+    /// Slows down from the approach to rest at `held`, or short of there if something holds the
+    /// finger back for the movement's timeout.
+    fn press(&mut self, held: Isometry3<f64>) -> Result<PathEnd, Fault> {
         let from = self.x_wt().translation.vector;
-        let mut path = Path::straight(from, held, self.settings.approach_m_s).moving();
-        let mut deadline = Deadline::default();
-        loop {
-            let passed_s = self.passed_s();
-            let goal = path.advance(passed_s);
-            self.tick(&goal)?;
-            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
-                return Ok(Some(ApproachEnd::Overload));
-            }
-            let away = self.x_wt().translation.vector - held.translation.vector;
-            let is_there = path.pace.is_done() && away.norm() < ARRIVED_M;
-            if is_there || deadline.is_over(self, path.pace.timeout_s(), passed_s) {
-                return Ok(None);
-            }
-        }
+        let path = Path::straight(from, held, self.settings.approach_m_s).moving();
+        self.move_along(path, |end| end == ApproachEnd::Overload)
     }
 
     /// Stops at the point of detection, settles and reads the contact. The overrun while the servos
@@ -342,7 +343,7 @@ impl Servo {
         let is_pressed = self.robot.yields() || !self.body.capabilities().tactile;
         if is_pressed && self.settings.press_m > 0.0 {
             held.translation.vector += approach.direction_w().scale(self.settings.press_m);
-            if self.press(held)? == Some(ApproachEnd::Overload) {
+            if matches!(self.press(held)?, PathEnd::Stopped(_)) {
                 return Ok(None);
             }
         }
@@ -363,6 +364,16 @@ impl Servo {
         self.doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
         Ok(located.ok().map(|sensed| Contact::sensed(&x_wt, &sensed)))
     }
+}
+
+/// End of a movement along a path.
+enum PathEnd {
+    /// The tip is at the path's end.
+    Arrived,
+    /// Contact or overload stopped it.
+    Stopped(ApproachEnd),
+    /// The movement's timeout is over.
+    Late,
 }
 
 /// Deadline of a movement. It counts from the first reading, because the clock of a real arm runs
