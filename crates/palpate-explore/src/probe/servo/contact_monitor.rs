@@ -39,6 +39,10 @@ pub(super) enum ApproachEnd {
     Overload,
 }
 
+/// Force at which a press ends before its depth, as a fraction of the limit.
+// heuristic: the rest is for the way in which an arm slows down on a hard object.
+const PRESSED: f64 = 0.5;
+
 /// Sensor state during one touch.
 pub(super) struct ContactMonitor {
     settings: TouchSettings,
@@ -92,6 +96,12 @@ impl ContactMonitor {
         let touching = self.sensors.iter().find_map(|sensor| sensor.is_touching());
         let is_felt = touching.unwrap_or(self.force_n > self.settings.detection_n);
         is_felt.then_some(ApproachEnd::Contact)
+    }
+
+    /// Whether a press must not go deeper: at overload, or at [`PRESSED`] of the force limit.
+    pub(super) fn is_pressed(&self) -> bool {
+        self.force_n > PRESSED * self.settings.force_limit_n
+            || self.approach_end() == Some(ApproachEnd::Overload)
     }
 
     /// Number of samples required by the next [`tare`](Self::tare).

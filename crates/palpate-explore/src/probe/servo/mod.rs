@@ -26,6 +26,10 @@ pub(super) use reach::{standoff, turning_point};
 /// than the height of any object.
 const DEEPER_M: f64 = 5e-3;
 
+/// Speed of a press as a fraction of the approach's; a heuristic: on a hard object the force rises
+/// with every micrometre while the arm slows down.
+const PRESS_SPEED: f64 = 0.25;
+
 /// Tolerance of each joint at home, rad; a heuristic: equal to the attitude tolerance of a path.
 const HOME_RAD: f64 = 2e-3;
 
@@ -155,18 +159,18 @@ impl Servo {
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
         let to = path.to;
-        match self.move_along(path, |_| alert)? {
+        match self.move_along(path, |monitor| alert && monitor.approach_end().is_some())? {
             PathEnd::Arrived => Ok(None),
-            PathEnd::Stopped(end) => Ok(Some(end)),
+            PathEnd::Stopped => Ok(self.monitor.approach_end()),
             PathEnd::Late => Err(self.timeout_fault(phase, &to)),
         }
     }
 
-    /// Moves along `path` until it has arrived, is late, or meets an end that `stops` it.
+    /// Moves along `path` until it has arrived, is late, or what is felt `stops` it.
     fn move_along(
         &mut self,
         mut path: Path,
-        stops: impl Fn(ApproachEnd) -> bool,
+        stops: impl Fn(&ContactMonitor) -> bool,
     ) -> Result<PathEnd, Fault> {
         let to = path.to;
         let mut deadline = Deadline::default();
@@ -175,8 +179,8 @@ impl Servo {
             let goal = path.advance(passed_s);
             self.tick(&goal)?;
             let is_late = deadline.is_over(self, path.pace.timeout_s(), passed_s);
-            if let Some(end) = self.monitor.approach_end().filter(|end| stops(*end)) {
-                return Ok(PathEnd::Stopped(end));
+            if stops(&self.monitor) {
+                return Ok(PathEnd::Stopped);
             }
             let here = self.x_wt();
             let away = here.translation.vector - to.translation.vector;
@@ -323,12 +327,33 @@ impl Servo {
         Ok(None)
     }
 
-    /// Slows down from the approach to rest at `held`, or short of there if something holds the
-    /// finger back for the movement's timeout.
-    fn press(&mut self, held: Isometry3<f64>) -> Result<PathEnd, Fault> {
-        let from = self.x_wt().translation.vector;
-        let path = Path::straight(from, held, self.settings.approach_m_s).moving();
-        self.move_along(path, |end| end == ApproachEnd::Overload)
+    /// Rests at `x_wt` until impact and overrun have died down. Returns the overload that ends it.
+    fn settle(&mut self, x_wt: Isometry3<f64>) -> Result<Option<ApproachEnd>, Fault> {
+        let until_s = self.time_s + self.settings.settle_s;
+        while self.time_s < until_s {
+            self.tick(&Goal::at_rest(x_wt))?;
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
+                return Ok(Some(ApproachEnd::Overload));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Moves slowly from `here` to the depth of the press, or short of there on an object so hard
+    /// that the force is enough. Returns the pose to hold.
+    fn press(
+        &mut self,
+        approach: &Approach,
+        here: Isometry3<f64>,
+    ) -> Result<Isometry3<f64>, Fault> {
+        let mut to = here;
+        to.translation.vector += approach.direction_w().scale(self.settings.press_m);
+        let speed_m_s = PRESS_SPEED * self.settings.approach_m_s;
+        let path = Path::straight(here.translation.vector, to, speed_m_s);
+        match self.move_along(path, ContactMonitor::is_pressed)? {
+            PathEnd::Arrived => Ok(to),
+            PathEnd::Stopped | PathEnd::Late => Ok(self.x_wt()),
+        }
     }
 
     /// Stops at the point of detection, settles and reads the contact. The overrun while the servos
@@ -342,19 +367,12 @@ impl Servo {
         // A force that locates the contact must remain while it is read.
         let is_pressed = self.robot.yields() || !self.body.capabilities().tactile;
         if is_pressed && self.settings.press_m > 0.0 {
-            held.translation.vector += approach.direction_w().scale(self.settings.press_m);
-            if matches!(self.press(held)?, PathEnd::Stopped(_)) {
+            if self.settle(held)?.is_some() {
                 return Ok(None);
             }
+            held = self.press(approach, held)?;
         }
-        let until_s = self.time_s + self.settings.settle_s;
-        while self.time_s < until_s {
-            self.tick(&Goal::at_rest(held))?;
-            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
-                return Ok(None);
-            }
-        }
-        if self.rest(held, self.settings.frames)?.is_some() {
+        if self.settle(held)?.is_some() || self.rest(held, self.settings.frames)?.is_some() {
             return Ok(None);
         }
         let x_wt = self.x_wt();
@@ -370,8 +388,8 @@ impl Servo {
 enum PathEnd {
     /// The tip is at the path's end.
     Arrived,
-    /// Contact or overload stopped it.
-    Stopped(ApproachEnd),
+    /// What was felt stopped it.
+    Stopped,
     /// The movement's timeout is over.
     Late,
 }

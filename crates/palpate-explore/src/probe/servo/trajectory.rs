@@ -42,13 +42,6 @@ impl Path {
         Self { from, to, round: Some(round), pace }
     }
 
-    /// Starts the path at its speed, or at the largest from which it stops at its end.
-    pub(super) fn moving(mut self) -> Self {
-        let VelocityProfile { length_m, speed_m_s, .. } = self.pace;
-        self.pace.now_m_s = speed_m_s.min((2.0 * ACCELERATION_M_S2 * length_m).sqrt());
-        self
-    }
-
     /// Whether the path is straight.
     pub(super) fn is_straight(&self) -> bool {
         self.round.is_none()
