@@ -3,7 +3,7 @@
 use super::settings::InterlockSettings;
 use crate::backend::{Capabilities, Reading, Trip};
 use crate::robot::Robot;
-use crate::robot::arm::{Chain, Jacobian, Joints};
+use crate::robot::arm::{Chain, Jacobian, JointSegment, Joints};
 use nalgebra::{Isometry3, Point3};
 use palpate_geometry::distance::{HalfSpace, OrientedBox};
 
@@ -90,61 +90,14 @@ pub struct SafetyContext {
     pub travel_m_s: f64,
 }
 
-/// Stopping path of a robot: one more tick, then braking to rest. It is a straight line in joint
-/// space, since braking preserves the direction of the joint velocities.
-pub struct StoppingPath<'a> {
-    now: &'a RobotState,
-    from: Joints,
-    by: Joints,
-}
-
-/// Tolerance of the distance checks between sampled postures; a heuristic: a hundredth of an arm's
-/// link.
-pub const GRAIN_M: f64 = 1e-3;
-
-/// Largest number of postures checked along one path; a heuristic. A path that needs more stays
-/// close to its limit over centimetres.
-const LOOKS: usize = 32;
-
-impl<'a> StoppingPath<'a> {
-    /// Returns the stopping path after `qdot` is commanded for one tick and takes effect
-    /// `reaction_s` later. It assumes that the robot has moved as commanded since its position
-    /// reading last changed.
-    pub fn new(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> Self {
-        let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
-        Self { now, from: now.q, by: now.unconfirmed_motion + qdot * time_s }
-    }
-
-    /// Returns the largest motion of any point of the robot until the end of the path, with the
-    /// robot at `q`.
-    pub fn farthest_m(&self, q: &Joints) -> f64 {
-        let ends = (self.from - q).abs().sup(&(self.from + self.by - q).abs());
-        ends.dot(&self.now.reaches_m)
-    }
-
-    /// Returns the first clearance below `least_m` along the path, by conservative advancement:
-    /// `clearance_m` must not decrease faster than points move. Returns `None` if there is none.
-    pub fn first_clearance_below(
-        &self,
-        least_m: f64,
-        mut clearance_m: impl FnMut(&Joints) -> f64,
-    ) -> Option<f64> {
-        let length_m = self.by.abs().dot(&self.now.reaches_m);
-        let mut part = 0.0;
-        let mut found_m = f64::NEG_INFINITY;
-        for _ in 0..LOOKS {
-            found_m = clearance_m(&self.now.chain.clamp(&(self.from + self.by * part)));
-            if found_m < least_m || found_m.is_nan() {
-                return Some(found_m);
-            }
-            if length_m <= 0.0 || part >= 1.0 {
-                return None;
-            }
-            // The end is always checked.
-            part = (part + (found_m - least_m + GRAIN_M) / length_m).min(1.0);
-        }
-        Some(found_m)
-    }
+/// Returns the stopping path of a robot after `qdot` is commanded for one tick and takes effect
+/// `reaction_s` later. It is a straight line in joint space, since braking preserves the direction
+/// of the joint velocities, and assumes that the robot has moved as commanded since its position
+/// reading last changed.
+pub fn stopping_path<'a>(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> JointSegment<'a> {
+    let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
+    let by = now.unconfirmed_motion + qdot * time_s;
+    JointSegment { chain: &now.chain, reaches_m: &now.reaches_m, from: now.q, by }
 }
 
 /// Returns the time in which all joints come to rest together from `qdot`, each within its

@@ -1,6 +1,6 @@
 //! Workspace interlocks: bounds of fingertip and elbow, and of the finger's depth.
 
-use super::interlock::{Interlock, InterlockEntry, RobotState, StoppingPath};
+use super::interlock::{Interlock, InterlockEntry, RobotState, stopping_path};
 use crate::backend::Trip;
 use crate::robot::arm::Joints;
 use nalgebra::{Point3, Vector3};
@@ -63,13 +63,13 @@ impl WorkspaceBox {
 
 impl Interlock for Workspace {
     fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
-        let ahead = StoppingPath::new(now, qdot, self.reaction_s);
+        let ahead = stopping_path(now, qdot, self.reaction_s);
         let farthest_m = ahead.farthest_m(&now.q);
         for room in &self.rooms {
             if room.clearance_m(now, &now.q) > farthest_m {
                 continue;
             }
-            if let Some(found) = ahead.first_clearance_below(0.0, |q| room.clearance_m(now, q)) {
+            if let Some(found) = ahead.first_below(0.0, |q| room.clearance_m(now, q)) {
                 let part = if room.elbow.is_some() { "the elbow" } else { "the tip" };
                 return Trip::check(false, WORKSPACE.name, part, [found, 0.0], "m inside");
             }
@@ -87,12 +87,12 @@ struct Depth {
 impl Interlock for Depth {
     fn command(&mut self, now: &RobotState, qdot: &mut Joints) -> Result<(), Trip> {
         let left_m = |p_w| self.margin_m - self.space.distance_m(&p_w);
-        let ahead = StoppingPath::new(now, qdot, self.reaction_s);
+        let ahead = stopping_path(now, qdot, self.reaction_s);
         if left_m(now.x_wt.translation.vector.into()) > ahead.farthest_m(&now.q) {
             return Ok(());
         }
-        let below = ahead
-            .first_clearance_below(0.0, |q| left_m(now.chain.forward(q).translation.vector.into()));
+        let below =
+            ahead.first_below(0.0, |q| left_m(now.chain.forward(q).translation.vector.into()));
         let found_m = self.margin_m - below.unwrap_or_default();
         let (measures, unit) = ([found_m, self.margin_m], "m beyond the turning point");
         Trip::check(below.is_none(), DEPTH.name, "", measures, unit)

@@ -40,8 +40,8 @@ pub(super) enum ApproachEnd {
 }
 
 /// Force at which a press ends before its depth, as a fraction of the limit.
-// heuristic: the rest is for the way in which an arm slows down on a hard object.
-const PRESSED: f64 = 0.5;
+// heuristic: a deeper press slides along a slope, and the arm needs room to slow down.
+const PRESSED: f64 = 0.25;
 
 /// Sensor state during one touch.
 pub(super) struct ContactMonitor {

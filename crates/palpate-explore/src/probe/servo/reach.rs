@@ -8,7 +8,9 @@ use crate::backend::interlock::defaults;
 use crate::control::{Controller, posture};
 use crate::robot::Robot;
 use crate::robot::arm::chain::MAX_JOINTS;
-use crate::robot::arm::{ArmError, Chain, JointType, Joints, LinkCapsule, RobotPart};
+use crate::robot::arm::{
+    ArmError, Chain, Clearance, JointSegment, JointType, Joints, LinkCapsule, RobotPart,
+};
 use crate::task::approach::BEYOND_M;
 use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball, DIRECTIONS, Task};
@@ -162,9 +164,9 @@ pub struct ArmReach {
     approach_m_s: f64,
     /// Pose of the tip at home.
     home: Isometry3<f64>,
-    links: Vec<LinkCapsule>,
-    /// Pairs of links that must not collide.
-    pairs: Vec<[usize; 2]>,
+    clearance: Clearance,
+    /// For each joint, the largest motion of any point of the robot per rad or m.
+    reaches_m: Joints,
 }
 
 /// A segment of an arm's path to an approach.
@@ -188,12 +190,11 @@ impl ArmReach {
             return None;
         }
         let home = robot.chain.forward(&robot.chain.home);
-        let links = robot.capsules();
-        let pairs = (0..links.len()).flat_map(|i| (0..i).map(move |k| [k, i]));
-        let pairs = pairs.filter(|&[k, i]| links[k].can_collide(&links[i])).collect();
+        let clearance = Clearance::new(robot.capsules());
+        let reaches_m = robot.chain.reaches_m(robot.finger.radius_m);
         let &TouchSettings { standoff_m, travel_m_s, approach_m_s, .. } = touch;
         let robot = robot.clone();
-        Some(Self { robot, standoff_m, travel_m_s, approach_m_s, home, links, pairs })
+        Some(Self { robot, standoff_m, travel_m_s, approach_m_s, home, clearance, reaches_m })
     }
 
     /// Returns the clearance constraints, with this fraction of the margins.
@@ -406,7 +407,7 @@ impl ArmReach {
     fn follow_one(&self, q: Joints, path: Path, clear: &ClearanceConstraints) -> Option<Joints> {
         let is_approach = path.is_straight();
         let rehearsed = rehearse(&self.robot.chain, q, path, |q, qdot| {
-            self.is_clear(q, clear, is_approach) && self.is_apart(&self.stops(q, qdot), clear)
+            self.is_clear(q, clear, is_approach) && self.is_apart(q, qdot, clear)
         });
         rehearsed.ok()
     }
@@ -415,25 +416,22 @@ impl ArmReach {
     fn allows(&self, line: &JointLine, clear: &ClearanceConstraints) -> bool {
         line.postures(GRAIN_M).all(|q| {
             self.is_clear(&q, clear, false)
-                && self.is_apart(&q, clear)
+                && self.is_apart(&q, &Joints::zeros(), clear)
                 && self.is_above(&self.robot.chain.frames(&q), clear, LinkCapsule::is_carried)
         })
     }
 
-    /// Returns the joints after all of them have braked together from `qdot`.
-    fn stops(&self, q: &Joints, qdot: &Joints) -> Joints {
-        let joints = self.robot.chain.joints.iter().zip(qdot.iter());
+    /// Whether the links keep their distance from each other until all joints have braked together
+    /// from `qdot`.
+    fn is_apart(&self, q: &Joints, qdot: &Joints, clear: &ClearanceConstraints) -> bool {
+        let chain = &self.robot.chain;
+        let joints = chain.joints.iter().zip(qdot.iter());
         let braking_s = joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit);
         let time_s = REACTION * defaults::REACTION_S + braking_s.fold(0.0, f64::max) / 2.0;
-        self.robot.chain.clamp(&(q + qdot * time_s))
-    }
-
-    /// Whether the links keep their distance from each other.
-    fn is_apart(&self, q: &Joints, clear: &ClearanceConstraints) -> bool {
-        let frames = self.robot.chain.frames(q);
+        let (from, by, reaches_m) = (*q, qdot * time_s, &self.reaches_m);
         let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
-        let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
-        self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > least_m)
+        let ahead = JointSegment { chain, reaches_m, from, by };
+        self.clearance.first_below(&ahead, least_m).is_none()
     }
 
     /// Whether the posture keeps all constraints: joint limits, the tip's box, links outside the
@@ -453,7 +451,7 @@ impl ArmReach {
         let (p_wt, [low, high]) = (Point3::from(x_wt.translation.vector), clear.tip_w);
         let (centre_w, radius_m) = clear.ball;
         let ball = Capsule { p0_w: centre_w, p1_w: centre_w, radius_m };
-        let mut far = self.links.iter().filter(|link| !link.near_base);
+        let mut far = self.clearance.links().iter().filter(|link| !link.near_base);
         (p_wt - low).inf(&(high - p_wt)).min() >= 0.0
             && self.is_above(&frames, clear, |link| link.part == RobotPart::Tool)
             && (is_approach
@@ -468,7 +466,7 @@ impl ArmReach {
         holds: impl Fn(&LinkCapsule) -> bool,
     ) -> bool {
         let Some(lowest_m) = clear.lowest_m else { return true };
-        let mut links = self.links.iter().filter(|link| holds(link));
+        let mut links = self.clearance.links().iter().filter(|link| holds(link));
         links.all(|link| {
             let Capsule { p0_w, p1_w, radius_m } = link.at(&frames[link.link]);
             p0_w.z.min(p1_w.z) - radius_m >= lowest_m

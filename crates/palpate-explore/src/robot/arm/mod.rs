@@ -1,6 +1,7 @@
 //! The arm or three-axis stage that carries the finger, as a chain of joints.
 
 pub mod chain;
+mod clearance;
 pub mod model;
 pub mod parts;
 pub mod settings;
@@ -8,5 +9,6 @@ pub mod stage;
 mod urdf;
 
 pub use chain::{ArmError, Chain, Jacobian, Joint, JointType, Joints, LinkCapsule, RobotPart};
+pub use clearance::{Clearance, JointSegment, Obstacle};
 pub use model::ArmModel;
 pub use settings::ArmSettings;
