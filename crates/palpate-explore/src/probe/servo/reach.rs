@@ -5,7 +5,7 @@
 
 use super::trajectory::{ARRIVED_M, ArcPath, JointLine, Path, paths_around};
 use crate::backend::interlock::defaults;
-use crate::control::{Controller, posture};
+use crate::control::{Controller, JointMotion, posture};
 use crate::robot::Robot;
 use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{
@@ -297,9 +297,13 @@ impl ArmReach {
     }
 }
 
-/// Control period of the simulated check, s; a heuristic: coarse, for the controller's gain of 5
-/// per second.
-const PERIOD_S: f64 = 0.05;
+/// Control period of the simulated check, s; a heuristic: no longer, or the joints of a redundant
+/// arm end elsewhere than in the actual motion.
+const PERIOD_S: f64 = 0.02;
+
+/// Largest damping of the inverse on a checked path, from 0 to 1; a heuristic: closer to a
+/// singularity an arm is slow to arrive, and its joints are not where the check has them.
+const DAMPED: f64 = 0.5;
 
 /// Largest lag of tip position and attitude behind their path before the arm counts as stuck; a
 /// heuristic: near a singularity it slows down and catches up.
@@ -325,7 +329,7 @@ const GRAIN_M: f64 = 2e-3;
 const REACTION: f64 = 2.0;
 
 /// Moves `chain` from `q` along `path` on its kinematics, as long as `holds` for the joints and
-/// their velocities. It has to arrive as near and as soon as a movement of the servo.
+/// their motion. It has to arrive as near and as soon as a movement of the servo.
 ///
 /// # Errors
 /// If it does not get to the end: the distance, m, and the angle, rad, to the goal at that time.
@@ -333,7 +337,7 @@ fn rehearse(
     chain: &Chain,
     mut q: Joints,
     mut path: Path,
-    holds: impl Fn(&Joints, &Joints) -> bool,
+    holds: impl Fn(&Joints, &JointMotion) -> bool,
 ) -> Result<Joints, (f64, f64)> {
     let nowhere = (f64::INFINITY, f64::INFINITY);
     let mut control = Controller::new(chain.clone(), PERIOD_S).map_err(|_| nowhere)?;
@@ -345,7 +349,7 @@ fn rehearse(
         q = chain.clamp(&(q + motion.qdot * PERIOD_S));
         let x_wt = control.x_wt(&q.as_slice()[..count]).map_err(|_| nowhere)?;
         let (away_m, away_rad) = apart(&x_wt, &goal.x_wt);
-        if away_m > LAG_M || away_rad > LAG_RAD || !holds(&q, &motion.qdot) {
+        if away_m > LAG_M || away_rad > LAG_RAD || !holds(&q, &motion) {
             return Err((away_m, away_rad));
         }
         if path.pace.is_done() && away_m < ARRIVED_M && path.has_turned(&x_wt) {
@@ -406,8 +410,10 @@ impl ArmReach {
 
     fn follow_one(&self, q: Joints, path: Path, clear: &ClearanceConstraints) -> Option<Joints> {
         let is_approach = path.is_straight();
-        let rehearsed = rehearse(&self.robot.chain, q, path, |q, qdot| {
-            self.is_clear(q, clear, is_approach) && self.is_apart(q, qdot, clear)
+        let rehearsed = rehearse(&self.robot.chain, q, path, |q, motion| {
+            motion.damping <= DAMPED
+                && self.is_clear(q, clear, is_approach)
+                && self.is_apart(q, &motion.qdot, clear)
         });
         rehearsed.ok()
     }
