@@ -116,12 +116,24 @@ fn nothing_goes_below_what_the_object_stands_on() {
     }
 }
 
-/// An arm reaches every target that it reports as reachable, in any order.
+/// An arm reaches every target that it reports as reachable, in any order; without redundancy near
+/// the singularities of its wrist too.
 #[test]
 fn an_arm_comes_to_all_that_it_reaches() {
     let sets = ["simulator=\"kinematic\""];
-    let environment =
-        Arc::new(Environment::build(scene("container_around_pa10.toml", &sets)).unwrap());
+    assert!(comes_to_all("container_around_pa10.toml", &sets) >= 10);
+    let standing = ["whole_object.lowest_m=0.4", "object.position_m=[0, -0.76, 0.5]"];
+    for model in ["ur5e", "iiwa14"] {
+        let arm = format!("arm={{ model = \"{model}\" }}");
+        let sets = [sets[0], standing[0], standing[1], &arm];
+        assert!(comes_to_all("container_around.toml", &sets) >= 4, "{model}");
+    }
+}
+
+/// Touches the object from each of 40 directions that the arm reports as reachable; returns their
+/// number.
+fn comes_to_all(name: &str, sets: &[&str]) -> usize {
+    let environment = environment(name, sets);
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     assert!(simulator.check_reach().is_ok());
     let task = environment.task();
@@ -133,10 +145,11 @@ fn an_arm_comes_to_all_that_it_reaches() {
         if task.is_reachable(&aim) {
             reached += 1;
             let touch = probe.touch(&task.approach(&aim.into()).unwrap());
-            assert!(matches!(touch, Ok(Touch::Contact(_))), "{aim:?}: {touch:?}");
+            assert!(matches!(touch, Ok(Touch::Contact(_))), "{name} {aim:?}: {touch:?}");
         }
     }
-    assert!((10..40).contains(&reached), "{reached}");
+    assert!(reached < 40);
+    reached
 }
 
 /// Arm of `scenes/container_around_pa10.toml` at rest at these joints, rad, without contact.

@@ -268,6 +268,36 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     assert!(turn_deg[0].abs() < 4.0 * x_sd_deg.max(0.3), "{turn_deg:?} {x_sd_deg}");
 }
 
+/// A ball on a force/torque sensor that is half as large again as stated is named, with its radius;
+/// one of the stated size is not.
+#[test]
+fn a_wrong_radius_of_the_tip_is_named() {
+    for stated_m in [0.005, 0.0075] {
+        let sets = [
+            "simulator=\"kinematic\"",
+            "finger={ radius_m = 0.0075, length_m = 0.02 }",
+            "sensor.kind=\"force_torque_tip\"",
+            "touch.detection_n=0.5",
+            "effects={ sensor = \"ati_gamma\", rigid_tip = {}, friction = {}, wrench = {} }",
+        ];
+        let sets = sets.map(String::from);
+        let scene = Scene::load("scenes/container_pa10.toml".as_ref(), &sets).unwrap();
+        let environment = Arc::new(known_body::environment(&scene, &BALL).unwrap());
+        let touch = environment.task().touch().clone();
+        let mut stated = environment.robot().unwrap();
+        stated.finger.radius_m = stated_m;
+        let mut random = seed::stream(0, 0, "design");
+        let design = RegistrationDesign::new(&stated, &touch, &BALL, 24, &mut random).unwrap();
+        let mut probe = Simulator::new(environment).unwrap().probe(1).unwrap();
+        let found = register(&mut *probe, &stated, &touch, (&BALL, &design), &mut |_| ()).unwrap();
+        let radius_m = found.tip_radius_m.unwrap();
+        assert!((radius_m - 0.0075).abs() < 2e-4, "{radius_m}");
+        let remark = found.wrong_radius(&stated);
+        assert_eq!(remark.is_some(), stated_m == 0.005, "{remark:?}");
+        assert!(remark.is_none_or(|remark| remark.contains("finger.radius_m is 0.005")));
+    }
+}
+
 /// A correction equal to the error restores the nominal pose of the finger; without a correction
 /// the chain is unchanged exactly.
 #[test]

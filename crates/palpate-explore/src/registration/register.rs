@@ -2,7 +2,8 @@
 
 use super::design::{RegistrationDesign, pressed_m};
 use super::hand_eye::{
-    HandEyeEstimate, HandEyeFit, PARAMETERS, RegistrationTouch, depths_m, parameters, undetermined,
+    HandEyeEstimate, HandEyeFit, PARAMETERS, RegistrationTouch, SENSING_PARAMETERS, depths_m,
+    parameters, undetermined,
 };
 use super::known_body::{CalibrationBody, FingerOutline};
 use crate::backend::Fault;
@@ -14,6 +15,15 @@ use palpate_gp::math::least_squares::fit;
 use palpate_gp::math::pose::parts;
 use palpate_input::error::InputError;
 use toml_edit::{Array, DocumentMut, Item, Table, value};
+
+/// Index of the indentation among the parameters.
+const GIVE: usize = 6 + CalibrationBody::PARAMETERS;
+
+/// Smallest error of the tip's radius that is reported, as a fraction of the radius and in standard
+/// deviations.
+// heuristic: below that it is what an arm and a light touch indent.
+const WRONG: f64 = 0.05;
+const SIGMAS: f64 = 3.0;
 
 /// Result of a registration by touch.
 #[derive(Clone, Debug)]
@@ -28,6 +38,8 @@ pub struct RegistrationResult {
     pub condition: f64,
     /// Root mean square of the depth residuals of the touches used.
     pub rms_m: f64,
+    /// Radius of the tip that the touches fit, m; `None` for a soft finger, or if undetermined.
+    pub tip_radius_m: Option<f64>,
     /// Number of touches with contact.
     pub contacts: usize,
     /// Number of contacts left out as outliers.
@@ -43,6 +55,21 @@ impl RegistrationResult {
     /// `arm.tool_rotation_deg`; `before` is their value during the touches.
     pub fn tool(&self, before: Option<Isometry3<f64>>) -> Isometry3<f64> {
         before.map_or(self.found.correction, |before| before * self.found.correction)
+    }
+
+    /// Returns what is wrong with the radius of the tip, if it is not that of `robot`.
+    pub fn wrong_radius(&self, robot: &Robot) -> Option<String> {
+        let radius_m = robot.finger.radius_m;
+        let found_m = self.tip_radius_m?;
+        let off_m = (found_m - radius_m).abs();
+        let is_wrong = off_m > WRONG * radius_m && off_m > SIGMAS * self.sds[GIVE];
+        is_wrong.then(|| {
+            let [found_mm, sd_mm] = [found_m, self.sds[GIVE]].map(|m| 1e3 * m);
+            format!(
+                "the touches fit a tip with a radius of {found_mm:.2} mm (standard deviation \
+                 {sd_mm:.2} mm); finger.radius_m is {radius_m}: measure the tip"
+            )
+        })
     }
 
     /// Returns the keys of a scene's `[arm]` and `[object]` (for the body, a ball's centre, or a
@@ -68,6 +95,10 @@ impl RegistrationResult {
         }
         if let Some(fault) = &self.fault {
             sure["ended"] = value(fault.to_string());
+        }
+        if let Some(radius_m) = self.tip_radius_m {
+            sure["tip_radius_m"] = value(radius_m);
+            sure["tip_radius_sd_m"] = value(self.sds[GIVE]);
         }
         let mut tables = DocumentMut::new();
         tables["arm"] = pose_table("tool_", &self.tool(before));
@@ -155,10 +186,14 @@ pub fn conclude(
     let used: Vec<f64> =
         depths_m.iter().zip(&fitted.used).filter(|(_, used)| **used).map(|(m, _)| *m).collect();
     let squares: f64 = used.iter().map(|m| m * m).sum();
+    let undetermined = undetermined(&fitted, body);
+    // A tip that is larger than stated touches earlier: a negative indentation.
+    let is_known = !robot.is_soft && !undetermined.contains(&SENSING_PARAMETERS[0]);
     Ok(RegistrationResult {
+        tip_radius_m: is_known.then_some(outline.radius_m() - fitted.state.indentation_m),
         found: fitted.state,
         sds: std::array::from_fn(|i| fitted.covariance[(i, i)].sqrt() * named[i].1),
-        undetermined: undetermined(&fitted, body),
+        undetermined,
         condition: fitted.condition,
         rms_m: (squares / used.len().max(1) as f64).sqrt(),
         contacts: touches.len(),

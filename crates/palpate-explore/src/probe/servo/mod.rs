@@ -388,7 +388,7 @@ impl Servo {
 enum PathEnd {
     /// The tip is at the path's end.
     Arrived,
-    /// What was felt stopped it.
+    /// Stopped by what was felt.
     Stopped,
     /// The movement's timeout is over.
     Late,

@@ -199,3 +199,38 @@ impl Clearance {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::arm::ArmSettings;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        /// Compares with the distances at 2000 postures: no pair that comes closer is overlooked,
+        /// and one that is found does, or stays close along the whole line.
+        #[test]
+        fn the_first_pair_below_is_that_of_many_postures(
+            from in prop::array::uniform6(-2.5..2.5f64),
+            by in prop::array::uniform6(-1.0..1.0f64),
+            least_m in 0.02..0.1f64,
+        ) {
+            let settings = ArmSettings { model: "ur5e".into(), ..ArmSettings::default() };
+            let chain = settings.chain().unwrap();
+            let clearance = Clearance::new(chain.capsules.clone());
+            let joints = |q: [f64; 6]| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
+            let reaches_m = chain.reaches_m(0.0);
+            let (from, by) = (joints(from), joints(by));
+            let line = JointSegment { chain: &chain, reaches_m: &reaches_m, from, by };
+            let at = |i: usize| clearance.nearest(&chain, &(from + by * (i as f64 / 2000.0)));
+            let nearest_m = (0..=2000).map(|i| at(i).distance_m).fold(f64::INFINITY, f64::min);
+            match clearance.first_below(&line, least_m) {
+                Some(found) if found.distance_m < least_m => prop_assert!(nearest_m < least_m),
+                Some(_) => prop_assert!(nearest_m < least_m + 0.05),
+                None => prop_assert!(nearest_m > least_m - GRAIN_M),
+            }
+        }
+    }
+}
