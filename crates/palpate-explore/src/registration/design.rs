@@ -4,12 +4,13 @@ use super::hand_eye::{
     HandEyeFit, PARAMETERS, RegistrationTouch, SENSING_PARAMETERS, parameters, undetermined,
 };
 use super::known_body::{CalibrationBody, FingerOutline};
+use crate::backend::interlock::defaults;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::control::posture;
 use crate::probe::Probe;
 use crate::probe::servo::{BEYOND_M, Servo};
 use crate::robot::Robot;
-use crate::robot::arm::{Chain, JointType, Joints};
+use crate::robot::arm::{Chain, Clearance, JointSegment, JointType, Joints};
 use crate::robot::finger::Finger;
 use crate::robot::finger::frame::FRAME_S;
 use crate::task::Approach;
@@ -356,9 +357,12 @@ fn in_order(robot: &Robot, mut left: Vec<Candidate>) -> Vec<Candidate> {
     ordered
 }
 
-/// A purely kinematic arm: no mass, no object, no sensor.
+/// A purely kinematic arm: no mass, no object, no sensor. It stops before its links come too close
+/// to each other.
 struct KinematicArm {
     chain: Chain,
+    clearance: Clearance,
+    reaches_m: Joints,
     capabilities: Capabilities,
     q: Joints,
     reading: Reading,
@@ -368,10 +372,16 @@ struct KinematicArm {
 const PERIOD_S: f64 = 0.01;
 
 impl KinematicArm {
-    fn new(chain: &Chain) -> Self {
-        let capabilities = Capabilities::simulated(chain, PERIOD_S);
-        let (chain, q, reading) = (chain.clone(), chain.home, Reading::default());
-        Self { chain, capabilities, q, reading }
+    fn new(robot: &Robot) -> Self {
+        let chain = robot.chain.clone();
+        Self {
+            capabilities: Capabilities::simulated(&chain, PERIOD_S),
+            clearance: Clearance::new(robot.capsules()),
+            reaches_m: chain.reaches_m(robot.finger.radius_m),
+            q: chain.home,
+            reading: Reading::default(),
+            chain,
+        }
     }
 
     fn report(&mut self, qdot: &Joints) {
@@ -398,6 +408,12 @@ impl Backend for KinematicArm {
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
         let qdot = self.capabilities.accept(command)?;
+        let (chain, q, reaction_s) = (&self.chain, &self.q, PERIOD_S + defaults::REACTION_S);
+        let ahead = JointSegment::braking(chain, &self.reaches_m, q, &qdot, reaction_s);
+        let least_m = defaults::CLEARANCE_M + SLACK_M;
+        if self.clearance.first_below(&ahead, least_m).is_some() {
+            return Err(Fault::NoPath { time_s: self.reading.time_s, q: self.reading.q.clone() });
+        }
         self.q = self.chain.clamp(&(self.q + qdot * PERIOD_S));
         self.reading.time_s += PERIOD_S;
         self.report(&qdot);
@@ -405,9 +421,10 @@ impl Backend for KinematicArm {
     }
 }
 
-/// Margin of the simulated joints to their limits, since touches do not end exactly where they were
-/// simulated; a heuristic.
+/// Margins of the simulated joints to their limits, and of the links to each other beyond the
+/// interlocks' clearance, since touches do not end exactly where they were simulated; heuristics.
 const SLACK_RAD: f64 = 0.25;
+const SLACK_M: f64 = 5e-3;
 
 /// Returns the indices of those `approaches` that `robot` can make one after the other from home.
 ///
@@ -425,7 +442,7 @@ fn simulate_touches(
     // Simulated with the servo that will make them, on the arm's kinematics alone.
     let mut left: Vec<usize> = (0..approaches.len()).collect();
     'again: loop {
-        let body = Box::new(KinematicArm::new(&robot.chain));
+        let body = Box::new(KinematicArm::new(&robot));
         let mut servo = Servo::new(robot.clone(), touch.clone(), body, 0)?;
         for at in 0..left.len() {
             if servo.touch(&approaches[left[at]]).is_err() {

@@ -91,18 +91,10 @@ pub struct SafetyContext {
 }
 
 /// Returns the stopping path of a robot after `qdot` is commanded for one tick and takes effect
-/// `reaction_s` later. It is a straight line in joint space, since braking preserves the direction
-/// of the joint velocities, and assumes that the robot has moved as commanded since its position
-/// reading last changed.
+/// `reaction_s` later. It assumes that the robot has moved as commanded since its position reading
+/// last changed.
 pub fn stopping_path<'a>(now: &'a RobotState, qdot: &Joints, reaction_s: f64) -> JointSegment<'a> {
-    let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
-    let by = now.unconfirmed_motion + qdot * time_s;
-    JointSegment { chain: &now.chain, reaches_m: &now.reaches_m, from: now.q, by }
-}
-
-/// Returns the time in which all joints come to rest together from `qdot`, each within its
-/// deceleration limit.
-pub fn stopping_s(now: &RobotState, qdot: &Joints) -> f64 {
-    let joints = now.chain.joints.iter().zip(qdot.iter());
-    joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit).fold(0.0, f64::max)
+    let RobotState { chain, reaches_m, q, unconfirmed_motion, period_s, .. } = now;
+    let path = JointSegment::braking(chain, reaches_m, q, qdot, period_s + reaction_s);
+    JointSegment { by: path.by + unconfirmed_motion, ..path }
 }

@@ -2,7 +2,7 @@
 
 use super::INTERLOCKS;
 use super::force::{FORCE, RETRACT_M_S, RETRACT_RISE_N};
-use super::interlock::{Interlock, InterlockEntry, RobotState, SafetyContext, stopping_s};
+use super::interlock::{Interlock, InterlockEntry, RobotState, SafetyContext};
 use super::limits::limited;
 use super::settings::InterlockSettings;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
@@ -185,10 +185,11 @@ impl InterlockedBackend {
     /// excessive force was the only trip meanwhile.
     fn brake(&mut self) -> bool {
         let mut is_sound = true;
-        let ticks = (stopping_s(&self.now, &self.now.sent) / self.now.period_s).ceil() as usize + 1;
+        let ticks =
+            (self.now.chain.stopping_s(&self.now.sent) / self.now.period_s).ceil() as usize + 1;
         for _ in 0..ticks {
             let sent = self.now.sent;
-            let left_s = stopping_s(&self.now, &sent);
+            let left_s = self.now.chain.stopping_s(&sent);
             if left_s <= 0.0 {
                 break;
             }

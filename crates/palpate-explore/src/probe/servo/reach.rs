@@ -430,13 +430,9 @@ impl ArmReach {
     /// Whether the links keep their distance from each other until all joints have braked together
     /// from `qdot`.
     fn is_apart(&self, q: &Joints, qdot: &Joints, clear: &ClearanceConstraints) -> bool {
-        let chain = &self.robot.chain;
-        let joints = chain.joints.iter().zip(qdot.iter());
-        let braking_s = joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit);
-        let time_s = REACTION * defaults::REACTION_S + braking_s.fold(0.0, f64::max) / 2.0;
-        let (from, by, reaches_m) = (*q, qdot * time_s, &self.reaches_m);
+        let (chain, reaction_s) = (&self.robot.chain, REACTION * defaults::REACTION_S);
+        let ahead = JointSegment::braking(chain, &self.reaches_m, q, qdot, reaction_s);
         let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
-        let ahead = JointSegment { chain, reaches_m, from, by };
         self.clearance.first_below(&ahead, least_m).is_none()
     }
 

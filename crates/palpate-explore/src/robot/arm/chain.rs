@@ -209,6 +209,13 @@ impl Chain {
         reaches
     }
 
+    /// Returns the time in which all joints come to rest together from `qdot`, each within its
+    /// deceleration limit, s.
+    pub fn stopping_s(&self, qdot: &Joints) -> f64 {
+        let joints = self.joints.iter().zip(qdot.iter());
+        joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit).fold(0.0, f64::max)
+    }
+
     /// Returns [`forward`](Self::forward) with the geometric Jacobian (Siciliano et al. 2009,
     /// Robotics, Eq. 3.30). Column i is `[a × (p_T − p_i); a]` for a revolute and `[a; 0]` for a
     /// prismatic joint i, with its axis a and origin p_i in `W`.

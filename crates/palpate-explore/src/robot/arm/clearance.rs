@@ -26,7 +26,20 @@ pub struct JointSegment<'a> {
     pub by: Joints,
 }
 
-impl JointSegment<'_> {
+impl<'a> JointSegment<'a> {
+    /// Returns the path of joints at `q` with the velocities `qdot` that brake together after
+    /// `reaction_s`. It is straight, since braking preserves the direction of the velocities.
+    pub fn braking(
+        chain: &'a Chain,
+        reaches_m: &'a Joints,
+        q: &Joints,
+        qdot: &Joints,
+        reaction_s: f64,
+    ) -> Self {
+        let by = qdot * (reaction_s + 0.5 * chain.stopping_s(qdot));
+        Self { chain, reaches_m, from: *q, by }
+    }
+
     /// Returns the largest motion of any point of the robot until the end, with the robot at `q`.
     pub fn farthest_m(&self, q: &Joints) -> f64 {
         let ends = (self.from - q).abs().sup(&(self.from + self.by - q).abs());
