@@ -290,7 +290,7 @@ fn a_wrong_radius_of_the_tip_is_named() {
         let design = RegistrationDesign::new(&stated, &touch, &BALL, 24, &mut random).unwrap();
         let mut probe = Simulator::new(environment).unwrap().probe(1).unwrap();
         let found = register(&mut *probe, &stated, &touch, (&BALL, &design), &mut |_| ()).unwrap();
-        let radius_m = found.tip_radius_m.unwrap();
+        let radius_m = found.tip_radius_m.unwrap_or_else(|| panic!("{found:?}"));
         assert!((radius_m - 0.0075).abs() < 2e-4, "{radius_m}");
         let remark = found.wrong_radius(&stated);
         assert_eq!(remark.is_some(), stated_m == 0.005, "{remark:?}");

@@ -84,6 +84,20 @@ impl<'a> HandEyeFit<'a> {
         Self { outline, felt: felt.collect(), touches }
     }
 
+    /// Returns the estimate from which the touches are fitted. A rigid finger of another radius
+    /// than stated meets everything that much earlier or later; from a start elsewhere that would
+    /// look like outliers.
+    pub(super) fn started(&self, body: CalibrationBody) -> HandEyeEstimate {
+        let mut start = Self::start(body);
+        if !self.outline.is_soft() {
+            let residuals = self.residuals(&start);
+            let mut depths: Vec<f64> = residuals.iter().copied().take(self.touches.len()).collect();
+            depths.sort_by(f64::total_cmp);
+            start.indentation_m -= DEPTH_SD_M * depths.get(depths.len() / 2).unwrap_or(&0.0);
+        }
+        start
+    }
+
     /// Returns the initial estimate.
     pub fn start(body: CalibrationBody) -> HandEyeEstimate {
         HandEyeEstimate {

@@ -179,7 +179,7 @@ pub fn conclude(
 ) -> Result<RegistrationResult, InputError> {
     let outline = FingerOutline::new(robot);
     let problem = HandEyeFit::new(&outline, touches);
-    let fitted = fit(&problem, &HandEyeFit::start(*body))
+    let fitted = fit(&problem, &problem.started(*body))
         .map_err(|error| InputError::new(error.to_string()))?;
     let named = parameters(body);
     let depths_m = depths_m(&fitted, touches.len());
