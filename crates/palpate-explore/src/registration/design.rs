@@ -363,6 +363,7 @@ struct KinematicArm {
     chain: Chain,
     clearance: Clearance,
     reaches_m: Joints,
+    start: Joints,
     capabilities: Capabilities,
     q: Joints,
     reading: Reading,
@@ -372,13 +373,15 @@ struct KinematicArm {
 const PERIOD_S: f64 = 0.01;
 
 impl KinematicArm {
-    fn new(robot: &Robot) -> Self {
+    /// Creates an arm at rest at `start`.
+    fn new(robot: &Robot, start: Joints) -> Self {
         let chain = robot.chain.clone();
         Self {
             capabilities: Capabilities::simulated(&chain, PERIOD_S),
             clearance: Clearance::new(robot.capsules()),
             reaches_m: chain.reaches_m(robot.finger.radius_m),
-            q: chain.home,
+            start,
+            q: start,
             reading: Reading::default(),
             chain,
         }
@@ -400,7 +403,7 @@ impl Backend for KinematicArm {
     }
 
     fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
-        self.q = self.chain.home;
+        self.q = self.start;
         self.reading.time_s = 0.0;
         self.report(&Joints::zeros());
         Ok(&self.reading)
@@ -440,16 +443,19 @@ fn simulate_touches(
         joint.q_limits = [joint.q_limits[0] + SLACK_RAD, joint.q_limits[1] - SLACK_RAD];
     }
     // Simulated with the servo that will make them, on the arm's kinematics alone.
-    let mut left: Vec<usize> = (0..approaches.len()).collect();
-    'again: loop {
-        let body = Box::new(KinematicArm::new(&robot));
-        let mut servo = Servo::new(robot.clone(), touch.clone(), body, 0)?;
-        for at in 0..left.len() {
-            if servo.touch(&approaches[left[at]]).is_err() {
-                left.remove(at);
-                continue 'again;
-            }
+    let servo_at = |q: Joints| {
+        Servo::new(robot.clone(), touch.clone(), Box::new(KinematicArm::new(&robot, q)), 0)
+    };
+    let mut q = robot.chain.home;
+    let mut servo = servo_at(q)?;
+    let mut made = Vec::new();
+    for (i, approach) in approaches.iter().enumerate() {
+        if servo.touch(approach).is_ok() {
+            made.push(i);
+            q = servo.joints().unwrap_or(q);
+        } else {
+            servo = servo_at(q)?;
         }
-        return Ok(left);
     }
+    Ok(made)
 }

@@ -103,6 +103,11 @@ impl Servo {
         x_wt.unwrap_or(self.control.chain().base)
     }
 
+    /// Returns the joint positions of the last reading, rad or m.
+    pub fn joints(&self) -> Option<Joints> {
+        self.robot.chain.joints_from(&self.q)
+    }
+
     fn period_s(&self) -> f64 {
         self.body.capabilities().period_s
     }
@@ -220,7 +225,7 @@ impl Servo {
         let legs = match &self.reach {
             None => vec![PathSegment::Around(above)],
             Some(reach) => {
-                let q = self.robot.chain.joints_from(&self.q);
+                let q = self.joints();
                 q.and_then(|q| reach.plan(&q, approach)).ok_or_else(|| self.no_way())?
             }
         };
@@ -250,7 +255,7 @@ impl Servo {
     /// Moves all joints home along a straight line in joint space, from where an arm reaches every
     /// approach. The line is checked from the measured joint positions.
     fn go_home(&mut self, around: &Ball) -> Result<(), Fault> {
-        let q = self.robot.chain.joints_from(&self.q);
+        let q = self.joints();
         let line = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.line_home(&q, around));
         let mut line = line.ok_or_else(|| self.no_way())?;
         let mut deadline = Deadline::default();
@@ -286,7 +291,7 @@ impl Servo {
         let speed_m_s = self.settings.approach_m_s;
         if let Some(reach) = &self.reach {
             let path = Path::straight(here.translation.vector, out, speed_m_s);
-            let q = self.robot.chain.joints_from(&self.q);
+            let q = self.joints();
             if !q.is_some_and(|q| reach.leaves(&q, path, around)) {
                 return Err(self.no_way());
             }
