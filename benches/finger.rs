@@ -73,16 +73,17 @@ fn finger(c: &mut Criterion) {
     gel(&environment, bvh, |depth_m| at(touching_m - depth_m).x_wt);
 }
 
+/// Returns a skin of this model with fluid under it.
+fn wet(model: SkinModel) -> Effects {
+    let skin = SkinEffect { model, ..SkinEffect::default() };
+    Effects { skin: Some(skin), fluid: Some(Default::default()), ..Effects::default() }
+}
+
 /// Prints the cost of a depth image of a pad 0.5 mm deep, in milliseconds and in ticks of a BioTac
 /// with skin and fluid at the same depth; each value is the minimum of 30.
 fn gel(environment: &Environment, bvh: &MeshBvh, at: impl Fn(f64) -> Isometry3<f64>) {
     let finger = &environment.scene().finger;
-    let wet = Effects {
-        skin: Some(SkinEffect::default()),
-        fluid: Some(Default::default()),
-        ..Effects::default()
-    };
-    let biotac = Fingertip::new(finger, &wet);
+    let biotac = Fingertip::new(finger, &wet(SkinModel::Columns));
     let pads = [[32, 24], [320, 240]].map(|pixels| GelEffect { pixels, ..GelEffect::default() });
     let mut quickest_s = [f64::INFINITY; 3];
     for round in 0..30 {
@@ -114,12 +115,7 @@ fn gel(environment: &Environment, bvh: &MeshBvh, at: impl Fn(f64) -> Isometry3<f
 /// minimum for its tick.
 fn beside(environment: &Environment, bvh: &MeshBvh, at: impl Fn(f64) -> TipMotion) {
     const TICKS: usize = 150;
-    let pressed = |model| {
-        let skin = SkinEffect { model, ..SkinEffect::default() };
-        let effects =
-            Effects { skin: Some(skin), fluid: Some(Default::default()), ..Effects::default() };
-        Fingertip::new(&environment.scene().finger, &effects)
-    };
+    let pressed = |model| Fingertip::new(&environment.scene().finger, &wet(model));
     let tips = [SkinModel::Columns, SkinModel::Shell].map(pressed);
     let mut quickest_s = [[f64::INFINITY; TICKS]; 2];
     for _ in 0..40 {

@@ -414,7 +414,8 @@ impl Backend for KinematicArm {
         let (chain, q, reaction_s) = (&self.chain, &self.q, PERIOD_S + defaults::REACTION_S);
         let ahead = JointSegment::braking(chain, &self.reaches_m, q, &qdot, reaction_s);
         let least_m = defaults::CLEARANCE_M + SLACK_M;
-        if self.clearance.first_below(&ahead, least_m).is_some() {
+        let start = self.clearance.nearest(chain, q);
+        if self.clearance.first_below(&ahead, least_m, start).is_some() {
             return Err(Fault::NoPath { time_s: self.reading.time_s, q: self.reading.q.clone() });
         }
         self.q = self.chain.clamp(&(self.q + qdot * PERIOD_S));

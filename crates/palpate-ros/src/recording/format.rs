@@ -181,7 +181,7 @@ pub struct TickMessage<'a> {
 /// Fields of the slips, byte for byte as in stored recordings.
 macro_rules! slips {
     () => {
-        "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
+        "# Of each frame whether the skin slipped: 1, 0, or 2 if unknown; or empty.\n\
          uint8[] slips\n"
     };
 }

@@ -52,8 +52,9 @@ impl Interlock for CollisionMonitor {
         {
             return Ok(());
         }
-        self.looked = Some((now.q, self.clearance.nearest(&now.chain, &now.q).distance_m));
-        self.clearance.first_below(&ahead, least_m).map_or(Ok(()), |found| {
+        let start = self.clearance.nearest(&now.chain, &now.q);
+        self.looked = Some((now.q, start.distance_m));
+        self.clearance.first_below(&ahead, least_m, start).map_or(Ok(()), |found| {
             let pair = self.clearance.name(found.pair);
             Trip::check(false, CLEARANCE.name, &pair, [found.distance_m, least_m], "m")
         })

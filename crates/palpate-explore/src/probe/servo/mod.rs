@@ -345,19 +345,20 @@ impl Servo {
     }
 
     /// Moves slowly from `here` to the depth of the press, or short of there on an object so hard
-    /// that the force is enough. Returns the pose to hold.
+    /// that the force is enough. Returns the pose to hold; `None` at overload.
     fn press(
         &mut self,
         approach: &Approach,
         here: Isometry3<f64>,
-    ) -> Result<Isometry3<f64>, Fault> {
+    ) -> Result<Option<Isometry3<f64>>, Fault> {
         let mut to = here;
         to.translation.vector += approach.direction_w().scale(self.settings.press_m);
         let speed_m_s = PRESS_SPEED * self.settings.approach_m_s;
         let path = Path::straight(here.translation.vector, to, speed_m_s);
         match self.move_along(path, ContactMonitor::is_pressed)? {
-            PathEnd::Arrived => Ok(to),
-            PathEnd::Stopped | PathEnd::Late => Ok(self.x_wt()),
+            PathEnd::Arrived => Ok(Some(to)),
+            _ if self.monitor.approach_end() == Some(ApproachEnd::Overload) => Ok(None),
+            PathEnd::Stopped | PathEnd::Late => Ok(Some(self.x_wt())),
         }
     }
 
@@ -375,7 +376,8 @@ impl Servo {
             if self.settle(held)?.is_some() {
                 return Ok(None);
             }
-            held = self.press(approach, held)?;
+            let Some(pressed) = self.press(approach, held)? else { return Ok(None) };
+            held = pressed;
         }
         if self.settle(held)?.is_some() || self.rest(held, self.settings.frames)?.is_some() {
             return Ok(None);

@@ -433,7 +433,8 @@ impl ArmReach {
         let (chain, reaction_s) = (&self.robot.chain, REACTION * defaults::REACTION_S);
         let ahead = JointSegment::braking(chain, &self.reaches_m, q, qdot, reaction_s);
         let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
-        self.clearance.first_below(&ahead, least_m).is_none()
+        let start = self.clearance.nearest(chain, q);
+        self.clearance.first_below(&ahead, least_m, start).is_none()
     }
 
     /// Whether the posture keeps all constraints: joint limits, the tip's box, links outside the

@@ -347,8 +347,7 @@ mod tests {
             to in prop::array::uniform7(-1.5..1.5f64),
         ) {
             let chain = ArmSettings::default().chain().unwrap();
-            let joints = |q: [f64; 7]| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
-            let (from, to) = (joints(from), joints(to));
+            let [from, to] = [from, to].map(|q| chain.joints_from(&q).unwrap());
             let mut line = JointLine::new(&chain, &from, &to, 0.1);
             let tip = chain.flange * chain.tool;
             let moved_m = |a: &Joints, b: &Joints| {

@@ -6,9 +6,9 @@ use nalgebra::Isometry3;
 use palpate_geometry::distance::{HalfSpace, OrientedBox};
 use std::ops::Range;
 
-/// Motion in which a clearance that becomes smaller may be overlooked between two postures, m; a
-/// heuristic: a hundredth of an arm's link.
-pub const GRAIN_M: f64 = 1e-3;
+/// Largest decrease of a clearance that may be overlooked between two postures, m; a heuristic: a
+/// hundredth of an arm's link.
+const GRAIN_M: f64 = 1e-3;
 
 /// Largest number of postures looked at along one line; a heuristic. A line that needs more stays
 /// close to its limit over centimetres.
@@ -61,16 +61,20 @@ impl<'a> JointSegment<'a> {
         mut clearance_m: impl FnMut(&Joints) -> f64,
     ) -> Option<f64> {
         let length_m = self.length_m(0..self.by.len());
-        self.first_blocked(|q| {
+        self.first_blocked(0.0, |q| {
             let found_m = clearance_m(q);
             (part_free(found_m, least_m, length_m), found_m)
         })
     }
 
-    /// Advances by the part of the line that `look` says is free, until nothing is; returns what it
-    /// found there. `look` returns that part, `None` if nothing is free, and what it has found.
-    fn first_blocked<T>(&self, mut look: impl FnMut(&Joints) -> (Option<f64>, T)) -> Option<T> {
-        let mut part = 0.0;
+    /// Advances from `part` of the line by the part that `look` says is free, until nothing is;
+    /// returns what it found there. `look` returns that part, `None` if nothing is free, and what
+    /// it has found.
+    fn first_blocked<T>(
+        &self,
+        mut part: f64,
+        mut look: impl FnMut(&Joints) -> (Option<f64>, T),
+    ) -> Option<T> {
         let mut last = None;
         for _ in 0..LOOKS {
             let (free, found) = look(&self.chain.clamp(&(self.from + self.by * part)));
@@ -194,12 +198,21 @@ impl Clearance {
 
     /// Returns the first pair that comes closer than `least_m` along `line`, by conservative
     /// advancement: only the joints between two links change their distance. `None` if none does.
-    pub fn first_below(&self, line: &JointSegment, least_m: f64) -> Option<Nearest> {
-        let start = line.chain.clamp(&line.from);
-        if self.nearest(line.chain, &start).distance_m - line.farthest_m(&start) > least_m {
+    /// `start` is the [`nearest`](Self::nearest) pair at the start of the line.
+    pub fn first_below(
+        &self,
+        line: &JointSegment,
+        least_m: f64,
+        start: Nearest,
+    ) -> Option<Nearest> {
+        let length_m = line.length_m(0..line.by.len());
+        let Some(part) = part_free(start.distance_m, least_m, length_m) else {
+            return Some(start);
+        };
+        if start.distance_m - length_m > least_m {
             return None;
         }
-        line.first_blocked(|q| {
+        line.first_blocked(part.min(1.0), |q| {
             let frames = line.chain.frames(q);
             let looks = self.pairs.iter().enumerate().map(|(pair, meeting)| {
                 let distance_m = self.distance_m(&frames, meeting);
@@ -233,13 +246,12 @@ mod tests {
             let settings = ArmSettings { model: "ur5e".into(), ..ArmSettings::default() };
             let chain = settings.chain().unwrap();
             let clearance = Clearance::new(chain.capsules.clone());
-            let joints = |q: [f64; 6]| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0));
             let reaches_m = chain.reaches_m(0.0);
-            let (from, by) = (joints(from), joints(by));
+            let [from, by] = [from, by].map(|q| chain.joints_from(&q).unwrap());
             let line = JointSegment { chain: &chain, reaches_m: &reaches_m, from, by };
             let at = |i: usize| clearance.nearest(&chain, &(from + by * (i as f64 / 2000.0)));
             let nearest_m = (0..=2000).map(|i| at(i).distance_m).fold(f64::INFINITY, f64::min);
-            match clearance.first_below(&line, least_m) {
+            match clearance.first_below(&line, least_m, at(0)) {
                 Some(found) if found.distance_m < least_m => prop_assert!(nearest_m < least_m),
                 Some(_) => prop_assert!(nearest_m < least_m + 0.05),
                 None => prop_assert!(nearest_m > least_m - GRAIN_M),
