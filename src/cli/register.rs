@@ -111,8 +111,8 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     );
     write_whole(&out, &text)?;
     print(&format!("{text}\nfile: {}", out.display()))?;
-    if let Some(words) = found.wrong_radius(&robot) {
-        talk.note(words);
+    for remark in found.remarks(&robot) {
+        talk.note(remark);
     }
     Ok(Outcome::Done)
 }

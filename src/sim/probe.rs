@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch, check_finite};
 use palpate_explore::robot::Finger;
+use palpate_explore::robot::sensor::SensedContact;
 use palpate_explore::task::Approach;
 use palpate_explore::task::approach::BEYOND_M;
 use palpate_geometry::bvh::SweepHit;
@@ -14,7 +15,7 @@ use std::sync::Arc;
 
 /// Returns a probe that touches the environment's surface exactly and at once.
 pub fn exact_probe(environment: Arc<Environment>) -> Box<dyn Probe> {
-    Box::new(ExactProbe { environment, swept: None, tip: None })
+    Box::new(ExactProbe { environment, swept: None, sensed: None })
 }
 
 /// Probe that evaluates the scene's function, or sweeps the finger's hull along the approach to
@@ -22,7 +23,7 @@ pub fn exact_probe(environment: Arc<Environment>) -> Box<dyn Probe> {
 struct ExactProbe {
     environment: Arc<Environment>,
     swept: Option<SweptVolume>,
-    tip: Option<Isometry3<f64>>,
+    sensed: Option<(Isometry3<f64>, SensedContact)>,
 }
 
 impl Probe for ExactProbe {
@@ -46,9 +47,11 @@ impl Probe for ExactProbe {
         };
         let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
         self.swept = Some(SweptVolume { finger: pitched(environment, approach), p_wt });
-        self.tip = found
-            .as_ref()
-            .map(|rest| Isometry3::from_parts(rest.p_wt.coords.into(), approach.r_wt()));
+        self.sensed = found.map(|RestingPose { p_wt, hit }| {
+            let x_wt = Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
+            let p_tc = x_wt.inverse_transform_point(&hit.point);
+            (x_wt, SensedContact::new(p_tc, x_wt.inverse_transform_vector(&hit.normal)))
+        });
         Ok(found.map_or(Touch::Miss, |RestingPose { hit, .. }| {
             Touch::Contact(Contact::new(hit.point, hit.normal))
         }))
@@ -58,8 +61,8 @@ impl Probe for ExactProbe {
         self.swept.clone()
     }
 
-    fn tip(&self) -> Option<Isometry3<f64>> {
-        self.tip
+    fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
+        self.sensed.as_ref()
     }
 }
 
@@ -71,6 +74,7 @@ fn pitched(environment: &Environment, approach: &Approach) -> Finger {
 }
 
 /// Pose of the hull at rest on the object.
+#[derive(Clone, Copy)]
 pub struct RestingPose {
     /// Centre of the fingertip's hemisphere in `W`.
     pub p_wt: Point3<f64>,

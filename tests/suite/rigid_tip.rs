@@ -130,7 +130,8 @@ fn the_stated_ellipsoid_holds_95_percent() {
         for force_n in [0.5, 1.0, 2.0, 5.0] {
             let mut rng = ChaCha8Rng::seed_from_u64(7);
             let (mut held, mut stated, mut light) = (0, 0, 0);
-            let times = 2000;
+            // More with the number in the environment.
+            let times = std::env::var("PALPATE_TOUCHES").map_or(2000, |text| text.parse().unwrap());
             for seed in 0..times {
                 let n = near(&ahead, &mut rng);
                 let p = n * finger.radius_m;
@@ -150,8 +151,9 @@ fn the_stated_ellipsoid_holds_95_percent() {
             }
             let share = f64::from(held) / f64::from(stated.max(1));
             println!("{name} {force_n} N: {stated} stated, {light} too light, {share:.3} held");
-            // Of 2000 touches one standard deviation is half a percent.
-            let is_honest = stated < 200 || (0.925..0.975).contains(&share);
+            // Of 2000 touches one standard deviation is half a percent. The few that noise lifts over
+            // the threshold have a force that is read too large, and an ellipsoid too small.
+            let is_honest = stated < times as i32 / 10 || (0.925..0.975).contains(&share);
             if !is_honest || stated + light < 9 * times as i32 / 10 {
                 wrong.push(format!("{name} {force_n} N: {share}"));
             }
@@ -297,6 +299,32 @@ fn every_sensor_touches_the_container() {
             println!("{sets:?}: {off_m:.6} m, stated {:?}", touched.sd_m);
             assert!(off_m < worst_m && touched.sd_m.is_some(), "{off_m}");
         }
+    }
+}
+
+/// A ball on a force/torque sensor, carried by an arm with masses and servos, lands on the container
+/// within what its servos and its contact yield, and its force stays below the limit.
+#[test]
+fn a_ball_tip_on_a_moving_arm_touches_the_container() {
+    let sets = [
+        "simulator=\"dynamic\"",
+        "sensor.kind=\"force_torque_tip\"",
+        "touch.detection_n=0.5",
+        "effects={ sensor = \"ati_gamma\", rigid_tip = {}, friction = {}, wrench = {} }",
+    ];
+    let environment = environment("container_pa10.toml", &sets);
+    let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
+    let mesh = MeshBvh::new(environment.mesh().unwrap().clone());
+    for target in [[0.52, 0.6], [0.47, 0.65]] {
+        let target = environment.task().zone().unwrap().at(&target);
+        let approach = environment.task().approach(&target.into()).unwrap();
+        let touched = contact(probe.touch(&approach).unwrap());
+        let off_m = (mesh.closest_point(&touched.p_wc).point - touched.p_wc).norm();
+        let (_, sensed) = probe.sensed().unwrap();
+        let force_n = sensed.load.unwrap().force_n.norm();
+        println!("{off_m:.6} m, stated {:?}, {force_n:.2} N", touched.sd_m);
+        assert!(off_m < 1e-3 && touched.sd_m.is_some(), "{off_m}");
+        assert!(force_n > 0.5 && force_n < environment.task().touch().force_limit_n);
     }
 }
 

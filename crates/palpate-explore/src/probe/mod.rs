@@ -80,9 +80,9 @@ pub trait Probe: Send {
         None
     }
 
-    /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the last contact;
-    /// `None` for a probe without a finger, or before a contact.
-    fn tip(&self) -> Option<Isometry3<f64>> {
+    /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the last contact, and
+    /// what its sensor located; `None` for a probe without a finger, or before a contact.
+    fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
         None
     }
 

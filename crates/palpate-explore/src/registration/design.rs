@@ -13,6 +13,7 @@ use crate::robot::Robot;
 use crate::robot::arm::{Chain, Clearance, JointSegment, JointType, Joints};
 use crate::robot::finger::Finger;
 use crate::robot::finger::frame::FRAME_S;
+use crate::robot::sensor::GelPad;
 use crate::task::Approach;
 use crate::task::touch::TouchSettings;
 use nalgebra::{
@@ -60,6 +61,19 @@ const FRAMES: usize = 25;
 /// there is fluid under the skin.
 const SITES: [f64; 6] = [0.8, 0.55, 0.2, -0.25, -0.6, -0.88];
 const TURNS_DEG: [f64; 5] = [-65.0, -25.0, 0.0, 25.0, 65.0];
+
+/// Touched places of a pad along each of its sides, as fractions of it from the middle; a heuristic:
+/// the rim stays free.
+const PAD_SITES: [f64; 3] = [-0.2, 0.0, 0.2];
+
+/// Expected indentation of a pad, part of it that a located point is above the deepest, and distance
+/// of these points on a plate as a fraction of the pad's shorter side; heuristics.
+const PAD_PRESSED_M: f64 = 0.5e-3;
+const PAD_SHARE: f64 = 0.3;
+const PAD_AROUND: f64 = 0.2;
+
+/// Number of steps onto the body; heuristic: each leaves at most a tenth of the distance.
+const STEPS: usize = 12;
 
 /// Directions from which the body is touched: angles from its free side, and number on that circle;
 /// a heuristic.
@@ -176,7 +190,7 @@ impl RegistrationDesign {
             }
         }
         chosen.truncate(count);
-        let touches: Vec<_> = chosen.iter().map(|candidate| candidate.touch).collect();
+        let touches: Vec<_> = chosen.iter().map(|candidate| candidate.touch.clone()).collect();
         let fit = HandEyeFit::new(&outline, &touches);
         let foreseen = predict_information(&fit, &HandEyeFit::start(*body))
             .map_err(|error| InputError::new(error.to_string()))?;
@@ -247,34 +261,94 @@ fn candidates(
     free_w: &UnitVector3<f64>,
     rng: &mut impl Rng,
 ) -> Vec<Candidate> {
-    let sites: Vec<(f64, f64)> = (SITES.iter())
-        .flat_map(|&site| TURNS_DEG.iter().map(move |turn_deg| (site, turn_deg.to_radians())))
-        .collect();
-    let mut all: Vec<(UnitVector3<f64>, (f64, f64), f64)> = Vec::new();
+    let sites = sites(outline);
+    let mut all: Vec<(UnitVector3<f64>, &Site, f64)> = Vec::new();
     for side_w in sides(body, free_w) {
-        for &site in &sites {
+        for site in &sites {
             let spins = (0..SPINS).map(|i| std::f64::consts::TAU * i as f64 / SPINS as f64);
             all.extend(spins.map(|spin| (side_w, site, spin)));
         }
     }
     all.shuffle(rng);
-    let made = all.into_iter().filter_map(|(side_w, (site, turn), spin)| {
-        let length_m = if site > 0.0 { outline.radius_m() } else { outline.length_m() };
-        let (p_t, outward_t) = outline.at(site * length_m, turn);
-        let x_wt = pose(body, &side_w, (&p_t, &outward_t), spin)?;
-        let touch = RegistrationTouch { x_wt, pressed_m: 0.0, sensed_t: Some(p_t) };
+    let made = all.into_iter().filter_map(|(side_w, site, spin)| {
+        let x_wt = pose(body, &side_w, (&site.p_t, &site.outward_t), spin)?;
+        let sensed_t = match outline.pad() {
+            Some((pad, x_tp)) => pad_points(pad, x_tp, (body, &x_wt, &side_w), &site.p_t),
+            None => vec![site.p_t],
+        };
+        let touch = RegistrationTouch { x_wt, pressed_m: 0.0, sensed_t, load: None };
         let is_meant = outline.nearest(body, &x_wt).1 > -INTO_M;
         is_meant.then(|| {
-            let only = [touch];
-            let fit = HandEyeFit::new(outline, &only);
+            let only = std::slice::from_ref(&touch);
+            let fit = HandEyeFit::new(outline, only);
             let state = HandEyeFit::start(*body);
-            let count = fit.residuals(&state).len();
-            // The last row belongs to no touch.
-            let rows = jacobian(&fit, &state, count).remove_row(count - 1);
-            Candidate { touch, approach: approach(&x_wt, &side_w, &robot.finger), rows }
+            let (count, plausible) = (fit.residuals(&state).len(), fit.plausible_count());
+            let rows = jacobian(&fit, &state, count).remove_rows(count - plausible, plausible);
+            let approach = approach(&x_wt, &side_w, &robot.finger);
+            Candidate { touch, approach, rows }
         })
     });
     made.take(CANDIDATES).collect()
+}
+
+/// Place of the finger that touches, and its outward normal.
+struct Site {
+    p_t: Point3<f64>,
+    outward_t: UnitVector3<f64>,
+}
+
+/// Returns the places of the finger that touch, all over its outline or its pad.
+fn sites(outline: &FingerOutline) -> Vec<Site> {
+    if let Some((pad, x_tp)) = outline.pad() {
+        let at = PAD_SITES.map(|share| pad.size_m.map(|size_m| share * size_m));
+        let places = at.iter().flat_map(|[x, _]| at.iter().map(move |[_, y]| [*x, *y]));
+        return places
+            .map(|[x, y]| {
+                let p = Point3::new(x, y, pad.surface_m([x, y]));
+                // The normal of a dome leads away from its centre.
+                let dome = UnitVector3::try_new(Vector3::new(x, y, p.z + pad.dome_m), 0.0);
+                let normal = dome.filter(|_| pad.dome_m > 0.0).unwrap_or(Vector3::z_axis());
+                Site { p_t: x_tp * p, outward_t: x_tp.rotation * normal }
+            })
+            .collect();
+    }
+    let places = SITES.iter().flat_map(|site| TURNS_DEG.map(|turn_deg| (*site, turn_deg)));
+    places
+        .map(|(site, turn_deg)| {
+            let length_m = if site > 0.0 { outline.radius_m() } else { outline.length_m() };
+            let (p_t, outward_t) = outline.at(site * length_m, turn_deg.to_radians());
+            Site { p_t, outward_t }
+        })
+        .collect()
+}
+
+/// Returns points of the body, in `T`, that a pad locates when it is pressed at `p_t` from its pose
+/// `x_wt` of first contact.
+fn pad_points(
+    pad: &GelPad,
+    x_tp: &Isometry3<f64>,
+    (body, x_wt, side_w): (&CalibrationBody, &Isometry3<f64>, &UnitVector3<f64>),
+    p_t: &Point3<f64>,
+) -> Vec<Point3<f64>> {
+    let mut x_wp = x_wt * x_tp;
+    x_wp.translation.vector -= side_w.scale(PAD_PRESSED_M);
+    let middle = x_tp.inverse_transform_point(p_t);
+    let [width_m, height_m] = pad.size_m;
+    let mut around_m = PAD_AROUND * width_m.min(height_m);
+    if let CalibrationBody::Ball { radius_m, .. } = body {
+        around_m = around_m.min((2.0 * radius_m * PAD_PRESSED_M * PAD_SHARE).sqrt());
+    }
+    let places = [[0.0, 0.0], [1.0, 0.0], [-0.5, 0.87], [-0.5, -0.87]];
+    places
+        .map(|[x, y]| {
+            let mut p = middle + Vector3::new(x, y, 0.0) * around_m;
+            // Along the pad's normal, until it is on the body.
+            for _ in 0..STEPS {
+                p.z += body.distance_m(&(x_wp * p));
+            }
+            x_tp * p
+        })
+        .into()
 }
 
 /// Returns directions from the body towards the finger: around the free side of a ball; one for a

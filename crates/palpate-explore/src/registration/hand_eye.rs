@@ -6,20 +6,26 @@
 //! used, so its errors do not enter. The outline constrains a rotation about the finger's own axis
 //! only weakly, by the corner of its tip. There, the side of contact according to the electrodes is
 //! used too, with a fitted gain, within the region where a finger is mirror-symmetric.
+//!
+//! A pad with a camera sees more than where the tip is: the points that it locates lie on the body.
+//! Their curvature gives the scale of its depths, which takes the place of the gain.
 
 use super::known_body::{CalibrationBody, FingerOutline};
+use crate::robot::sensor::Wrench;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::least_squares::{Problem, Solution};
 
 /// One touch of the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RegistrationTouch {
     /// Pose of `T` by forward kinematics at the reading of the contact.
     pub x_wt: Isometry3<f64>,
     /// Depth of that pose beyond the detection of contact.
     pub pressed_m: f64,
-    /// Contact located by the sensor, in its own `T`; `None` if it was not located.
-    pub sensed_t: Option<Point3<f64>>,
+    /// Points located by the sensor, in its own `T`: the contact, then those of its patch.
+    pub sensed_t: Vec<Point3<f64>>,
+    /// Load on the tip at that contact, relative to that at rest, if the sensor measures it.
+    pub load: Option<Wrench>,
 }
 
 /// Estimate from touches of a known body.
@@ -31,7 +37,7 @@ pub struct HandEyeEstimate {
     pub body: CalibrationBody,
     /// Indentation of the finger before contact is detected; see [`FingerOutline::contact`].
     pub indentation_m: f64,
-    /// Gain of the lateral contact position: measured over actual.
+    /// Gain of the lateral contact position, or of a pad's depths: measured over actual.
     pub gain: f64,
     /// Measured lateral position of a central contact.
     pub lateral_offset_m: f64,
@@ -50,8 +56,8 @@ const GAIN: f64 = 0.5;
 /// Plausible lateral offset of a central contact for an electrode finger, whose halves are never
 /// identical. A heuristic: three times the value of `make contacts` on a sphere.
 const ASIDE_M: f64 = 3e-4;
-/// Plausible lateral offset for a finger with exact contacts.
-const ASIDE_EXACT_M: f64 = 1e-6;
+/// Plausible indentation and lateral offset for a finger with exact contacts.
+const EXACT_M: f64 = 1e-6;
 
 /// Initial value of the indentation; a heuristic.
 const START_M: f64 = 3e-4;
@@ -78,10 +84,24 @@ impl<'a> HandEyeFit<'a> {
     pub fn new(outline: &'a FingerOutline, touches: &'a [RegistrationTouch]) -> Self {
         let limit_m = ASKED * outline.radius_m();
         let felt = touches.iter().enumerate().filter_map(|(i, touch)| {
-            let aside_m = touch.sensed_t?.y;
+            let aside_m = touch.sensed_t.first()?.y;
             (aside_m.abs() <= limit_m).then_some((i, aside_m))
         });
-        Self { outline, felt: felt.collect(), touches }
+        let felt = if outline.pad().is_some() { Vec::new() } else { felt.collect() };
+        Self { outline, felt, touches }
+    }
+
+    /// Number of depths among the residuals: one per touch, or one per point that a pad locates.
+    pub fn depth_count(&self) -> usize {
+        match self.outline.pad() {
+            Some(_) => self.touches.iter().map(|touch| touch.sensed_t.len()).sum(),
+            None => self.touches.len(),
+        }
+    }
+
+    /// Number of the last residuals that belong to no touch: deviations from plausible values.
+    pub fn plausible_count(&self) -> usize {
+        if self.outline.pad().is_some() { 2 } else { 1 }
     }
 
     /// Returns the estimate from which the touches are fitted. A rigid finger of another radius
@@ -89,13 +109,26 @@ impl<'a> HandEyeFit<'a> {
     /// look like outliers.
     pub(super) fn started(&self, body: CalibrationBody) -> HandEyeEstimate {
         let mut start = Self::start(body);
-        if !self.outline.is_soft() {
+        if self.outline.pad().is_some() {
+            start.indentation_m = 0.0;
+        } else if !self.outline.is_soft() {
             let residuals = self.residuals(&start);
             let mut depths: Vec<f64> = residuals.iter().copied().take(self.touches.len()).collect();
             depths.sort_by(f64::total_cmp);
             start.indentation_m -= DEPTH_SD_M * depths.get(depths.len() / 2).unwrap_or(&0.0);
         }
         start
+    }
+
+    /// Returns how far from the body each point is that a pad locates, in units of the scatter.
+    fn points_off(&self, state: &HandEyeEstimate) -> impl Iterator<Item = f64> {
+        self.touches.iter().flat_map(move |touch| {
+            let x_wt = touch.x_wt * state.correction;
+            touch.sensed_t.iter().map(move |p_t| {
+                let p_w = x_wt * self.outline.rescaled(p_t, state.gain);
+                state.body.distance_m(&p_w) / DEPTH_SD_M
+            })
+        })
     }
 
     /// Returns the initial estimate.
@@ -135,8 +168,13 @@ impl Problem for HandEyeFit<'_> {
     }
 
     /// Returns the residuals: the depth of each touch, the lateral position where used, and the
-    /// deviation from plausible values.
+    /// deviation from plausible values. A pad has depths only, one per point, and no indentation
+    /// and offset other than its image shows.
     fn residuals(&self, state: &HandEyeEstimate) -> DVector<f64> {
+        if self.outline.pad().is_some() {
+            let exact = [state.indentation_m, state.lateral_offset_m].map(|m| m / EXACT_M);
+            return DVector::from_vec(self.points_off(state).chain(exact).collect());
+        }
         let meetings = self.touches.iter().map(|touch| {
             let x_wt = touch.x_wt * state.correction;
             self.outline.contact(&state.body, &x_wt, state.indentation_m)
@@ -147,13 +185,13 @@ impl Problem for HandEyeFit<'_> {
         let sides = (self.felt.iter()).map(|&(i, felt_m)| {
             (felt_m - state.lateral_offset_m - state.gain * meetings[i].0.y) / FELT_SD_M
         });
-        let plausible_m = if self.outline.is_soft() { ASIDE_M } else { ASIDE_EXACT_M };
+        let plausible_m = if self.outline.is_soft() { ASIDE_M } else { EXACT_M };
         let aside = [state.lateral_offset_m / plausible_m];
         DVector::from_vec(depths.chain(sides).chain(aside).collect())
     }
 
     fn kind(&self, i: usize) -> usize {
-        match i.checked_sub(self.touches.len()) {
+        match i.checked_sub(self.depth_count()) {
             None => 0,
             Some(side) if side < self.felt.len() => 1,
             Some(_) => 2,
@@ -196,7 +234,7 @@ pub fn undetermined(fit: &Solution<HandEyeEstimate>, body: &CalibrationBody) -> 
     named.filter(|(i, _)| lost(*i)).map(|(_, (name, _))| name).collect()
 }
 
-/// Returns the depth residuals of a fit, one per touch, m.
-pub fn depths_m(fit: &Solution<HandEyeEstimate>, touches: usize) -> Vec<f64> {
-    fit.residuals.iter().take(touches).map(|r| r * DEPTH_SD_M).collect()
+/// Returns the depth residuals of a fit, the first `count`, m.
+pub fn depths_m(fit: &Solution<HandEyeEstimate>, count: usize) -> Vec<f64> {
+    fit.residuals.iter().take(count).map(|r| r * DEPTH_SD_M).collect()
 }

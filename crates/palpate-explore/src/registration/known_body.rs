@@ -3,6 +3,7 @@
 
 use crate::robot::Robot;
 use crate::robot::finger::profile::Profile;
+use crate::robot::sensor::GelPad;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -40,6 +41,15 @@ impl CalibrationBody {
             Self::Ball { centre_w, radius_m } => (p_w - centre_w).norm() - radius_m,
             Self::Plate { point_w, normal_w } => normal_w.dot(&(p_w - point_w)),
         }
+    }
+
+    /// Returns the point of the body's surface nearest to a point of `W`.
+    pub fn nearest_w(&self, p_w: &Point3<f64>) -> Point3<f64> {
+        let out_w = match self {
+            Self::Ball { centre_w, .. } => (p_w - centre_w).try_normalize(0.0).unwrap_or_default(),
+            Self::Plate { normal_w, .. } => normal_w.into_inner(),
+        };
+        p_w - out_w * self.distance_m(p_w)
     }
 
     /// Returns the body moved by a step in plausible units: a ball along x, y, z; a plate along its
@@ -124,6 +134,8 @@ const STEPS: usize = 30;
 pub struct FingerOutline {
     profile: Profile,
     is_soft: bool,
+    /// Pad before the hull, and its pose in `T`.
+    pad: Option<(GelPad, Isometry3<f64>)>,
     points: Vec<Sample>,
     /// Spacing of points: m along the finger, rad around it.
     steps: [f64; 2],
@@ -148,7 +160,9 @@ impl FingerOutline {
         };
         let (length_m, radius_m) = (profile.length_m, profile.radius_m);
         let steps = [(length_m + radius_m) / ALONG as f64, TAU / AROUND as f64];
-        let mut outline = Self { points: Vec::new(), profile, is_soft: robot.is_soft, steps };
+        let pad = robot.pad.clone().map(|pad| (pad, GelPad::x_tp(&robot.finger)));
+        let points = Vec::new();
+        let mut outline = Self { points, profile, is_soft: robot.is_soft, pad, steps };
         let places = (0..ALONG).flat_map(|i| (0..AROUND).map(move |j| (i as f64, j as f64)));
         let samples = places.map(|(i, j)| {
             let place = [(i + 0.5) * steps[0] - length_m, j * steps[1] - PI];
@@ -276,6 +290,20 @@ impl FingerOutline {
             }
         }
         (at(place), distance_m)
+    }
+
+    /// Returns the pad before the hull, and its pose in `T`.
+    pub fn pad(&self) -> Option<&(GelPad, Isometry3<f64>)> {
+        self.pad.as_ref()
+    }
+
+    /// Returns where a point in `T` that a pad has located is if its images show depths that are
+    /// too large by the factor `scale`.
+    pub fn rescaled(&self, p_t: &Point3<f64>, scale: f64) -> Point3<f64> {
+        let rescaled = |(pad, x_tp): &(GelPad, Isometry3<f64>)| {
+            x_tp * pad.rescaled(&x_tp.inverse_transform_point(p_t), scale)
+        };
+        self.pad.as_ref().map_or(*p_t, rescaled)
     }
 
     /// Whether the finger is soft.

@@ -9,8 +9,10 @@ pub mod hand_eye;
 pub mod icp;
 mod known_body;
 mod register;
+mod wrench_fit;
 
 pub use design::RegistrationDesign;
 pub use hand_eye::{HandEyeEstimate, HandEyeFit, RegistrationTouch};
 pub use known_body::{CalibrationBody, FingerOutline};
 pub use register::{RegistrationResult, conclude, register};
+pub use wrench_fit::WrenchErrors;

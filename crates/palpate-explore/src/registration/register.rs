@@ -6,6 +6,7 @@ use super::hand_eye::{
     parameters, undetermined,
 };
 use super::known_body::{CalibrationBody, FingerOutline};
+use super::wrench_fit::WrenchErrors;
 use crate::backend::Fault;
 use crate::probe::{Probe, Touch};
 use crate::robot::Robot;
@@ -16,8 +17,9 @@ use palpate_gp::math::pose::parts;
 use palpate_input::error::InputError;
 use toml_edit::{Array, DocumentMut, Item, Table, value};
 
-/// Index of the indentation among the parameters.
+/// Indices of the indentation and of the gain among the parameters.
 const GIVE: usize = 6 + CalibrationBody::PARAMETERS;
+const GAIN: usize = GIVE + 1;
 
 /// Smallest error of the tip's radius that is reported, as a fraction of the radius and in standard
 /// deviations.
@@ -40,9 +42,14 @@ pub struct RegistrationResult {
     pub rms_m: f64,
     /// Radius of the tip that the touches fit, m; `None` for a soft finger, or if undetermined.
     pub tip_radius_m: Option<f64>,
+    /// Depths of a pad's images over the true ones that the touches fit; `None` without a pad, or
+    /// if undetermined.
+    pub pad_scale: Option<f64>,
+    /// Errors of the force/torque sensor that locates the contacts, if the touches determine them.
+    pub wrench: Option<WrenchErrors>,
     /// Number of touches with contact.
     pub contacts: usize,
-    /// Number of contacts left out as outliers.
+    /// Number of contacts, or of points that a pad located, left out as outliers.
     pub outliers: usize,
     /// Number of misses and interrupted touches.
     pub failed: usize,
@@ -55,6 +62,12 @@ impl RegistrationResult {
     /// `arm.tool_rotation_deg`; `before` is their value during the touches.
     pub fn tool(&self, before: Option<Isometry3<f64>>) -> Isometry3<f64> {
         before.map_or(self.found.correction, |before| before * self.found.correction)
+    }
+
+    /// Returns what is wrong with the finger of `robot` according to the touches.
+    pub fn remarks(&self, robot: &Robot) -> Vec<String> {
+        let wrench = self.wrench.and_then(|errors| errors.remark());
+        self.wrong_radius(robot).into_iter().chain(wrench).collect()
     }
 
     /// Returns what is wrong with the radius of the tip, if it is not that of `robot`.
@@ -100,8 +113,30 @@ impl RegistrationResult {
             sure["tip_radius_m"] = value(radius_m);
             sure["tip_radius_sd_m"] = value(self.sds[GIVE]);
         }
+        if let Some(errors) = &self.wrench {
+            let [force_sd, torque_sd] = &errors.bias_sds;
+            for (key, vector) in [
+                ("wrench_bias_n", &errors.bias.force_n),
+                ("wrench_bias_sd_n", force_sd),
+                ("wrench_bias_nm", &errors.bias.torque_nm),
+                ("wrench_bias_sd_nm", torque_sd),
+                ("wrench_offset_m", &errors.offset_m),
+                ("wrench_offset_sd_m", &errors.offset_sd_m),
+            ] {
+                sure[key] = value(Array::from_iter(vector.iter().copied()));
+            }
+        }
         let mut tables = DocumentMut::new();
         tables["arm"] = pose_table("tool_", &self.tool(before));
+        if let Some(scale) = self.pad_scale {
+            sure["pad_scale_sd"] = value(scale / self.found.gain * self.sds[GAIN]);
+            let mut gel = Table::new();
+            gel["scale"] = value(scale);
+            let mut effects = Table::new();
+            effects.set_implicit(true);
+            effects["gel"] = gel.into();
+            tables["effects"] = effects.into();
+        }
         tables["object"] = pose_table("", &self.found.body.x_wo());
         tables["registration"] = sure.into();
         tables.to_string()
@@ -143,12 +178,17 @@ pub fn register(
         };
         made(&ending);
         made_count += 1;
-        if let Touch::Contact(contact) = &ending {
-            let x_wt = probe.tip().ok_or_else(|| {
+        if let Touch::Contact(_) = &ending {
+            let (x_wt, sensed) = probe.sensed().ok_or_else(|| {
                 InputError::new("this probe does not report the pose of its finger at contact")
             })?;
-            let felt_t = Some(x_wt.inverse_transform_point(&contact.p_wc));
-            touches.push(RegistrationTouch { x_wt, pressed_m, sensed_t: felt_t });
+            let points = std::iter::once(sensed).chain(&sensed.patch);
+            touches.push(RegistrationTouch {
+                x_wt: *x_wt,
+                pressed_m,
+                sensed_t: points.map(|point| point.p_tc).collect(),
+                load: sensed.load.filter(|_| sensed.doubt.is_none()),
+            });
         }
     }
     let least = PARAMETERS;
@@ -182,22 +222,36 @@ pub fn conclude(
     let fitted = fit(&problem, &problem.started(*body))
         .map_err(|error| InputError::new(error.to_string()))?;
     let named = parameters(body);
-    let depths_m = depths_m(&fitted, touches.len());
+    let depths_m = depths_m(&fitted, problem.depth_count());
     let used: Vec<f64> =
         depths_m.iter().zip(&fitted.used).filter(|(_, used)| **used).map(|(m, _)| *m).collect();
     let squares: f64 = used.iter().map(|m| m * m).sum();
     let undetermined = undetermined(&fitted, body);
     // A tip that is larger than stated touches earlier: a negative indentation.
-    let is_known = !robot.is_soft && !undetermined.contains(&SENSING_PARAMETERS[0]);
+    let [give, gain, _] = SENSING_PARAMETERS;
+    let is_known = !robot.yields() && !undetermined.contains(&give);
+    let pad = robot.pad.as_ref().filter(|_| !undetermined.contains(&gain));
+    let loads: Vec<_> = (touches.iter())
+        .filter_map(|touch| {
+            let HandEyeEstimate { correction, body, indentation_m, .. } = &fitted.state;
+            let x_wt = touch.x_wt * correction;
+            let (p_t, _) = outline.contact(body, &x_wt, *indentation_m);
+            // A tip of another radius than stated touches the body elsewhere.
+            let p_t = x_wt.inverse_transform_point(&body.nearest_w(&(x_wt * p_t)));
+            Some((p_t, touch.load?.moved(&correction.inverse())))
+        })
+        .collect();
     Ok(RegistrationResult {
         tip_radius_m: is_known.then_some(outline.radius_m() - fitted.state.indentation_m),
+        pad_scale: pad.map(|pad| pad.scale * fitted.state.gain),
+        wrench: WrenchErrors::find(&loads),
         found: fitted.state,
         sds: std::array::from_fn(|i| fitted.covariance[(i, i)].sqrt() * named[i].1),
         undetermined,
         condition: fitted.condition,
         rms_m: (squares / used.len().max(1) as f64).sqrt(),
         contacts: touches.len(),
-        outliers: touches.len() - used.len(),
+        outliers: depths_m.len() - used.len(),
         failed: of - touches.len(),
         fault: None,
     })

@@ -26,7 +26,9 @@ effect! {
         modulus_pa: f64, 1e3..=1e9;
         /// Standard deviation of the noise of a pixel.
         noise_m: f64, 0.0..=1e-3;
-        /// Standard deviation between pads of the scale of the depths.
+        /// Depths of the images over the true ones, as found by `palpate register`.
+        scale: f64, 0.2..=5.0;
+        /// Standard deviation of this scale between pads, or what is left of it.
         scale_sd: f64, 0.0..=0.3;
         /// Time between images.
         frame_s: f64, 1e-3..=1.0;
@@ -50,6 +52,7 @@ impl GelEffect {
             size_m: self.size_m,
             dome_m: self.dome_m,
             noise_m: self.noise_m,
+            scale: self.scale,
             scale_sd: self.scale_sd,
             depth_max_m: DEEP * self.thickness_m,
         }

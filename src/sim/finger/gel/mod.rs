@@ -57,7 +57,7 @@ impl GelState {
     /// Creates the state at the start of a trial; `rng` is its only randomness.
     pub fn new(effect: &GelEffect, mut rng: ChaCha8Rng) -> Self {
         Self {
-            scale: 1.0 + effect.scale_sd * normal(&mut rng),
+            scale: effect.scale * (1.0 + effect.scale_sd * normal(&mut rng)),
             rng,
             next_frame_s: effect.frame_s,
             x_wt: None,

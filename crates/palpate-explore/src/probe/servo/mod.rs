@@ -10,7 +10,7 @@ use crate::control::{Controller, Goal, posture};
 use crate::robot::Robot;
 use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
-use crate::robot::sensor::{Doubt, Sensor};
+use crate::robot::sensor::{Doubt, SensedContact, Sensor};
 use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
@@ -48,8 +48,8 @@ pub struct Servo {
     applied_ratio: f64,
     q: Vec<f64>,
     swept: Option<SweptVolume>,
-    /// Pose of the tip at the reading of the last contact.
-    tip: Option<Isometry3<f64>>,
+    /// Pose of the tip at the reading of the last contact, and that contact.
+    sensed: Option<(Isometry3<f64>, SensedContact)>,
     /// Doubt about the last touch.
     doubt: Option<Doubt>,
     /// Reach of an arm, which checks each path around an object before moving.
@@ -85,7 +85,7 @@ impl Servo {
             applied_ratio: 1.0,
             q,
             swept: None,
-            tip: None,
+            sensed: None,
             doubt: None,
             reach,
         })
@@ -383,11 +383,11 @@ impl Servo {
             return Ok(None);
         }
         let x_wt = self.x_wt();
-        self.tip = Some(x_wt);
         let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
         let located = self.monitor.contact(&self.robot.finger, moved_m);
         self.doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
-        Ok(located.ok().map(|sensed| Contact::sensed(&x_wt, &sensed)))
+        self.sensed = located.ok().map(|sensed| (x_wt, sensed));
+        Ok(self.sensed.as_ref().map(|(x_wt, sensed)| Contact::sensed(x_wt, sensed)))
     }
 }
 
@@ -471,8 +471,8 @@ impl Probe for Servo {
         self.swept.clone()
     }
 
-    fn tip(&self) -> Option<Isometry3<f64>> {
-        self.tip
+    fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
+        self.sensed.as_ref()
     }
 
     fn doubt(&self) -> Option<Doubt> {

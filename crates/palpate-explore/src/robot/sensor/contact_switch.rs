@@ -32,6 +32,7 @@ pub(super) fn foremost(finger: &Finger, doubt: Option<Doubt>) -> SensedContact {
         covariance_t: Some(spread * finger.radius_m.powi(2)),
         doubt,
         patch: Vec::new(),
+        load: None,
     }
 }
 

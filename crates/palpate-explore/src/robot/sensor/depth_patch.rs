@@ -12,7 +12,7 @@ use nalgebra::{
 /// A pad at the end of the finger: its middle touches the hull's foremost point, and it faces the
 /// approach. Its frame `P` has its origin there, x along the width, which is y of `T`, and z
 /// outwards.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GelPad {
     /// Width and height, m.
     pub size_m: [f64; 2],
@@ -20,10 +20,20 @@ pub struct GelPad {
     pub dome_m: f64,
     /// Standard deviation of the noise of a pixel.
     pub noise_m: f64,
-    /// Standard deviation of the scale of the depths, common to all pixels.
+    /// Depths of its images over the true ones.
+    pub scale: f64,
+    /// Standard deviation of this scale, common to all pixels.
     pub scale_sd: f64,
     /// Indentation beyond which the pad is overloaded.
     pub depth_max_m: f64,
+}
+
+impl Default for GelPad {
+    /// Returns a flat pad without size and noise.
+    fn default() -> Self {
+        let [dome_m, noise_m, scale_sd, depth_max_m] = [0.0; 4];
+        Self { size_m: [0.0; 2], dome_m, noise_m, scale: 1.0, scale_sd, depth_max_m }
+    }
 }
 
 impl GelPad {
@@ -41,6 +51,12 @@ impl GelPad {
         // The difference of nearly equal numbers, rearranged.
         let inside = (self.dome_m * self.dome_m - across2).max(0.0).sqrt();
         if self.dome_m > 0.0 { -across2 / (self.dome_m + inside) } else { 0.0 }
+    }
+
+    /// Returns where a point of `P` is if the indentation there is smaller by the factor `scale`.
+    pub fn rescaled(&self, p: &Point3<f64>, scale: f64) -> Point3<f64> {
+        let surface_m = self.surface_m([p.x, p.y]);
+        Point3::new(p.x, p.y, surface_m - (surface_m - p.z) / scale)
     }
 
     /// Place of a pixel's centre, in `P`, of an image with these numbers of pixels.
@@ -147,8 +163,9 @@ impl DepthPatch {
 
     /// Mean indentation at each pixel.
     fn depths_m(&self) -> Vec<f64> {
-        let count = self.count.max(1) as f64;
-        self.sums_m.iter().zip(&self.rest_m).map(|(sum, rest)| sum / count - rest).collect()
+        let (count, scale) = (self.count.max(1) as f64, self.pad.scale);
+        let depth_m = |(sum, rest): (&f64, &f64)| (sum / count - rest) / scale;
+        self.sums_m.iter().zip(&self.rest_m).map(depth_m).collect()
     }
 }
 
@@ -259,6 +276,7 @@ impl DepthPatch {
             covariance_t: Some(along * variance_m2 + across),
             doubt,
             patch: Vec::new(),
+            load: None,
         }
     }
 

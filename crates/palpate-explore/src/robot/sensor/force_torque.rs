@@ -186,7 +186,7 @@ impl Sensor for ForceTorqueTip {
                 return Err(Doubt::TooLight);
             }
             let (p_tc, normal) = point_on_hull(finger, &wrench).ok_or(Doubt::NoSignal)?;
-            return Ok(SensedContact::new(p_tc, -normal));
+            return Ok(SensedContact { load: Some(wrench), ..SensedContact::new(p_tc, -normal) });
         };
         accuracy.check_readings(rest, &self.now)?;
         let sds = accuracy.sds(rest, &self.now, moved_m);
@@ -198,7 +198,8 @@ impl Sensor for ForceTorqueTip {
             load[i] += sign * sds[i];
             in_tip(&load)
         };
-        let too_light = || Ok(foremost(finger, Some(Doubt::TooLight)));
+        let too_light =
+            || Ok(SensedContact { load: Some(wrench), ..foremost(finger, Some(Doubt::TooLight)) });
         if force_n <= SIGMAS * force_sd_n || force_n == 0.0 {
             return too_light();
         }
@@ -252,6 +253,7 @@ impl Sensor for ForceTorqueTip {
             covariance_t: Some(across + normal * normal.transpose() * offset_m.powi(2)),
             doubt,
             patch: Vec::new(),
+            load: Some(wrench),
         })
     }
 }

@@ -36,6 +36,8 @@ pub struct SensedContact {
     pub doubt: Option<Doubt>,
     /// Further points of the object that the same touch shows.
     pub patch: Vec<SensedContact>,
+    /// Load on the tip, relative to that at rest, if the sensor measures it.
+    pub load: Option<Wrench>,
 }
 
 impl SensedContact {
@@ -48,6 +50,7 @@ impl SensedContact {
             covariance_t: None,
             doubt: None,
             patch: Vec::new(),
+            load: None,
         }
     }
 
