@@ -2,6 +2,10 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
+use palpate::explore::belief::HeightField;
+use palpate::explore::gp_settings::GpSettings;
+use palpate::explore::planner;
+use palpate::explore::probe::Touch;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
@@ -11,9 +15,12 @@ use palpate::sim::finger::effects::gel::GelEffect;
 use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 use palpate::sim::finger::gel::{Gel, GelState};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
+use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
+use rand::RngExt;
 use std::hint::black_box;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 fn finger(c: &mut Criterion) {
@@ -145,5 +152,56 @@ fn beside(environment: &Environment, bvh: &MeshBvh, at: impl Fn(f64) -> TipMotio
     }
 }
 
-criterion_group!(benches, finger);
+/// Cost of a belief after 60 touches, each of which shows three further points, over that of one
+/// touch, one point: one fit and one choice of the next touch.
+fn patches(_: &mut Criterion) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+    let built = Scene::load(&path, &[]).ok().and_then(|scene| Environment::build(scene).ok());
+    let Some(environment) = built.map(Arc::new) else { return };
+    let Some(zone) = environment.task().zone() else { return };
+    let mut probe = exact_probe(Arc::clone(&environment));
+    let mut random = stream(1, 0, "places");
+    let mut beliefs = [(); 2].map(|()| HeightField::new(zone.clone(), GpSettings::default()));
+    let mut contact_at = |parts: &[f64]| {
+        let target = zone.at(parts);
+        let approach = environment.task().approach(&target.clone().into())?;
+        let Ok(Touch::Contact(contact)) = probe.touch(&approach) else { return None };
+        Some((target, contact))
+    };
+    let mut count = 0;
+    while count < 60 {
+        let [x, z] = [(); 2].map(|()| random.random_range(0.05..0.95));
+        let Some((target, mut contact)) = contact_at(&[x, z]) else { continue };
+        beliefs[0].observe(&target, &Touch::Contact(contact.clone()));
+        let around = [[0.02, 0.0], [-0.01, 0.02], [-0.01, -0.02]];
+        let further = around.into_iter().filter_map(|[a, b]| contact_at(&[x + a, z + b]));
+        contact.patch = further.map(|(_, contact)| contact).collect();
+        beliefs[1].observe(&target, &Touch::Contact(contact));
+        count += 1;
+    }
+    let Some(active) = planner::by_name("active") else { return };
+    let seconds = beliefs.map(|belief| {
+        let made = (0..20).map(|_| {
+            let mut belief = belief.clone();
+            let mut planner = (active.make)(&Default::default(), stream(1, 0, "active"));
+            let begin = Instant::now();
+            let is_fitted = belief.refit().is_ok();
+            let middle = begin.elapsed().as_secs_f64();
+            black_box((is_fitted, planner.plan(&belief.into()).is_ok()));
+            [middle, begin.elapsed().as_secs_f64()]
+        });
+        made.fold([f64::INFINITY; 2], |least, s| [least[0].min(s[0]), least[1].min(s[1])])
+    });
+    let [alone, patched] = seconds;
+    println!(
+        "belief of 60 touches: fit {:.2} ms, with patches {:.2} ms; fit and choice {:.2} ms, with \
+         patches {:.2} ms",
+        1e3 * alone[0],
+        1e3 * patched[0],
+        1e3 * alone[1],
+        1e3 * patched[1],
+    );
+}
+
+criterion_group!(benches, finger, patches);
 criterion_main!(benches);

@@ -20,6 +20,7 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Fit the finger's constants to recordings on a flat plate, and score them on held-out sensors.
+/// Pads and rigid tips are calibrated by `palpate register --ball`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:

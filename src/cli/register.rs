@@ -28,7 +28,8 @@ Examples:
   palpate register models/container.obj --unit mm --cloud runs/container-scan/cloud.ply --at 0,-0.65,0.5
 
 Touches the ball or plate from many sides with many parts of the finger, and writes registration.toml: \
-arm.tool_position_m and arm.tool_rotation_deg for the scene, the body's pose, and the uncertainty of each. With --cloud \
+arm.tool_position_m and arm.tool_rotation_deg for the scene, the body's pose, and the uncertainty of each. A rigid tip's \
+wrong radius and the errors of its force/torque sensor are named; a pad's images also give effects.gel.scale. With --cloud \
 nothing is touched: the contacts are registered to the object's mesh, and align.toml holds object.position_m and \
 object.rotation_deg for a scene, and their uncertainty.")]
 pub(super) struct Args {

@@ -62,7 +62,7 @@ const FRAMES: usize = 25;
 const SITES: [f64; 6] = [0.8, 0.55, 0.2, -0.25, -0.6, -0.88];
 const TURNS_DEG: [f64; 5] = [-65.0, -25.0, 0.0, 25.0, 65.0];
 
-/// Touched places of a pad along each of its sides, as fractions of it from the middle; a heuristic:
+/// Touched places of a pad along each side, as fractions of it from the middle; a heuristic:
 /// the rim stays free.
 const PAD_SITES: [f64; 3] = [-0.2, 0.0, 0.2];
 

@@ -18,7 +18,7 @@ const SCATTER_NM: f64 = 1e-3;
 const SIGMAS: f64 = 4.0;
 const LEAST_M: f64 = 5e-4;
 
-/// What is wrong with the loads that a force/torque sensor reports, relative to rest.
+/// Errors of the loads that a force/torque sensor reports relative to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WrenchErrors {
     /// Bias that remains after the tare, in `T`.
