@@ -39,6 +39,8 @@ pub fn search_box() -> SearchBox {
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
         touch_noise: TouchNoise::Fitted,
+
+        reference_sd: None,
         slope_noise_ratio: None,
     }
 }

@@ -116,7 +116,13 @@ impl FreeSpaceBound {
             else {
                 continue;
             };
-            let cut = Observation { place, height, noise: sd.max(soft_sd) / noise_sd, slope: None };
+            let cut = Observation {
+                place,
+                height,
+                noise: sd.max(soft_sd) / noise_sd,
+                slope: None,
+                known: None,
+            };
             if belief.push(&cut).is_err() {
                 return;
             }

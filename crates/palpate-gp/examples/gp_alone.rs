@@ -20,6 +20,8 @@ fn main() -> Result<(), CovarianceError> {
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
         touch_noise: TouchNoise::Fitted,
+
+        reference_sd: None,
         slope_noise_ratio: None,
     };
     let grid: Vec<[f64; 1]> = (0..=400).map(|i| [-2.0 + 0.01 * f64::from(i)]).collect();

@@ -40,7 +40,8 @@ pub enum CovarianceError {
     },
 }
 
-/// Factors C + N + jitter·diag(C), with the correlations C and the diagonal noise N, into `dense`,
+/// Factors C + N + E + jitter·diag(C), with the correlations C, the diagonal noise N and the
+/// covariance E of known errors, into `dense`,
 /// with the smallest sufficient jitter of 0, 1e-15, 1e-14, …, and returns that jitter.
 /// `correlations` is the buffer, and entries that it already holds are not computed again.
 ///
@@ -80,6 +81,9 @@ pub(super) fn factor(
                 1.0 + noise.height * noise.height + jitter
             }
         };
+        observations.for_known(noise, |row, column, value| {
+            dense.column_mut(column)[row - column] += value;
+        });
         match dense.factor(largest) {
             Ok(()) => return Ok(jitter),
             Err(cause) if jitter >= JITTER_MAX => {

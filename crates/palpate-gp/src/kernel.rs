@@ -51,7 +51,7 @@ impl Hyperparameters {
     pub fn noise_ratio(&self) -> NoiseRatio {
         let [height, slope] =
             [self.noise_sd, self.slope_noise_sd].map(|noise_sd| noise_sd / self.signal_sd);
-        NoiseRatio { height, slope }
+        NoiseRatio { height, slope, known: 1.0 / self.signal_sd }
     }
 }
 

@@ -29,6 +29,7 @@
 //!     noise_ratio: (1e-4, 1e-2).into(),
 //!     signal_sd: (1e-4, 1.0).into(),
 //!     touch_noise: TouchNoise::Fitted,
+//!     reference_sd: None,
 //!     slope_noise_ratio: None,
 //! };
 //! let fit = search_box.fit(&SquaredExponential, &observations);
@@ -76,6 +77,6 @@ mod tiles;
 
 pub use fit::{Fit, RefitSequence};
 pub use kernel::{Hyperparameters, Kernel};
-pub use observations::{NoiseRatio, Observation, Observations, Slope};
+pub use observations::{KnownError, NoiseRatio, Observation, Observations, Slope};
 pub use posterior::Posterior;
 pub use search_box::{LogNormal, MeanModel, Range, SearchBox, SignalModel, TouchNoise};

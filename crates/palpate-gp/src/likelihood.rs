@@ -98,7 +98,13 @@ impl<'a> Likelihood<'a> {
         let signal2 = at.signal_sd * at.signal_sd;
         self.gradient(signal2, lengths, noise, rest);
         let by_noise: f64 = rest.iter().skip(lengths.len()).sum();
-        *by_signal = fit / signal2 - self.observations.order() as f64 - by_noise;
+        let mut by_known = 0.0;
+        self.observations.for_known(noise, |row, column, value| {
+            let inverse = self.dense.inverse_column(column)[row - column];
+            let change = self.weights[row] * self.weights[column] / signal2 - inverse;
+            by_known += change * value * if row == column { 1.0 } else { 2.0 };
+        });
+        *by_signal = fit / signal2 - self.observations.order() as f64 - by_noise - by_known;
         Ok(value)
     }
 

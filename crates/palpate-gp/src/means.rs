@@ -243,9 +243,15 @@ mod tests {
                 let slope = Slope { gradient: &[0.3, -0.1], noise: 1.0 };
                 let slope = is_sloped.then_some(slope);
                 let height = (3.0 * place[0]).sin() + place[1];
-                observations.push(&Observation { place: &place, height, noise: 1.0, slope });
+                observations.push(&Observation {
+                    place: &place,
+                    height,
+                    noise: 1.0,
+                    slope,
+                    known: None,
+                });
             }
-            let noise = crate::NoiseRatio { height: 0.01, slope: 0.1 };
+            let noise = crate::NoiseRatio { height: 0.01, slope: 0.1, known: 0.0 };
             let at = Hyperparameters::new(0.7, vec![0.4, 0.6], noise, 0.2);
             let mut belief = Posterior::new(&Matern52, at, observations).unwrap();
             let places: Vec<[f64; 2]> =
@@ -272,11 +278,17 @@ mod tests {
             let gradient = [number(), number(), number()];
             let slope = (i % 3 > 0).then_some(Slope { gradient: &gradient, noise: 1.0 });
             let height = number();
-            observations.push(&Observation { place: &place, height, noise: 1.0, slope });
+            observations.push(&Observation {
+                place: &place,
+                height,
+                noise: 1.0,
+                slope,
+                known: None,
+            });
         }
         let kernels: [&'static dyn Kernel; 2] = [&Matern52, &SquaredExponential];
         for kernel in kernels {
-            let noise = NoiseRatio { height: 0.05, slope: 0.3 };
+            let noise = NoiseRatio { height: 0.05, slope: 0.3, known: 0.0 };
             let parameters = Hyperparameters::new(0.7, vec![0.4, 0.6, 0.5], noise, 0.1);
             let posterior = Posterior::new(kernel, parameters, observations.clone()).unwrap();
             let mut field = MeanField::from(&posterior);

@@ -15,6 +15,24 @@ pub struct Observation<'a> {
     pub noise: f64,
     /// Slope at the place, if observed.
     pub slope: Option<Slope<'a>>,
+    /// Further error of the height, of known size.
+    pub known: Option<KnownError<'a>>,
+}
+
+/// Error of a height whose size is known in the heights' unit, independently of the belief.
+///
+/// The height is off by a normal error of its own, and by Σ_k `loadings`_k·b_k. The standard normal
+/// b are the errors that all heights of one source have in common, as are those of a camera's pose:
+/// random effects of a linear mixed model (Rasmussen & Williams 2006, section 2.7).
+#[derive(Clone, Copy, Debug)]
+pub struct KnownError<'a> {
+    /// Variance of the height's own error.
+    pub variance: f64,
+    /// Number of the source.
+    pub source: usize,
+    /// Change of the height per standard deviation of each error of the source; as many for all
+    /// its heights, or none.
+    pub loadings: &'a [f64],
 }
 
 /// The gradient of the height at a place.
@@ -29,7 +47,7 @@ pub struct Slope<'a> {
 impl<'a> Observation<'a> {
     /// Creates an observation of a height alone, with the belief's noise.
     pub fn height(place: &'a [f64], height: f64) -> Self {
-        Self { place, height, noise: 1.0, slope: None }
+        Self { place, height, noise: 1.0, slope: None, known: None }
     }
 
     /// Returns the count of its numbers: height and slope components.
@@ -39,7 +57,12 @@ impl<'a> Observation<'a> {
 
     /// Variance of its height's error, in units of the signal's.
     pub(super) fn height_noise2(&self, ratio: NoiseRatio) -> f64 {
-        ratio.height * ratio.height * (self.noise * self.noise)
+        let known = |error: KnownError| {
+            let common: f64 = error.loadings.iter().map(|loading| loading * loading).sum();
+            ratio.known * ratio.known * (error.variance + common)
+        };
+        let noise = ratio.height * ratio.height * (self.noise * self.noise);
+        noise + self.known.map_or(0.0, known)
     }
 
     /// Variance of its slopes' errors per length scale, in units of the signal's.
@@ -56,11 +79,13 @@ pub struct NoiseRatio {
     pub height: f64,
     /// Noise of a slope, per unit of the inputs.
     pub slope: f64,
+    /// Unit of the heights, in which known errors are stated.
+    pub known: f64,
 }
 
 impl From<f64> for NoiseRatio {
     fn from(height: f64) -> Self {
-        Self { height, slope: 0.0 }
+        Self { height, slope: 0.0, known: 0.0 }
     }
 }
 
@@ -78,6 +103,32 @@ pub struct Observations {
     slope_noise2: Vec<f64>,
     /// Index of the first number of each place.
     starts: Vec<usize>,
+    /// Places with an error of known size, and its own variance.
+    #[serde(default)]
+    known: Vec<(usize, f64)>,
+    #[serde(default)]
+    sources: Vec<Source>,
+}
+
+/// Heights whose errors have a part in common.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Source {
+    number: usize,
+    /// Number of its errors, and the loadings of its heights on them, height after height.
+    errors: usize,
+    loadings: Vec<f64>,
+    places: Vec<usize>,
+}
+
+impl Source {
+    /// Returns the places with their loadings.
+    fn rows(&self) -> impl Iterator<Item = (usize, &[f64])> + Clone {
+        self.places.iter().copied().zip(self.loadings.chunks_exact(self.errors))
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl Observations {
@@ -103,6 +154,89 @@ impl Observations {
             self.slopes.extend(slope.gradient.iter().take(self.dimension()));
         }
         self.slope_noise2.push(observation.slope.map_or(0.0, |slope| slope.noise * slope.noise));
+        if let Some(KnownError { variance, source: number, loadings }) = observation.known {
+            let at = self.len() - 1;
+            self.known.push((at, variance));
+            let (errors, begun) = (loadings.len(), |source: &Source| source.number == number);
+            if errors == 0 {
+                return;
+            }
+            let found = self.sources.iter().position(begun).unwrap_or(self.sources.len());
+            if found == self.sources.len() {
+                let (loadings, places) = (Vec::new(), Vec::new());
+                self.sources.push(Source { number, errors, loadings, places });
+            }
+            let source = &mut self.sources[found];
+            source.places.push(at);
+            source.loadings.extend((0..source.errors).map(|k| loadings.get(k).unwrap_or(&0.0)));
+        }
+    }
+
+    /// Whether any height has an error of known size.
+    pub fn has_known_errors(&self) -> bool {
+        !self.known.is_empty()
+    }
+
+    /// Calls `add` with row, column and value of each entry of the lower triangle of the known
+    /// errors' covariance, in units of the signal's variance; an entry may come in parts.
+    pub(super) fn for_known(&self, ratio: NoiseRatio, mut add: impl FnMut(usize, usize, f64)) {
+        let unit2 = ratio.known * ratio.known;
+        for (at, variance) in &self.known {
+            add(self.start(*at), self.start(*at), unit2 * variance);
+        }
+        for source in &self.sources {
+            let mut rows = source.rows();
+            while let Some((j, own)) = rows.next() {
+                let column = self.start(j);
+                add(column, column, unit2 * dot(own, own));
+                rows.clone().for_each(|(i, loadings)| {
+                    add(self.start(i), column, unit2 * dot(own, loadings));
+                });
+            }
+        }
+    }
+
+    /// Adds to `row` the covariances that a known error, of an observation before which these were
+    /// added, has with theirs.
+    pub(super) fn add_known_row(
+        &self,
+        error: Option<KnownError>,
+        ratio: NoiseRatio,
+        row: &mut [f64],
+    ) {
+        let Some(KnownError { source: number, loadings, .. }) = error else { return };
+        let unit2 = ratio.known * ratio.known;
+        let source = self.sources.iter().find(|source| source.number == number);
+        for (i, others) in source.into_iter().flat_map(Source::rows) {
+            if let Some(entry) = row.get_mut(self.start(i)) {
+                *entry += unit2 * dot(loadings, others);
+            }
+        }
+    }
+
+    /// Returns the known error of height `i`.
+    pub(super) fn known(&self, i: usize) -> Option<KnownError<'_>> {
+        let found = self.known.binary_search_by_key(&i, |(at, _)| *at).ok()?;
+        let mut rows = self.sources.iter().filter_map(|source| {
+            let at = source.places.binary_search(&i).ok()?;
+            Some((source.number, &source.loadings[at * source.errors..][..source.errors]))
+        });
+        let (source, loadings) = rows.next().unwrap_or((0, &[]));
+        Some(KnownError { variance: self.known[found].1, source, loadings })
+    }
+
+    /// Returns the columns of loadings of the errors of source `number` on all observed numbers.
+    pub(super) fn loadings(&self, number: usize) -> Vec<Vec<f64>> {
+        let Some(source) = self.sources.iter().find(|source| source.number == number) else {
+            return Vec::new();
+        };
+        let mut columns = vec![vec![0.0; self.order()]; source.errors];
+        for (i, loadings) in source.rows() {
+            for (column, loading) in columns.iter_mut().zip(loadings) {
+                column[self.start(i)] = *loading;
+            }
+        }
+        columns
     }
 
     /// Whether these observations start with `others`.
@@ -117,6 +251,12 @@ impl Observations {
             && self.starts.get(..count) == Some(&others.starts)
             && same(&self.slopes, &others.slopes)
             && same(&self.slope_noise2, &others.slope_noise2)
+            && (0..if self.has_known_errors() { count } else { 0 }).all(|i| {
+                let parts = |error: KnownError| (error.variance, error.source);
+                let [mine, theirs] = [self, others].map(|all| all.known(i));
+                mine.map(parts) == theirs.map(parts)
+                    && mine.map(|error| error.loadings) == theirs.map(|error| error.loadings)
+            })
     }
 
     /// Returns every `step`th observation.
@@ -143,6 +283,7 @@ impl Observations {
             height: others.heights[i],
             noise: others.height_noise2[i].sqrt(),
             slope: (!gradient.is_empty()).then_some(Slope { gradient, noise }),
+            known: others.known(i),
         });
     }
 
@@ -244,7 +385,7 @@ impl Observations {
         (0..self.len()).for_each(|i| out[self.start(i)] = 1.0);
     }
 
-    /// Variance of the error of height `i`, in units of the signal's.
+    /// Variance of the belief's noise of height `i`, in units of the signal's.
     #[inline(always)]
     pub(super) fn height_noise2(&self, i: usize, ratio: NoiseRatio) -> f64 {
         ratio.height * ratio.height * self.height_noise2[i]

@@ -108,9 +108,9 @@ mod tests {
             for ([x, z], is_sloped) in &touches {
                 let gradient = [2.0 * x, 0.5];
                 let slope = is_sloped.then_some(Slope { gradient: &gradient, noise: 1.0 });
-                observations.push(&Observation { place: &[*x, *z], height: x * x, noise: 1.0, slope });
+                observations.push(&Observation { place: &[*x, *z], height: x * x, noise: 1.0, slope, known: None });
             }
-            let noise = NoiseRatio { height: 0.05, slope: 0.1 };
+            let noise = NoiseRatio { height: 0.05, slope: 0.1, known: 0.0 };
             let hyperparameters = Hyperparameters::new(2.0, vec![0.4, 0.7], noise, 0.0);
             let posterior = Posterior::new(&Matern52, hyperparameters, observations).unwrap();
             let (at, weights): (Vec<[f64; 2]>, Vec<f64>) = references.into_iter().unzip();

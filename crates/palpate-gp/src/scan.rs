@@ -8,7 +8,7 @@ use super::cholesky::Factor;
 use super::kernel::Kernel;
 use super::likelihood;
 use super::likelihood::ProfiledLikelihood;
-use super::observations::Observations;
+use super::observations::{NoiseRatio, Observation, Observations};
 use super::search_box::MeanModel;
 use super::search_box::SearchBox;
 use super::search_box::SignalModel;
@@ -164,6 +164,8 @@ fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
 pub(super) struct Scan {
     grid: Grid,
     taken: Observations,
+    /// Unit of the known errors.
+    unit: f64,
     points: Vec<Point>,
 }
 
@@ -190,7 +192,9 @@ impl Scan {
         kernel: &dyn Kernel,
         observations: &Observations,
     ) -> Vec<Option<ProfiledLikelihood>> {
-        if self.grid != *grid || !observations.begin_with(&self.taken) {
+        let unit = sought.known_unit();
+        if self.grid != *grid || self.unit != unit || !observations.begin_with(&self.taken) {
+            self.unit = unit;
             self.grid.clone_from(grid);
             self.points.resize_with(grid.len(), Point::default);
             self.points.iter_mut().for_each(Point::forget);
@@ -208,8 +212,14 @@ impl Scan {
                 row.resize(i + 1, 0.0);
                 observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);
                 kernel.correlate(&mut row[..i]);
+                // Equal at all noises.
+                let known = NoiseRatio { height: 0.0, ..ratios[0] };
+                let error = observations.known(i);
+                observations.add_known_row(error, known, &mut row[..i]);
+                let own = Observation { known: error, ..Observation::height(&[], 0.0) };
+                let own = own.height_noise2(known);
                 for (point, noise) in points.iter_mut().zip(&ratios) {
-                    row[i] = 1.0 + observations.height_noise2(i, *noise);
+                    row[i] = 1.0 + observations.height_noise2(i, *noise) + own;
                     point.append(&row, observations.heights()[i]);
                 }
             }

@@ -26,6 +26,9 @@ pub struct SearchBox {
     pub signal_sd: Range,
     /// Model of the touch noise.
     pub touch_noise: TouchNoise,
+    /// Signal standard deviation at which known errors count during the search, if there are any:
+    /// near that of the surface. A posterior counts them exactly.
+    pub reference_sd: Option<f64>,
 }
 
 /// Model of the touch noise's standard deviation, in the unit of the heights.
@@ -63,7 +66,13 @@ impl SearchBox {
         let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
         let noises = lengths.split_off(self.length_scales.len().min(logs.len()));
         let noise = |i: usize| noises.get(i).copied().unwrap_or(0.0);
-        (lengths, NoiseRatio { height: noise(0), slope: noise(1) })
+        (lengths, NoiseRatio { height: noise(0), slope: noise(1), known: self.known_unit() })
+    }
+
+    /// Returns the unit of known errors relative to the signal.
+    pub(super) fn known_unit(&self) -> f64 {
+        let middle = || (self.signal_sd.low * self.signal_sd.high).sqrt();
+        1.0 / self.reference_sd.unwrap_or_else(middle)
     }
 
     /// Returns the logarithms of the parameters, the inverse of [`parameters`](Self::parameters).

@@ -111,7 +111,7 @@ impl HeightField {
                     let place = self.zone.place(&point.p_wc);
                     let (height, noise) = (self.zone.height_m(&point.p_wc), self.noise(point));
                     let to = if i == 0 { &mut self.contacts } else { &mut self.patches };
-                    to.push(&Observation { place: &place, height, noise, slope });
+                    to.push(&Observation { place: &place, height, noise, slope, known: None });
                 }
                 let place = self.zone.place(&contact.p_wc);
                 self.zone.distance(&place, target) <= REACHED_WITHIN
@@ -310,6 +310,7 @@ impl HeightField {
                 (None, Some(least_m)) => TouchNoise::AtLeast(least_m),
                 (None, None) => TouchNoise::Fitted,
             },
+            reference_sd: None,
         }
     }
 

@@ -125,7 +125,7 @@ impl TouchEvidence {
                 .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
             let place = p_w.coords.as_slice();
             let noise = sd_m.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
-            all.push(&Observation { place, height: -field.value, noise, slope });
+            all.push(&Observation { place, height: -field.value, noise, slope, known: None });
         }
         for (p_w, radius_m) in self.free(ball) {
             let distances_m = self.contacts().map(|contact| (contact - p_w).norm());
@@ -137,6 +137,7 @@ impl TouchEvidence {
                 height: nearest_m - prior.field(&p_w).value,
                 noise: (sd_m / noise_m).max(1.0),
                 slope: None,
+                known: None,
             });
         }
         all

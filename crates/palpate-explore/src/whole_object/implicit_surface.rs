@@ -236,5 +236,5 @@ impl ImplicitSurface {
 /// length scale.
 fn parameters(logs: &[f64]) -> (f64, NoiseRatio) {
     let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());
-    (at(0), NoiseRatio { height: at(1), slope: at(2) / at(0) })
+    (at(0), NoiseRatio { height: at(1), slope: at(2) / at(0), known: 0.0 })
 }

@@ -403,9 +403,15 @@ fn many_places_at_once_are_each_of_them_alone() {
                 let slope = Slope { gradient: &[0.3, -0.1], noise: 1.0 };
                 let slope = is_sloped.then_some(slope);
                 let height = (3.0 * place[0]).sin() + place[1];
-                touches.push(&Observation { place: &place, height, noise: 1.0, slope });
+                touches.push(&Observation {
+                    place: &place,
+                    height,
+                    noise: 1.0,
+                    slope,
+                    known: None,
+                });
             }
-            let noise = NoiseRatio { height: 0.01, slope: 0.1 };
+            let noise = NoiseRatio { height: 0.01, slope: 0.1, known: 0.0 };
             let at = Hyperparameters::new(0.7, vec![0.4, 0.6], noise, 0.2);
             let belief = Posterior::new(&SquaredExponential, at, touches).unwrap();
             let places: Vec<Vec<f64>> = (0..count as usize % 37 + 1)

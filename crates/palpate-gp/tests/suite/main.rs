@@ -2,5 +2,6 @@
 
 mod gp;
 mod inducing;
+mod known_errors;
 mod optimizers;
 mod slopes;

@@ -19,7 +19,13 @@ struct Touch {
 impl Touch {
     fn observation(&self) -> Observation<'_> {
         let slope = self.slope.as_ref().map(|gradient| Slope { gradient, noise: self.noise });
-        Observation { place: &self.place, height: self.height, noise: self.noise, slope }
+        Observation {
+            place: &self.place,
+            height: self.height,
+            noise: self.noise,
+            slope,
+            known: None,
+        }
     }
 }
 
@@ -111,7 +117,13 @@ fn crosses(touches: &[Touch]) -> Observations {
                 beside[axis] += side;
                 let height = height + side * slope;
                 let noise = 2.0;
-                crosses.push(&Observation { place: &beside, height, noise, slope: None });
+                crosses.push(&Observation {
+                    place: &beside,
+                    height,
+                    noise,
+                    slope: None,
+                    known: None,
+                });
             }
         }
         if slope.is_none() {
@@ -228,11 +240,11 @@ proptest! {
         let scale =
             [SignalModel::Profiled((1e-3, 1e3).into()), SignalModel::KnownNoise(0.05), SignalModel::KnownNoise(0.2)][choice];
         let mut likelihood = Likelihood::new(kernel(choice % 2), mean, &observations);
-        let NoiseRatio { height, slope } = at.noise_ratio();
+        let NoiseRatio { height, slope, .. } = at.noise_ratio();
         let logs = [at.length_scales[0], at.length_scales[1], height, slope].map(f64::ln);
         let mut score = |logs: [f64; 4], gradient: Option<&mut [f64]>| {
             let [a, b, height, slope] = logs.map(f64::exp);
-            let noise = NoiseRatio { height, slope };
+            let noise = NoiseRatio { height, slope, known: 0.0 };
             likelihood.profile(&[a, b], noise, &scale, gradient).unwrap().log_likelihood
         };
         let mut gradient = [0.0; 4];

@@ -1,0 +1,225 @@
+//! Tests of errors of known size, and of those that several heights have in common.
+
+use nalgebra::{DMatrix, DVector};
+use palpate_gp::fit::RefitSequence;
+use palpate_gp::kernel::{Kernel, Matern52};
+use palpate_gp::likelihood::Likelihood;
+use palpate_gp::posterior::Scratch;
+use palpate_gp::{
+    Hyperparameters, KnownError, MeanModel, Observation, Observations, Posterior, SearchBox, Slope,
+    TouchNoise,
+};
+use proptest::prelude::*;
+
+/// One observation with its known error.
+#[derive(Clone, Debug)]
+struct Row {
+    place: [f64; 2],
+    height: f64,
+    slope: Option<[f64; 2]>,
+    variance: f64,
+    source: Option<usize>,
+    loadings: [f64; 2],
+}
+
+impl Row {
+    fn push(&self, to: &mut impl FnMut(&Observation)) {
+        let slope = self.slope.as_ref().map(|gradient| Slope { gradient, noise: 1.0 });
+        let known = self.source.map(|source| KnownError {
+            variance: self.variance,
+            source,
+            loadings: &self.loadings,
+        });
+        to(&Observation { place: &self.place, height: self.height, noise: 1.0, slope, known });
+    }
+}
+
+fn all(rows: &[Row]) -> Observations {
+    let mut observations = Observations::new(2);
+    rows.iter().for_each(|row| row.push(&mut |observation| observations.push(observation)));
+    observations
+}
+
+fn rows(has_slopes: bool) -> impl Strategy<Value = Vec<Row>> {
+    let row = (
+        prop::array::uniform2(0.0..1.0_f64),
+        -1.0..1.0_f64,
+        prop::option::of(prop::array::uniform2(-2.0..2.0_f64)),
+        0.0..0.1_f64,
+        prop::option::of(0_usize..3),
+        prop::array::uniform2(-0.5..0.5_f64),
+    );
+    let row = row.prop_map(move |(place, height, slope, variance, source, loadings)| Row {
+        place,
+        height,
+        slope: slope.filter(|_| has_slopes),
+        variance,
+        source,
+        loadings,
+    });
+    prop::collection::vec(row, 3..14)
+}
+
+fn hyperparameters() -> Hyperparameters {
+    Hyperparameters::new(0.7, vec![0.4, 0.6], 0.05.into(), 0.1)
+}
+
+/// Mean and variance at a place, and mean and covariance of the errors of source 1, from the dense
+/// matrices of the linear mixed model.
+fn slow_twin(rows: &[Row], at: &[f64; 2]) -> ([f64; 2], DVector<f64>, DMatrix<f64>) {
+    let Hyperparameters { signal_sd, length_scales, noise_sd, mean, .. } = hyperparameters();
+    let covariance = |a: &[f64; 2], b: &[f64; 2]| {
+        let r2: f64 = (0..2).map(|d| ((a[d] - b[d]) / length_scales[d]).powi(2)).sum();
+        let mut correlation = [r2];
+        Matern52.correlate(&mut correlation);
+        signal_sd * signal_sd * correlation[0]
+    };
+    let n = rows.len();
+    let loadings = DMatrix::from_fn(n, 6, |i, k| match rows[i].source {
+        Some(source) if k / 2 == source => rows[i].loadings[k % 2],
+        _ => 0.0,
+    });
+    let own = |i: usize| noise_sd * noise_sd + rows[i].source.map_or(0.0, |_| rows[i].variance);
+    let mut k = DMatrix::from_fn(n, n, |i, j| covariance(&rows[i].place, &rows[j].place));
+    (0..n).for_each(|i| k[(i, i)] += own(i));
+    k += &loadings * loadings.transpose();
+    let inverse = k.try_inverse().unwrap();
+    let y = DVector::from_fn(n, |i, _| rows[i].height - mean);
+    let cross = DVector::from_fn(n, |i, _| covariance(&rows[i].place, at));
+    let weights = &inverse * &y;
+    let height = mean + cross.dot(&weights);
+    let variance = covariance(at, at) - cross.dot(&(&inverse * &cross));
+    let errors = loadings.transpose() * weights;
+    let left = DMatrix::identity(6, 6) - loadings.transpose() * inverse * loadings;
+    ([height, variance], errors.rows(2, 2).into(), left.view((2, 2), (2, 2)).into())
+}
+
+proptest! {
+    #[test]
+    fn a_posterior_equals_the_linear_mixed_model(
+        rows in rows(false),
+        at in prop::array::uniform2(0.0..1.0_f64),
+    ) {
+        let posterior = Posterior::new(&Matern52, hyperparameters(), all(&rows)).unwrap();
+        let ([height, variance], errors, left) = slow_twin(&rows, &at);
+        let scratch = &mut Scratch::default();
+        prop_assert!((posterior.mean(&at, scratch) - height).abs() < 1e-9);
+        prop_assert!((posterior.variance(&at, scratch) - variance).abs() < 1e-9);
+        match posterior.common_errors(1) {
+            Some((mean, covariance)) => {
+                prop_assert!((mean - errors).amax() < 1e-9);
+                prop_assert!((covariance - left).amax() < 1e-9);
+            }
+            None => prop_assert!(rows.iter().all(|row| row.source != Some(1))),
+        }
+    }
+
+    #[test]
+    fn observations_one_by_one_equal_all_at_once(
+        rows in rows(true),
+        at in prop::array::uniform2(0.0..1.0_f64),
+    ) {
+        let whole = Posterior::new(&Matern52, hyperparameters(), all(&rows)).unwrap();
+        let mut grown = Posterior::new(&Matern52, hyperparameters(), all(&rows[..1])).unwrap();
+        for row in &rows[1..] {
+            row.push(&mut |observation| grown.push(observation).unwrap());
+        }
+        let scratch = &mut Scratch::default();
+        prop_assert!((whole.mean(&at, scratch) - grown.mean(&at, scratch)).abs() < 1e-8);
+        prop_assert!((whole.variance(&at, scratch) - grown.variance(&at, scratch)).abs() < 1e-8);
+    }
+
+    #[test]
+    fn the_gradient_of_the_likelihood_is_that_of_its_differences(
+        rows in rows(true),
+        has_slopes: bool,
+    ) {
+        let rows: Vec<Row> = rows
+            .into_iter()
+            .map(|row| Row { slope: row.slope.filter(|_| has_slopes), ..row })
+            .collect();
+        let observations = all(&rows);
+        let at = Hyperparameters { slope_noise_sd: 0.3, ..hyperparameters() };
+        let mut likelihood = Likelihood::new(&Matern52, MeanModel::Zero, &observations);
+        let count = if observations.has_slopes() { 5 } else { 4 };
+        let mut gradient = vec![0.0; count];
+        likelihood.value_gradient(&at, &mut gradient).unwrap();
+        for (i, slope) in gradient.iter().enumerate() {
+            let mut value = |step: f64| {
+                let mut at = at.clone();
+                let lengths = &mut at.length_scales;
+                let logs = match i {
+                    0 => &mut at.signal_sd,
+                    1 | 2 => &mut lengths[i - 1],
+                    3 => &mut at.noise_sd,
+                    _ => &mut at.slope_noise_sd,
+                };
+                *logs *= step.exp();
+                likelihood.value_gradient(&at, &mut []).unwrap()
+            };
+            let difference = (value(1e-5) - value(-1e-5)) / 2e-5;
+            prop_assert!(
+                (slope - difference).abs() < 1e-4 * (1.0 + slope.abs()),
+                "{i}: {slope} {difference}"
+            );
+        }
+    }
+}
+
+/// Heights with a large common error, of a plane, a bump and noise; the last are exact.
+fn offset_rows(offset: f64) -> Vec<Row> {
+    let surface = |[x, z]: [f64; 2]| (3.0 * x).sin() + 0.5 * (4.0 * z).cos();
+    let mut rows = Vec::new();
+    for i in 0..36 {
+        let place = [f64::from(i % 6) / 5.0, f64::from(i / 6) / 5.0];
+        rows.push(Row {
+            place,
+            height: surface(place) + offset,
+            slope: None,
+            variance: 1e-6,
+            source: Some(1),
+            loadings: [3.0, 0.0],
+        });
+    }
+    for place in [[0.31, 0.52], [0.77, 0.13]] {
+        let height = surface(place);
+        let (variance, source, loadings) = (0.0, None, [0.0; 2]);
+        rows.push(Row { place, height, slope: None, variance, source, loadings });
+    }
+    rows
+}
+
+/// An offset that all heights of a source have in common is found by few exact heights, and leaves
+/// the surface unchanged.
+#[test]
+fn a_common_offset_is_found_and_removed() {
+    let sought = SearchBox {
+        mean: MeanModel::Zero,
+        length_scales: vec![(0.05, 3.0).into(); 2],
+        noise_ratio: (1e-4, 0.1).into(),
+        slope_noise_ratio: None,
+        signal_sd: (0.1, 10.0).into(),
+        touch_noise: TouchNoise::Fitted,
+        reference_sd: None,
+    };
+    let posterior = |offset: f64| {
+        let mut sequence = RefitSequence::new(&Matern52);
+        let rows = offset_rows(offset);
+        // With cached factors of the first heights.
+        sequence.fit(&sought, &all(&rows[..37]));
+        let fit = sequence.fit(&sought, &all(&rows));
+        let fresh = sought.fit(&Matern52, &all(&rows));
+        // A climb ends at a predicted gain of 1e-4.
+        assert!(fit.log_likelihood > fresh.log_likelihood - 1e-3);
+        Posterior::new(&Matern52, fit.hyperparameters, all(&rows)).unwrap()
+    };
+    let (without, with) = (posterior(0.0), posterior(2.0));
+    let scratch = &mut Scratch::default();
+    for place in [[0.1, 0.9], [0.5, 0.5], [0.95, 0.05]] {
+        let [a, b] = [&without, &with].map(|posterior| posterior.mean(&place, scratch));
+        assert!((a - b).abs() < 0.02, "{a} {b}");
+    }
+    let (mean, covariance) = with.common_errors(1).unwrap();
+    let (found, sd) = (3.0 * mean[0], 3.0 * covariance[(0, 0)].sqrt());
+    assert!((found - 2.0).abs() < 4.0 * sd && sd < 0.05, "{found} ± {sd}");
+}
