@@ -6,14 +6,17 @@ use crate::probe::{Contact, SweptVolume, Touch};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
-use nalgebra::Vector3;
+use crate::view::{RigidError, SeenSurface, View};
+use nalgebra::{Point3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::fit::KernelSelection;
 use palpate_gp::inducing::InducingPosterior;
 use palpate_gp::math::normal::BAND_95;
 use palpate_gp::posterior::Posterior;
-use palpate_gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
+use palpate_gp::{
+    Hyperparameters, KnownError, Observation, Observations, Range, SearchBox, Slope, TouchNoise,
+};
 use serde::{Deserialize, Serialize};
 
 /// Distance between contact and target above which the target counts as unreached, in units of the
@@ -29,6 +32,24 @@ const NORMAL_Y_MIN: f64 = 0.05;
 // heuristic: below it the kernel's misfit to a surface is larger.
 const SD_UNIT_M: f64 = 1e-4;
 
+/// Smallest y of a seen normal in the zone that is used.
+// heuristic: a steeper wall's height is uncertain by ten times the error of its place.
+const SEEN_NORMAL_Y_MIN: f64 = 0.1;
+
+/// Distance beside the zone up to which a view is used, as a fraction of the longest side, and in
+/// standard deviations of the camera's position.
+// heuristic: the belief at the zone's edge depends on the surface beside it.
+const BESIDE_VIEW: f64 = 0.05;
+const MARGIN_SIGMAS: f64 = 3.0;
+
+/// Number of seen heights of a view that a fit uses.
+// heuristic: a fit's time grows as their cube, and its lengths hardly change.
+const SEEN_FITTED: usize = 64;
+
+/// Largest number of linearisations of a view at its camera's errors.
+// heuristic: errors of 10 mm and 3° settle after three.
+const LINEARISATIONS: usize = 6;
+
 /// Belief of a height field over a zone.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct HeightField {
@@ -41,6 +62,9 @@ pub struct HeightField {
     /// that a fit takes no longer than without them.
     #[serde(default)]
     patches: Observations,
+    /// Surfaces that cameras have seen, one per view.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    seen: Vec<SeenSurface>,
     /// Upper bound from free space, if that is enabled.
     ceiling: Option<FreeSpaceBound>,
     presence: SurfaceEvidence,
@@ -82,6 +106,7 @@ impl HeightField {
             zone,
             settings,
             patches: contacts.clone(),
+            seen: Vec::new(),
             contacts,
             targets: Vec::new(),
             unreached: Vec::new(),
@@ -121,6 +146,71 @@ impl HeightField {
         if !reached {
             self.unreached.push(target.into());
         }
+    }
+
+    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit).
+    pub fn observe_view(&mut self, view: &View) {
+        let zone = &self.zone;
+        let margin_m = BESIDE_VIEW * zone.widest_m() + MARGIN_SIGMAS * view.accuracy.position_sd_m;
+        let wanted = |p_w: &Point3<f64>| {
+            let place = zone.place(p_w);
+            let y_m = zone.x_wz().inverse_transform_point(p_w).y;
+            let is_beside = |([low, high], at): ([f64; 2], &f64)| {
+                (low - margin_m..=high + margin_m).contains(at)
+            };
+            let is_deep =
+                |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
+            zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
+        };
+        self.seen.push(SeenSurface::new(view, wanted));
+    }
+
+    /// The surfaces that cameras have seen, one per view.
+    pub fn seen(&self) -> &[SeenSurface] {
+        &self.seen
+    }
+
+    /// Returns the error of the camera's pose in each view, after a fit.
+    pub fn rigid_errors(&self) -> Vec<RigidError> {
+        let Some(surface) = &self.surface else { return Vec::new() };
+        let error = |(number, seen): (usize, &SeenSurface)| {
+            let (mean, covariance) = surface.common_errors(number)?;
+            Some(seen.rigid_error(&mean, &covariance))
+        };
+        self.seen.iter().enumerate().filter_map(error).collect()
+    }
+
+    /// Returns the seen heights, at most about `most` of each view.
+    fn seen_heights(&self, most: usize) -> Observations {
+        let mut all = Observations::new(self.zone.dimension());
+        for (source, seen) in self.seen.iter().enumerate() {
+            let step = seen.len().div_ceil(most).max(1);
+            for element in seen.elements().step_by(step) {
+                let normal_y = self.zone.x_wz().inverse_transform_vector(&element.normal_w).y;
+                if normal_y < SEEN_NORMAL_Y_MIN {
+                    continue;
+                }
+                let place = self.zone.place(&element.p_w);
+                let height = self.zone.height_m(&element.p_w) + element.removed_m / normal_y;
+                let loadings = element.loadings_m.map(|loading_m| loading_m / normal_y);
+                let variance = (element.sd_m / normal_y).powi(2);
+                let known = Some(KnownError { variance, source, loadings: &loadings });
+                let slope = None;
+                all.push(&Observation { place: &place, height, noise: 1.0, slope, known });
+            }
+        }
+        all
+    }
+
+    /// Linearises each view at the errors of its camera's pose that `posterior` finds. Returns
+    /// whether that changes the observations.
+    fn relinearise(&mut self, posterior: &Posterior) -> bool {
+        let mut is_changed = false;
+        for (number, seen) in self.seen.iter_mut().enumerate() {
+            let errors = posterior.common_errors(number);
+            is_changed |= errors.is_some_and(|(mean, _)| seen.relinearise(&mean));
+        }
+        is_changed
     }
 
     /// Returns the noise of a contact's height relative to that of an exact one: the deviation of
@@ -165,16 +255,12 @@ impl HeightField {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
-        let search_box = self.search_box();
-        let mut fit = match self.inducing() {
-            None => self.kernels.fit(&search_box, &self.contacts),
-            // Thinned evenly, so that some touches are close to each other and determine the noise;
-            // the same ones for as long as possible, so that the last fit remains a valid start.
-            Some(most) => {
-                let thinned = self.contacts.subsample(self.contacts.len() / most);
-                self.kernels.fit(&search_box, &thinned)
-            }
-        };
+        let reference_sd = self.fit.as_ref().map(|fit| fit.hyperparameters.signal_sd);
+        let mut fit = self.most_likely(reference_sd);
+        let is_first = reference_sd.is_none() && !self.seen.is_empty();
+        if is_first {
+            fit = self.most_likely(Some(fit.hyperparameters.signal_sd));
+        }
         if self.settings.band == Band::Named(BandName::LeaveOneOut) {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
@@ -183,10 +269,24 @@ impl HeightField {
             // Conditioned again below, so that the recorded numbers are reproduced to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
-        let (posterior, left_sd) = self.posterior(fit.hyperparameters.clone())?;
+        let (posterior, left_sd) = self.linearised_posterior(&fit.hyperparameters)?;
         fit.nystrom_residual_sd = left_sd;
         self.explore(&posterior)?;
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
+    }
+
+    /// Returns the most likely fit, with the known errors of views scaled by `reference_sd`.
+    fn most_likely(&mut self, reference_sd: Option<f64>) -> Fit {
+        let observations = match self.inducing() {
+            None if self.seen.is_empty() => None,
+            None => Some(self.seen_heights(SEEN_FITTED).followed_by(&self.contacts)),
+            // Thinned evenly, so that some touches are close to each other and determine the noise;
+            // the same ones for as long as possible, so that the last fit remains a valid start.
+            Some(most) => Some(self.contacts.subsample(self.contacts.len() / most)),
+        };
+        let observations = observations.as_ref().unwrap_or(&self.contacts);
+        let search_box = SearchBox { reference_sd, ..self.search_box(observations) };
+        self.kernels.fit(&search_box, observations)
     }
 
     /// Conditions on all contacts with the given fit, e.g. to draw a recorded belief.
@@ -195,7 +295,7 @@ impl HeightField {
     /// If the covariance of the contacts cannot be factored.
     pub fn condition(&mut self, fit: &Fit) -> Result<(), CovarianceError> {
         self.kernels.select(fit);
-        let (posterior, _) = self.posterior(fit.hyperparameters.clone())?;
+        let (posterior, _) = self.linearised_posterior(&fit.hyperparameters)?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
         self.fit = Some(fit.clone());
@@ -213,13 +313,33 @@ impl HeightField {
 
     /// Number of inducing touches, if the posterior is not exact.
     fn inducing(&self) -> Option<usize> {
-        let most = self.settings.inducing_touches? as usize;
+        // Inducing points cannot represent errors in common.
+        let most = self.settings.inducing_touches.filter(|_| self.seen.is_empty())? as usize;
         (self.contacts.len() > most).then_some(most)
     }
 
     /// Returns all observed heights.
     fn observations(&self) -> Observations {
-        self.contacts.followed_by(&self.patches)
+        let touched = self.contacts.followed_by(&self.patches);
+        match self.seen.is_empty() {
+            true => touched,
+            false => self.seen_heights(usize::MAX).followed_by(&touched),
+        }
+    }
+
+    /// Returns the posterior with each view linearised at the errors that it finds.
+    fn linearised_posterior(
+        &mut self,
+        hyperparameters: &Hyperparameters,
+    ) -> Result<(Posterior, Option<f64>), CovarianceError> {
+        let mut found = self.posterior(hyperparameters.clone())?;
+        for _ in 0..LINEARISATIONS {
+            if !self.relinearise(&found.0) {
+                break;
+            }
+            found = self.posterior(hyperparameters.clone())?;
+        }
+        Ok(found)
     }
 
     /// Returns the posterior given all contacts, and the residual standard deviation of an
@@ -273,8 +393,8 @@ impl HeightField {
         posteriors.map(Posterior::jitter).fold(0.0, f64::max)
     }
 
-    fn search_box(&self) -> SearchBox {
-        let heights = self.contacts.heights();
+    fn search_box(&self, observations: &Observations) -> SearchBox {
+        let heights = observations.heights();
         let squares: f64 = heights.iter().map(|y| y * y).sum();
         let rms = (squares / heights.len().max(1) as f64).sqrt();
         let extents_m = self.zone.extents_m();

@@ -1,0 +1,196 @@
+//! Seen surface: the evidence of a view, with the rigid error of its camera as a random effect.
+//!
+//! A camera whose pose is off by a translation t, a rotation r about the camera and a relative error
+//! s of its depths shows a point p at p + t + r × (p − c) + s·(p − c), with the camera's place c.
+//! Along a normal n of the surface that is off by n·t + ((p − c) × n)·r + (n·(p − c))·s: linear in
+//! seven numbers, which all points of the view have in common.
+
+use super::{CameraAccuracy, SurfaceElement, View, thin};
+use nalgebra::{
+    DMatrix, DVector, Isometry3, Matrix3, Point3, SVector, Translation3, UnitQuaternion,
+    UnitVector3, Vector3,
+};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Number of errors of a camera: translation, rotation, scale.
+pub const ERRORS: usize = 7;
+
+/// Change of an error, in standard deviations, below which its linearisation is kept.
+// heuristic: the remaining error is the square of it, far below a view's noise.
+const SETTLED: f64 = 0.02;
+
+/// Surface that one view shows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeenSurface {
+    x_wc: Isometry3<f64>,
+    accuracy: CameraAccuracy,
+    elements: Vec<SurfaceElement>,
+    /// Errors at which the view is linearised, in standard deviations.
+    errors: SVector<f64, ERRORS>,
+}
+
+/// An element of the surface, corrected by the errors at which a view is linearised, and what is
+/// known of its error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CorrectedElement {
+    /// Place in `W`.
+    pub p_w: Point3<f64>,
+    /// Unit normal, towards the camera.
+    pub normal_w: UnitVector3<f64>,
+    /// Standard deviation of its own error along the normal.
+    pub sd_m: f64,
+    /// Shift along the normal per standard deviation of each of the camera's errors.
+    pub loadings_m: [f64; ERRORS],
+    /// Shift along the normal that the correction has removed, in the linearised model.
+    pub removed_m: f64,
+}
+
+/// Error of a camera's pose, as touches and prior tell it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RigidError {
+    /// Shift of the seen points about `pivot_w`, m.
+    pub shift_m: [f64; 3],
+    /// Its standard deviation.
+    pub shift_sd_m: [f64; 3],
+    /// Rotation vector of the camera, deg.
+    pub turn_deg: [f64; 3],
+    /// Its standard deviation.
+    pub turn_sd_deg: [f64; 3],
+    /// Relative error of the depths.
+    pub scale: f64,
+    /// Its standard deviation.
+    pub scale_sd: f64,
+    /// Middle of the seen points, at which the shift is stated, in `W`.
+    pub pivot_w: [f64; 3],
+    /// Corrected position of the camera in `W`, m.
+    pub position_m: [f64; 3],
+    /// Corrected rotation of the camera, as a unit quaternion (x, y, z, w).
+    pub rotation: [f64; 4],
+}
+
+impl SeenSurface {
+    /// Thins the points of `view` that are `wanted`, given in `W`.
+    pub fn new(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Self {
+        let elements = thin(view, wanted);
+        let errors = SVector::zeros();
+        Self { x_wc: view.x_wc, accuracy: view.accuracy, elements, errors }
+    }
+
+    /// Returns the number of surface elements.
+    pub fn len(&self) -> usize {
+        self.elements.len()
+    }
+
+    /// Whether the view shows nothing of the region.
+    pub fn is_empty(&self) -> bool {
+        self.elements.is_empty()
+    }
+
+    /// Standard deviation of each error.
+    fn sds(&self) -> SVector<f64, ERRORS> {
+        let CameraAccuracy { position_sd_m, rotation_sd_deg, scale_sd, .. } = self.accuracy;
+        let turn = rotation_sd_deg.to_radians();
+        SVector::from_fn(|i, _| [position_sd_m, turn, scale_sd][i / 3])
+    }
+
+    /// Pose of the camera in `W`, corrected by the present errors.
+    fn corrected(&self) -> Isometry3<f64> {
+        let moved = self.errors.component_mul(&self.sds());
+        let [shift, turn] = [0, 3].map(|row| moved.fixed_rows::<3>(row).into_owned());
+        let translation = Translation3::from(self.x_wc.translation.vector - shift);
+        let rotation = UnitQuaternion::from_scaled_axis(-turn) * self.x_wc.rotation;
+        Isometry3::from_parts(translation, rotation)
+    }
+
+    /// Depths that the camera states, over the true ones.
+    fn scale(&self) -> f64 {
+        1.0 + self.errors[ERRORS - 1] * self.accuracy.scale_sd
+    }
+
+    /// Returns the surface elements, corrected and linearised at the present errors.
+    pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
+        let (sds, x_wc, scale) = (self.sds(), self.corrected(), self.scale());
+        self.elements.iter().map(move |element| {
+            let p_w = x_wc * Point3::from(element.p_c.coords / scale);
+            let normal_w = x_wc.rotation * element.normal_c;
+            let away = p_w.coords - x_wc.translation.vector;
+            let turned = away.cross(&normal_w);
+            let shifts = [normal_w.x, normal_w.y, normal_w.z, turned.x, turned.y, turned.z];
+            let loadings_m = std::array::from_fn(|i| {
+                sds[i] * shifts.get(i).copied().unwrap_or(normal_w.dot(&away))
+            });
+            let removed = |(loading, error): (&f64, &f64)| loading * error;
+            let removed_m = loadings_m.iter().zip(&self.errors).map(removed).sum();
+            CorrectedElement { p_w, normal_w, sd_m: element.sd_m, loadings_m, removed_m }
+        })
+    }
+
+    /// Linearises at the posterior mean of the errors. Returns whether that changes the elements.
+    pub fn relinearise(&mut self, errors: &DVector<f64>) -> bool {
+        let new = SVector::from_fn(|i, _| errors.get(i).copied().unwrap_or(0.0));
+        let is_moved = (new - self.errors).amax() > SETTLED;
+        if is_moved {
+            self.errors = new;
+        }
+        is_moved
+    }
+
+    /// Returns the errors of the camera's pose from their posterior mean and covariance, in prior
+    /// standard deviations.
+    pub fn rigid_error(&self, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> RigidError {
+        let sds = self.sds();
+        let x_wc = Self { errors: SVector::from_fn(|i, _| mean[i]), ..self.clone() }.corrected();
+        let count = self.elements.len().max(1) as f64;
+        let sum = self.elements.iter().map(|element| (x_wc * element.p_c).coords);
+        let pivot_w = sum.sum::<Vector3<f64>>() / count;
+        // The shift t + r × (p − c) + s·(p − c) at the pivot, as a matrix on the errors.
+        let away = pivot_w - x_wc.translation.vector;
+        let mut shift = DMatrix::zeros(3, ERRORS);
+        shift.view_mut((0, 0), (3, 3)).copy_from(&Matrix3::identity());
+        shift.view_mut((0, 3), (3, 3)).copy_from(&-away.cross_matrix());
+        shift.view_mut((0, 6), (3, 1)).copy_from(&away);
+        for (i, mut column) in shift.column_iter_mut().enumerate() {
+            column *= sds[i];
+        }
+        let (found, spread) = (&shift * mean, &shift * covariance * shift.transpose());
+        let sd = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+        let axes = [0, 1, 2];
+        let turn = x_wc.rotation.coords;
+        RigidError {
+            shift_m: axes.map(|i| found[i]),
+            shift_sd_m: axes.map(|i| spread[(i, i)].max(0.0).sqrt()),
+            turn_deg: axes.map(|i| (mean[i + 3] * sds[i + 3]).to_degrees()),
+            turn_sd_deg: axes.map(|i| (sd(i + 3) * sds[i + 3]).to_degrees()),
+            scale: mean[6] * sds[6],
+            scale_sd: sd(6) * sds[6],
+            pivot_w: pivot_w.into(),
+            position_m: x_wc.translation.vector.into(),
+            rotation: [turn.x, turn.y, turn.z, turn.w],
+        }
+    }
+}
+
+impl fmt::Display for RigidError {
+    /// Writes sizes with their standard deviations: "2.9 ± 0.2 mm, 0.6 ± 0.1°".
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let size = |values: &[f64; 3]| Vector3::from(*values).norm();
+        // The deviation of a length is that along it.
+        let along = |values: &[f64; 3], sds: &[f64; 3]| {
+            let direction = Vector3::from(*values).try_normalize(0.0).unwrap_or(Vector3::x());
+            direction.component_mul(&Vector3::from(*sds)).norm()
+        };
+        write!(
+            f,
+            "{:.1} ± {:.1} mm, {:.1} ± {:.1}°",
+            1e3 * size(&self.shift_m),
+            1e3 * along(&self.shift_m, &self.shift_sd_m),
+            size(&self.turn_deg),
+            along(&self.turn_deg, &self.turn_sd_deg),
+        )?;
+        if self.scale_sd > 0.0 {
+            write!(f, ", depths {:+.1} ± {:.1} %", 100.0 * self.scale, 100.0 * self.scale_sd)?;
+        }
+        Ok(())
+    }
+}
