@@ -44,6 +44,9 @@ pub struct Experiment {
     pub initial_touches: u32,
     /// Touches per trial, initial ones included.
     pub touches: u32,
+    /// Views of the scene's camera before the touches.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub views: u32,
     /// Held-out touches after the trial's `touches`, at low-discrepancy places: they test the
     /// predictions of the belief without ground truth.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -95,6 +98,10 @@ const REMOVED: [&str; 2] = ["pi", "ei"];
 /// Maximum touches for an exact fit, whose cost is cubic in their number.
 const EXACT_TOUCHES_MAX: u32 = 2000;
 
+/// Maximum views of a trial.
+// heuristic: all sides of an object; each adds hundreds of rows to a belief.
+const VIEWS_MAX: f64 = 8.0;
+
 /// Default number of test points along each side of the zone.
 // heuristic: balances resolution and cost.
 const GRID: u32 = 31;
@@ -123,6 +130,7 @@ impl Experiment {
             seed: 0,
             initial_touches: 5.min(touches),
             touches,
+            views: 0,
             verification_touches: 0,
             repeat_touches: 0,
             grid: GRID,
@@ -381,7 +389,14 @@ impl Validate for Experiment {
         rules.require("touches", self.touches, is_fitted, || {
             format!("1 to {EXACT_TOUCHES_MAX}, or up to {TOUCHES_MAX} with gp.inducing_touches")
         });
-        rules.number("initial_touches", self.initial_touches.into(), 1.0..=self.touches.into());
+        // With a view, a planner can choose the first touch.
+        let least = if self.views > 0 { 0.0 } else { 1.0 };
+        rules.number("initial_touches", self.initial_touches.into(), least..=self.touches.into());
+        rules.number("views", self.views.into(), 0.0..=VIEWS_MAX);
+        let can_look = self.views == 0 || self.scene.camera.is_some();
+        rules.require("views", self.views, can_look, || {
+            "0, or a scene with a table [camera]".into()
+        });
         rules.number("verification_touches", self.verification_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("repeat_touches", self.repeat_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("grid", self.grid.into(), 2.0..=2001.0);

@@ -1,5 +1,6 @@
 //! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
+use super::camera::{Sight, capsules_at_home};
 use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
@@ -13,6 +14,7 @@ use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
+use palpate_explore::view::View;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::holes::{Hole, find_holes};
 use palpate_geometry::implicit::ImplicitSolid;
@@ -21,6 +23,7 @@ use palpate_geometry::mesh::Mesh;
 use palpate_geometry::report::MeshReport;
 use palpate_geometry::surfaces;
 use palpate_input::error::InputError;
+use rand::Rng;
 use std::borrow::Cow;
 
 /// Scene with its mesh loaded and its search tree built.
@@ -200,6 +203,24 @@ impl Environment {
     /// Returns the task: the region to explore and how to touch, without the true surface.
     pub fn task(&self) -> &Task {
         &self.task
+    }
+
+    /// Returns what the scene's camera sees, with errors drawn from `rng`; `None` without a camera.
+    pub fn look(&self, rng: &mut impl Rng) -> Option<View> {
+        let (camera, ObjectShape::Mesh { bvh, .. }) = (self.scene.camera.as_ref()?, &self.shape)
+        else {
+            return None;
+        };
+        let middle_w = match self.task.region() {
+            Region::Ball(ball) => ball.centre_w,
+            Region::Zone(zone) => {
+                let [near_m, far_m] = self.task.depth_m();
+                zone.x_wz() * zone.local(&zone.at(&[0.5, 0.5]), -0.5 * (near_m + far_m))
+            }
+        };
+        let arm = self.robot().filter(|_| camera.is_hidden_by_arm && self.arm.is_some());
+        let capsules_w = arm.as_ref().map(capsules_at_home).unwrap_or_default();
+        Some(camera.look(&Sight { object: bvh, middle_w, capsules_w }, rng))
     }
 
     /// Returns the arm or stage with its finger; `None` for a function.

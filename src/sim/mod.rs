@@ -1,5 +1,6 @@
 //! Simulation: the object, the physics of the finger, and the simulated robots.
 
+pub mod camera;
 pub mod environment;
 pub mod finger;
 pub mod kinematic;

@@ -1,5 +1,6 @@
 //! The scene: object, finger, zone, and the simulator that carries out a touch.
 
+use super::camera::CameraSettings;
 use super::solver::SolverSettings;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::sensor;
@@ -51,6 +52,9 @@ pub struct Scene {
     /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmSettings>,
+    /// Depth camera that looks before the touches of an experiment with `views`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraSettings>,
     /// Optional physics of a soft finger, one table per effect.
     #[serde(default, skip_serializing_if = "is_default")]
     pub effects: Effects,
@@ -316,6 +320,11 @@ impl Validate for Scene {
              stage of simulator = \"dynamic\" has no wrist"
                 .into()
         });
+        if let Some(camera) = &self.camera {
+            rules.table("camera", camera);
+            let is_curve = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_none());
+            given(rules, "camera", is_curve, "no camera: a zone without z_m is a curve");
+        }
         rules.table("effects", &self.effects);
         rules.table("touch", &self.touch);
         rules.table("solver", &self.solver);
@@ -509,6 +518,7 @@ impl Scene {
         for ending in FILE_ENDINGS {
             loader.resolve_path_ending(&format!("{prefix}arm.model"), ending);
         }
+        CameraSettings::resolve(loader, &format!("{prefix}camera"))?;
         sensor::load(loader, &format!("{prefix}effects"))
     }
 }

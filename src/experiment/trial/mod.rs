@@ -12,7 +12,7 @@ pub mod view;
 pub(super) use oracle::{GroundTruth, OracleFactory};
 
 use self::belief_shape::{BelievedShape, shape};
-use self::row::{TouchRow, TrialRow};
+use self::row::{TouchRow, TrialRow, ViewRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
@@ -125,6 +125,17 @@ fn run_touches(
     let writes_normals = experiment.gp.normals || is_around;
     let uses_tips = experiment.gp.free_space || experiment.gp.band.learned().is_some();
     let writes_tips = uses_tips || is_around;
+    for number in 0..experiment.views {
+        let purpose = format!("view {number}");
+        let mut random = seed::stream(experiment.seed, row.trial.into(), &purpose);
+        let view = truth.environment.look(&mut random).ok_or("the scene has no camera")?;
+        if let Some(seen) = belief.observe_view(&view) {
+            row.views.push(ViewRow { seen: seen.clone(), error: None });
+        }
+    }
+    if experiment.views > 0 {
+        belief.refit().map_err(|error| format!("fit after the views: {error}"))?;
+    }
     for count in 1..=experiment.touches {
         let is_start = count <= experiment.initial_touches;
         let plan = if is_start { start.plan(&belief) } else { planner.plan(&belief) };
@@ -180,6 +191,9 @@ fn run_touches(
         row.touches.push(touch_row);
         fitted.map_err(|error| format!("fit after touch {count}: {error}"))?;
         observed.map_err(|fault| format!("touch {count}: {fault}"))?;
+    }
+    for (view, error) in row.views.iter_mut().zip(belief.rigid_errors()) {
+        view.error = Some(error);
     }
     verify(experiment, task, &belief, probe, row)
 }

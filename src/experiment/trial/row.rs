@@ -9,6 +9,7 @@ use palpate_explore::planner::Fallback;
 use palpate_explore::probe::{Contact, Touch};
 use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Target;
+use palpate_explore::view::{RigidError, SeenSurface};
 use palpate_gp::fit::Fit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,11 +33,24 @@ pub struct TrialRow {
     /// Reason of an early end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
+    /// Views of a camera before the touches.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<ViewRow>,
     /// Touches in order.
     pub touches: Vec<TouchRow>,
     /// Held-out touches, made after `touches`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub verification: Vec<VerificationRow>,
+}
+
+/// One view of a camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ViewRow {
+    /// Surface that it shows, thinned.
+    pub seen: SeenSurface,
+    /// Error of the camera's pose after the last touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<RigidError>,
 }
 
 /// One touch and the belief after it.
@@ -139,8 +153,8 @@ impl TrialRow {
         planner: &str,
         failure: Option<String>,
     ) -> Self {
-        let (touches, verification) = (Vec::new(), Vec::new());
-        Self { trial, planner: planner.into(), failure, touches, verification }
+        let (views, touches, verification) = Default::default();
+        Self { trial, planner: planner.into(), failure, views, touches, verification }
     }
 
     /// Creates a trial that a fault ended before its first touch.

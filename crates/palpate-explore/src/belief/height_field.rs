@@ -7,13 +7,13 @@ use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
 use crate::view::{RigidError, SeenSurface, View};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::fit::KernelSelection;
 use palpate_gp::inducing::InducingPosterior;
 use palpate_gp::math::normal::BAND_95;
-use palpate_gp::posterior::Posterior;
+use palpate_gp::posterior::{Posterior, Scratch};
 use palpate_gp::{
     Hyperparameters, KnownError, Observation, Observations, Range, SearchBox, Slope, TouchNoise,
 };
@@ -33,13 +33,11 @@ const NORMAL_Y_MIN: f64 = 0.05;
 const SD_UNIT_M: f64 = 1e-4;
 
 /// Smallest y of a seen normal in the zone that is used.
-// heuristic: a steeper wall's height is uncertain by ten times the error of its place.
-const SEEN_NORMAL_Y_MIN: f64 = 0.1;
+// heuristic: a steeper wall's height is uncertain by four times the error of its place.
+const SEEN_NORMAL_Y_MIN: f64 = 0.25;
 
-/// Distance beside the zone up to which a view is used, as a fraction of the longest side, and in
-/// standard deviations of the camera's position.
-// heuristic: the belief at the zone's edge depends on the surface beside it.
-const BESIDE_VIEW: f64 = 0.05;
+/// Distance beside the zone, in standard deviations of the camera's position, up to which points are
+/// kept: a corrected pose may move them into it.
 const MARGIN_SIGMAS: f64 = 3.0;
 
 /// Number of seen heights of a view that a fit uses.
@@ -151,7 +149,7 @@ impl HeightField {
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit).
     pub fn observe_view(&mut self, view: &View) {
         let zone = &self.zone;
-        let margin_m = BESIDE_VIEW * zone.widest_m() + MARGIN_SIGMAS * view.accuracy.position_sd_m;
+        let margin_m = MARGIN_SIGMAS * view.accuracy.position_sd_m;
         let wanted = |p_w: &Point3<f64>| {
             let place = zone.place(p_w);
             let y_m = zone.x_wz().inverse_transform_point(p_w).y;
@@ -162,7 +160,13 @@ impl HeightField {
                 |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
             zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
         };
-        self.seen.push(SeenSurface::new(view, wanted));
+        let seen = SeenSurface::new(view, wanted);
+        self.observe_seen(seen);
+    }
+
+    /// Adds a view that is thinned already.
+    pub fn observe_seen(&mut self, seen: SeenSurface) {
+        self.seen.push(seen);
     }
 
     /// The surfaces that cameras have seen, one per view.
@@ -182,15 +186,16 @@ impl HeightField {
 
     /// Returns the seen heights, at most about `most` of each view.
     fn seen_heights(&self, most: usize) -> Observations {
-        let mut all = Observations::new(self.zone.dimension());
+        let (x_wz, mut all) = (self.zone.x_wz(), Observations::new(self.zone.dimension()));
         for (source, seen) in self.seen.iter().enumerate() {
             let step = seen.len().div_ceil(most).max(1);
             for element in seen.elements().step_by(step) {
-                let normal_y = self.zone.x_wz().inverse_transform_vector(&element.normal_w).y;
-                if normal_y < SEEN_NORMAL_Y_MIN {
+                let up = |normal_w: &Vector3<f64>| x_wz.inverse_transform_vector(normal_w).y;
+                let (normal_y, fitted_y) = (up(&element.normal_w), up(&element.fitted_w));
+                let place = self.zone.place(&element.p_w);
+                if fitted_y < SEEN_NORMAL_Y_MIN || !self.zone.contains(&place) {
                     continue;
                 }
-                let place = self.zone.place(&element.p_w);
                 let height = self.zone.height_m(&element.p_w) + element.removed_m / normal_y;
                 let loadings = element.loadings_m.map(|loading_m| loading_m / normal_y);
                 let variance = (element.sd_m / normal_y).powi(2);
@@ -202,13 +207,26 @@ impl HeightField {
         all
     }
 
-    /// Linearises each view at the errors of its camera's pose that `posterior` finds. Returns
-    /// whether that changes the observations.
+    /// Linearises each view at the errors of its camera's pose, and the slopes, that `posterior`
+    /// finds. Returns whether that changes the observations.
     fn relinearise(&mut self, posterior: &Posterior) -> bool {
+        let (zone, scratch) = (&self.zone, &mut Scratch::default());
+        let x_wz = zone.x_wz();
+        let mut gradient = vec![0.0; zone.dimension()];
+        let mut normal = |p_w: &Point3<f64>| {
+            let place = zone.place(p_w);
+            if !zone.contains(&place) {
+                return None;
+            }
+            posterior.mean_gradient(&place, &mut gradient, scratch);
+            let slope = |axis: usize| gradient.get(axis).copied().unwrap_or(0.0);
+            let normal_z = Vector3::new(-slope(0), 1.0, -slope(1));
+            Some(UnitVector3::new_normalize(x_wz.rotation * normal_z))
+        };
         let mut is_changed = false;
         for (number, seen) in self.seen.iter_mut().enumerate() {
             let errors = posterior.common_errors(number);
-            is_changed |= errors.is_some_and(|(mean, _)| seen.relinearise(&mean));
+            is_changed |= errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut normal));
         }
         is_changed
     }
@@ -259,6 +277,7 @@ impl HeightField {
         let mut fit = self.most_likely(reference_sd);
         let is_first = reference_sd.is_none() && !self.seen.is_empty();
         if is_first {
+            self.linearised_posterior(&fit.hyperparameters)?;
             fit = self.most_likely(Some(fit.hyperparameters.signal_sd));
         }
         if self.settings.band == Band::Named(BandName::LeaveOneOut) {

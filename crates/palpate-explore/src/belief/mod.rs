@@ -12,6 +12,7 @@ use super::probe::{SweptVolume, Touch};
 use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use crate::robot::Finger;
 use crate::task::{Approach, Region, Target, Task};
+use crate::view::{RigidError, SeenSurface, View};
 use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -68,6 +69,26 @@ impl Belief {
                 surface.observe(aim, approach, (touch, swept));
             }
             _ => {}
+        }
+    }
+
+    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit).
+    /// Returns what it shows of the region.
+    pub fn observe_view(&mut self, view: &View) -> Option<&SeenSurface> {
+        match self {
+            Self::HeightField(field) => {
+                field.observe_view(view);
+                field.seen().last()
+            }
+            Self::ImplicitSurface(_) => None,
+        }
+    }
+
+    /// Returns the error of the camera's pose in each view, after a fit.
+    pub fn rigid_errors(&self) -> Vec<RigidError> {
+        match self {
+            Self::HeightField(field) => field.rigid_errors(),
+            Self::ImplicitSurface(_) => Vec::new(),
         }
     }
 

@@ -10,6 +10,7 @@ use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Point3, SVector, Translation3, UnitQuaternion,
     UnitVector3, Vector3,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -20,13 +21,24 @@ pub const ERRORS: usize = 7;
 // heuristic: the remaining error is the square of it, far below a view's noise.
 const SETTLED: f64 = 0.02;
 
+/// Change of a normal below which it is kept.
+// heuristic: with an error of a few millimetres it shifts the surface by a tenth of one.
+const TURNED: f64 = 0.03;
+
 /// Surface that one view shows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SeenSurface {
+    #[schemars(with = "serde_json::Value")]
     x_wc: Isometry3<f64>,
     accuracy: CameraAccuracy,
     elements: Vec<SurfaceElement>,
+    /// Normals of the believed surface at the elements, in `W`; a few points alone give normals so
+    /// noisy that the camera would seem to be elsewhere. Empty before a belief.
+    #[schemars(with = "Vec<[f64; 3]>")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    normals_w: Vec<UnitVector3<f64>>,
     /// Errors at which the view is linearised, in standard deviations.
+    #[schemars(with = "[f64; ERRORS]")]
     errors: SVector<f64, ERRORS>,
 }
 
@@ -36,8 +48,10 @@ pub struct SeenSurface {
 pub struct CorrectedElement {
     /// Place in `W`.
     pub p_w: Point3<f64>,
-    /// Unit normal, towards the camera.
+    /// Unit normal of the believed surface.
     pub normal_w: UnitVector3<f64>,
+    /// Unit normal of the surface fitted to its points, towards the camera.
+    pub fitted_w: UnitVector3<f64>,
     /// Standard deviation of its own error along the normal.
     pub sd_m: f64,
     /// Shift along the normal per standard deviation of each of the camera's errors.
@@ -47,7 +61,7 @@ pub struct CorrectedElement {
 }
 
 /// Error of a camera's pose, as touches and prior tell it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RigidError {
     /// Shift of the seen points about `pivot_w`, m.
     pub shift_m: [f64; 3],
@@ -74,7 +88,8 @@ impl SeenSurface {
     pub fn new(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Self {
         let elements = thin(view, wanted);
         let errors = SVector::zeros();
-        Self { x_wc: view.x_wc, accuracy: view.accuracy, elements, errors }
+        let normals_w = Vec::new();
+        Self { x_wc: view.x_wc, accuracy: view.accuracy, elements, normals_w, errors }
     }
 
     /// Returns the number of surface elements.
@@ -111,10 +126,12 @@ impl SeenSurface {
     /// Returns the surface elements, corrected and linearised at the present errors.
     pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
         let (sds, x_wc, scale) = (self.sds(), self.corrected(), self.scale());
-        self.elements.iter().map(move |element| {
+        self.elements.iter().enumerate().map(move |(i, element)| {
             let p_w = x_wc * Point3::from(element.p_c.coords / scale);
-            let normal_w = x_wc.rotation * element.normal_c;
+            let fitted_w = x_wc.rotation * element.normal_c;
+            let normal_w = self.normals_w.get(i).copied().unwrap_or(fitted_w);
             let away = p_w.coords - x_wc.translation.vector;
+            let cosine = away.normalize().dot(&normal_w).abs();
             let turned = away.cross(&normal_w);
             let shifts = [normal_w.x, normal_w.y, normal_w.z, turned.x, turned.y, turned.z];
             let loadings_m = std::array::from_fn(|i| {
@@ -122,18 +139,34 @@ impl SeenSurface {
             });
             let removed = |(loading, error): (&f64, &f64)| loading * error;
             let removed_m = loadings_m.iter().zip(&self.errors).map(removed).sum();
-            CorrectedElement { p_w, normal_w, sd_m: element.sd_m, loadings_m, removed_m }
+            let sd_m = element.sd_m * cosine;
+            CorrectedElement { p_w, normal_w, fitted_w, sd_m, loadings_m, removed_m }
         })
     }
 
-    /// Linearises at the posterior mean of the errors. Returns whether that changes the elements.
-    pub fn relinearise(&mut self, errors: &DVector<f64>) -> bool {
+    /// Linearises at the posterior mean of the errors, with the `normal` of the believed surface at
+    /// each corrected element in `W`, if there is one. Returns whether that changes the elements.
+    pub fn relinearise(
+        &mut self,
+        errors: &DVector<f64>,
+        mut normal: impl FnMut(&Point3<f64>) -> Option<UnitVector3<f64>>,
+    ) -> bool {
         let new = SVector::from_fn(|i, _| errors.get(i).copied().unwrap_or(0.0));
-        let is_moved = (new - self.errors).amax() > SETTLED;
-        if is_moved {
+        let mut is_changed = (new - self.errors).amax() > SETTLED;
+        if is_changed {
             self.errors = new;
         }
-        is_moved
+        let at = |element: CorrectedElement| normal(&element.p_w).unwrap_or(element.fitted_w);
+        let normals_w: Vec<UnitVector3<f64>> = self.elements().map(at).collect();
+        let turned = |(new, old): (&UnitVector3<f64>, &UnitVector3<f64>)| {
+            (new.into_inner() - old.into_inner()).norm() > TURNED
+        };
+        is_changed |= self.normals_w.len() != normals_w.len()
+            || normals_w.iter().zip(&self.normals_w).any(turned);
+        if is_changed {
+            self.normals_w = normals_w;
+        }
+        is_changed
     }
 
     /// Returns the errors of the camera's pose from their posterior mean and covariance, in prior

@@ -8,16 +8,19 @@
 use super::View;
 use crate::quadratic_surface::QuadraticSurface;
 use nalgebra::{Point3, UnitVector3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A small piece of the surface that a camera has seen, in the camera's frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurfaceElement {
     /// Its middle.
+    #[schemars(with = "[f64; 3]")]
     pub p_c: Point3<f64>,
-    /// Unit normal, towards the camera.
+    /// Unit normal of the surface fitted to its points, towards the camera.
+    #[schemars(with = "[f64; 3]")]
     pub normal_c: UnitVector3<f64>,
-    /// Standard deviation of its place along the normal, without the error of the camera's pose.
+    /// Standard deviation of its distance from the camera, without the error of the camera's pose.
     pub sd_m: f64,
     /// Number of points.
     pub count: usize,
@@ -219,7 +222,7 @@ impl<'a> Image<'a> {
         // count once.
         let independent = (n / (share * count as f64)) * accuracy.noise_px * accuracy.noise_px;
         let variance_m2 = scatter2 * part * independent.max(1.0 / n) + 0.25 * misfit2;
-        let sd_m = variance_m2.sqrt() * ray.norm() * cosine;
+        let sd_m = variance_m2.sqrt() * ray.norm();
         let misfit = misfit2.sqrt() / noise_m.max(1e-6);
         let p_c = Point3::from(ray * z);
         Some((SurfaceElement { p_c, normal_c, sd_m, count }, misfit))

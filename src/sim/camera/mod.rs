@@ -1,0 +1,150 @@
+//! Simulated depth camera: rays on the exact mesh, and the errors that the scene calls for.
+
+pub mod settings;
+
+pub use settings::CameraSettings;
+
+use crate::sim::finger::noise::normal;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use palpate_explore::robot::Robot;
+use palpate_explore::view::View;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::primitives::nearest_of_segments;
+use palpate_geometry::sweep::Capsule;
+use rand::{Rng, RngExt};
+use settings::{FlyingPixels, PixelNoise};
+
+/// Largest depth, m.
+// heuristic: beyond the range of every camera beside an arm.
+const FARTHEST_M: f64 = 5.0;
+
+/// Step of the depth between neighbouring pixels, as a fraction of it, that is an edge.
+// heuristic: a surface at 75° to the ray has a step of a hundredth at 640 pixels.
+const EDGE: f64 = 0.02;
+
+/// What a camera looks at.
+pub struct Sight<'a> {
+    /// Object.
+    pub object: &'a MeshBvh,
+    /// Middle of the region, at which the camera looks unless its rotation is given.
+    pub middle_w: Point3<f64>,
+    /// Capsules that may hide the object, in `W`.
+    pub capsules_w: Vec<Capsule>,
+}
+
+/// Returns the capsules of an arm in its home posture.
+pub fn capsules_at_home(robot: &Robot) -> Vec<Capsule> {
+    let frames = robot.chain.frames(&robot.chain.home);
+    robot.capsules().iter().map(|capsule| capsule.at(&frames[capsule.link])).collect()
+}
+
+/// Image of depths along the camera's axis; NaN without one.
+struct Image {
+    pixels: [usize; 2],
+    depths_m: Vec<f64>,
+}
+
+impl CameraSettings {
+    /// Returns a view of the scene. `rng` gives the error of the pose and the noise.
+    pub fn look(&self, sight: &Sight, rng: &mut impl Rng) -> View {
+        let stated = self.x_wc(&sight.middle_w);
+        let (x_wc, scale) = self.true_pose(&stated, rng);
+        let mut image = self.render(sight, &x_wc);
+        if let Some(flying) = &self.flying_pixels {
+            image.fly(flying, rng);
+        }
+        for depth_m in &mut image.depths_m {
+            *depth_m *= scale;
+        }
+        if let Some(noise) = &self.noise {
+            image.blur(noise, rng);
+        }
+        if let Some(step_m) = self.quantisation.as_ref().map(|quantisation| quantisation.step_m) {
+            image.depths_m.iter_mut().for_each(|m| *m = (*m / step_m).round() * step_m);
+        }
+        let seen = image.depths_m.iter().enumerate().filter(|(_, depth_m)| depth_m.is_finite());
+        let points_c = seen.map(|(i, depth_m)| (self.ray(i) * *depth_m).into()).collect();
+        View { x_wc: stated, points_c, accuracy: self.accuracy() }
+    }
+
+    /// Returns the vector (x/z, y/z, 1) along pixel `i`.
+    fn ray(&self, i: usize) -> Vector3<f64> {
+        let [width, height] = self.pixels.map(|count| count as f64);
+        let pitch = 2.0 * (0.5 * self.fov_deg).to_radians().tan() / width;
+        let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at as f64 + 0.5);
+        Vector3::new((column - 0.5 * width) * pitch, (row - 0.5 * height) * pitch, 1.0)
+    }
+
+    /// Draws where the camera is, and the scale of its depths; the inverse of the correction by
+    /// [`SeenSurface`](palpate_explore::view::SeenSurface).
+    fn true_pose(&self, stated: &Isometry3<f64>, rng: &mut impl Rng) -> (Isometry3<f64>, f64) {
+        let Some(error) = &self.pose_error else { return (*stated, 1.0) };
+        let mut draw = |sd: f64| Vector3::from_fn(|_, _| sd * normal(rng));
+        let (shift, turn) = (draw(error.position_sd_m), draw(error.rotation_sd_deg.to_radians()));
+        let scale = 1.0 + draw(error.scale_sd).x;
+        let translation = Translation3::from(stated.translation.vector - shift);
+        let rotation = UnitQuaternion::from_scaled_axis(-turn) * stated.rotation;
+        (Isometry3::from_parts(translation, rotation), scale)
+    }
+
+    /// Returns the exact depths from the pose `x_wc`.
+    fn render(&self, sight: &Sight, x_wc: &Isometry3<f64>) -> Image {
+        let origin_w = Point3::from(x_wc.translation.vector);
+        let steepest = self.holes.as_ref().map(|holes| holes.grazing_deg.to_radians().cos());
+        let depth_m = |i: usize| {
+            let ray_c = self.ray(i);
+            let direction_w = UnitVector3::new_normalize(x_wc.rotation * ray_c);
+            let hit = sight.object.ray(&origin_w, &direction_w, FARTHEST_M)?;
+            let cosine = hit.normal.dot(&direction_w).abs();
+            let is_hole = steepest.is_some_and(|least| cosine < least);
+            let is_before = |capsule: &Capsule| {
+                let axis = [&capsule.p0_w, &capsule.p1_w];
+                let (a, b) = nearest_of_segments([&origin_w, &hit.point], axis);
+                (a - b).norm() < capsule.radius_m
+            };
+            let is_hidden = sight.capsules_w.iter().any(is_before);
+            (!is_hole && !is_hidden).then(|| hit.distance_m / ray_c.norm())
+        };
+        let count = self.pixels[0] * self.pixels[1];
+        let depths_m = (0..count).map(|i| depth_m(i).unwrap_or(f64::NAN)).collect();
+        Image { pixels: self.pixels, depths_m }
+    }
+}
+
+impl Image {
+    /// Replaces pixels beside an edge of the depth by depths between those of its two sides.
+    fn fly(&mut self, flying: &FlyingPixels, rng: &mut impl Rng) {
+        let [width, height] = self.pixels;
+        let exact = &self.depths_m.clone();
+        let reach = flying.band_px;
+        for (i, depth_m) in self.depths_m.iter_mut().enumerate() {
+            if !depth_m.is_finite() {
+                continue;
+            }
+            let [column, row] = [i % width, i / width];
+            let columns = column.saturating_sub(reach)..(column + reach + 1).min(width);
+            let beside = (row.saturating_sub(reach)..(row + reach + 1).min(height))
+                .flat_map(|row| columns.clone().map(move |column| exact[row * width + column]))
+                .filter(|other_m| other_m.is_finite())
+                .max_by(|a, b| (a - *depth_m).abs().total_cmp(&(b - *depth_m).abs()));
+            let Some(other_m) = beside.filter(|m| (m - *depth_m).abs() > EDGE * *depth_m) else {
+                continue;
+            };
+            if rng.random_bool(flying.share) {
+                *depth_m += rng.random_range(0.0..1.0) * (other_m - *depth_m);
+            }
+        }
+    }
+
+    /// Adds noise, equal over squares of pixels.
+    fn blur(&mut self, noise: &PixelNoise, rng: &mut impl Rng) {
+        let side = noise.noise_px;
+        let columns = self.pixels[0].div_ceil(side);
+        let squares = columns * self.pixels[1].div_ceil(side);
+        let draws: Vec<f64> = (0..squares).map(|_| normal(rng)).collect();
+        for (i, depth_m) in self.depths_m.iter_mut().enumerate() {
+            let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at / side);
+            *depth_m += noise.sd_m(*depth_m) * draws[row * columns + column];
+        }
+    }
+}

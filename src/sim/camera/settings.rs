@@ -1,0 +1,281 @@
+//! Settings of a depth camera: where it is, its model, and the errors that a scene calls for.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use palpate_explore::view::CameraAccuracy;
+use palpate_gp::math::pose::pose;
+use palpate_input::config::{ConfigError, Loader, Rules, Validate};
+use palpate_input::files;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Cameras included in Palpate: names and files.
+pub const CAMERAS: [(&str, &str); 2] = [
+    ("d405", include_str!("../../../models/cameras/d405.toml")),
+    ("d435", include_str!("../../../models/cameras/d435.toml")),
+];
+
+/// Table `[camera]`: a depth camera that looks before the touches. Each of its errors is a table;
+/// without it the camera has none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSettings {
+    /// Stated position in `W`.
+    pub position_m: [f64; 3],
+    /// Point at which it looks, with +z of `W` up in the image; default: the middle of the region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_at_m: Option<[f64; 3]>,
+    /// Stated rotation of its optical frame (z ahead, x right, y down) about the fixed axes x, then
+    /// y, then z of `W`; replaces `look_at_m`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_deg: Option<[f64; 3]>,
+    /// Pixels along width and height.
+    #[serde(default = "pixels")]
+    pub pixels: [usize; 2],
+    /// Horizontal field of view.
+    #[serde(default = "fov_deg")]
+    pub fov_deg: f64,
+    /// Noise of each pixel.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<PixelNoise>,
+    /// Error of the stated pose, common to a view.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_error: Option<PoseError>,
+    /// Depths between those of both sides of an edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flying_pixels: Option<FlyingPixels>,
+    /// Missing depths at grazing angles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holes: Option<Holes>,
+    /// Steps of the depths.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantisation: Option<Quantisation>,
+    /// Whether the arm at home hides what is behind it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_hidden_by_arm: bool,
+}
+
+fn pixels() -> [usize; 2] {
+    [640, 360]
+}
+
+fn fov_deg() -> f64 {
+    87.0
+}
+
+/// Table `[camera.noise]`: noise of each pixel's depth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PixelNoise {
+    /// Standard deviation, m.
+    pub noise_m: f64,
+    /// Further, independent standard deviation as a fraction of the depth.
+    pub noise_ratio: f64,
+    /// Side of the squares of pixels with equal noise, pixels.
+    pub noise_px: usize,
+}
+
+impl Default for PixelNoise {
+    /// Returns the noise of a D405.
+    fn default() -> Self {
+        Self { noise_m: 0.0, noise_ratio: 3e-3, noise_px: 3 }
+    }
+}
+
+impl PixelNoise {
+    /// Standard deviation at a depth.
+    pub fn sd_m(&self, depth_m: f64) -> f64 {
+        self.noise_m.hypot(self.noise_ratio * depth_m)
+    }
+}
+
+/// Table `[camera.pose_error]`: error of the camera's stated pose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PoseError {
+    /// Standard deviation of the position along each axis, m.
+    pub position_sd_m: f64,
+    /// Standard deviation of the rotation about each axis, deg.
+    pub rotation_sd_deg: f64,
+    /// Standard deviation of the relative error of all depths.
+    pub scale_sd: f64,
+}
+
+impl Default for PoseError {
+    /// Returns the error of a calibrated camera beside an arm.
+    fn default() -> Self {
+        let CameraAccuracy { position_sd_m, rotation_sd_deg, scale_sd, .. } = Default::default();
+        Self { position_sd_m, rotation_sd_deg, scale_sd }
+    }
+}
+
+/// Table `[camera.flying_pixels]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FlyingPixels {
+    /// Width of the band beside an edge, pixels.
+    pub band_px: usize,
+    /// Share of the pixels in it that fly.
+    pub share: f64,
+}
+
+impl Default for FlyingPixels {
+    /// Returns those of a D405.
+    fn default() -> Self {
+        Self { band_px: 2, share: 0.5 }
+    }
+}
+
+/// Table `[camera.holes]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Holes {
+    /// Largest angle between ray and normal at which there is a depth, deg.
+    pub grazing_deg: f64,
+}
+
+impl Default for Holes {
+    fn default() -> Self {
+        Self { grazing_deg: 75.0 }
+    }
+}
+
+/// Table `[camera.quantisation]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Quantisation {
+    /// Step of the depths, m.
+    pub step_m: f64,
+}
+
+impl Default for Quantisation {
+    fn default() -> Self {
+        Self { step_m: 1e-4 }
+    }
+}
+
+impl CameraSettings {
+    /// Returns the stated pose in `W`; `middle_w` is the middle of the region.
+    pub fn x_wc(&self, middle_w: &Point3<f64>) -> Isometry3<f64> {
+        if let Some(rotation_deg) = self.rotation_deg {
+            return pose(self.position_m, rotation_deg);
+        }
+        let position_w = Point3::from(self.position_m);
+        let target_w = self.look_at_m.map_or(*middle_w, Point3::from);
+        let ahead = (target_w - position_w).try_normalize(0.0).unwrap_or(-Vector3::z());
+        // Straight up or down, +y of `W` is up in the image.
+        let up = if ahead.z.abs() < 1.0 - 1e-9 { Vector3::z() } else { Vector3::y() };
+        let right = ahead.cross(&up).normalize();
+        let axes = Matrix3::from_columns(&[right, ahead.cross(&right), ahead]);
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+        Isometry3::from_parts(Translation3::from(position_w), turn)
+    }
+
+    /// Returns what is known of the camera's errors.
+    pub fn accuracy(&self) -> CameraAccuracy {
+        let noise = self.noise.clone();
+        let noise = noise.unwrap_or(PixelNoise { noise_m: 0.0, noise_ratio: 0.0, noise_px: 1 });
+        let exact = PoseError { position_sd_m: 0.0, rotation_sd_deg: 0.0, scale_sd: 0.0 };
+        let error = self.pose_error.clone().unwrap_or(exact);
+        CameraAccuracy {
+            noise_m: noise.noise_m,
+            noise_ratio: noise.noise_ratio,
+            noise_px: noise.noise_px as f64,
+            position_sd_m: error.position_sd_m,
+            rotation_sd_deg: error.rotation_sd_deg,
+            scale_sd: error.scale_sd,
+        }
+    }
+
+    /// Copies the values of the camera's model into the tables that the scene has under `camera`,
+    /// unless it sets them itself.
+    ///
+    /// # Errors
+    /// If the model is unknown or its file cannot be read.
+    pub fn resolve(loader: &mut Loader, camera: &str) -> Result<(), ConfigError> {
+        let key = format!("{camera}.model");
+        loader.resolve_path_ending(&key, ".toml");
+        let Some(name) = loader.value(&key).and_then(Value::as_str).map(String::from) else {
+            return Ok(());
+        };
+        let included = CAMERAS.iter().find(|(known, _)| *known == name);
+        let shown = format!("\"{name}\"");
+        let text = match included {
+            Some((_, text)) => (*text).into(),
+            None if name.ends_with(".toml") => files::text(Path::new(&name), files::TEXT_MAX)
+                .map_err(|cause| {
+                    let allowed = format!("a readable file ({name}: {cause})");
+                    loader.not_allowed(&key, &shown, &allowed)
+                })?,
+            None => {
+                let names = CAMERAS.map(|(name, _)| format!("\"{name}\"")).join(", ");
+                let allowed = format!("{names}, or a file ending in .toml");
+                return Err(loader.not_allowed(&key, &shown, &allowed));
+            }
+        };
+        let mut file = Loader::from_text(Path::new(&name), text)?;
+        let model = file.table_mut("").map(std::mem::take).unwrap_or_default();
+        if let Some(table) = loader.table_mut(camera) {
+            table.remove("model");
+            overlay(table, model);
+        }
+        Ok(())
+    }
+}
+
+/// Adds the values of `model` that `camera` lacks, and those of its tables that `camera` has.
+fn overlay(camera: &mut Table, model: Table) {
+    for (key, value) in model {
+        match (camera.get_mut(&key), value) {
+            (Some(Value::Table(own)), Value::Table(inner)) => {
+                for (key, value) in inner {
+                    own.entry(key).or_insert(value);
+                }
+            }
+            (None, Value::Table(_)) | (Some(_), _) => {}
+            (None, value) => drop(camera.insert(key, value)),
+        }
+    }
+}
+
+impl Validate for CameraSettings {
+    fn check(&self, rules: &mut Rules) {
+        rules.numbers("position_m", &self.position_m, -1e3..=1e3);
+        self.look_at_m.iter().for_each(|at| rules.numbers("look_at_m", at, -1e3..=1e3));
+        self.rotation_deg.iter().for_each(|deg| rules.numbers("rotation_deg", deg, -360.0..=360.0));
+        let is_twofold = self.look_at_m.is_some() && self.rotation_deg.is_some();
+        rules.require("look_at_m", "(given)", !is_twofold, || {
+            "either this or rotation_deg, not both".into()
+        });
+        let is_here = self.look_at_m == Some(self.position_m);
+        rules.require("look_at_m", format!("{:?}", self.position_m), !is_here, || {
+            "another point than position_m".into()
+        });
+        let is_allowed = self.pixels.iter().all(|count| (16..=4096).contains(count));
+        rules.require("pixels", format!("{:?}", self.pixels), is_allowed, || {
+            "two numbers from 16 to 4096".into()
+        });
+        rules.number("fov_deg", self.fov_deg, 1.0..=170.0);
+        if let Some(noise) = &self.noise {
+            rules.number("noise.noise_m", noise.noise_m, 0.0..=0.1);
+            rules.number("noise.noise_ratio", noise.noise_ratio, 0.0..=0.5);
+            rules.number("noise.noise_px", noise.noise_px as f64, 1.0..=64.0);
+        }
+        if let Some(error) = &self.pose_error {
+            rules.number("pose_error.position_sd_m", error.position_sd_m, 0.0..=0.1);
+            rules.number("pose_error.rotation_sd_deg", error.rotation_sd_deg, 0.0..=20.0);
+            rules.number("pose_error.scale_sd", error.scale_sd, 0.0..=0.2);
+        }
+        if let Some(flying) = &self.flying_pixels {
+            rules.number("flying_pixels.band_px", flying.band_px as f64, 0.0..=16.0);
+            rules.number("flying_pixels.share", flying.share, 0.0..=1.0);
+        }
+        if let Some(holes) = &self.holes {
+            rules.number("holes.grazing_deg", holes.grazing_deg, 10.0..=90.0);
+        }
+        if let Some(quantisation) = &self.quantisation {
+            rules.number("quantisation.step_m", quantisation.step_m, 1e-6..=0.05);
+        }
+    }
+}
