@@ -5,9 +5,9 @@ pub mod settings;
 pub use settings::CameraSettings;
 
 use crate::sim::finger::noise::normal;
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_explore::robot::Robot;
-use palpate_explore::view::View;
+use palpate_explore::view::{View, corrected_pose};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::nearest_of_segments;
 use palpate_geometry::sweep::Capsule;
@@ -48,7 +48,8 @@ impl CameraSettings {
     /// Returns a view of the scene. `rng` gives the error of the pose and the noise.
     pub fn look(&self, sight: &Sight, rng: &mut impl Rng) -> View {
         let stated = self.x_wc(&sight.middle_w);
-        let (x_wc, scale) = self.true_pose(&stated, rng);
+        let pivot_w = self.target_w(&sight.middle_w);
+        let (x_wc, scale) = self.true_pose(&stated, &pivot_w, rng);
         let mut image = self.render(sight, &x_wc);
         if let Some(flying) = &self.flying_pixels {
             image.fly(flying, rng);
@@ -64,7 +65,7 @@ impl CameraSettings {
         }
         let seen = image.depths_m.iter().enumerate().filter(|(_, depth_m)| depth_m.is_finite());
         let points_c = seen.map(|(i, depth_m)| (self.ray(i) * *depth_m).into()).collect();
-        View { x_wc: stated, points_c, accuracy: self.accuracy() }
+        View { x_wc: stated, points_c, pivot_w, accuracy: self.accuracy() }
     }
 
     /// Returns the vector (x/z, y/z, 1) along pixel `i`.
@@ -77,14 +78,19 @@ impl CameraSettings {
 
     /// Draws where the camera is, and the scale of its depths; the inverse of the correction by
     /// [`SeenSurface`](palpate_explore::view::SeenSurface).
-    fn true_pose(&self, stated: &Isometry3<f64>, rng: &mut impl Rng) -> (Isometry3<f64>, f64) {
+    fn true_pose(
+        &self,
+        stated: &Isometry3<f64>,
+        pivot_w: &Point3<f64>,
+        rng: &mut impl Rng,
+    ) -> (Isometry3<f64>, f64) {
         let Some(error) = &self.pose_error else { return (*stated, 1.0) };
-        let mut draw = |sd: f64| Vector3::from_fn(|_, _| sd * normal(rng));
-        let (shift, turn) = (draw(error.position_sd_m), draw(error.rotation_sd_deg.to_radians()));
-        let scale = 1.0 + draw(error.scale_sd).x;
-        let translation = Translation3::from(stated.translation.vector - shift);
-        let rotation = UnitQuaternion::from_scaled_axis(-turn) * stated.rotation;
-        (Isometry3::from_parts(translation, rotation), scale)
+        let mut draw =
+            |sds: [f64; 3]| stated.rotation * Vector3::from(sds.map(|sd| sd * normal(rng)));
+        let (shift, turn) =
+            (draw(error.position_sd_m), draw(error.rotation_sd_deg.map(f64::to_radians)));
+        let scale = 1.0 + error.scale_sd * normal(rng);
+        (corrected_pose(stated, pivot_w, (&shift, &turn)), scale)
     }
 
     /// Returns the exact depths from the pose `x_wc`.

@@ -94,10 +94,11 @@ impl PixelNoise {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PoseError {
-    /// Standard deviation of the position along each axis, m.
-    pub position_sd_m: f64,
-    /// Standard deviation of the rotation about each axis, deg.
-    pub rotation_sd_deg: f64,
+    /// Standard deviation of the shift of the seen points along x, y and z of the camera, at what it
+    /// looks at, m.
+    pub position_sd_m: [f64; 3],
+    /// Standard deviation of their rotation about the same axes, deg.
+    pub rotation_sd_deg: [f64; 3],
     /// Standard deviation of the relative error of all depths.
     pub scale_sd: f64,
 }
@@ -156,14 +157,19 @@ impl Default for Quantisation {
 }
 
 impl CameraSettings {
+    /// Returns the point of `W` at which the camera looks; `middle_w` is the middle of the region.
+    pub fn target_w(&self, middle_w: &Point3<f64>) -> Point3<f64> {
+        self.look_at_m.map_or(*middle_w, Point3::from)
+    }
+
     /// Returns the stated pose in `W`; `middle_w` is the middle of the region.
     pub fn x_wc(&self, middle_w: &Point3<f64>) -> Isometry3<f64> {
         if let Some(rotation_deg) = self.rotation_deg {
             return pose(self.position_m, rotation_deg);
         }
         let position_w = Point3::from(self.position_m);
-        let target_w = self.look_at_m.map_or(*middle_w, Point3::from);
-        let ahead = (target_w - position_w).try_normalize(0.0).unwrap_or(-Vector3::z());
+        let ahead =
+            (self.target_w(middle_w) - position_w).try_normalize(0.0).unwrap_or(-Vector3::z());
         // Straight up or down, +y of `W` is up in the image.
         let up = if ahead.z.abs() < 1.0 - 1e-9 { Vector3::z() } else { Vector3::y() };
         let right = ahead.cross(&up).normalize();
@@ -176,7 +182,7 @@ impl CameraSettings {
     pub fn accuracy(&self) -> CameraAccuracy {
         let noise = self.noise.clone();
         let noise = noise.unwrap_or(PixelNoise { noise_m: 0.0, noise_ratio: 0.0, noise_px: 1 });
-        let exact = PoseError { position_sd_m: 0.0, rotation_sd_deg: 0.0, scale_sd: 0.0 };
+        let exact = PoseError { position_sd_m: [0.0; 3], rotation_sd_deg: [0.0; 3], scale_sd: 0.0 };
         let error = self.pose_error.clone().unwrap_or(exact);
         CameraAccuracy {
             noise_m: noise.noise_m,
@@ -263,8 +269,8 @@ impl Validate for CameraSettings {
             rules.number("noise.noise_px", noise.noise_px as f64, 1.0..=64.0);
         }
         if let Some(error) = &self.pose_error {
-            rules.number("pose_error.position_sd_m", error.position_sd_m, 0.0..=0.1);
-            rules.number("pose_error.rotation_sd_deg", error.rotation_sd_deg, 0.0..=20.0);
+            rules.numbers("pose_error.position_sd_m", &error.position_sd_m, 0.0..=0.1);
+            rules.numbers("pose_error.rotation_sd_deg", &error.rotation_sd_deg, 0.0..=20.0);
             rules.number("pose_error.scale_sd", error.scale_sd, 0.0..=0.2);
         }
         if let Some(flying) = &self.flying_pixels {

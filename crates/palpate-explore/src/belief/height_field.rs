@@ -40,6 +40,12 @@ const SEEN_NORMAL_Y_MIN: f64 = 0.25;
 /// kept: a corrected pose may move them into it.
 const MARGIN_SIGMAS: f64 = 3.0;
 
+/// Largest signal's standard deviation with a view, over the heights' root mean square. Many heights
+/// of a smooth surface make ever larger ones more likely, and with them rounding errors of the
+/// camera's pose.
+// heuristic: ten times what a surface of these heights needs.
+const SEEN_SIGNAL_MAX: f64 = 10.0;
+
 /// Number of seen heights of a view that a fit uses.
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
 const SEEN_FITTED: usize = 64;
@@ -149,7 +155,8 @@ impl HeightField {
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit).
     pub fn observe_view(&mut self, view: &View) {
         let zone = &self.zone;
-        let margin_m = MARGIN_SIGMAS * view.accuracy.position_sd_m;
+        let sds_m = view.accuracy.position_sd_m;
+        let margin_m = MARGIN_SIGMAS * sds_m.into_iter().fold(0.0, f64::max);
         let wanted = |p_w: &Point3<f64>| {
             let place = zone.place(p_w);
             let y_m = zone.x_wz().inverse_transform_point(p_w).y;
@@ -421,7 +428,10 @@ impl HeightField {
         let scale = if rms > 0.0 { rms } else { extents_m[0] };
         let [shortest, longest] = self.settings.length_scale;
         let [quietest, loudest] = self.settings.noise;
-        let [smallest, largest] = self.settings.signal;
+        let [smallest, mut largest] = self.settings.signal;
+        if !self.seen.is_empty() {
+            largest = largest.min(SEEN_SIGNAL_MAX).max(smallest);
+        }
         let prior = &self.settings.prior;
         SearchBox {
             mean: self.settings.mean,

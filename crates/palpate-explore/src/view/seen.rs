@@ -1,14 +1,14 @@
 //! Seen surface: the evidence of a view, with the rigid error of its camera as a random effect.
 //!
-//! A camera whose pose is off by a translation t, a rotation r about the camera and a relative error
-//! s of its depths shows a point p at p + t + r × (p − c) + s·(p − c), with the camera's place c.
-//! Along a normal n of the surface that is off by n·t + ((p − c) × n)·r + (n·(p − c))·s: linear in
-//! seven numbers, which all points of the view have in common.
+//! A camera whose pose is off shows a point p at p + t + r × (p − q) + s·(p − c), with a translation
+//! t, a rotation r about the pivot q, and a relative error s of its depths from its place c. Along a
+//! normal n of the surface that is off by n·t + ((p − q) × n)·r + (n·(p − c))·s: linear in seven
+//! numbers, which all points of the view have in common. t and r are along the camera's axes.
 
 use super::{CameraAccuracy, SurfaceElement, View, thin};
 use nalgebra::{
-    DMatrix, DVector, Isometry3, Matrix3, Point3, SVector, Translation3, UnitQuaternion,
-    UnitVector3, Vector3,
+    DMatrix, DVector, Isometry3, Point3, SVector, Translation3, UnitQuaternion, UnitVector3,
+    Vector3,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,6 +30,8 @@ const TURNED: f64 = 0.03;
 pub struct SeenSurface {
     #[schemars(with = "serde_json::Value")]
     x_wc: Isometry3<f64>,
+    #[schemars(with = "[f64; 3]")]
+    pivot_w: Point3<f64>,
     accuracy: CameraAccuracy,
     elements: Vec<SurfaceElement>,
     /// Normals of the believed surface at the elements, in `W`; a few points alone give normals so
@@ -63,11 +65,11 @@ pub struct CorrectedElement {
 /// Error of a camera's pose, as touches and prior tell it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RigidError {
-    /// Shift of the seen points about `pivot_w`, m.
+    /// Shift of the seen points at the middle of the region along x, y and z of the camera, m.
     pub shift_m: [f64; 3],
     /// Its standard deviation.
     pub shift_sd_m: [f64; 3],
-    /// Rotation vector of the camera, deg.
+    /// Rotation of the seen points about the same axes, deg.
     pub turn_deg: [f64; 3],
     /// Its standard deviation.
     pub turn_sd_deg: [f64; 3],
@@ -75,8 +77,6 @@ pub struct RigidError {
     pub scale: f64,
     /// Its standard deviation.
     pub scale_sd: f64,
-    /// Middle of the seen points, at which the shift is stated, in `W`.
-    pub pivot_w: [f64; 3],
     /// Corrected position of the camera in `W`, m.
     pub position_m: [f64; 3],
     /// Corrected rotation of the camera, as a unit quaternion (x, y, z, w).
@@ -86,10 +86,14 @@ pub struct RigidError {
 impl SeenSurface {
     /// Thins the points of `view` that are `wanted`, given in `W`.
     pub fn new(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Self {
-        let elements = thin(view, wanted);
-        let errors = SVector::zeros();
-        let normals_w = Vec::new();
-        Self { x_wc: view.x_wc, accuracy: view.accuracy, elements, normals_w, errors }
+        Self {
+            x_wc: view.x_wc,
+            pivot_w: view.pivot_w,
+            accuracy: view.accuracy,
+            elements: thin(view, wanted),
+            normals_w: Vec::new(),
+            errors: SVector::zeros(),
+        }
     }
 
     /// Returns the number of surface elements.
@@ -105,17 +109,17 @@ impl SeenSurface {
     /// Standard deviation of each error.
     fn sds(&self) -> SVector<f64, ERRORS> {
         let CameraAccuracy { position_sd_m, rotation_sd_deg, scale_sd, .. } = self.accuracy;
-        let turn = rotation_sd_deg.to_radians();
-        SVector::from_fn(|i, _| [position_sd_m, turn, scale_sd][i / 3])
+        let turns = rotation_sd_deg.map(f64::to_radians);
+        let sds = position_sd_m.into_iter().chain(turns).chain([scale_sd]);
+        SVector::from_iterator(sds)
     }
 
     /// Pose of the camera in `W`, corrected by the present errors.
     fn corrected(&self) -> Isometry3<f64> {
         let moved = self.errors.component_mul(&self.sds());
-        let [shift, turn] = [0, 3].map(|row| moved.fixed_rows::<3>(row).into_owned());
-        let translation = Translation3::from(self.x_wc.translation.vector - shift);
-        let rotation = UnitQuaternion::from_scaled_axis(-turn) * self.x_wc.rotation;
-        Isometry3::from_parts(translation, rotation)
+        let [shift, turn] =
+            [0, 3].map(|row| self.x_wc.rotation * moved.fixed_rows::<3>(row).into_owned());
+        corrected_pose(&self.x_wc, &self.pivot_w, (&shift, &turn))
     }
 
     /// Depths that the camera states, over the true ones.
@@ -132,8 +136,10 @@ impl SeenSurface {
             let normal_w = self.normals_w.get(i).copied().unwrap_or(fitted_w);
             let away = p_w.coords - x_wc.translation.vector;
             let cosine = away.normalize().dot(&normal_w).abs();
-            let turned = away.cross(&normal_w);
-            let shifts = [normal_w.x, normal_w.y, normal_w.z, turned.x, turned.y, turned.z];
+            let turned_w = (p_w - self.pivot_w).cross(&normal_w);
+            let along = self.x_wc.rotation.inverse_transform_vector(&normal_w);
+            let turned = self.x_wc.rotation.inverse_transform_vector(&turned_w);
+            let shifts = [along.x, along.y, along.z, turned.x, turned.y, turned.z];
             let loadings_m = std::array::from_fn(|i| {
                 sds[i] * shifts.get(i).copied().unwrap_or(normal_w.dot(&away))
             });
@@ -174,34 +180,33 @@ impl SeenSurface {
     pub fn rigid_error(&self, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> RigidError {
         let sds = self.sds();
         let x_wc = Self { errors: SVector::from_fn(|i, _| mean[i]), ..self.clone() }.corrected();
-        let count = self.elements.len().max(1) as f64;
-        let sum = self.elements.iter().map(|element| (x_wc * element.p_c).coords);
-        let pivot_w = sum.sum::<Vector3<f64>>() / count;
-        // The shift t + r × (p − c) + s·(p − c) at the pivot, as a matrix on the errors.
-        let away = pivot_w - x_wc.translation.vector;
-        let mut shift = DMatrix::zeros(3, ERRORS);
-        shift.view_mut((0, 0), (3, 3)).copy_from(&Matrix3::identity());
-        shift.view_mut((0, 3), (3, 3)).copy_from(&-away.cross_matrix());
-        shift.view_mut((0, 6), (3, 1)).copy_from(&away);
-        for (i, mut column) in shift.column_iter_mut().enumerate() {
-            column *= sds[i];
-        }
-        let (found, spread) = (&shift * mean, &shift * covariance * shift.transpose());
         let sd = |i: usize| covariance[(i, i)].max(0.0).sqrt();
         let axes = [0, 1, 2];
-        let turn = x_wc.rotation.coords;
+        let rotation = x_wc.rotation.coords;
         RigidError {
-            shift_m: axes.map(|i| found[i]),
-            shift_sd_m: axes.map(|i| spread[(i, i)].max(0.0).sqrt()),
+            shift_m: axes.map(|i| mean[i] * sds[i]),
+            shift_sd_m: axes.map(|i| sd(i) * sds[i]),
             turn_deg: axes.map(|i| (mean[i + 3] * sds[i + 3]).to_degrees()),
             turn_sd_deg: axes.map(|i| (sd(i + 3) * sds[i + 3]).to_degrees()),
             scale: mean[6] * sds[6],
             scale_sd: sd(6) * sds[6],
-            pivot_w: pivot_w.into(),
             position_m: x_wc.translation.vector.into(),
-            rotation: [turn.x, turn.y, turn.z, turn.w],
+            rotation: [rotation.x, rotation.y, rotation.z, rotation.w],
         }
     }
+}
+
+/// Returns where a camera is whose points appear shifted and then rotated about a pivot, both in `W`,
+/// for its stated pose.
+pub fn corrected_pose(
+    stated: &Isometry3<f64>,
+    pivot_w: &Point3<f64>,
+    (shift, turn): (&Vector3<f64>, &Vector3<f64>),
+) -> Isometry3<f64> {
+    // A point p appears at exp(r)·(p − q) + q + t.
+    let back = UnitQuaternion::from_scaled_axis(-turn);
+    let p_w = pivot_w.coords + back * (stated.translation.vector - pivot_w.coords - shift);
+    Isometry3::from_parts(Translation3::from(p_w), back * stated.rotation)
 }
 
 impl fmt::Display for RigidError {
