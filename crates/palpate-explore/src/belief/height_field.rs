@@ -282,8 +282,7 @@ impl HeightField {
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
         let reference_sd = self.fit.as_ref().map(|fit| fit.hyperparameters.signal_sd);
         let mut fit = self.most_likely(reference_sd);
-        let is_first = reference_sd.is_none() && !self.seen.is_empty();
-        if is_first {
+        if reference_sd.is_none() && !self.seen.is_empty() {
             self.linearised_posterior(&fit.hyperparameters)?;
             fit = self.most_likely(Some(fit.hyperparameters.signal_sd));
         }

@@ -33,11 +33,11 @@ const COARSEST: u32 = 3;
 
 /// Number of elements up to which cells are divided that are already explained.
 // heuristic: as dense as a Gaussian process of a surface with details of a tenth of the image needs.
-const ENOUGH: usize = 160;
+const ENOUGH: usize = 250;
 
 /// Largest number of elements.
 // heuristic: the belief's update grows as its cube.
-const MOST: usize = 300;
+const MOST: usize = 350;
 
 /// Fewest points of a cell, and largest number that is fitted; the others only reduce the noise.
 // heuristic: twice the surface's coefficients; enough to find its misfit.
@@ -72,12 +72,16 @@ pub fn thin(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Vec<SurfaceEl
         leaves.extend(image.leaf(COARSEST, cell));
     }
     // The worst explained cells first, then the largest.
-    while leaves.len() < MOST {
+    loop {
+        let count = leaves.iter().filter(|leaf| leaf.element.is_some()).count();
+        if count >= MOST {
+            break;
+        }
         let worst =
             (0..leaves.len()).max_by(|a, b| leaves[*a].urgency.total_cmp(&leaves[*b].urgency));
         let Some(worst) = worst.filter(|worst| {
             let leaf = &leaves[*worst];
-            leaf.urgency > 1.0 || leaf.urgency > 0.0 && leaves.len() < ENOUGH
+            leaf.urgency > 1.0 || leaf.urgency > 0.0 && count < ENOUGH
         }) else {
             break;
         };

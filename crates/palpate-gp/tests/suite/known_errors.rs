@@ -6,8 +6,8 @@ use palpate_gp::kernel::{Kernel, Matern52};
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::{
-    Hyperparameters, KnownError, MeanModel, Observation, Observations, Posterior, SearchBox, Slope,
-    TouchNoise,
+    Hyperparameters, KnownError, MeanModel, NoiseRatio, Observation, Observations, Posterior,
+    SearchBox, SignalModel, Slope, TouchNoise,
 };
 use proptest::prelude::*;
 
@@ -162,6 +162,45 @@ proptest! {
                 (slope - difference).abs() < 1e-4 * (1.0 + slope.abs()),
                 "{i}: {slope} {difference}"
             );
+        }
+    }
+}
+
+/// The profiled likelihood is the largest over the signal, and its gradient that of its differences.
+#[test]
+fn a_profiled_likelihood_is_the_largest_over_the_signal() {
+    let observations = all(&offset_rows(0.5));
+    for scale in [SignalModel::Profiled((0.01, 100.0).into()), SignalModel::KnownNoise(0.01)] {
+        let mut likelihood = Likelihood::new(&Matern52, MeanModel::Zero, &observations);
+        let at = [0.5_f64, 0.7, 0.02];
+        let mut profile = |at: &[f64; 3], gradient: Option<&mut [f64]>| {
+            let noise = NoiseRatio { known: 1.0, ..at[2].into() };
+            likelihood.profile(&at[..2], noise, &scale, gradient).unwrap()
+        };
+        let mut gradient = [0.0; 3];
+        let found = profile(&at, Some(&mut gradient));
+        for i in 0..3 {
+            let mut value = |step: f64| {
+                let mut at = at;
+                at[i] *= step.exp();
+                profile(&at, None).log_likelihood
+            };
+            let difference = (value(1e-3) - value(-1e-3)) / 2e-3;
+            assert!(
+                (gradient[i] - difference).abs() < 0.02 * (1.0 + difference.abs()),
+                "{i}: {gradient:?} {difference}"
+            );
+        }
+        let mut exact = |signal_sd: f64| {
+            let noise = NoiseRatio { height: at[2], slope: 0.0, known: 0.0 };
+            let at = Hyperparameters::new(signal_sd, at[..2].into(), noise, 0.0);
+            likelihood.value_gradient(&at, &mut []).unwrap()
+        };
+        assert!((exact(found.signal_sd) - found.log_likelihood).abs() < 1e-9);
+        if matches!(scale, SignalModel::Profiled(_)) {
+            for factor in [0.5, 0.9, 0.99, 1.01, 1.1, 2.0] {
+                assert!(exact(found.signal_sd * factor) < found.log_likelihood + 1e-6, "{factor}");
+            }
         }
     }
 }
