@@ -29,7 +29,7 @@ fn search_box(mean: MeanModel, length_scales: Vec<Range>) -> SearchBox {
         signal_sd,
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
-        reference_sd: None,
+        start_sd: None,
     }
 }
 

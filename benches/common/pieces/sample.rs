@@ -40,7 +40,7 @@ pub fn search_box() -> SearchBox {
         signal_sd: (1e-3, 1e3).into(),
         touch_noise: TouchNoise::Fitted,
 
-        reference_sd: None,
+        start_sd: None,
         slope_noise_ratio: None,
     }
 }

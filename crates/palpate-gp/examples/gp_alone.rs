@@ -21,7 +21,7 @@ fn main() -> Result<(), CovarianceError> {
         signal_sd: (1e-3, 1e3).into(),
         touch_noise: TouchNoise::Fitted,
 
-        reference_sd: None,
+        start_sd: None,
         slope_noise_ratio: None,
     };
     let grid: Vec<[f64; 1]> = (0..=400).map(|i| [-2.0 + 0.01 * f64::from(i)]).collect();

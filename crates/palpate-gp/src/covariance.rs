@@ -276,6 +276,23 @@ impl DerivativeCovariance {
         }
     }
 
+    /// Adds to `gradient` the derivative of `weight` times the covariance of the heights at the place
+    /// and at observation `i`, with respect to the logarithm of each length scale.
+    pub(super) fn add_height_gradient(
+        &self,
+        observations: &Observations,
+        lengths: &[f64],
+        i: usize,
+        weight: f64,
+        gradient: &mut [f64],
+    ) {
+        let by_distance = weight * self.derivatives[0][i - self.first];
+        for (axis, slope) in gradient.iter_mut().enumerate() {
+            let u = self.step(observations, lengths, i, axis);
+            *slope -= 2.0 * u * u * by_distance;
+        }
+    }
+
     /// Adds to `gradient` the derivative, with respect to the logarithm of each length scale, of
     /// the weighted sum of the covariances of the place with observation `i`.
     ///

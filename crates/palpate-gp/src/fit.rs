@@ -111,8 +111,10 @@ impl FitState {
         let count = observations.len();
         let is_recent = |last: &&Fit| count as f64 <= SCAN_AGAIN * last.scanned_at as f64;
         let last = self.last.as_ref();
-        let is_kept = last.is_some() && count <= SCAN_ALWAYS && !observations.has_slopes();
-        let recent = last.filter(is_recent).filter(|_| count > SCAN_ALWAYS);
+        let is_searched = sought.is_signal_searched() || observations.has_known_errors();
+        let is_plain = !observations.has_slopes() && !is_searched;
+        let is_kept = last.is_some() && count <= SCAN_ALWAYS && is_plain;
+        let recent = last.filter(is_recent).filter(|_| count > SCAN_ALWAYS || is_searched);
         let mut in_half = 0;
         if !observations.is_empty() {
             if let Some(last) = last {
@@ -250,6 +252,7 @@ impl<'a> Search<'a> {
     ) -> Self {
         let scale = match sought.touch_noise {
             TouchNoise::Known(noise_sd) => SignalModel::KnownNoise(noise_sd),
+            _ if sought.is_signal_searched() => SignalModel::Searched,
             TouchNoise::Fitted | TouchNoise::AtLeast(_) => SignalModel::Profiled(sought.signal_sd),
         };
         let likelihood = Likelihood::new(kernel, sought.mean, observations);
@@ -296,14 +299,24 @@ impl<'a> Search<'a> {
     /// Evaluates a grid over the box and climbs its highest hills, except those that cannot exceed
     /// the best optimum. With a `scan`, reuses its cached factors.
     fn scan(&mut self, scan: Option<&mut Scan>) {
-        let grid = Grid::new(self.bounds, self.sought.length_scales.len());
+        // A searched signal starts at one value.
+        let noises = self.sought.noises().end;
+        let bounds =
+            Bounds { lower: &self.bounds.lower[..noises], upper: &self.bounds.upper[..noises] };
+        let grid = Grid::new(bounds, self.sought.length_scales.len());
+        let signal = self.sought.start_sd.filter(|_| self.sought.is_signal_searched());
+        let place = |index: usize| {
+            let mut place = grid.place(index);
+            place.extend(signal.map(f64::ln));
+            place
+        };
         let known = scan.map(|scan| {
             scan.profiles(self.sought, (&grid, &self.scale), self.kernel, self.observations)
         });
         let Self { sought, likelihood, scale, .. } = self;
         let values: Vec<f64> = (0..grid.len())
             .map(|index| {
-                let at = grid.place(index);
+                let at = place(index);
                 let known = known.as_ref().and_then(|known| known[index]);
                 let score = match known {
                     Some(profile) => with_priors(sought, scale, &at, &profile),
@@ -314,7 +327,7 @@ impl<'a> Search<'a> {
             .collect();
         for (hill, rise) in grid.hills(&values).into_iter().take(CLIMBS) {
             if values[hill] + rise > self.best_score() {
-                self.climb(&grid.place(hill), None);
+                self.climb(&place(hill), None);
             }
         }
     }
@@ -324,7 +337,7 @@ impl<'a> Search<'a> {
     fn cross_noise(&mut self) {
         let Some(best) = &self.best else { return };
         let (value, top) = (best.score, best.x.clone());
-        for noise in self.sought.length_scales.len()..top.len() {
+        for noise in self.sought.noises() {
             for level in [self.bounds.lower[noise], self.bounds.upper[noise]] {
                 let mut at = top.clone();
                 at[noise] = level;

@@ -29,7 +29,7 @@
 //!     noise_ratio: (1e-4, 1e-2).into(),
 //!     signal_sd: (1e-4, 1.0).into(),
 //!     touch_noise: TouchNoise::Fitted,
-//!     reference_sd: None,
+//!     start_sd: None,
 //!     slope_noise_ratio: None,
 //! };
 //! let fit = search_box.fit(&SquaredExponential, &observations);

@@ -30,17 +30,7 @@ pub struct Likelihood<'a> {
     pair: [Vec<f64>; 2],
     correlations: Correlations,
     factorisations: u32,
-    /// Logarithm of the last signal's standard deviation found with errors of known size.
-    last_log: Option<f64>,
 }
-
-/// First steps of the search for the signal's standard deviation, as its logarithm, with and without
-/// an earlier result; steps after which it ends; and the largest number of steps.
-// heuristic: the likelihood is then accurate to 1e-6.
-const WARM_STEP: f64 = 0.1;
-const COLD_STEP: f64 = 0.7;
-const SIGNAL_SETTLED: f64 = 0.02;
-const SIGNAL_STEPS: usize = 12;
 
 /// Profiled likelihood: the signal's standard deviation follows from the other parameters.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +70,6 @@ impl<'a> Likelihood<'a> {
             pair: Default::default(),
             correlations: Correlations::default(),
             factorisations: 0,
-            last_log: None,
         }
     }
 
@@ -116,7 +105,8 @@ impl<'a> Likelihood<'a> {
 
     /// Returns the log marginal likelihood with signal_sd according to `scale`. A `gradient` is
     /// written with respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of
-    /// the slope noise ratio if there is space; it includes the prior of signal_sd.
+    /// the slope noise ratio if there is space; it includes the prior of signal_sd. If signal_sd is
+    /// searched, its derivative is the last.
     ///
     /// # Errors
     /// [`CovarianceError`] if the covariance cannot be factored.
@@ -127,25 +117,30 @@ impl<'a> Likelihood<'a> {
         scale: &SignalModel,
         gradient: Option<&mut [f64]>,
     ) -> Result<ProfiledLikelihood, CovarianceError> {
-        let mut noise = noise_ratio.into();
-        if self.observations.has_known_errors() {
-            noise.known = 1.0 / self.signal_sd(length_scales, noise, scale)?;
-        }
+        let noise = noise_ratio.into();
         let (fit, mean) = self.fit(length_scales, noise)?;
         let count = self.observations.order();
-        let signal_sd = match self.observations.has_known_errors() {
-            true => 1.0 / noise.known,
-            false => scale.signal_sd(fit, count, noise.height),
-        };
+        let signal_sd = scale.signal_sd(fit, count, noise);
         if let Some(gradient) = gradient {
             let signal2 = signal_sd * signal_sd;
             self.gradient(signal2, length_scales, noise, gradient);
-            // At the optimal signal_sd the value is stationary in it; with a known noise, signal_sd
-            // decreases as the ratio increases.
-            if let (SignalModel::KnownNoise(_), Some(by_noise)) =
-                (scale, gradient.get_mut(length_scales.len()))
-            {
-                *by_noise -= fit / signal2 - count as f64 - self.by_known(signal2, noise);
+            // At the optimal signal_sd the value is stationary in it. Otherwise it changes by this,
+            // with errors of known size, which do not grow with it.
+            let by_signal =
+                |all: &Self| fit / signal2 - count as f64 - all.by_known(signal2, noise);
+            match scale {
+                SignalModel::Profiled(_) => {}
+                // With a known noise, signal_sd decreases as the ratio increases.
+                SignalModel::KnownNoise(_) => {
+                    let by_signal = by_signal(self);
+                    gradient.iter_mut().skip(length_scales.len()).take(1).for_each(|by_noise| {
+                        *by_noise -= by_signal;
+                    });
+                }
+                SignalModel::Searched => {
+                    let by_signal = by_signal(self);
+                    gradient.iter_mut().next_back().into_iter().for_each(|last| *last = by_signal);
+                }
             }
         }
         let log_likelihood = self.value(signal_sd, length_scales, fit);
@@ -170,56 +165,6 @@ impl<'a> Likelihood<'a> {
         let buffers = [&mut self.scratch, &mut self.weights];
         let mean = self.mean.of(self.observations, lengths, &self.dense, buffers);
         Ok((self.whiten(mean, lengths), mean))
-    }
-
-    /// Returns the signal's most probable standard deviation if errors of known size do not grow
-    /// with it, so that there is no closed form: by parabolas through the likelihood over its
-    /// logarithm, from that of the last call.
-    fn signal_sd(
-        &mut self,
-        lengths: &[f64],
-        noise: NoiseRatio,
-        scale: &SignalModel,
-    ) -> Result<f64, CovarianceError> {
-        let range = match scale {
-            SignalModel::KnownNoise(noise_sd) => return Ok(noise_sd / noise.height),
-            SignalModel::Profiled(range) => range,
-        };
-        let ends = [range.low.ln(), range.high.ln()];
-        let last = self.last_log;
-        let mut at = last.unwrap_or(-noise.known.ln()).clamp(ends[0], ends[1]);
-        let mut step = if last.is_some() { WARM_STEP } else { COLD_STEP };
-        let mut value = |log: f64| -> Result<f64, CovarianceError> {
-            let signal_sd = log.exp();
-            let (fit, _) = self.fit(lengths, NoiseRatio { known: 1.0 / signal_sd, ..noise })?;
-            Ok(self.value(signal_sd, lengths, fit) + scale.log_prior(signal_sd))
-        };
-        let mut best = value(at)?;
-        for _ in 0..SIGNAL_STEPS {
-            let beside = [(at - step).max(ends[0]), (at + step).min(ends[1])];
-            let [below, above] = [value(beside[0])?, value(beside[1])?];
-            let top = if below > above { (beside[0], below) } else { (beside[1], above) };
-            if top.1 > best {
-                (at, best) = top;
-                step *= 1.5;
-                continue;
-            }
-            // The vertex of the parabola through the three.
-            let bend = below - 2.0 * best + above;
-            let vertex = if bend < 0.0 { 0.5 * step * (below - above) / bend } else { 0.0 };
-            let found = (at + vertex).clamp(beside[0], beside[1]);
-            let value = value(found)?;
-            if value >= best {
-                (at, best) = (found, value);
-            }
-            if step < SIGNAL_SETTLED {
-                break;
-            }
-            step = (0.25 * step).max(vertex.abs());
-            step = step.min(0.5 * (beside[1] - beside[0]));
-        }
-        self.last_log = Some(at);
-        Ok(at.exp())
     }
 
     fn value(&self, signal_sd: f64, length_scales: &[f64], fit: f64) -> f64 {
@@ -325,13 +270,18 @@ impl<'a> Likelihood<'a> {
             }
             let derivatives = &mut correlations.derivatives;
             derivatives.correlate(*kernel, observations, lengths, observations.place(j), j);
+            let slopes_of_j = observations.slope(j).len();
             for i in j + 1..observations.len() {
                 let row = observations.start(i);
+                if slopes_of_j + observations.slope(i).len() == 0 {
+                    let change = change(row, column);
+                    derivatives.add_height_gradient(observations, lengths, i, change, by_length);
+                    continue;
+                }
                 slope_height.clear();
                 slope_height.resize(d, 0.0);
                 slopes.clear();
                 slopes.resize(d * d, 0.0);
-                let slopes_of_j = observations.slope(j).len();
                 for (axis, sum) in slope_height.iter_mut().take(slopes_of_j).enumerate() {
                     *sum += change(row, column + 1 + axis);
                 }

@@ -8,7 +8,7 @@ use super::cholesky::Factor;
 use super::kernel::Kernel;
 use super::likelihood;
 use super::likelihood::ProfiledLikelihood;
-use super::observations::{NoiseRatio, Observation, Observations};
+use super::observations::Observations;
 use super::search_box::MeanModel;
 use super::search_box::SearchBox;
 use super::search_box::SignalModel;
@@ -164,8 +164,6 @@ fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
 pub(super) struct Scan {
     grid: Grid,
     taken: Observations,
-    /// Unit of the known errors.
-    unit: f64,
     points: Vec<Point>,
 }
 
@@ -184,7 +182,7 @@ struct Point {
 impl Scan {
     /// Returns the profile of each place of `grid`, `None` if the covariance cannot be factored
     /// without jitter. Cached factors are reused if they belong to the same grid and the first of
-    /// these observations, which have heights only.
+    /// these observations, which have heights only, without errors of known size.
     pub(super) fn profiles(
         &mut self,
         sought: &SearchBox,
@@ -192,9 +190,7 @@ impl Scan {
         kernel: &dyn Kernel,
         observations: &Observations,
     ) -> Vec<Option<ProfiledLikelihood>> {
-        let unit = sought.known_unit();
-        if self.grid != *grid || self.unit != unit || !observations.begin_with(&self.taken) {
-            self.unit = unit;
+        if self.grid != *grid || !observations.begin_with(&self.taken) {
             self.grid.clone_from(grid);
             self.points.resize_with(grid.len(), Point::default);
             self.points.iter_mut().for_each(Point::forget);
@@ -212,14 +208,8 @@ impl Scan {
                 row.resize(i + 1, 0.0);
                 observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);
                 kernel.correlate(&mut row[..i]);
-                // Equal at all noises.
-                let known = NoiseRatio { height: 0.0, ..ratios[0] };
-                let error = observations.known(i);
-                observations.add_known_row(error, known, &mut row[..i]);
-                let own = Observation { known: error, ..Observation::height(&[], 0.0) };
-                let own = own.height_noise2(known);
                 for (point, noise) in points.iter_mut().zip(&ratios) {
-                    row[i] = 1.0 + observations.height_noise2(i, *noise) + own;
+                    row[i] = 1.0 + observations.height_noise2(i, *noise);
                     point.append(&row, observations.heights()[i]);
                 }
             }

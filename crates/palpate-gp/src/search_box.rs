@@ -26,9 +26,9 @@ pub struct SearchBox {
     pub signal_sd: Range,
     /// Model of the touch noise.
     pub touch_noise: TouchNoise,
-    /// Signal standard deviation at which known errors count during the search, if there are any:
-    /// near that of the surface. A posterior counts them exactly.
-    pub reference_sd: Option<f64>,
+    /// Start of a search for the signal's standard deviation, which is needed for observations with
+    /// errors of known size: these do not grow with the signal, so that it has no closed form.
+    pub start_sd: Option<f64>,
 }
 
 /// Model of the touch noise's standard deviation, in the unit of the heights.
@@ -44,7 +44,8 @@ pub enum TouchNoise {
 }
 
 impl SearchBox {
-    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio.
+    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio and signal if
+    /// they are searched.
     pub(super) fn ranges(&self) -> impl Iterator<Item = Range> {
         // A known noise and a range of the signal determine a range of their ratio.
         let noise_ratio = match self.touch_noise {
@@ -53,7 +54,15 @@ impl SearchBox {
             }
             TouchNoise::Fitted | TouchNoise::AtLeast(_) => self.noise_ratio,
         };
-        self.length_scales.iter().copied().chain([noise_ratio]).chain(self.slope_noise_ratio)
+        let noises = [noise_ratio].into_iter().chain(self.slope_noise_ratio);
+        let signal = self.is_signal_searched().then_some(self.signal_sd);
+        self.length_scales.iter().copied().chain(noises).chain(signal)
+    }
+
+    /// Whether the signal's standard deviation is a parameter of the search; with a known noise it
+    /// follows from the noise ratio.
+    pub(super) fn is_signal_searched(&self) -> bool {
+        self.start_sd.is_some() && !matches!(self.touch_noise, TouchNoise::Known(_))
     }
 
     /// Returns the logarithms of the lower and upper bounds.
@@ -64,23 +73,31 @@ impl SearchBox {
     /// Returns lengths and noise ratios from their logarithms.
     pub(super) fn parameters(&self, logs: &[f64]) -> (Vec<f64>, NoiseRatio) {
         let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
-        let noises = lengths.split_off(self.length_scales.len().min(logs.len()));
+        let mut noises = lengths.split_off(self.length_scales.len().min(logs.len()));
+        let searched = if self.is_signal_searched() { noises.pop() } else { None };
         let noise = |i: usize| noises.get(i).copied().unwrap_or(0.0);
-        (lengths, NoiseRatio { height: noise(0), slope: noise(1), known: self.known_unit() })
-    }
-
-    /// Returns the unit of known errors relative to the signal.
-    pub(super) fn known_unit(&self) -> f64 {
-        let middle = || (self.signal_sd.low * self.signal_sd.high).sqrt();
-        1.0 / self.reference_sd.unwrap_or_else(middle)
+        let known = match (self.touch_noise, searched) {
+            (TouchNoise::Known(noise_sd), _) => noise(0) / noise_sd,
+            (_, signal_sd) => signal_sd.map_or(0.0, f64::recip),
+        };
+        (lengths, NoiseRatio { height: noise(0), slope: noise(1), known })
     }
 
     /// Returns the logarithms of the parameters, the inverse of [`parameters`](Self::parameters).
     pub(super) fn log_parameters(&self, at: &Hyperparameters) -> Vec<f64> {
         let noise = at.noise_ratio();
         let slope = self.slope_noise_ratio.map(|range| noise.slope.clamp(range.low, range.high));
-        let parameters = at.length_scales.iter().copied().chain([noise.height]).chain(slope);
-        parameters.map(f64::ln).collect()
+        let SearchBox { signal_sd, .. } = self;
+        let signal = at.signal_sd.clamp(signal_sd.low, signal_sd.high);
+        let signal = self.is_signal_searched().then_some(signal);
+        let noises = [noise.height].into_iter().chain(slope);
+        at.length_scales.iter().copied().chain(noises).chain(signal).map(f64::ln).collect()
+    }
+
+    /// Indices of the noise ratios among the parameters.
+    pub(super) fn noises(&self) -> std::ops::Range<usize> {
+        let first = self.length_scales.len();
+        first..first + 1 + usize::from(self.slope_noise_ratio.is_some())
     }
 
     /// Sets `logs` to a third of the lengths and the middle noises: a start from which a fit in a
@@ -88,7 +105,10 @@ impl SearchBox {
     pub(super) fn shorter_lengths(&self, logs: &mut [f64], lower: &[f64], upper: &[f64]) {
         let lengths = self.length_scales.len();
         logs.iter_mut().take(lengths).for_each(|log| *log -= 3f64.ln());
-        for (noise, (lower, upper)) in logs.iter_mut().zip(lower.iter().zip(upper)).skip(lengths) {
+        let noises = self.noises();
+        for (noise, (lower, upper)) in
+            logs.iter_mut().zip(lower.iter().zip(upper)).take(noises.end).skip(lengths)
+        {
             *noise = 0.5 * (lower + upper);
         }
     }
@@ -151,6 +171,8 @@ pub enum SignalModel {
     Profiled(Range),
     /// s follows from a known touch noise and its ratio.
     KnownNoise(f64),
+    /// s is a parameter of the search: the inverse of the unit of known errors.
+    Searched,
 }
 
 impl SignalModel {
@@ -158,9 +180,11 @@ impl SignalModel {
     ///
     /// Maximises −½F/s² − n·ln s plus the log prior of s. Without a prior, s is sqrt(F/n); with
     /// one, the derivative decreases in ln s, and its zero is found by bisection.
-    pub fn signal_sd(&self, fit: f64, count: usize, noise_ratio: f64) -> f64 {
+    pub fn signal_sd(&self, fit: f64, count: usize, noise_ratio: impl Into<NoiseRatio>) -> f64 {
+        let noise = noise_ratio.into();
         let range = match self {
-            Self::KnownNoise(noise_sd) => return noise_sd / noise_ratio,
+            Self::KnownNoise(noise_sd) => return noise_sd / noise.height,
+            Self::Searched => return 1.0 / noise.known,
             Self::Profiled(range) => range,
         };
         let n = count.max(1) as f64;

@@ -153,7 +153,7 @@ fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
         signal_sd: (1e-12 * scale, 1e3 * scale).into(),
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
-        reference_sd: None,
+        start_sd: None,
     };
     let fit = search.fit(&KERNEL, &all_of);
     if fit.stop == Stop::Failed {

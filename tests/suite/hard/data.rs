@@ -37,7 +37,7 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
         signal_sd: (1e-3 * scale, 1e3 * scale).into(),
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
-        reference_sd: None,
+        start_sd: None,
     }
 }
 

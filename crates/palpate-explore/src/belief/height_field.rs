@@ -46,6 +46,12 @@ const MARGIN_SIGMAS: f64 = 3.0;
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
 
+/// Largest noise with a view, as a fraction of the signal's standard deviation: what a smooth surface
+/// cannot represent is then a shorter length, and one touch of a detail does not blur all that was
+/// seen.
+// heuristic: a tenth of a millimetre on objects of some centimetres.
+const SEEN_NOISE_MAX: f64 = 3e-3;
+
 /// Number of seen heights of a view that a fit uses.
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
 const SEEN_FITTED: usize = 64;
@@ -280,9 +286,9 @@ impl HeightField {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
-        let reference_sd = self.fit.as_ref().map(|fit| fit.hyperparameters.signal_sd);
-        let mut fit = self.most_likely(reference_sd);
-        if reference_sd.is_none() && !self.seen.is_empty() {
+        let start_sd = self.fit.as_ref().map(|fit| fit.hyperparameters.signal_sd);
+        let mut fit = self.most_likely(start_sd);
+        if start_sd.is_none() && !self.seen.is_empty() {
             self.linearised_posterior(&fit.hyperparameters)?;
             fit = self.most_likely(Some(fit.hyperparameters.signal_sd));
         }
@@ -300,8 +306,8 @@ impl HeightField {
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
     }
 
-    /// Returns the most likely fit, with the known errors of views scaled by `reference_sd`.
-    fn most_likely(&mut self, reference_sd: Option<f64>) -> Fit {
+    /// Returns the most likely fit; with views, the search for the signal starts at `start_sd`.
+    fn most_likely(&mut self, start_sd: Option<f64>) -> Fit {
         let observations = match self.inducing() {
             None if self.seen.is_empty() => None,
             None => Some(self.seen_heights(SEEN_FITTED).followed_by(&self.contacts)),
@@ -310,7 +316,10 @@ impl HeightField {
             Some(most) => Some(self.contacts.subsample(self.contacts.len() / most)),
         };
         let observations = observations.as_ref().unwrap_or(&self.contacts);
-        let search_box = SearchBox { reference_sd, ..self.search_box(observations) };
+        let search_box = self.search_box(observations);
+        let middle = || (search_box.signal_sd.low * search_box.signal_sd.high).sqrt();
+        let start_sd = (!self.seen.is_empty()).then(|| start_sd.unwrap_or_else(middle));
+        let search_box = SearchBox { start_sd, ..search_box };
         self.kernels.fit(&search_box, observations)
     }
 
@@ -426,10 +435,11 @@ impl HeightField {
         // Heights that are all zero have no scale.
         let scale = if rms > 0.0 { rms } else { extents_m[0] };
         let [shortest, longest] = self.settings.length_scale;
-        let [quietest, loudest] = self.settings.noise;
+        let [quietest, mut loudest] = self.settings.noise;
         let [smallest, mut largest] = self.settings.signal;
         if !self.seen.is_empty() {
             largest = largest.min(SEEN_SIGNAL_MAX).max(smallest);
+            loudest = loudest.min(SEEN_NOISE_MAX).max(quietest);
         }
         let prior = &self.settings.prior;
         SearchBox {
@@ -458,7 +468,7 @@ impl HeightField {
                 (None, Some(least_m)) => TouchNoise::AtLeast(least_m),
                 (None, None) => TouchNoise::Fitted,
             },
-            reference_sd: None,
+            start_sd: None,
         }
     }
 
