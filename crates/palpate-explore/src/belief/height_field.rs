@@ -46,12 +46,6 @@ const MARGIN_SIGMAS: f64 = 3.0;
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
 
-/// Largest noise with a view, as a fraction of the signal's standard deviation: what a smooth surface
-/// cannot represent is then a shorter length, and one touch of a detail does not blur all that was
-/// seen.
-// heuristic: a tenth of a millimetre on objects of some centimetres.
-const SEEN_NOISE_MAX: f64 = 3e-3;
-
 /// Number of seen heights of a view that a fit uses.
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
 const SEEN_FITTED: usize = 64;
@@ -435,11 +429,10 @@ impl HeightField {
         // Heights that are all zero have no scale.
         let scale = if rms > 0.0 { rms } else { extents_m[0] };
         let [shortest, longest] = self.settings.length_scale;
-        let [quietest, mut loudest] = self.settings.noise;
+        let [quietest, loudest] = self.settings.noise;
         let [smallest, mut largest] = self.settings.signal;
         if !self.seen.is_empty() {
             largest = largest.min(SEEN_SIGNAL_MAX).max(smallest);
-            loudest = loudest.min(SEEN_NOISE_MAX).max(quietest);
         }
         let prior = &self.settings.prior;
         SearchBox {

@@ -80,7 +80,10 @@ impl Belief {
                 field.observe_view(view);
                 field.seen().last()
             }
-            Self::ImplicitSurface(_) => None,
+            Self::ImplicitSurface(surface) => {
+                surface.observe_view(view);
+                surface.seen().last()
+            }
         }
     }
 
@@ -88,7 +91,7 @@ impl Belief {
     pub fn rigid_errors(&self) -> Vec<RigidError> {
         match self {
             Self::HeightField(field) => field.rigid_errors(),
-            Self::ImplicitSurface(_) => Vec::new(),
+            Self::ImplicitSurface(surface) => surface.rigid_errors(),
         }
     }
 
