@@ -22,27 +22,27 @@ fn main() {
         let place = zone.place(&e.p_w);
         if let Some(h) = environment.true_height_m(&place) {
             let off = zone.height_m(&e.p_w) - h;
-            let up = zone.x_wz().inverse_transform_vector(&e.fitted_w).y;
-            if zone.contains(&place) && up >= 0.25 && (off * up / e.sd_m).abs() > 4.0 {
+            let up = zone.x_wz().inverse_transform_vector(&e.normal_w).y;
+            if zone.contains(&place) && up >= 0.25 && (off * up / e.sd).abs() > 4.0 {
                 println!(
                     "  outlier {place:?} off {:.2} mm up {up:.2} sd {:.3}",
                     1e3 * off,
-                    1e3 * e.sd_m
+                    1e3 * e.sd
                 );
             }
-            let up = zone.x_wz().inverse_transform_vector(&e.fitted_w).y;
+            let up = zone.x_wz().inverse_transform_vector(&e.normal_w).y;
             if !zone.contains(&place) || up < 0.25 {
                 continue;
             }
             let off = zone.height_m(&e.p_w) - h;
             sum += off;
             n += 1;
-            z2 += (off * up / e.sd_m).powi(2);
+            z2 += (off * up / e.sd).powi(2);
             if n % 20 == 0 {
                 println!(
                     "  place {place:?} off {:.2} mm, up {up:.2}, sd {:.3}",
                     1e3 * off,
-                    1e3 * e.sd_m
+                    1e3 * e.sd
                 );
             }
         }

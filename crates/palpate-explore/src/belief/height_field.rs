@@ -52,7 +52,7 @@ const SEEN_FITTED: usize = 64;
 
 /// Largest number of linearisations of a view at its camera's errors.
 // heuristic: errors of 10 mm and 3° settle after three.
-const LINEARISATIONS: usize = 6;
+const LINEARISATIONS: usize = 12;
 
 /// Belief of a height field over a zone.
 #[derive(Clone, Serialize, Deserialize)]
@@ -167,7 +167,13 @@ impl HeightField {
                 |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
             zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
         };
-        let seen = SeenSurface::new(view, wanted);
+        // Of the field that is the height above the surface.
+        let x_wz = zone.x_wz();
+        let gradient = |normal_w: &UnitVector3<f64>| {
+            let up = x_wz.inverse_transform_vector(normal_w).y;
+            normal_w.into_inner() / up.abs().max(SEEN_NORMAL_Y_MIN)
+        };
+        let seen = SeenSurface::new(view, wanted, gradient);
         self.observe_seen(seen);
     }
 
@@ -197,16 +203,14 @@ impl HeightField {
         for (source, seen) in self.seen.iter().enumerate() {
             let step = seen.len().div_ceil(most).max(1);
             for element in seen.elements().step_by(step) {
-                let up = |normal_w: &Vector3<f64>| x_wz.inverse_transform_vector(normal_w).y;
-                let (normal_y, fitted_y) = (up(&element.normal_w), up(&element.fitted_w));
+                let normal_y = x_wz.inverse_transform_vector(&element.normal_w).y;
                 let place = self.zone.place(&element.p_w);
-                if fitted_y < SEEN_NORMAL_Y_MIN || !self.zone.contains(&place) {
+                if normal_y < SEEN_NORMAL_Y_MIN || !self.zone.contains(&place) {
                     continue;
                 }
-                let height = self.zone.height_m(&element.p_w) + element.removed_m / normal_y;
-                let loadings = element.loadings_m.map(|loading_m| loading_m / normal_y);
-                let variance = (element.sd_m / normal_y).powi(2);
-                let known = Some(KnownError { variance, source, loadings: &loadings });
+                let height = self.zone.height_m(&element.p_w) + element.removed;
+                let variance = element.sd * element.sd;
+                let known = Some(KnownError { variance, source, loadings: &element.loadings });
                 let slope = None;
                 all.push(&Observation { place: &place, height, noise: 1.0, slope, known });
             }
@@ -220,20 +224,20 @@ impl HeightField {
         let (zone, scratch) = (&self.zone, &mut Scratch::default());
         let x_wz = zone.x_wz();
         let mut gradient = vec![0.0; zone.dimension()];
-        let mut normal = |p_w: &Point3<f64>| {
+        let mut field_gradient = |p_w: &Point3<f64>| {
             let place = zone.place(p_w);
             if !zone.contains(&place) {
                 return None;
             }
             posterior.mean_gradient(&place, &mut gradient, scratch);
             let slope = |axis: usize| gradient.get(axis).copied().unwrap_or(0.0);
-            let normal_z = Vector3::new(-slope(0), 1.0, -slope(1));
-            Some(UnitVector3::new_normalize(x_wz.rotation * normal_z))
+            Some(x_wz.rotation * Vector3::new(-slope(0), 1.0, -slope(1)))
         };
         let mut is_changed = false;
         for (number, seen) in self.seen.iter_mut().enumerate() {
             let errors = posterior.common_errors(number);
-            is_changed |= errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut normal));
+            is_changed |=
+                errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut field_gradient));
         }
         is_changed
     }

@@ -2,8 +2,8 @@
 //!
 //! A camera whose pose is off shows a point p at p + t + r × (p − q) + s·(p − c), with a translation
 //! t, a rotation r about the pivot q, and a relative error s of its depths from its place c. Along a
-//! normal n of the surface that is off by n·t + ((p − q) × n)·r + (n·(p − c))·s: linear in seven
-//! numbers, which all points of the view have in common. t and r are along the camera's axes.
+//! gradient g of the belief's field that is off by g·t + ((p − q) × g)·r + (g·(p − c))·s: linear in
+//! seven numbers, which all points of the view have in common. t and r are along the camera's axes.
 
 use super::{CameraAccuracy, SurfaceElement, View, thin};
 use nalgebra::{
@@ -21,7 +21,7 @@ pub const ERRORS: usize = 7;
 // heuristic: the remaining error is the square of it, far below a view's noise.
 const SETTLED: f64 = 0.02;
 
-/// Change of a normal below which it is kept.
+/// Relative change of a gradient below which it is kept.
 // heuristic: with an error of a few millimetres it shifts the surface by a tenth of one.
 const TURNED: f64 = 0.03;
 
@@ -34,32 +34,32 @@ pub struct SeenSurface {
     pivot_w: Point3<f64>,
     accuracy: CameraAccuracy,
     elements: Vec<SurfaceElement>,
-    /// Normals of the believed surface at the elements, in `W`; a few points alone give normals so
-    /// noisy that the camera would seem to be elsewhere. Empty before a belief.
+    /// Gradients in `W`, at the elements, of a field that is 0 on the surface and positive outside.
+    /// They are those of the belief: the normals of a few points are so noisy that the camera would
+    /// seem to be elsewhere, and a gradient of another length would fix where it is.
     #[schemars(with = "Vec<[f64; 3]>")]
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    normals_w: Vec<UnitVector3<f64>>,
+    gradients_w: Vec<Vector3<f64>>,
+    /// Whether these are those of a belief.
+    is_believed: bool,
     /// Errors at which the view is linearised, in standard deviations.
     #[schemars(with = "[f64; ERRORS]")]
     errors: SVector<f64, ERRORS>,
 }
 
 /// An element of the surface, corrected by the errors at which a view is linearised, and what is
-/// known of its error.
+/// known of the error of the field there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CorrectedElement {
     /// Place in `W`.
     pub p_w: Point3<f64>,
-    /// Unit normal of the believed surface.
-    pub normal_w: UnitVector3<f64>,
     /// Unit normal of the surface fitted to its points, towards the camera.
-    pub fitted_w: UnitVector3<f64>,
-    /// Standard deviation of its own error along the normal.
-    pub sd_m: f64,
-    /// Shift along the normal per standard deviation of each of the camera's errors.
-    pub loadings_m: [f64; ERRORS],
-    /// Shift along the normal that the correction has removed, in the linearised model.
-    pub removed_m: f64,
+    pub normal_w: UnitVector3<f64>,
+    /// Standard deviation of its own error.
+    pub sd: f64,
+    /// Change per standard deviation of each of the camera's errors.
+    pub loadings: [f64; ERRORS],
+    /// Change that the correction has removed, in the linearised model.
+    pub removed: f64,
 }
 
 /// Error of a camera's pose, as touches and prior tell it.
@@ -84,14 +84,22 @@ pub struct RigidError {
 }
 
 impl SeenSurface {
-    /// Thins the points of `view` that are `wanted`, given in `W`.
-    pub fn new(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Self {
+    /// Thins the points of `view` that are `wanted`, given in `W`. `gradient` gives that of the field
+    /// before there is a belief, from a normal.
+    pub fn new(
+        view: &View,
+        wanted: impl Fn(&Point3<f64>) -> bool,
+        gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
+    ) -> Self {
+        let elements = thin(view, wanted);
+        let normal_w = |element: &SurfaceElement| view.x_wc.rotation * element.normal_c;
         Self {
             x_wc: view.x_wc,
             pivot_w: view.pivot_w,
             accuracy: view.accuracy,
-            elements: thin(view, wanted),
-            normals_w: Vec::new(),
+            gradients_w: elements.iter().map(|element| gradient(&normal_w(element))).collect(),
+            elements,
+            is_believed: false,
             errors: SVector::zeros(),
         }
     }
@@ -130,47 +138,49 @@ impl SeenSurface {
     /// Returns the surface elements, corrected and linearised at the present errors.
     pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
         let (sds, x_wc, scale) = (self.sds(), self.corrected(), self.scale());
-        self.elements.iter().enumerate().map(move |(i, element)| {
+        self.elements.iter().zip(&self.gradients_w).map(move |(element, gradient_w)| {
             let p_w = x_wc * Point3::from(element.p_c.coords / scale);
-            let fitted_w = x_wc.rotation * element.normal_c;
-            let normal_w = self.normals_w.get(i).copied().unwrap_or(fitted_w);
+            let normal_w = x_wc.rotation * element.normal_c;
             let away = p_w.coords - x_wc.translation.vector;
-            let cosine = away.normalize().dot(&normal_w).abs();
-            let turned_w = (p_w - self.pivot_w).cross(&normal_w);
-            let along = self.x_wc.rotation.inverse_transform_vector(&normal_w);
+            let turned_w = (p_w - self.pivot_w).cross(gradient_w);
+            let along = self.x_wc.rotation.inverse_transform_vector(gradient_w);
             let turned = self.x_wc.rotation.inverse_transform_vector(&turned_w);
             let shifts = [along.x, along.y, along.z, turned.x, turned.y, turned.z];
-            let loadings_m = std::array::from_fn(|i| {
-                sds[i] * shifts.get(i).copied().unwrap_or(normal_w.dot(&away))
+            let loadings = std::array::from_fn(|i| {
+                sds[i] * shifts.get(i).copied().unwrap_or(gradient_w.dot(&away))
             });
             let removed = |(loading, error): (&f64, &f64)| loading * error;
-            let removed_m = loadings_m.iter().zip(&self.errors).map(removed).sum();
-            let sd_m = element.sd_m * cosine;
-            CorrectedElement { p_w, normal_w, fitted_w, sd_m, loadings_m, removed_m }
+            let removed = loadings.iter().zip(&self.errors).map(removed).sum();
+            let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
+            CorrectedElement { p_w, normal_w, sd, loadings, removed }
         })
     }
 
-    /// Linearises at the posterior mean of the errors, with the `normal` of the believed surface at
+    /// Linearises at the posterior mean of the errors, with the `gradient` of the belief's field at
     /// each corrected element in `W`, if there is one. Returns whether that changes the elements.
     pub fn relinearise(
         &mut self,
         errors: &DVector<f64>,
-        mut normal: impl FnMut(&Point3<f64>) -> Option<UnitVector3<f64>>,
+        mut gradient: impl FnMut(&Point3<f64>) -> Option<Vector3<f64>>,
     ) -> bool {
-        let new = SVector::from_fn(|i, _| errors.get(i).copied().unwrap_or(0.0));
-        let mut is_changed = (new - self.errors).amax() > SETTLED;
-        if is_changed {
-            self.errors = new;
+        // Errors that noisy normals have given mean nothing.
+        let mut is_changed = !self.is_believed;
+        if self.is_believed {
+            let new = SVector::from_fn(|i, _| errors.get(i).copied().unwrap_or(0.0));
+            is_changed = (new - self.errors).amax() > SETTLED;
+            self.errors = if is_changed { new } else { self.errors };
         }
-        let at = |element: CorrectedElement| normal(&element.p_w).unwrap_or(element.fitted_w);
-        let normals_w: Vec<UnitVector3<f64>> = self.elements().map(at).collect();
-        let turned = |(new, old): (&UnitVector3<f64>, &UnitVector3<f64>)| {
-            (new.into_inner() - old.into_inner()).norm() > TURNED
-        };
-        is_changed |= self.normals_w.len() != normals_w.len()
-            || normals_w.iter().zip(&self.normals_w).any(turned);
-        if is_changed {
-            self.normals_w = normals_w;
+        self.is_believed = true;
+        let places: Vec<Point3<f64>> = self.elements().map(|element| element.p_w).collect();
+        let mut gradients_w = self.gradients_w.clone();
+        for (gradient_w, p_w) in gradients_w.iter_mut().zip(&places) {
+            *gradient_w = gradient(p_w).unwrap_or(*gradient_w);
+        }
+        let turned =
+            |(new, old): (&Vector3<f64>, &Vector3<f64>)| (new - old).norm() > TURNED * old.norm();
+        if gradients_w.iter().zip(&self.gradients_w).any(turned) {
+            is_changed = true;
+            self.gradients_w = gradients_w;
         }
         is_changed
     }

@@ -162,23 +162,23 @@ impl TouchEvidence {
         for (source, seen) in self.seen.iter().enumerate() {
             for (i, element) in used(seen).enumerate() {
                 // A surface that is seen too far out is inside of what was seen.
-                let loadings = element.loadings_m.map(|loading_m| -loading_m);
-                let variance = element.sd_m * element.sd_m;
+                let loadings = element.loadings.map(|loading| -loading);
+                let variance = element.sd * element.sd;
                 all.push(&Observation {
                     place: element.p_w.coords.as_slice(),
-                    height: -element.removed_m - prior.field(&element.p_w).value,
+                    height: -element.removed - prior.field(&element.p_w).value,
                     noise: 1.0,
                     slope: None,
                     known: Some(KnownError { variance, source, loadings: &loadings }),
                 });
                 if i % 2 == 0 {
-                    let p_w = element.p_w + element.fitted_w.scale(before_m);
+                    let p_w = element.p_w + element.normal_w.scale(before_m);
                     all.push(&Observation {
                         place: p_w.coords.as_slice(),
-                        height: before_m - prior.field(&p_w).value,
+                        height: before_m - element.removed - prior.field(&p_w).value,
                         noise: (SURE * before_m / noise_m).max(1.0),
                         slope: None,
-                        known: None,
+                        known: Some(KnownError { variance, source, loadings: &loadings }),
                     });
                 }
             }

@@ -8,7 +8,7 @@ use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
 use crate::view::{RigidError, SeenSurface, View};
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::kernel;
@@ -65,14 +65,11 @@ const STEP_LAST: f64 = 0.1;
 
 /// Largest number of linearisations of a view at its camera's errors.
 // heuristic: errors of 10 mm and 3° settle after three.
-const LINEARISATIONS: usize = 6;
+const LINEARISATIONS: usize = 12;
 
 /// Distance from the ball's lowest height, in standard deviations of the camera's position, within
 /// which a view shows what the object stands on.
 const MARGIN_SIGMAS: f64 = 3.0;
-
-/// Smallest norm of a field's gradient that gives a normal.
-const FLAT: f64 = 0.1;
 
 impl ImplicitSurface {
     /// Creates a belief without data.
@@ -105,7 +102,7 @@ impl ImplicitSurface {
             let is_above = lowest_m.is_none_or(|lowest_m| p_w.z > lowest_m + margin_m);
             is_above && (p_w - centre_w).norm() < radius_m
         };
-        self.observe_seen(SeenSurface::new(view, wanted));
+        self.observe_seen(SeenSurface::new(view, wanted, |normal_w| normal_w.into_inner()));
     }
 
     /// Adds a view that is thinned already.
@@ -201,14 +198,15 @@ impl ImplicitSurface {
     /// Returns whether that changes the observations.
     fn relinearise(&mut self, (prior, posterior): &(PriorMean, Posterior)) -> bool {
         let (scratch, mut gradient) = (&mut Scratch::default(), [0.0; 3]);
-        let mut normal = |p_w: &Point3<f64>| {
+        let mut field_gradient = |p_w: &Point3<f64>| {
             posterior.mean_gradient(p_w.coords.as_slice(), &mut gradient, scratch);
-            UnitVector3::try_new(prior.field(p_w).gradient + Vector3::from(gradient), FLAT)
+            Some(prior.field(p_w).gradient + Vector3::from(gradient))
         };
         let mut is_changed = false;
         for (number, seen) in self.evidence.seen.iter_mut().enumerate() {
             let errors = posterior.common_errors(number);
-            is_changed |= errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut normal));
+            is_changed |=
+                errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut field_gradient));
         }
         is_changed
     }
