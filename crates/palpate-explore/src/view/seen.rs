@@ -130,6 +130,11 @@ impl SeenSurface {
         corrected_pose(&self.x_wc, &self.pivot_w, (&shift, &turn))
     }
 
+    /// Returns the places of the elements in `W` by the stated pose.
+    pub fn stated(&self) -> impl Iterator<Item = Point3<f64>> {
+        self.elements.iter().map(|element| self.x_wc * element.p_c)
+    }
+
     /// Depths that the camera states, over the true ones.
     fn scale(&self) -> f64 {
         1.0 + self.errors[ERRORS - 1] * self.accuracy.scale_sd

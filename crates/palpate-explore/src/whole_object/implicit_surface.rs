@@ -219,7 +219,9 @@ impl ImplicitSurface {
 
     /// Returns the observations, in units of the noise of `last`.
     fn observations(&self, last: Option<&Hyperparameters>) -> (PriorMean, Observations) {
-        let points: Vec<Point3<f64>> = self.evidence.points().collect();
+        // A prior that followed the corrected views would let them wander off with it.
+        let seen = self.evidence.seen.iter().flat_map(SeenSurface::stated);
+        let points: Vec<Point3<f64>> = self.contacts().copied().chain(seen).collect();
         let ball = self.scope.estimated_ball(points.iter());
         let prior = PriorMean::about(self.settings.prior, &ball, points.iter());
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
