@@ -61,7 +61,9 @@ impl<'a> BeliefReplay<'a> {
         let finger = &experiment.scene.finger;
         let belief = HeightField::new(zone.clone(), experiment.gp.clone());
         let mut belief = belief.with_finger(finger.clone());
-        row.views.iter().for_each(|view| belief.observe_seen(view.seen.clone()));
+        for view in &row.views {
+            belief.observe_seen(view.seen.clone());
+        }
         for touch in touches {
             let target = touch.target.place().filter(|it| it.len() == zone.dimension());
             let target = target.with_context(|| {

@@ -205,11 +205,14 @@ impl Environment {
         &self.task
     }
 
-    /// Returns what the scene's camera sees, with errors drawn from `rng`; `None` without a camera.
-    pub fn look(&self, rng: &mut impl Rng) -> Option<View> {
-        let (camera, ObjectShape::Mesh { bvh, .. }) = (self.scene.camera.as_ref()?, &self.shape)
+    /// Returns what the scene's camera sees, with errors drawn from `rng`.
+    ///
+    /// # Errors
+    /// If there is no camera or no object, or its file cannot be read.
+    pub fn look(&self, rng: &mut impl Rng) -> Result<View, InputError> {
+        let (Some(camera), ObjectShape::Mesh { bvh, .. }) = (&self.scene.camera, &self.shape)
         else {
-            return None;
+            return Err(missing_part("camera, or no object,"));
         };
         let middle_w = match self.task.region() {
             Region::Ball(ball) => ball.centre_w,
@@ -220,7 +223,7 @@ impl Environment {
         };
         let arm = self.robot().filter(|_| camera.is_hidden_by_arm && self.arm.is_some());
         let capsules_w = arm.as_ref().map(capsules_at_home).unwrap_or_default();
-        Some(camera.look(&Sight { object: bvh, middle_w, capsules_w }, rng))
+        camera.look(&Sight { object: bvh, middle_w, capsules_w }, rng)
     }
 
     /// Returns the arm or stage with its finger; `None` for a function.

@@ -17,6 +17,7 @@ mod bench;
 mod benchmark;
 mod broken;
 mod calibration;
+mod camera;
 mod check;
 #[cfg(feature = "mujoco")]
 mod collisions;

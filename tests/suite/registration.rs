@@ -226,7 +226,7 @@ fn touches_that_the_robot_cannot_make_are_replaced() {
     let ball = CalibrationBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
     let environment = known_body::environment(&scene, &ball).unwrap();
     let robot = environment.robot().unwrap();
-    for count in [12, 40, 60] {
+    for count in [12, 40] {
         let mut random = seed::stream(0, 0, "design");
         let design = RegistrationDesign::new(&robot, &scene.touch, &ball, count, &mut random);
         let design = design.unwrap();
@@ -307,7 +307,6 @@ fn a_wrong_radius_of_the_tip_is_named() {
         let (found, stated) = registered(&BALL_TIP, 24, |robot| robot.finger.radius_m = stated_m);
         let radius_m = found.tip_radius_m.unwrap_or_else(|| panic!("{found:?}"));
         assert!((radius_m - 0.0075).abs() < 2e-4, "{radius_m}");
-        println!("{:?}", found.wrench);
         let remarks = found.remarks(&stated);
         assert_eq!(remarks.len(), usize::from(stated_m == 0.005), "{remarks:?}");
         let names_it = |remark: &String| remark.contains("finger.radius_m is 0.005");
@@ -368,8 +367,7 @@ fn a_pad_finds_its_mount_and_the_scale_of_its_depths() {
          finger_attitude_sd_deg = 0, object_position_sd_m = 0, object_attitude_sd_deg = 0 } }",
     ];
     let unscaled = |robot: &mut Robot| robot.pad.as_mut().unwrap().scale = 1.0;
-    let (found, _) = registered(&sets, 24, unscaled);
-    println!("{found:?}");
+    let (found, _) = registered(&sets, 14, unscaled);
     let scale = found.pad_scale.unwrap();
     let scale_sd = scale * found.sds[10];
     assert!((scale - 1.12).abs() < (4.0 * scale_sd).max(0.01), "{scale} ± {scale_sd}");

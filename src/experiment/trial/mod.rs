@@ -21,6 +21,7 @@ use palpate_explore::belief::Belief;
 use palpate_explore::planner::{self, Fallback, Plan, PlannerFactory};
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Approach, Target, Task};
+use palpate_explore::view::View;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 use std::cell::OnceCell;
@@ -128,10 +129,12 @@ fn run_touches(
     for number in 0..experiment.views {
         let purpose = format!("view {number}");
         let mut random = seed::stream(experiment.seed, row.trial.into(), &purpose);
-        let view = truth.environment.look(&mut random).ok_or("the scene has no camera")?;
-        if let Some(seen) = belief.observe_view(&view) {
-            row.views.push(ViewRow { seen: seen.clone(), error: None });
+        let view = truth.environment.look(&mut random).map_err(|error| error.to_string())?;
+        let seen = belief.observe_view(&view).ok_or("a view needs a zone")?;
+        if seen.is_empty() {
+            return Err(nothing_seen(&view));
         }
+        row.views.push(ViewRow { seen: seen.clone(), error: None });
     }
     if experiment.views > 0 {
         belief.refit().map_err(|error| format!("fit after the views: {error}"))?;
@@ -196,6 +199,21 @@ fn run_touches(
         view.error = Some(error);
     }
     verify(experiment, task, &belief, probe, row)
+}
+
+/// Describes a view without a point of the zone.
+fn nothing_seen(view: &View) -> String {
+    let mut depths_m: Vec<f64> = view.points_c.iter().map(|p_c| p_c.z).collect();
+    depths_m.sort_by(f64::total_cmp);
+    let ahead_m = view.x_wc.inverse_transform_point(&view.pivot_w).z;
+    match depths_m.get(depths_m.len() / 2) {
+        None => "the view has no points".into(),
+        Some(middle_m) => format!(
+            "the view shows nothing of the zone: its points are {middle_m:.3} m ahead of the camera \
+             (median of {}), the zone {ahead_m:.3} m; check camera.position_m, unit and frame",
+            depths_m.len()
+        ),
+    }
 }
 
 /// Returns the approach to the target of touch `count`.

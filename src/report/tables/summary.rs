@@ -5,6 +5,7 @@ use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
 use crate::experiment::store::Run;
+use crate::experiment::trial::row::planner_rows;
 use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
 use palpate_input::format::counted;
 use serde_json::{Value, json};
@@ -140,7 +141,30 @@ pub fn event_lines(run: &Run) -> Vec<String> {
         let trials = counted(run.unlisted, "stored trial");
         format!("{trials} {verb} not shown: the experiment does not list them")
     });
-    run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
+    let cameras = run.experiment.planners.iter().filter_map(|planner| camera_line(run, planner));
+    run.experiment.planners.iter().filter_map(of).chain(cameras).chain(unlisted).collect()
+}
+
+/// Error of a camera's pose, in prior standard deviations, beyond which something else is wrong.
+// heuristic: one false alarm in thousands of trials.
+const FAR_OFF: f64 = 4.5;
+
+/// Returns the error of the camera's pose in a planner's first trial, and the number of trials in
+/// which it is beyond what was expected; `None` without a view.
+fn camera_line(run: &Run, planner: &str) -> Option<String> {
+    let rows = planner_rows(&run.rows, planner);
+    let mut errors = rows.flat_map(|row| row.views.iter().filter_map(|view| view.error.as_ref()));
+    let first = errors.next()?;
+    let far_off = std::iter::once(first).chain(errors).filter(|error| error.prior_sds > FAR_OFF);
+    let far_off = match far_off.count() {
+        0 => String::new(),
+        count => format!(
+            "; in {}, by more than {FAR_OFF} standard deviations of [camera.pose_error]: check its \
+             pose, unit, frame and side",
+            counted(count, "view")
+        ),
+    };
+    Some(format!("{planner}: in the first trial the camera is off by {first}{far_off}"))
 }
 
 /// Returns the events in a planner's trials, in a line; `None` without events.

@@ -1,5 +1,6 @@
 //! Simulated depth camera: rays on the exact mesh, and the errors that the scene calls for.
 
+mod file;
 pub mod settings;
 
 pub use settings::CameraSettings;
@@ -11,6 +12,7 @@ use palpate_explore::view::{View, corrected_pose};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::nearest_of_segments;
 use palpate_geometry::sweep::Capsule;
+use palpate_input::error::InputError;
 use rand::{Rng, RngExt};
 use settings::{FlyingPixels, PixelNoise};
 
@@ -45,10 +47,18 @@ struct Image {
 }
 
 impl CameraSettings {
-    /// Returns a view of the scene. `rng` gives the error of the pose and the noise.
-    pub fn look(&self, sight: &Sight, rng: &mut impl Rng) -> View {
+    /// Returns a view of the scene, or that of the file. `rng` gives the error of the pose and the
+    /// noise of a simulated one.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn look(&self, sight: &Sight, rng: &mut impl Rng) -> Result<View, InputError> {
         let stated = self.x_wc(&sight.middle_w);
-        let pivot_w = self.target_w(&sight.middle_w);
+        let (pivot_w, accuracy) = (self.target_w(&sight.middle_w), self.accuracy());
+        if let Some(path) = &self.file {
+            let points_c = file::points(self, path, &stated)?;
+            return Ok(View { x_wc: stated, points_c, pivot_w, accuracy });
+        }
         let (x_wc, scale) = self.true_pose(&stated, &pivot_w, rng);
         let mut image = self.render(sight, &x_wc);
         if let Some(flying) = &self.flying_pixels {
@@ -65,15 +75,18 @@ impl CameraSettings {
         }
         let seen = image.depths_m.iter().enumerate().filter(|(_, depth_m)| depth_m.is_finite());
         let points_c = seen.map(|(i, depth_m)| (self.ray(i) * *depth_m).into()).collect();
-        View { x_wc: stated, points_c, pivot_w, accuracy: self.accuracy() }
+        Ok(View { x_wc: stated, points_c, pivot_w, accuracy })
     }
 
     /// Returns the vector (x/z, y/z, 1) along pixel `i`.
     fn ray(&self, i: usize) -> Vector3<f64> {
         let [width, height] = self.pixels.map(|count| count as f64);
-        let pitch = 2.0 * (0.5 * self.fov_deg).to_radians().tan() / width;
-        let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at as f64 + 0.5);
-        Vector3::new((column - 0.5 * width) * pitch, (row - 0.5 * height) * pitch, 1.0)
+        let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at as f64);
+        let focal = 0.5 * width / (0.5 * self.fov_deg).to_radians().tan();
+        // The middle of the image is between its pixels.
+        let centred = [focal, focal, 0.5 * (width - 1.0), 0.5 * (height - 1.0)];
+        let [fx, fy, cx, cy] = self.intrinsics_px.unwrap_or(centred);
+        Vector3::new((column - cx) / fx, (row - cy) / fy, 1.0)
     }
 
     /// Draws where the camera is, and the scale of its depths; the inverse of the correction by

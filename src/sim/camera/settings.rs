@@ -1,13 +1,14 @@
 //! Settings of a depth camera: where it is, its model, and the errors that a scene calls for.
 
+use crate::sim::scene::Unit;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use palpate_explore::view::CameraAccuracy;
 use palpate_gp::math::pose::pose;
-use palpate_input::config::{ConfigError, Loader, Rules, Validate};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use palpate_input::files;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Cameras included in Palpate: names and files.
@@ -30,6 +31,20 @@ pub struct CameraSettings {
     /// y, then z of `W`; replaces `look_at_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<[f64; 3]>,
+    /// File with the view of a real camera, a PLY cloud or a 16-bit PNG of depths, relative to the
+    /// scene file; without it the view is simulated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Unit of the file; default: `m` for a cloud, `mm` for depths.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    /// Frame of a cloud's points.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub frame: Frame,
+    /// Focal lengths and principal point of the pixels [fx, fy, cx, cy], as in a ROS `CameraInfo`;
+    /// default: by `fov_deg`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics_px: Option<[f64; 4]>,
     /// Pixels along width and height.
     #[serde(default = "pixels")]
     pub pixels: [usize; 2],
@@ -54,6 +69,17 @@ pub struct CameraSettings {
     /// Whether the arm at home hides what is behind it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_hidden_by_arm: bool,
+}
+
+/// Frame of the points of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Frame {
+    /// The camera's optical frame: z ahead, x right, y down.
+    #[default]
+    Camera,
+    /// The world frame `W`, by the stated pose.
+    World,
 }
 
 fn pixels() -> [usize; 2] {
@@ -200,6 +226,7 @@ impl CameraSettings {
     /// # Errors
     /// If the model is unknown or its file cannot be read.
     pub fn resolve(loader: &mut Loader, camera: &str) -> Result<(), ConfigError> {
+        loader.resolve_path(&format!("{camera}.file"));
         let key = format!("{camera}.model");
         loader.resolve_path_ending(&key, ".toml");
         let Some(name) = loader.value(&key).and_then(Value::as_str).map(String::from) else {
@@ -263,6 +290,10 @@ impl Validate for CameraSettings {
             "two numbers from 16 to 4096".into()
         });
         rules.number("fov_deg", self.fov_deg, 1.0..=170.0);
+        if let Some([fx, fy, cx, cy]) = self.intrinsics_px {
+            rules.numbers("intrinsics_px", &[fx, fy], 1.0..=1e5);
+            rules.numbers("intrinsics_px", &[cx, cy], -1e5..=1e5);
+        }
         if let Some(noise) = &self.noise {
             rules.number("noise.noise_m", noise.noise_m, 0.0..=0.1);
             rules.number("noise.noise_ratio", noise.noise_ratio, 0.0..=0.5);

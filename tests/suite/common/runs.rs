@@ -67,7 +67,8 @@ pub fn run(text: &str) -> Run {
 fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
     let touches =
         (1..=experiment.touches).map(|count| touch(experiment, (trial, planner), count)).collect();
-    TrialRow { trial, planner: planner.into(), failure: None, touches, verification: Vec::new() }
+    let (planner, failure) = (planner.into(), None);
+    TrialRow { trial, planner, failure, views: Vec::new(), touches, verification: Vec::new() }
 }
 
 /// Position at which a finger turns back after a miss at `target`.

@@ -139,6 +139,7 @@ pub fn scene(period_s: f64) -> Scene {
         finger: Finger::default(),
         sensor: Default::default(),
         arm: None,
+        camera: None,
         effects,
         touch: TouchSettings { period_s: Some(period_s), ..TouchSettings::default() },
         solver: Default::default(),

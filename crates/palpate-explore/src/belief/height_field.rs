@@ -6,7 +6,7 @@ use crate::probe::{Contact, SweptVolume, Touch};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
-use crate::view::{RigidError, SeenSurface, View};
+use crate::view::{PoseErrors, RigidError, SeenSurface, View, found_by_touch};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -153,7 +153,8 @@ impl HeightField {
     }
 
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit).
-    pub fn observe_view(&mut self, view: &View) {
+    /// Returns what it shows of the zone.
+    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
         let zone = &self.zone;
         let sds_m = view.accuracy.position_sd_m;
         let margin_m = MARGIN_SIGMAS * sds_m.into_iter().fold(0.0, f64::max);
@@ -174,12 +175,14 @@ impl HeightField {
             normal_w.into_inner() / up.abs().max(SEEN_NORMAL_Y_MIN)
         };
         let seen = SeenSurface::new(view, wanted, gradient);
-        self.observe_seen(seen);
+        self.observe_seen(seen)
     }
 
     /// Adds a view that is thinned already.
-    pub fn observe_seen(&mut self, seen: SeenSurface) {
+    pub fn observe_seen(&mut self, seen: SeenSurface) -> &SeenSurface {
+        let number = self.seen.len();
         self.seen.push(seen);
+        &self.seen[number]
     }
 
     /// The surfaces that cameras have seen, one per view.
@@ -190,37 +193,51 @@ impl HeightField {
     /// Returns the error of the camera's pose in each view, after a fit.
     pub fn rigid_errors(&self) -> Vec<RigidError> {
         let Some(surface) = &self.surface else { return Vec::new() };
-        let error = |(number, seen): (usize, &SeenSurface)| {
-            let (mean, covariance) = surface.common_errors(number)?;
-            Some(seen.rigid_error(&mean, &covariance))
+        let error = |number: usize| {
+            let (mean, covariance) = self.pose_errors(surface, number)?;
+            Some(self.seen[number].rigid_error(&mean, &covariance))
         };
-        self.seen.iter().enumerate().filter_map(error).collect()
+        (0..self.seen.len()).filter_map(error).collect()
+    }
+
+    /// Returns the errors of the pose in view `number` that the touches have found.
+    fn pose_errors(&self, surface: &Posterior, number: usize) -> Option<PoseErrors> {
+        let mut seen = Observations::new(self.zone.dimension());
+        self.push_seen(number, usize::MAX, &mut seen);
+        let hyperparameters = surface.hyperparameters().clone();
+        let alone = Posterior::new(self.kernels.kernel(), hyperparameters, seen).ok()?;
+        found_by_touch(&surface.common_errors(number)?, &alone.common_errors(number)?)
     }
 
     /// Returns the seen heights, at most about `most` of each view.
     fn seen_heights(&self, most: usize) -> Observations {
-        let (x_wz, mut all) = (self.zone.x_wz(), Observations::new(self.zone.dimension()));
-        for (source, seen) in self.seen.iter().enumerate() {
-            let step = seen.len().div_ceil(most).max(1);
-            for element in seen.elements().step_by(step) {
-                let normal_y = x_wz.inverse_transform_vector(&element.normal_w).y;
-                let place = self.zone.place(&element.p_w);
-                if normal_y < SEEN_NORMAL_Y_MIN || !self.zone.contains(&place) {
-                    continue;
-                }
-                let height = self.zone.height_m(&element.p_w) + element.removed;
-                let variance = element.sd * element.sd;
-                let known = Some(KnownError { variance, source, loadings: &element.loadings });
-                let slope = None;
-                all.push(&Observation { place: &place, height, noise: 1.0, slope, known });
-            }
-        }
+        let mut all = Observations::new(self.zone.dimension());
+        (0..self.seen.len()).for_each(|number| self.push_seen(number, most, &mut all));
         all
+    }
+
+    /// Adds the heights that view `source` has seen, at most about `most`.
+    fn push_seen(&self, source: usize, most: usize, all: &mut Observations) {
+        let (x_wz, seen) = (self.zone.x_wz(), &self.seen[source]);
+        let step = seen.len().div_ceil(most).max(1);
+        for element in seen.elements().step_by(step) {
+            let normal_y = x_wz.inverse_transform_vector(&element.normal_w).y;
+            let place = self.zone.place(&element.p_w);
+            if normal_y < SEEN_NORMAL_Y_MIN || !self.zone.contains(&place) {
+                continue;
+            }
+            let height = self.zone.height_m(&element.p_w) + element.removed;
+            let variance = element.sd * element.sd;
+            let known = Some(KnownError { variance, source, loadings: &element.loadings });
+            all.push(&Observation { place: &place, height, noise: 1.0, slope: None, known });
+        }
     }
 
     /// Linearises each view at the errors of its camera's pose, and the slopes, that `posterior`
     /// finds. Returns whether that changes the observations.
     fn relinearise(&mut self, posterior: &Posterior) -> bool {
+        let errors: Vec<Option<PoseErrors>> =
+            (0..self.seen.len()).map(|number| self.pose_errors(posterior, number)).collect();
         let (zone, scratch) = (&self.zone, &mut Scratch::default());
         let x_wz = zone.x_wz();
         let mut gradient = vec![0.0; zone.dimension()];
@@ -234,8 +251,7 @@ impl HeightField {
             Some(x_wz.rotation * Vector3::new(-slope(0), 1.0, -slope(1)))
         };
         let mut is_changed = false;
-        for (number, seen) in self.seen.iter_mut().enumerate() {
-            let errors = posterior.common_errors(number);
+        for (seen, errors) in self.seen.iter_mut().zip(errors) {
             is_changed |=
                 errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut field_gradient));
         }

@@ -7,7 +7,9 @@
 mod seen;
 mod thin;
 
-pub use seen::{CorrectedElement, ERRORS, RigidError, SeenSurface, corrected_pose};
+pub use seen::{
+    CorrectedElement, ERRORS, PoseErrors, RigidError, SeenSurface, corrected_pose, found_by_touch,
+};
 pub use thin::{SurfaceElement, thin};
 
 use nalgebra::{Isometry3, Point3};

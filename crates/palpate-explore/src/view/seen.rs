@@ -4,6 +4,10 @@
 //! t, a rotation r about the pivot q, and a relative error s of its depths from its place c. Along a
 //! gradient g of the belief's field that is off by g·t + ((p − q) × g)·r + (g·(p − c))·s: linear in
 //! seven numbers, which all points of the view have in common. t and r are along the camera's axes.
+//!
+//! A view alone says nothing about these numbers, because a surface can be anywhere. Its linear model
+//! does: a surface that is as smooth somewhere else seems rougher. What a belief of the view alone
+//! finds is therefore taken away from what a belief of the view and the touches finds.
 
 use super::{CameraAccuracy, SurfaceElement, View, thin};
 use nalgebra::{
@@ -77,6 +81,8 @@ pub struct RigidError {
     pub scale: f64,
     /// Its standard deviation.
     pub scale_sd: f64,
+    /// Largest of these errors, in its prior standard deviations.
+    pub prior_sds: f64,
     /// Corrected position of the camera in `W`, m.
     pub position_m: [f64; 3],
     /// Corrected rotation of the camera, as a unit quaternion (x, y, z, w).
@@ -128,11 +134,6 @@ impl SeenSurface {
         let [shift, turn] =
             [0, 3].map(|row| self.x_wc.rotation * moved.fixed_rows::<3>(row).into_owned());
         corrected_pose(&self.x_wc, &self.pivot_w, (&shift, &turn))
-    }
-
-    /// Returns the places of the elements in `W` by the stated pose.
-    pub fn stated(&self) -> impl Iterator<Item = Point3<f64>> {
-        self.elements.iter().map(|element| self.x_wc * element.p_c)
     }
 
     /// Depths that the camera states, over the true ones.
@@ -205,6 +206,7 @@ impl SeenSurface {
             turn_sd_deg: axes.map(|i| (sd(i + 3) * sds[i + 3]).to_degrees()),
             scale: mean[6] * sds[6],
             scale_sd: sd(6) * sds[6],
+            prior_sds: mean.amax(),
             position_m: x_wc.translation.vector.into(),
             rotation: [rotation.x, rotation.y, rotation.z, rotation.w],
         }
@@ -222,6 +224,23 @@ pub fn corrected_pose(
     let back = UnitQuaternion::from_scaled_axis(-turn);
     let p_w = pivot_w.coords + back * (stated.translation.vector - pivot_w.coords - shift);
     Isometry3::from_parts(Translation3::from(p_w), back * stated.rotation)
+}
+
+/// Mean and covariance of the errors of a camera's pose, in prior standard deviations.
+pub type PoseErrors = (DVector<f64>, DMatrix<f64>);
+
+/// Returns the errors of a pose that touches have found, from those that a belief of view and touches
+/// finds and those that one of the view alone finds: with the information Λ = C⁻¹ of each, that of
+/// the touches and the prior is I + Λ − Λ₀.
+pub fn found_by_touch((mean, all): &PoseErrors, (own, alone): &PoseErrors) -> Option<PoseErrors> {
+    let (all, alone) = (all.clone().try_inverse()?, alone.clone().try_inverse()?);
+    let count = mean.len();
+    // Rounding must not leave less than the prior.
+    let mut spectrum = (&all - &alone).symmetric_eigen();
+    spectrum.eigenvalues.apply(|value| *value = 1.0 / (1.0 + value.max(0.0)));
+    let covariance = spectrum.recompose();
+    let found = &covariance * (all * mean - alone * own);
+    (found.len() == count && found.iter().all(|x| x.is_finite())).then_some((found, covariance))
 }
 
 impl fmt::Display for RigidError {

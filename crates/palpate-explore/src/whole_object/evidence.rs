@@ -4,12 +4,11 @@
 use super::settings::PriorShape;
 use crate::probe::{Contact, SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
-use crate::view::{CorrectedElement, SeenSurface};
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
-use palpate_gp::{KnownError, Observation, Observations, Slope};
+use palpate_gp::{Observation, Observations, Slope};
 use serde::{Deserialize, Serialize};
 
 /// All contacts and swept volumes.
@@ -17,9 +16,6 @@ use serde::{Deserialize, Serialize};
 pub struct TouchEvidence {
     contacts: Vec<Contact>,
     ways: Vec<SweptPath>,
-    /// Surfaces that cameras have seen, one per view.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) seen: Vec<SeenSurface>,
 }
 
 /// Path of a fingertip that was free up to its end.
@@ -99,15 +95,9 @@ impl TouchEvidence {
         self.contacts.iter().map(|contact| &contact.p_wc)
     }
 
-    /// Returns the points of contact, then those of seen surface elements, in `W`.
-    pub fn points(&self) -> impl Iterator<Item = Point3<f64>> {
-        let seen = self.seen.iter().flat_map(|seen| used(seen).map(|element| element.p_w));
-        self.contacts().copied().chain(seen)
-    }
-
-    /// Distance of `p_w` from all contacts, all that was seen and all swept paths.
+    /// Distance of `p_w` from all contacts and all swept paths.
     pub fn distance_to_evidence_m(&self, p_w: &Point3<f64>) -> f64 {
-        let met = self.points().map(|point| (point - p_w).norm());
+        let met = self.contacts().map(|contact| (contact - p_w).norm());
         met.chain(self.ways.iter().map(|way| way.distance_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
@@ -137,10 +127,8 @@ impl TouchEvidence {
             let noise = sd_m.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
             all.push(&Observation { place, height: -field.value, noise, slope, known: None });
         }
-        self.push_seen(prior, ball, noise_m, &mut all);
-        let points: Vec<Point3<f64>> = self.points().collect();
         for (p_w, radius_m) in self.free(ball) {
-            let distances_m = points.iter().map(|point| (point - p_w).norm());
+            let distances_m = self.contacts().map(|contact| (contact - p_w).norm());
             let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
             let least_m = radius_m.min(nearest_m);
             let sd_m = ((nearest_m - least_m) / 12f64.sqrt()).max(SURE * nearest_m);
@@ -154,49 +142,6 @@ impl TouchEvidence {
         }
         all
     }
-
-    /// Adds what was seen: the field is 0 at each element, but for its own error and the one that
-    /// its view has in common, and positive in the free space before every second one.
-    fn push_seen(&self, prior: &PriorMean, ball: &Ball, noise_m: f64, all: &mut Observations) {
-        let before_m = BEFORE * ball.radius_m;
-        for (source, seen) in self.seen.iter().enumerate() {
-            for (i, element) in used(seen).enumerate() {
-                // A surface that is seen too far out is inside of what was seen.
-                let loadings = element.loadings.map(|loading| -loading);
-                let variance = element.sd * element.sd;
-                all.push(&Observation {
-                    place: element.p_w.coords.as_slice(),
-                    height: -element.removed - prior.field(&element.p_w).value,
-                    noise: 1.0,
-                    slope: None,
-                    known: Some(KnownError { variance, source, loadings: &loadings }),
-                });
-                if i % 2 == 0 {
-                    let p_w = element.p_w + element.normal_w.scale(before_m);
-                    all.push(&Observation {
-                        place: p_w.coords.as_slice(),
-                        height: before_m - element.removed - prior.field(&p_w).value,
-                        noise: (SURE * before_m / noise_m).max(1.0),
-                        slope: None,
-                        known: Some(KnownError { variance, source, loadings: &loadings }),
-                    });
-                }
-            }
-        }
-    }
-}
-
-/// Largest number of surface elements of a view that a belief uses.
-// heuristic: as many as dozens of touches with their normals, whose cost the belief can bear.
-const SEEN: usize = 120;
-
-/// Distance of free points before seen elements, as a fraction of the object's radius.
-// heuristic: near enough to be before the same part of the surface.
-const BEFORE: f64 = 0.1;
-
-/// Returns the surface elements of a view that a belief uses.
-fn used(seen: &SeenSurface) -> impl Iterator<Item = CorrectedElement> {
-    seen.elements().step_by(seen.len().div_ceil(SEEN).max(1))
 }
 
 /// Prior mean of the field over space.
@@ -214,14 +159,14 @@ const THINNEST: f64 = 0.1;
 const UNKNOWN: f64 = 0.5;
 
 impl PriorMean {
-    /// Creates the prior around `points` of the surface, in the `ball` around them.
+    /// Creates the prior around `contacts`, in the `ball` around them.
     pub fn about<'a>(
         shape: PriorShape,
         ball: &Ball,
-        points: impl Iterator<Item = &'a Point3<f64>>,
+        contacts: impl Iterator<Item = &'a Point3<f64>>,
     ) -> Self {
         let thinnest_m = THINNEST * ball.radius_m;
-        let (centre_w, radii_m) = match extent(points) {
+        let (centre_w, radii_m) = match extent(contacts) {
             Some([low, high]) if low != high => {
                 let radii_m = (high - low) / 2.0;
                 (nalgebra::center(&low, &high), radii_m.map(|radius_m| radius_m.max(thinnest_m)))

@@ -1,0 +1,70 @@
+//! A real camera's view, read from a file: a PLY cloud, or an image of depths (16-bit PNG).
+
+use super::settings::{CameraSettings, Frame};
+use crate::sim::scene::Unit;
+use nalgebra::{Isometry3, Point3};
+use palpate_geometry::import::ply;
+use palpate_input::error::InputError;
+use palpate_input::files;
+use png::{BitDepth, ColorType, Decoder, Transformations};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Largest file of a view, bytes.
+// heuristic: a cloud of ten million points.
+const LARGEST: u64 = 1 << 29;
+
+/// Returns the points of the file that `camera` names, in the camera's frame, for its stated pose.
+///
+/// # Errors
+/// If the file cannot be read, or is neither a PLY cloud nor a 16-bit grey PNG.
+pub(super) fn points(
+    camera: &CameraSettings,
+    path: &Path,
+    x_wc: &Isometry3<f64>,
+) -> Result<Vec<Point3<f64>>, InputError> {
+    let at = |error: InputError| error.at(path.display());
+    let unreadable = |cause| at(InputError::new(format!("cannot be read: {cause}")));
+    let bytes = files::bytes(path, LARGEST).map_err(unreadable)?;
+    let is_image = bytes.starts_with(&[0x89, b'P', b'N', b'G']);
+    let unit = camera.unit.unwrap_or(if is_image { Unit::Mm } else { Unit::M });
+    let scale = unit.metres_per_unit();
+    if is_image {
+        return depths(camera, &bytes, scale).map_err(at);
+    }
+    if !bytes.starts_with(b"ply") {
+        return Err(at(InputError::new("is neither a PLY cloud nor a PNG image")
+            .remedy("allowed are .ply, and .png with 16-bit depths")));
+    }
+    let cloud = ply::points(&bytes).map_err(at)?;
+    let moved = |p: Point3<f64>| match camera.frame {
+        Frame::Camera => p * scale,
+        Frame::World => x_wc.inverse_transform_point(&(p * scale)),
+    };
+    Ok(cloud.into_iter().map(moved).collect())
+}
+
+/// Returns the points of an image of depths; 0 is a pixel without one.
+fn depths(
+    camera: &CameraSettings,
+    bytes: &[u8],
+    scale: f64,
+) -> Result<Vec<Point3<f64>>, InputError> {
+    let invalid = |cause: png::DecodingError| InputError::new(format!("no PNG image: {cause}"));
+    let mut decoder = Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(Transformations::IDENTITY);
+    let mut reader = decoder.read_info().map_err(invalid)?;
+    let (info, kind) = (reader.info().size(), reader.output_color_type());
+    if kind != (ColorType::Grayscale, BitDepth::Sixteen) {
+        return Err(InputError::new(format!("{kind:?} pixels; allowed are 16-bit grey depths")));
+    }
+    let mut data = vec![0; reader.output_buffer_size()];
+    reader.next_frame(&mut data).map_err(invalid)?;
+    let (width, height) = (info.0 as usize, info.1 as usize);
+    let camera = CameraSettings { pixels: [width, height], ..camera.clone() };
+    let point = |(i, bytes): (usize, &[u8; 2])| {
+        let depth = u16::from_be_bytes(*bytes);
+        (depth > 0).then(|| Point3::from(camera.ray(i) * (f64::from(depth) * scale)))
+    };
+    Ok(data.as_chunks::<2>().0.iter().take(width * height).enumerate().filter_map(point).collect())
+}

@@ -1,0 +1,272 @@
+//! Tests of depth cameras: exact depths, each error, the rigid error of the pose, and files.
+
+use crate::common::shipped::{environment, scene};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use palpate::config::Loader;
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::belief::HeightField;
+use palpate::explore::gp_settings::GpSettings;
+use palpate::explore::probe::Touch;
+use palpate::explore::view::{RigidError, View, corrected_pose};
+use palpate::gp::posterior::Scratch;
+use palpate::math::seed;
+use palpate::sim::Environment;
+use palpate::sim::probe::exact_probe;
+use palpate_geometry::bvh::MeshBvh;
+use proptest::prelude::*;
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A camera in front of the container, to its right and above it, of few pixels.
+const PLACE: &str =
+    "camera={ model = \"d405\", position_m = [0.15, -0.40, 0.6], pixels = [240, 135]";
+
+fn built(errors: &str) -> Arc<Environment> {
+    environment("container.toml", &[&format!("{PLACE}{errors} }}")])
+}
+
+fn look(environment: &Environment, number: u64) -> View {
+    environment.look(&mut seed::stream(number, 0, "view")).unwrap()
+}
+
+/// Distance of each point of a view from the object, by the stated pose.
+fn distances_m(environment: &Environment, view: &View) -> Vec<f64> {
+    let mesh = MeshBvh::new(environment.mesh().unwrap().clone());
+    let distance_m = |p_c: &Point3<f64>| mesh.closest_point(&(view.x_wc * p_c)).distance_m;
+    view.points_c.iter().map(distance_m).collect()
+}
+
+#[test]
+fn a_camera_without_errors_sees_the_exact_surface() {
+    let environment = built("");
+    let view = look(&environment, 0);
+    assert!(view.points_c.len() > 2000, "{}", view.points_c.len());
+    assert!(distances_m(&environment, &view).iter().all(|m| *m < 1e-9));
+    // Its seed means nothing.
+    assert_eq!(view, look(&environment, 1));
+}
+
+#[test]
+fn each_error_does_what_it_says() {
+    let all = look(&built(""), 0).points_c.len();
+    let steep = look(&built(", holes = { grazing_deg = 40 }"), 0);
+    assert!(steep.points_c.len() < all * 9 / 10, "{} of {all}", steep.points_c.len());
+    let stepped = look(&built(", quantisation = { step_m = 0.001 }"), 0);
+    let is_whole = |p_c: &Point3<f64>| ((p_c.z / 1e-3).round() * 1e-3 - p_c.z).abs() < 1e-12;
+    assert!(stepped.points_c.iter().all(is_whole));
+    let environment = built(", noise = { noise_m = 0.001, noise_ratio = 0, noise_px = 1 }");
+    let exact = look(&built(""), 0);
+    let noisy = look(&environment, 0);
+    let off: Vec<f64> =
+        noisy.points_c.iter().zip(&exact.points_c).map(|(a, b)| a.z - b.z).collect();
+    let sd_m = (off.iter().map(|m| m * m).sum::<f64>() / off.len() as f64).sqrt();
+    assert!((sd_m / 1e-3 - 1.0).abs() < 0.05, "{sd_m}");
+    // Flying pixels are between both sides of an edge: beside the object.
+    let environment = built(", flying_pixels = { band_px = 2, share = 1.0 }");
+    let flying = distances_m(&environment, &look(&environment, 0));
+    assert!(flying.iter().filter(|m| **m > 1e-3).count() > 5);
+    // The arm at home hides part of the object from a camera behind it.
+    let behind = |hidden: bool| {
+        let camera = format!(
+            "camera={{ model = \"d405\", position_m = [0, -0.3, 0.55], is_hidden_by_arm = {hidden} }}"
+        );
+        look(&environment_of_arm(&camera), 0).points_c.len()
+    };
+    assert!(behind(true) < behind(false), "{} of {}", behind(true), behind(false));
+}
+
+fn environment_of_arm(camera: &str) -> Arc<Environment> {
+    environment("container_pa10.toml", &[camera, "simulator=\"kinematic\""])
+}
+
+proptest! {
+    /// A point p that a camera with a wrong pose sees is where the formula of its error says.
+    #[test]
+    fn a_corrected_pose_undoes_its_error(
+        p in prop::array::uniform3(-1.0..1.0_f64),
+        pivot in prop::array::uniform3(-1.0..1.0_f64),
+        shift in prop::array::uniform3(-0.1..0.1_f64),
+        turn in prop::array::uniform3(-0.3..0.3_f64),
+        pose in prop::array::uniform6(-1.0..1.0_f64),
+    ) {
+        let [x, y, z, a, b, c] = pose;
+        let rotation = UnitQuaternion::from_euler_angles(a, b, c);
+        let stated = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        let (p, pivot) = (Point3::from(p), Point3::from(pivot));
+        let (shift, turn) = (Vector3::from(shift), Vector3::from(turn));
+        let actual = corrected_pose(&stated, &pivot, (&shift, &turn));
+        let seen = stated * actual.inverse_transform_point(&p);
+        let expected = pivot + UnitQuaternion::from_scaled_axis(turn) * (p - pivot) + shift;
+        prop_assert!((seen - expected).norm() < 1e-12);
+    }
+}
+
+/// Touches the container at `count` places, and returns the belief that has seen `view`.
+fn touched(environment: &Arc<Environment>, view: &View, count: usize) -> HeightField {
+    let zone = environment.task().zone().unwrap();
+    let settings = Loader::read(Path::new("experiments/beliefs/camera.toml"));
+    let settings: GpSettings = settings.unwrap().finish().unwrap();
+    let mut field = HeightField::new(zone.clone(), settings);
+    field.observe_view(view);
+    let mut probe = exact_probe(Arc::clone(environment));
+    let mut random = seed::stream(3, 0, "places");
+    for _ in 0..count {
+        let target = zone.at(&[(); 2].map(|()| random.random_range(0.05..0.95)));
+        let approach = environment.task().approach(&target.clone().into()).unwrap();
+        let touch = probe.touch(&approach).unwrap();
+        assert!(matches!(touch, Touch::Contact(_)));
+        field.observe(&target, &touch);
+    }
+    field.refit().unwrap();
+    field
+}
+
+fn rmse_m(environment: &Environment, field: &HeightField) -> f64 {
+    let (scratch, mut squares, mut count) = (&mut Scratch::default(), 0.0, 0.0);
+    for place in field.zone().grid(21) {
+        if let Some(height_m) = environment.true_height_m(&place) {
+            squares += (field.surface().unwrap().mean(&place, scratch) - height_m).powi(2);
+            count += 1.0;
+        }
+    }
+    (squares / count).sqrt()
+}
+
+/// The errors of the pose are found within their stated deviations, and the view corrected by them
+/// shows the surface; also errors of 10 mm and 3°.
+#[test]
+fn the_rigid_error_is_found_within_its_deviation() {
+    for (position_m, turn_deg) in [(0.003, 0.7), (0.010, 3.0)] {
+        let errors = format!(
+            ", noise = {{}}, pose_error = {{ position_sd_m = [{position_m}, {position_m}, {position_m}], \
+             rotation_sd_deg = [{turn_deg}, {turn_deg}, {turn_deg}] }}"
+        );
+        let environment = built(&errors);
+        let (mut squares, mut count, mut worst_mm) = (0.0, 0.0, 0.0_f64);
+        for number in 0..12 {
+            let mut random = seed::stream(number, 0, "view");
+            let drawn: [f64; 6] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
+            let field = touched(&environment, &look(&environment, number), 8);
+            let RigidError { shift_m, shift_sd_m, turn_deg: turns, turn_sd_deg, .. } =
+                field.rigid_errors().remove(0);
+            for axis in 0..3 {
+                let shift = (shift_m[axis] - position_m * drawn[axis]) / shift_sd_m[axis];
+                let turn = (turns[axis] - turn_deg * drawn[axis + 3]) / turn_sd_deg[axis];
+                squares += shift * shift + turn * turn;
+                count += 2.0;
+            }
+            worst_mm = worst_mm.max(1e3 * rmse_m(&environment, &field));
+        }
+        let rms = (squares / count).sqrt();
+        println!(
+            "{position_m} m, {turn_deg}°: errors {rms:.2} deviations, worst RMSE {worst_mm:.2} mm"
+        );
+        assert!(rms < 1.5, "{rms}");
+        assert!(worst_mm < 1.0, "{worst_mm} mm");
+    }
+}
+
+/// Points that are anywhere, a twentieth of all, do not pull the surface.
+#[test]
+fn outliers_do_not_pull_the_surface() {
+    let environment = built(", noise = {}");
+    let clean = look(&environment, 0);
+    let mut spoilt = clean.clone();
+    let mut random = seed::stream(1, 0, "outliers");
+    for p_c in &mut spoilt.points_c {
+        if random.random_bool(0.05) {
+            *p_c *= random.random_range(0.5..1.5);
+        }
+    }
+    let [clean, spoilt] = [clean, spoilt].map(|view| touched(&environment, &view, 2));
+    let [clean_m, spoilt_m] = [clean, spoilt].map(|field| rmse_m(&environment, &field));
+    println!("{clean_m} {spoilt_m}");
+    assert!(spoilt_m < 1.3 * clean_m + 1e-4, "{clean_m} {spoilt_m}");
+}
+
+/// One touch corrects a whole view: the error of an experiment is that of the view without its
+/// rigid error, and the row has what was seen.
+#[test]
+fn one_touch_corrects_a_view() {
+    let errors = ", noise = { noise_m = 0.0015, noise_ratio = 0, noise_px = 1 }, pose_error = { \
+                  position_sd_m = [0, 0, 0.003], rotation_sd_deg = [0.7, 0.7, 0] }";
+    let camera = format!(
+        "camera={{ model = \"d405\", position_m = [0, -0.35, 0.5], pixels = [320, 180]{errors} }}"
+    );
+    let mut experiment =
+        Experiment::with_defaults(&scene("container.toml", &[&camera]), &["active"], 1, 6);
+    (experiment.views, experiment.initial_touches) = (1, 0);
+    let simulation = Simulation::new(experiment).unwrap();
+    for trial in 0..3 {
+        let row = simulation.trial(simulation.planner("active").unwrap(), trial);
+        assert_eq!(row.failure, None);
+        let rmse_m = |count: usize| row.touches[count - 1].metrics.unwrap().rmse_m;
+        println!("{:.2} mm, {:.2} mm", 1e3 * rmse_m(1), 1e3 * rmse_m(6));
+        assert!(rmse_m(1) < 2e-3 && rmse_m(6) < 5e-4);
+        let error = row.views[0].error.as_ref().unwrap();
+        assert!(error.prior_sds < 4.5 && error.shift_sd_m[2] < 0.5e-3, "{error:?}");
+    }
+}
+
+/// A cloud in either frame and an image of depths give the view that they were written from; one in
+/// the wrong unit is refused with the depths that it has.
+#[test]
+fn views_are_read_from_files() {
+    let environment = built("");
+    let view = look(&environment, 0);
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = |points: &[Point3<f64>]| {
+        let lines: String = points.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\n\
+             property double z\nend_header\n{lines}",
+            points.len()
+        )
+    };
+    let in_world: Vec<Point3<f64>> = view.points_c.iter().map(|p_c| view.x_wc * p_c).collect();
+    let in_mm: Vec<Point3<f64>> = view.points_c.iter().map(|p_c| p_c * 1e3).collect();
+    for (name, points, keys) in [
+        ("camera.ply", &view.points_c, ""),
+        ("world.ply", &in_world, ", frame = \"world\""),
+        ("mm.ply", &in_mm, ", unit = \"mm\""),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, cloud(points)).unwrap();
+        let read = look(&built(&format!(", file = {path:?}{keys}")), 0);
+        assert_eq!(read.points_c.len(), view.points_c.len());
+        let off = read.points_c.iter().zip(&view.points_c).map(|(a, b)| (a - b).norm());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{name}");
+    }
+    // Without its unit nothing of it is in the zone.
+    let path = folder.path().join("mm.ply");
+    let camera = format!("{PLACE}, file = {path:?} }}");
+    let mut experiment =
+        Experiment::with_defaults(&scene("container.toml", &[&camera]), &["active"], 1, 2);
+    experiment.views = 1;
+    let simulation = Simulation::new(experiment).unwrap();
+    let row = simulation.trial(simulation.planner("active").unwrap(), 0);
+    let failure = row.failure.unwrap();
+    assert!(failure.contains("check camera.position_m, unit and frame"), "{failure}");
+    // An image of depths in tenths of a millimetre.
+    let path = folder.path().join("depths.png");
+    let mut depths = vec![0_u16; 240 * 135];
+    let focal = 120.0 / 43.5_f64.to_radians().tan();
+    for p_c in &view.points_c {
+        let column = (p_c.x / p_c.z * focal + 119.5).round() as usize;
+        let row = (p_c.y / p_c.z * focal + 67.0).round() as usize;
+        depths[row * 240 + column] = (p_c.z / 1e-3).round() as u16;
+    }
+    let mut encoder = png::Encoder::new(std::fs::File::create(&path).unwrap(), 240, 135);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let bytes: Vec<u8> = depths.iter().flat_map(|depth| depth.to_be_bytes()).collect();
+    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+    for keys in ["", ", intrinsics_px = [126.454, 126.454, 119.5, 67.0]"] {
+        let read = look(&built(&format!(", file = {path:?}{keys}")), 0);
+        assert_eq!(read.points_c.len(), view.points_c.len());
+        let off = read.points_c.iter().zip(&view.points_c).map(|(a, b)| (a - b).norm());
+        assert!(off.fold(0.0, f64::max) < 1.2e-3);
+    }
+}
