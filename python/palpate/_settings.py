@@ -29,6 +29,7 @@ class ExperimentSettings(TypedDict, total=False):
     initial_touches: int
     verification_touches: int
     repeat_touches: int
+    views: int
     grid: int
     gp: _File | _Table
     planning: _Table
@@ -49,6 +50,7 @@ class SceneSettings(TypedDict, total=False):
     arm: _Table
     effects: _Table
     sensor: _Table
+    camera: _Table
     solver: _Table
     touch: _Table
 

@@ -103,12 +103,14 @@ proptest! {
     }
 }
 
+fn settings() -> GpSettings {
+    Loader::read(Path::new("experiments/beliefs/camera.toml")).unwrap().finish().unwrap()
+}
+
 /// Touches the container at `count` places, and returns the belief that has seen `view`.
 fn touched(environment: &Arc<Environment>, view: &View, count: usize) -> HeightField {
     let zone = environment.task().zone().unwrap();
-    let settings = Loader::read(Path::new("experiments/beliefs/camera.toml"));
-    let settings: GpSettings = settings.unwrap().finish().unwrap();
-    let mut field = HeightField::new(zone.clone(), settings);
+    let mut field = HeightField::new(zone.clone(), settings());
     field.observe_view(view);
     let mut probe = exact_probe(Arc::clone(environment));
     let mut random = seed::stream(3, 0, "places");
@@ -164,7 +166,7 @@ fn the_rigid_error_is_found_within_its_deviation() {
             "{position_m} m, {turn_deg}°: errors {rms:.2} deviations, worst RMSE {worst_mm:.2} mm"
         );
         assert!(rms < 1.5, "{rms}");
-        assert!(worst_mm < 1.0, "{worst_mm} mm");
+        assert!(worst_mm < 1.5, "{worst_mm} mm");
     }
 }
 
@@ -197,7 +199,7 @@ fn one_touch_corrects_a_view() {
     );
     let mut experiment =
         Experiment::with_defaults(&scene("container.toml", &[&camera]), &["active"], 1, 6);
-    (experiment.views, experiment.initial_touches) = (1, 0);
+    (experiment.views, experiment.initial_touches, experiment.gp) = (1, 0, settings());
     let simulation = Simulation::new(experiment).unwrap();
     for trial in 0..3 {
         let row = simulation.trial(simulation.planner("active").unwrap(), trial);

@@ -16,6 +16,7 @@
 //! | [`surface_evidence`] | probability of a surface from contacts and misses |
 //! | [`planner`] | planners, one list for both |
 //! | [`probe`], [`control`] | a touch, and the motion of the arm |
+//! | [`view`] | what a depth camera has seen, and the error of its pose |
 //! | [`registration`] | the pose of finger and object, found by touch |
 //!
 //! ```

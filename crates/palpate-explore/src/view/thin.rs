@@ -222,10 +222,11 @@ impl<'a> Image<'a> {
         if !cosine.is_finite() || cosine < GRAZING {
             return None;
         }
-        // Fitted points, each of which has the noise of those it replaces; pixels with equal noise
-        // count once.
-        let independent = (n / (share * count as f64)) * accuracy.noise_px * accuracy.noise_px;
-        let variance_m2 = scatter2 * part * independent.max(1.0 / n) + 0.25 * misfit2;
+        // All points of the cell count, those with equal noise once; a fit to fewer than its
+        // coefficients is no better than a point.
+        let independent = (share * count as f64 / (accuracy.noise_px * accuracy.noise_px)).max(1.0);
+        let left = ((part * n) / independent).min(1.0);
+        let variance_m2 = scatter2.max(noise_m * noise_m) * left + 0.25 * misfit2;
         let sd_m = variance_m2.sqrt() * ray.norm();
         let misfit = misfit2.sqrt() / noise_m.max(1e-6);
         let p_c = Point3::from(ray * z);
