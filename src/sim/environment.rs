@@ -1,6 +1,6 @@
 //! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
-use super::camera::{Sight, capsules_at_home};
+use super::camera::{VisibleScene, capsules_at_home};
 use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
@@ -223,7 +223,7 @@ impl Environment {
         };
         let arm = self.robot().filter(|_| camera.is_hidden_by_arm && self.arm.is_some());
         let capsules_w = arm.as_ref().map(capsules_at_home).unwrap_or_default();
-        camera.look(&Sight { object: bvh, middle_w, capsules_w }, rng)
+        camera.look(&VisibleScene { object: bvh, middle_w, capsules_w }, rng)
     }
 
     /// Returns the arm or stage with its finger; `None` for a function.

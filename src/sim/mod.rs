@@ -16,6 +16,7 @@ pub mod scene;
 pub mod simulated_finger;
 pub mod simulator;
 pub mod solver;
+pub mod unit;
 
 pub use environment::Environment;
 pub use scene::Scene;

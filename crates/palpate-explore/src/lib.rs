@@ -56,7 +56,6 @@ mod free_space;
 pub mod gp_settings;
 pub mod planner;
 pub mod probe;
-mod quadratic_surface;
 pub mod registration;
 pub mod robot;
 pub mod surface_evidence;

@@ -276,8 +276,8 @@ impl DerivativeCovariance {
         }
     }
 
-    /// Adds to `gradient` the derivative of `weight` times the covariance of the heights at the place
-    /// and at observation `i`, with respect to the logarithm of each length scale.
+    /// Adds to `gradient` the derivative of `weight` times the covariance of the heights at the
+    /// place and at observation `i`, with respect to the logarithm of each length scale.
     pub(super) fn add_height_gradient(
         &self,
         observations: &Observations,

@@ -1,7 +1,7 @@
 //! A real camera's view, read from a file: a PLY cloud, or an image of depths (16-bit PNG).
 
 use super::settings::{CameraSettings, Frame};
-use crate::sim::scene::Unit;
+use crate::sim::unit::Unit;
 use nalgebra::{Isometry3, Point3};
 use palpate_geometry::import::ply;
 use palpate_input::error::InputError;

@@ -24,8 +24,8 @@ const FARTHEST_M: f64 = 5.0;
 // heuristic: a surface at 75° to the ray has a step of a hundredth at 640 pixels.
 const EDGE: f64 = 0.02;
 
-/// What a camera looks at.
-pub struct Sight<'a> {
+/// Scene before a camera.
+pub struct VisibleScene<'a> {
     /// Object.
     pub object: &'a MeshBvh,
     /// Middle of the region, at which the camera looks unless its rotation is given.
@@ -52,15 +52,15 @@ impl CameraSettings {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn look(&self, sight: &Sight, rng: &mut impl Rng) -> Result<View, InputError> {
-        let stated = self.x_wc(&sight.middle_w);
-        let (pivot_w, accuracy) = (self.target_w(&sight.middle_w), self.accuracy());
+    pub fn look(&self, scene: &VisibleScene, rng: &mut impl Rng) -> Result<View, InputError> {
+        let stated = self.x_wc(&scene.middle_w);
+        let (pivot_w, accuracy) = (self.target_w(&scene.middle_w), self.accuracy());
         if let Some(path) = &self.file {
             let points_c = file::points(self, path, &stated)?;
             return Ok(View { x_wc: stated, points_c, pivot_w, accuracy });
         }
         let (x_wc, scale) = self.true_pose(&stated, &pivot_w, rng);
-        let mut image = self.render(sight, &x_wc);
+        let mut image = self.render(scene, &x_wc);
         if let Some(flying) = &self.flying_pixels {
             image.fly(flying, rng);
         }
@@ -107,13 +107,13 @@ impl CameraSettings {
     }
 
     /// Returns the exact depths from the pose `x_wc`.
-    fn render(&self, sight: &Sight, x_wc: &Isometry3<f64>) -> Image {
+    fn render(&self, scene: &VisibleScene, x_wc: &Isometry3<f64>) -> Image {
         let origin_w = Point3::from(x_wc.translation.vector);
         let steepest = self.holes.as_ref().map(|holes| holes.grazing_deg.to_radians().cos());
         let depth_m = |i: usize| {
             let ray_c = self.ray(i);
             let direction_w = UnitVector3::new_normalize(x_wc.rotation * ray_c);
-            let hit = sight.object.ray(&origin_w, &direction_w, FARTHEST_M)?;
+            let hit = scene.object.ray(&origin_w, &direction_w, FARTHEST_M)?;
             let cosine = hit.normal.dot(&direction_w).abs();
             let is_hole = steepest.is_some_and(|least| cosine < least);
             let is_before = |capsule: &Capsule| {
@@ -121,7 +121,7 @@ impl CameraSettings {
                 let (a, b) = nearest_of_segments([&origin_w, &hit.point], axis);
                 (a - b).norm() < capsule.radius_m
             };
-            let is_hidden = sight.capsules_w.iter().any(is_before);
+            let is_hidden = scene.capsules_w.iter().any(is_before);
             (!is_hole && !is_hidden).then(|| hit.distance_m / ray_c.norm())
         };
         let count = self.pixels[0] * self.pixels[1];

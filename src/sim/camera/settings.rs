@@ -1,6 +1,6 @@
 //! Settings of a depth camera: where it is, its model, and the errors that a scene calls for.
 
-use crate::sim::scene::Unit;
+use crate::sim::unit::Unit;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use palpate_explore::view::CameraAccuracy;
 use palpate_gp::math::pose::pose;

@@ -6,8 +6,8 @@
 //! points, are left out.
 
 use super::View;
-use crate::quadratic_surface::QuadraticSurface;
 use nalgebra::{Point3, UnitVector3, Vector3};
+use palpate_gp::math::quadratic_surface::QuadraticSurface;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

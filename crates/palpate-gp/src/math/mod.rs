@@ -7,6 +7,7 @@ pub mod least_squares;
 pub mod normal;
 pub mod optimize;
 pub mod pose;
+pub mod quadratic_surface;
 pub mod seed;
 pub mod simd;
 pub mod vector;

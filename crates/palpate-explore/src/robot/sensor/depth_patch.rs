@@ -3,9 +3,9 @@
 use super::doubt::Doubt;
 use super::sample::{DepthImage, Sample, Wrench};
 use super::{SensedContact, Sensor};
-use crate::quadratic_surface::QuadraticSurface;
 use crate::robot::finger::Finger;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector2, Vector3};
+use palpate_gp::math::quadratic_surface::QuadraticSurface;
 
 /// A pad at the end of the finger: its middle touches the hull's foremost point, and it faces the
 /// approach. Its frame `P` has its origin there, x along the width, which is y of `T`, and z
