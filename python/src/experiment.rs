@@ -145,7 +145,8 @@ impl Experiment {
     /// Tests the planners for regressions against the baseline file `path`, as the command
     /// `palpate check` does: returns verdict, remarks, and the columns of a table. With a reason to
     /// `accept`, writes the file instead; returns `None`. `how` has the file, the reason, the
-    /// tolerance, the number of threads, and whether the baseline's other planners are left alone; `own` and `callbacks` are those of `run`.
+    /// tolerance, the number of threads, and whether the baseline's other planners are left alone;
+    /// `own` and `callbacks` are those of `run`.
     fn check<'py>(
         &self,
         py: Python<'py>,

@@ -100,7 +100,8 @@ fn a_setting_given_as_an_option_is_answered_with_its_assignment() {
     }
 }
 
-/// A plain name of a scene in an experiment is that of a file beside it, or else of a shipped scene.
+/// A plain name of a scene in an experiment is that of a file beside it, or else of a shipped
+/// scene.
 #[test]
 fn an_experiment_finds_a_shipped_scene_by_name() {
     let (folder, home) = (folder(), tempfile::tempdir().unwrap());

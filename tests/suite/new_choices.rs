@@ -38,8 +38,8 @@ fn egg(is_removed: impl Fn(Point3<f64>) -> bool) -> Mesh {
     Mesh::new(&vertices, &kept.copied().collect::<Vec<_>>()).unwrap().0
 }
 
-/// Middles of four holes, two of them in front (−y); none is at an end of the egg, so that the bounds
-/// stay.
+/// Middles of four holes, two of them in front (−y); none is at an end of the egg, so that the
+/// bounds stay.
 const HOLES: [[f64; 3]; 4] =
     [[0.03, -0.03, 0.015], [-0.03, -0.03, -0.01], [0.0, 0.037, 0.02], [0.0, 0.037, -0.02]];
 

@@ -270,8 +270,8 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     assert!(turn_deg[0].abs() < 4.0 * x_sd_deg.max(0.3), "{turn_deg:?} {x_sd_deg}");
 }
 
-/// Registers the finger of the scene with `sets` on a PA-10 by touches of a ball; `state` alters what
-/// is stated of its robot.
+/// Registers the finger of the scene with `sets` on a PA-10 by touches of a ball; `state` alters
+/// what is stated of its robot.
 fn registered(
     sets: &[&str],
     count: usize,

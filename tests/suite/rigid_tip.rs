@@ -151,8 +151,8 @@ fn the_stated_ellipsoid_holds_95_percent() {
             }
             let share = f64::from(held) / f64::from(stated.max(1));
             println!("{name} {force_n} N: {stated} stated, {light} too light, {share:.3} held");
-            // Of 2000 touches one standard deviation is half a percent. The few that noise lifts over
-            // the threshold have a force that is read too large, and an ellipsoid too small.
+            // Of 2000 touches one standard deviation is half a percent. The few that noise lifts
+            // over the threshold have a force that is read too large, and an ellipsoid too small.
             let is_honest = stated < times as i32 / 10 || (0.925..0.975).contains(&share);
             if !is_honest || stated + light < 9 * times as i32 / 10 {
                 wrong.push(format!("{name} {force_n} N: {share}"));
@@ -302,8 +302,8 @@ fn every_sensor_touches_the_container() {
     }
 }
 
-/// A ball on a force/torque sensor, carried by an arm with masses and servos, lands on the container
-/// within what its servos and its contact yield, and its force stays below the limit.
+/// A ball on a force/torque sensor, carried by an arm with masses and servos, lands on the
+/// container within what its servos and its contact yield, and its force stays below the limit.
 #[test]
 fn a_ball_tip_on_a_moving_arm_touches_the_container() {
     let sets = [

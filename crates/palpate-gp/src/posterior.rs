@@ -207,8 +207,8 @@ impl Posterior {
         self.gradient_with_slopes(weights, (derivatives, row), gradient);
     }
 
-    /// Returns mean and covariance of the errors that the heights of source `number` have in common,
-    /// in units of their prior standard deviations; `None` if there are none.
+    /// Returns mean and covariance of the errors that the heights of source `number` have in
+    /// common, in units of their prior standard deviations; `None` if there are none.
     pub fn common_errors(&self, number: usize) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let loadings = self.observations.loadings(number);
         let (signal_sd, count) = (self.hyperparameters.signal_sd, loadings.len());

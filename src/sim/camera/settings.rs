@@ -120,8 +120,8 @@ impl PixelNoise {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PoseError {
-    /// Standard deviation of the shift of the seen points along x, y and z of the camera, at what it
-    /// looks at, m.
+    /// Standard deviation of the shift of the seen points along x, y and z of the camera, at what
+    /// it looks at, m.
     pub position_sd_m: [f64; 3],
     /// Standard deviation of their rotation about the same axes, deg.
     pub rotation_sd_deg: [f64; 3],

@@ -36,13 +36,13 @@ const SD_UNIT_M: f64 = 1e-4;
 // heuristic: a steeper wall's height is uncertain by four times the error of its place.
 const SEEN_NORMAL_Y_MIN: f64 = 0.25;
 
-/// Distance beside the zone, in standard deviations of the camera's position, up to which points are
-/// kept: a corrected pose may move them into it.
+/// Distance beside the zone, in standard deviations of the camera's position, up to which points
+/// are kept: a corrected pose may move them into it.
 const MARGIN_SIGMAS: f64 = 3.0;
 
-/// Largest signal's standard deviation with a view, over the heights' root mean square. Many heights
-/// of a smooth surface make ever larger ones more likely, and with them rounding errors of the
-/// camera's pose.
+/// Largest signal's standard deviation with a view, over the heights' root mean square. Many
+/// heights of a smooth surface make ever larger ones more likely, and with them rounding errors of
+/// the camera's pose.
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
 

@@ -66,8 +66,8 @@ const TURNS_DEG: [f64; 5] = [-65.0, -25.0, 0.0, 25.0, 65.0];
 /// the rim stays free.
 const PAD_SITES: [f64; 3] = [-0.2, 0.0, 0.2];
 
-/// Expected indentation of a pad, part of it that a located point is above the deepest, and distance
-/// of these points on a plate as a fraction of the pad's shorter side; heuristics.
+/// Expected indentation of a pad, part of it that a located point is above the deepest, and
+/// distance of these points on a plate as a fraction of the pad's shorter side; heuristics.
 const PAD_PRESSED_M: f64 = 0.5e-3;
 const PAD_SHARE: f64 = 0.3;
 const PAD_AROUND: f64 = 0.2;

@@ -1,5 +1,5 @@
-//! Views of a depth camera: points of the surface with a noise of their own and a rigid error of the
-//! camera's pose in common.
+//! Views of a depth camera: points of the surface with a noise of their own and a rigid error of
+//! the camera's pose in common.
 //!
 //! [`thin`] turns the thousands of points of a [`View`] into a few hundred surface elements. A
 //! [`SeenSurface`] is the evidence that a belief takes from them.
@@ -41,7 +41,8 @@ pub struct CameraAccuracy {
     pub noise_ratio: f64,
     /// Distance over which the noise of pixels is equal, pixels; 1 for independent pixels.
     pub noise_px: f64,
-    /// Standard deviation of the shift of the points at the pivot along x, y and z of the camera, m.
+    /// Standard deviation of the shift of the points at the pivot along x, y and z of the camera,
+    /// m.
     pub position_sd_m: [f64; 3],
     /// Standard deviation of their rotation about the same axes through the pivot, deg.
     pub rotation_sd_deg: [f64; 3],

@@ -1,13 +1,14 @@
 //! Seen surface: the evidence of a view, with the rigid error of its camera as a random effect.
 //!
-//! A camera whose pose is off shows a point p at p + t + r × (p − q) + s·(p − c), with a translation
-//! t, a rotation r about the pivot q, and a relative error s of its depths from its place c. Along a
-//! gradient g of the belief's field that is off by g·t + ((p − q) × g)·r + (g·(p − c))·s: linear in
-//! seven numbers, which all points of the view have in common. t and r are along the camera's axes.
+//! A camera whose pose is off shows a point p at p + t + r × (p − q) + s·(p − c), with a
+//! translation t, a rotation r about the pivot q, and a relative error s of its depths from its
+//! place c. Along a gradient g of the belief's field that is off by g·t + ((p − q) × g)·r + (g·(p −
+//! c))·s: linear in seven numbers, which all points of the view have in common. t and r are along
+//! the camera's axes.
 //!
-//! A view alone says nothing about these numbers, because a surface can be anywhere. Its linear model
-//! does: a surface that is as smooth somewhere else seems rougher. What a belief of the view alone
-//! finds is therefore taken away from what a belief of the view and the touches finds.
+//! A view alone says nothing about these numbers, because a surface can be anywhere. Its linear
+//! model does: a surface that is as smooth somewhere else seems rougher. What a belief of the view
+//! alone finds is therefore taken away from what a belief of the view and the touches finds.
 
 use super::{CameraAccuracy, SurfaceElement, View, thin};
 use nalgebra::{
@@ -90,8 +91,8 @@ pub struct RigidError {
 }
 
 impl SeenSurface {
-    /// Thins the points of `view` that are `wanted`, given in `W`. `gradient` gives that of the field
-    /// before there is a belief, from a normal.
+    /// Thins the points of `view` that are `wanted`, given in `W`. `gradient` gives that of the
+    /// field before there is a belief, from a normal.
     pub fn new(
         view: &View,
         wanted: impl Fn(&Point3<f64>) -> bool,
@@ -213,8 +214,8 @@ impl SeenSurface {
     }
 }
 
-/// Returns where a camera is whose points appear shifted and then rotated about a pivot, both in `W`,
-/// for its stated pose.
+/// Returns where a camera is whose points appear shifted and then rotated about a pivot, both in
+/// `W`, for its stated pose.
 pub fn corrected_pose(
     stated: &Isometry3<f64>,
     pivot_w: &Point3<f64>,
@@ -229,9 +230,9 @@ pub fn corrected_pose(
 /// Mean and covariance of the errors of a camera's pose, in prior standard deviations.
 pub type PoseErrors = (DVector<f64>, DMatrix<f64>);
 
-/// Returns the errors of a pose that touches have found, from those that a belief of view and touches
-/// finds and those that one of the view alone finds: with the information Λ = C⁻¹ of each, that of
-/// the touches and the prior is I + Λ − Λ₀.
+/// Returns the errors of a pose that touches have found, from those that a belief of view and
+/// touches finds and those that one of the view alone finds: with the information Λ = C⁻¹ of each,
+/// that of the touches and the prior is I + Λ − Λ₀.
 pub fn found_by_touch((mean, all): &PoseErrors, (own, alone): &PoseErrors) -> Option<PoseErrors> {
     let (all, alone) = (all.clone().try_inverse()?, alone.clone().try_inverse()?);
     let count = mean.len();

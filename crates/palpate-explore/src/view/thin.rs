@@ -32,7 +32,8 @@ const LEVELS: u32 = 7;
 const COARSEST: u32 = 3;
 
 /// Number of elements up to which cells are divided that are already explained.
-// heuristic: as dense as a Gaussian process of a surface with details of a tenth of the image needs.
+// heuristic: as dense as a Gaussian process of a surface with details of a tenth of the image
+// needs.
 const ENOUGH: usize = 250;
 
 /// Largest number of elements.
@@ -44,8 +45,8 @@ const MOST: usize = 350;
 const LEAST: usize = 12;
 const FITTED: usize = 256;
 
-/// Robust standard deviations beyond which a point is an outlier, and largest part of a cell's points
-/// that may be outliers; with more it shows an edge.
+/// Robust standard deviations beyond which a point is an outlier, and largest part of a cell's
+/// points that may be outliers; with more it shows an edge.
 const OUTLIER: f64 = 3.5;
 const OUTLIERS: f64 = 0.15;
 
@@ -175,8 +176,8 @@ impl<'a> Image<'a> {
         Some(Leaf { level, cell, element: element.filter(|_| is_explained), urgency })
     }
 
-    /// Returns the element of the fitted points of a cell with `count` points, and the misfit of its
-    /// surface; `None` at an edge.
+    /// Returns the element of the fitted points of a cell with `count` points, and the misfit of
+    /// its surface; `None` at an edge.
     fn element(&mut self, count: usize) -> Option<(SurfaceElement, f64)> {
         let accuracy = &self.view.accuracy;
         let whole = self.fitted.len();

@@ -166,8 +166,8 @@ proptest! {
     }
 }
 
-/// The gradient of the likelihood that a search climbs is that of its differences, for a signal that
-/// is searched and one that follows from a known noise.
+/// The gradient of the likelihood that a search climbs is that of its differences, for a signal
+/// that is searched and one that follows from a known noise.
 #[test]
 fn the_searched_gradient_is_that_of_its_differences() {
     let observations = all(&offset_rows(0.5));
