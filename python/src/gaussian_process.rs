@@ -56,6 +56,7 @@ impl Fitted {
             slope_noise_ratio: None,
             signal_sd: signal.into(),
             touch_noise: TouchNoise::Fitted,
+            start_sd: None,
         };
         py.detach(|| {
             let fit = search_box.fit(kernel, &observations);
