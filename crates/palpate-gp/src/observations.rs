@@ -1,6 +1,6 @@
 //! Observations: places with heights and, optionally, slopes.
 
-use crate::math::simd::widest;
+use crate::math::simd::{dot, widest};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -58,7 +58,7 @@ impl<'a> Observation<'a> {
     /// Variance of its height's error, in units of the signal's.
     pub(super) fn height_noise2(&self, ratio: NoiseRatio) -> f64 {
         let known = |error: KnownError| {
-            let common: f64 = error.loadings.iter().map(|loading| loading * loading).sum();
+            let common = dot(error.loadings, error.loadings);
             ratio.known * ratio.known * (error.variance + common)
         };
         let noise = ratio.height * ratio.height * (self.noise * self.noise);
@@ -125,10 +125,6 @@ impl Source {
     fn rows(&self) -> impl Iterator<Item = (usize, &[f64])> + Clone {
         self.places.iter().copied().zip(self.loadings.chunks_exact(self.errors))
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl Observations {

@@ -8,13 +8,13 @@ pub use settings::CameraSettings;
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_explore::robot::Robot;
-use palpate_explore::view::{View, corrected_pose};
+use palpate_explore::view::{PixelNoise, View, corrected_pose};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::nearest_of_segments;
 use palpate_geometry::sweep::Capsule;
 use palpate_input::error::InputError;
 use rand::{Rng, RngExt};
-use settings::{FlyingPixels, PixelNoise};
+use settings::FlyingPixels;
 
 /// Largest depth, m.
 // heuristic: beyond the range of every camera beside an arm.

@@ -1,15 +1,15 @@
 //! Settings of a depth camera: where it is, its model, and the errors that a scene calls for.
 
+use crate::sim::model_file;
 use crate::sim::unit::Unit;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use palpate_explore::view::CameraAccuracy;
+use palpate_explore::view::{CameraAccuracy, PixelNoise, PoseError};
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
-use palpate_input::files;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use toml::{Table, Value};
+use toml::Value;
 
 /// Cameras included in Palpate: names and files.
 pub const CAMERAS: [(&str, &str); 2] = [
@@ -90,53 +90,6 @@ fn fov_deg() -> f64 {
     87.0
 }
 
-/// Table `[camera.noise]`: noise of each pixel's depth.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct PixelNoise {
-    /// Standard deviation, m.
-    pub noise_m: f64,
-    /// Further, independent standard deviation as a fraction of the depth.
-    pub noise_ratio: f64,
-    /// Side of the squares of pixels with equal noise, pixels.
-    pub noise_px: usize,
-}
-
-impl Default for PixelNoise {
-    /// Returns the noise of a D405.
-    fn default() -> Self {
-        Self { noise_m: 0.0, noise_ratio: 3e-3, noise_px: 3 }
-    }
-}
-
-impl PixelNoise {
-    /// Standard deviation at a depth.
-    pub fn sd_m(&self, depth_m: f64) -> f64 {
-        self.noise_m.hypot(self.noise_ratio * depth_m)
-    }
-}
-
-/// Table `[camera.pose_error]`: error of the camera's stated pose.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct PoseError {
-    /// Standard deviation of the shift of the seen points along x, y and z of the camera, at what
-    /// it looks at, m.
-    pub position_sd_m: [f64; 3],
-    /// Standard deviation of their rotation about the same axes, deg.
-    pub rotation_sd_deg: [f64; 3],
-    /// Standard deviation of the relative error of all depths.
-    pub scale_sd: f64,
-}
-
-impl Default for PoseError {
-    /// Returns the error of a calibrated camera beside an arm.
-    fn default() -> Self {
-        let CameraAccuracy { position_sd_m, rotation_sd_deg, scale_sd, .. } = Default::default();
-        Self { position_sd_m, rotation_sd_deg, scale_sd }
-    }
-}
-
 /// Table `[camera.flying_pixels]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -206,17 +159,9 @@ impl CameraSettings {
 
     /// Returns what is known of the camera's errors.
     pub fn accuracy(&self) -> CameraAccuracy {
-        let noise = self.noise.clone();
-        let noise = noise.unwrap_or(PixelNoise { noise_m: 0.0, noise_ratio: 0.0, noise_px: 1 });
-        let exact = PoseError { position_sd_m: [0.0; 3], rotation_sd_deg: [0.0; 3], scale_sd: 0.0 };
-        let error = self.pose_error.clone().unwrap_or(exact);
         CameraAccuracy {
-            noise_m: noise.noise_m,
-            noise_ratio: noise.noise_ratio,
-            noise_px: noise.noise_px as f64,
-            position_sd_m: error.position_sd_m,
-            rotation_sd_deg: error.rotation_sd_deg,
-            scale_sd: error.scale_sd,
+            noise: self.noise.clone().unwrap_or(PixelNoise::NONE),
+            pose_error: self.pose_error.clone().unwrap_or(PoseError::NONE),
         }
     }
 
@@ -232,43 +177,14 @@ impl CameraSettings {
         let Some(name) = loader.value(&key).and_then(Value::as_str).map(String::from) else {
             return Ok(());
         };
-        let included = CAMERAS.iter().find(|(known, _)| *known == name);
-        let shown = format!("\"{name}\"");
-        let text = match included {
-            Some((_, text)) => (*text).into(),
-            None if name.ends_with(".toml") => files::text(Path::new(&name), files::TEXT_MAX)
-                .map_err(|cause| {
-                    let allowed = format!("a readable file ({name}: {cause})");
-                    loader.not_allowed(&key, &shown, &allowed)
-                })?,
-            None => {
-                let names = CAMERAS.map(|(name, _)| format!("\"{name}\"")).join(", ");
-                let allowed = format!("{names}, or a file ending in .toml");
-                return Err(loader.not_allowed(&key, &shown, &allowed));
-            }
-        };
-        let mut file = Loader::from_text(Path::new(&name), text)?;
+        let (text, _) = model_file::text(loader, &key, &name, &CAMERAS)?;
+        let mut file = Loader::from_text(Path::new(&name), text.into_owned())?;
         let model = file.table_mut("").map(std::mem::take).unwrap_or_default();
         if let Some(table) = loader.table_mut(camera) {
             table.remove("model");
-            overlay(table, model);
+            model_file::overlay(table, &model);
         }
         Ok(())
-    }
-}
-
-/// Adds the values of `model` that `camera` lacks, and those of its tables that `camera` has.
-fn overlay(camera: &mut Table, model: Table) {
-    for (key, value) in model {
-        match (camera.get_mut(&key), value) {
-            (Some(Value::Table(own)), Value::Table(inner)) => {
-                for (key, value) in inner {
-                    own.entry(key).or_insert(value);
-                }
-            }
-            (None, Value::Table(_)) | (Some(_), _) => {}
-            (None, value) => drop(camera.insert(key, value)),
-        }
     }
 }
 
@@ -294,16 +210,8 @@ impl Validate for CameraSettings {
             rules.numbers("intrinsics_px", &[fx, fy], 1.0..=1e5);
             rules.numbers("intrinsics_px", &[cx, cy], -1e5..=1e5);
         }
-        if let Some(noise) = &self.noise {
-            rules.number("noise.noise_m", noise.noise_m, 0.0..=0.1);
-            rules.number("noise.noise_ratio", noise.noise_ratio, 0.0..=0.5);
-            rules.number("noise.noise_px", noise.noise_px as f64, 1.0..=64.0);
-        }
-        if let Some(error) = &self.pose_error {
-            rules.numbers("pose_error.position_sd_m", &error.position_sd_m, 0.0..=0.1);
-            rules.numbers("pose_error.rotation_sd_deg", &error.rotation_sd_deg, 0.0..=20.0);
-            rules.number("pose_error.scale_sd", error.scale_sd, 0.0..=0.2);
-        }
+        self.noise.iter().for_each(|noise| rules.table("noise", noise));
+        self.pose_error.iter().for_each(|error| rules.table("pose_error", error));
         if let Some(flying) = &self.flying_pixels {
             rules.number("flying_pixels.band_px", flying.band_px as f64, 0.0..=16.0);
             rules.number("flying_pixels.share", flying.share, 0.0..=1.0);

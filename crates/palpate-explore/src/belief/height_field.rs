@@ -156,7 +156,7 @@ impl HeightField {
     /// Returns what it shows of the zone.
     pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
         let zone = &self.zone;
-        let sds_m = view.accuracy.position_sd_m;
+        let sds_m = view.accuracy.pose_error.position_sd_m;
         let margin_m = MARGIN_SIGMAS * sds_m.into_iter().fold(0.0, f64::max);
         let wanted = |p_w: &Point3<f64>| {
             let place = zone.place(p_w);

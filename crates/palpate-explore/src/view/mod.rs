@@ -13,6 +13,7 @@ pub use seen::{
 pub use thin::{SurfaceElement, thin};
 
 use nalgebra::{Isometry3, Point3};
+use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,42 +32,82 @@ pub struct View {
 }
 
 /// Accuracy of a depth camera and of its stated pose.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraAccuracy {
-    /// Standard deviation of the noise of a pixel's depth, m.
+    /// Noise of each pixel.
+    pub noise: PixelNoise,
+    /// Error of the stated pose.
+    pub pose_error: PoseError,
+}
+
+/// Table `[camera.noise]`: noise of each pixel's depth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PixelNoise {
+    /// Standard deviation, m.
     pub noise_m: f64,
-    /// Standard deviation of the noise of a pixel's depth, as a fraction of the depth; added to
-    /// `noise_m` as independent noise.
+    /// Further, independent standard deviation as a fraction of the depth.
     pub noise_ratio: f64,
-    /// Distance over which the noise of pixels is equal, pixels; 1 for independent pixels.
-    pub noise_px: f64,
-    /// Standard deviation of the shift of the points at the pivot along x, y and z of the camera,
-    /// m.
+    /// Side of the squares of pixels with equal noise, pixels.
+    pub noise_px: usize,
+}
+
+impl Default for PixelNoise {
+    /// Returns the noise of a D405.
+    fn default() -> Self {
+        Self { noise_m: 0.0, noise_ratio: 3e-3, noise_px: 3 }
+    }
+}
+
+impl PixelNoise {
+    /// No noise.
+    pub const NONE: Self = Self { noise_m: 0.0, noise_ratio: 0.0, noise_px: 1 };
+
+    /// Standard deviation at a depth.
+    pub fn sd_m(&self, depth_m: f64) -> f64 {
+        self.noise_m.hypot(self.noise_ratio * depth_m)
+    }
+}
+
+/// Table `[camera.pose_error]`: error of the camera's stated pose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PoseError {
+    /// Standard deviation of the shift of the seen points along x, y and z of the camera, at what
+    /// it looks at, m.
     pub position_sd_m: [f64; 3],
-    /// Standard deviation of their rotation about the same axes through the pivot, deg.
+    /// Standard deviation of their rotation about the same axes, deg.
     pub rotation_sd_deg: [f64; 3],
     /// Standard deviation of the relative error of all depths.
     pub scale_sd: f64,
 }
 
-impl Default for CameraAccuracy {
-    /// Returns the errors of a calibrated camera: 2 to 5 mm and 0.5 to 1°.
+impl Default for PoseError {
+    /// Returns the error of a calibrated camera beside an arm.
     fn default() -> Self {
-        Self {
-            noise_m: 0.0,
-            noise_ratio: 0.0,
-            noise_px: 1.0,
-            position_sd_m: [3e-3; 3],
-            rotation_sd_deg: [0.7; 3],
-            scale_sd: 0.0,
-        }
+        // Calibrated cameras beside an arm are off by 2 to 5 mm and 0.5 to 1°.
+        Self { position_sd_m: [3e-3; 3], rotation_sd_deg: [0.7; 3], scale_sd: 0.0 }
     }
 }
 
-impl CameraAccuracy {
-    /// Standard deviation of the noise of a pixel at `depth_m`.
-    pub fn noise_sd_m(&self, depth_m: f64) -> f64 {
-        self.noise_m.hypot(self.noise_ratio * depth_m)
+impl PoseError {
+    /// An exact pose.
+    pub const NONE: Self =
+        Self { position_sd_m: [0.0; 3], rotation_sd_deg: [0.0; 3], scale_sd: 0.0 };
+}
+
+impl Validate for PixelNoise {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("noise_m", self.noise_m, 0.0..=0.1);
+        rules.number("noise_ratio", self.noise_ratio, 0.0..=0.5);
+        rules.number("noise_px", self.noise_px as f64, 1.0..=64.0);
+    }
+}
+
+impl Validate for PoseError {
+    fn check(&self, rules: &mut Rules) {
+        rules.numbers("position_sd_m", &self.position_sd_m, 0.0..=0.1);
+        rules.numbers("rotation_sd_deg", &self.rotation_sd_deg, 0.0..=20.0);
+        rules.number("scale_sd", self.scale_sd, 0.0..=0.2);
     }
 }

@@ -10,7 +10,7 @@
 //! model does: a surface that is as smooth somewhere else seems rougher. What a belief of the view
 //! alone finds is therefore taken away from what a belief of the view and the touches finds.
 
-use super::{CameraAccuracy, SurfaceElement, View, thin};
+use super::{PoseError, SurfaceElement, View, thin};
 use nalgebra::{
     DMatrix, DVector, Isometry3, Point3, SVector, Translation3, UnitQuaternion, UnitVector3,
     Vector3,
@@ -37,7 +37,7 @@ pub struct SeenSurface {
     x_wc: Isometry3<f64>,
     #[schemars(with = "[f64; 3]")]
     pivot_w: Point3<f64>,
-    accuracy: CameraAccuracy,
+    pose_error: PoseError,
     elements: Vec<SurfaceElement>,
     /// Gradients in `W`, at the elements, of a field that is 0 on the surface and positive outside.
     /// They are those of the belief: the normals of a few points are so noisy that the camera would
@@ -103,7 +103,7 @@ impl SeenSurface {
         Self {
             x_wc: view.x_wc,
             pivot_w: view.pivot_w,
-            accuracy: view.accuracy,
+            pose_error: view.accuracy.pose_error.clone(),
             gradients_w: elements.iter().map(|element| gradient(&normal_w(element))).collect(),
             elements,
             is_believed: false,
@@ -123,7 +123,7 @@ impl SeenSurface {
 
     /// Standard deviation of each error.
     fn sds(&self) -> SVector<f64, ERRORS> {
-        let CameraAccuracy { position_sd_m, rotation_sd_deg, scale_sd, .. } = self.accuracy;
+        let PoseError { position_sd_m, rotation_sd_deg, scale_sd } = self.pose_error;
         let turns = rotation_sd_deg.map(f64::to_radians);
         let sds = position_sd_m.into_iter().chain(turns).chain([scale_sd]);
         SVector::from_iterator(sds)
@@ -139,7 +139,7 @@ impl SeenSurface {
 
     /// Depths that the camera states, over the true ones.
     fn scale(&self) -> f64 {
-        1.0 + self.errors[ERRORS - 1] * self.accuracy.scale_sd
+        1.0 + self.errors[ERRORS - 1] * self.pose_error.scale_sd
     }
 
     /// Returns the surface elements, corrected and linearised at the present errors.

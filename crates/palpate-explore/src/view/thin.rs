@@ -179,13 +179,13 @@ impl<'a> Image<'a> {
     /// Returns the element of the fitted points of a cell with `count` points, and the misfit of
     /// its surface; `None` at an edge.
     fn element(&mut self, count: usize) -> Option<(SurfaceElement, f64)> {
-        let accuracy = &self.view.accuracy;
+        let noise = &self.view.accuracy.noise;
         let whole = self.fitted.len();
         let mut limit_m = f64::INFINITY;
         let mut kept: Vec<[f64; 3]> = self.fitted.clone();
         let mut surface = QuadraticSurface::fit(kept.iter().copied())?;
         let middle_m = kept[kept.len() / 2][2];
-        let noise_m = accuracy.noise_sd_m(middle_m);
+        let noise_m = noise.sd_m(middle_m);
         for _ in 0..ROUNDS {
             self.residuals_m.clear();
             let off = |[u, v, z]: &[f64; 3]| (z - surface.height([*u, *v]).0).abs();
@@ -225,7 +225,8 @@ impl<'a> Image<'a> {
         }
         // All points of the cell count, those with equal noise once; a fit to fewer than its
         // coefficients is no better than a point.
-        let independent = (share * count as f64 / (accuracy.noise_px * accuracy.noise_px)).max(1.0);
+        let equal = (noise.noise_px * noise.noise_px) as f64;
+        let independent = (share * count as f64 / equal).max(1.0);
         let left = ((part * n) / independent).min(1.0);
         let variance_m2 = scatter2.max(noise_m * noise_m) * left + 0.25 * misfit2;
         let sd_m = variance_m2.sqrt() * ray.norm();

@@ -3,8 +3,8 @@
 
 use super::constants::{DEFAULTS, SENSORS};
 use crate::sim::finger::Effects;
+use crate::sim::model_file;
 use palpate_input::config::{ConfigError, Loader};
-use palpate_input::files;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -45,27 +45,18 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
     };
     let moved = values(table, "").into_iter().filter(is_moved);
     let moved = moved.map(|(name, _)| format!("effects.{name}")).collect();
-    overlay(table, &sensor);
+    model_file::overlay(table, &sensor);
     Ok(moved)
 }
 
 /// Returns the constants in the file `name`, or those of an included sensor.
 fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
-    if let Some((_, text)) = SENSORS.iter().find(|(known, _)| *known == name) {
-        return Ok(toml::from_str(text).unwrap_or_default());
-    }
-    let shown = format!("\"{name}\"");
-    if !name.ends_with(".toml") {
-        let names: Vec<String> = SENSORS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-        let allowed = format!("{}, or a file ending in .toml", names.join(", "));
-        return Err(loader.not_allowed(key, &shown, &allowed));
+    let (text, is_included) = model_file::text(loader, key, name, &SENSORS)?;
+    if is_included {
+        return Ok(toml::from_str(&text).unwrap_or_default());
     }
     let path = Path::new(name);
-    let text = files::text(path, files::TEXT_MAX).map_err(|cause| {
-        let allowed = format!("a readable file ({}: {cause})", path.display());
-        loader.not_allowed(key, &shown, &allowed)
-    })?;
-    let mut file = Loader::from_text(path, text)?;
+    let mut file = Loader::from_text(path, text.into_owned())?;
     let Some(table) = file.table_mut("") else { return Ok(Table::new()) };
     let sensor = table.clone();
     // With all effects present, none lacks its requirement.
@@ -96,17 +87,6 @@ fn value<'a>(effects: &'a Table, name: &str) -> Option<&'a Value> {
     match name.split_once('.') {
         Some((table, rest)) => value(effects.get(table)?.as_table()?, rest),
         None => effects.get(name),
-    }
-}
-
-/// Adds the values of `sensor` to the tables of `effects` that exist.
-fn overlay(effects: &mut Table, sensor: &Table) {
-    for (key, value) in sensor {
-        match (effects.get_mut(key), value) {
-            (Some(Value::Table(effect)), Value::Table(constants)) => overlay(effect, constants),
-            (None, Value::Table(_)) | (Some(_), _) => {}
-            (None, value) => drop(effects.insert(key.clone(), value.clone())),
-        }
     }
 }
 
