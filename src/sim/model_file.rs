@@ -1,4 +1,4 @@
-//! Files of constants that a scene names: those of a sensor or a camera, included or the user's own.
+//! Files of constants that a scene names: of a sensor or a camera, included or the user's own.
 
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::files;

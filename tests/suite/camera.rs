@@ -3,13 +3,14 @@
 use crate::common::shipped::{environment, scene};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate::config::Loader;
-use palpate::experiment::{Experiment, Simulation};
+use palpate::experiment::{Experiment, Simulation, real_robot};
 use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::probe::Touch;
 use palpate::explore::view::{RigidError, View, corrected_pose};
 use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
+use palpate::ros::settings::BackendKind;
 use palpate::sim::Environment;
 use palpate::sim::probe::exact_probe;
 use palpate_geometry::bvh::MeshBvh;
@@ -271,4 +272,20 @@ fn views_are_read_from_files() {
         let off = read.points_c.iter().zip(&view.points_c).map(|(a, b)| (a - b).norm());
         assert!(off.fold(0.0, f64::max) < 1.2e-3);
     }
+}
+
+/// A real robot takes no view from the mesh: it needs the file of its camera.
+#[test]
+fn a_real_robot_needs_a_real_view() {
+    let camera = format!("{PLACE} }}");
+    let scene = scene("container.toml", &[&camera]);
+    let mut experiment = Experiment::with_defaults(&scene, &["active"], 1, 2);
+    experiment.backend.kind = BackendKind::Ros2;
+    let refused =
+        |experiment: &Experiment| real_robot::check(experiment, false).unwrap_err().to_string();
+    assert!(!refused(&experiment).contains("scene.camera.file"));
+    experiment.views = 1;
+    assert!(refused(&experiment).contains("scene.camera.file"));
+    experiment.scene.camera.as_mut().unwrap().file = Some("view.ply".into());
+    assert!(!refused(&experiment).contains("scene.camera.file"));
 }
