@@ -13,7 +13,7 @@
 use super::known_body::{CalibrationBody, FingerOutline};
 use crate::robot::sensor::Wrench;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use palpate_gp::math::least_squares::{Problem, Solution};
+use palpate_gp::math::least_squares::{FitError, Problem, Solution, fit, robust};
 
 /// One touch of the body.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,20 +104,38 @@ impl<'a> HandEyeFit<'a> {
         if self.outline.pad().is_some() { 2 } else { 1 }
     }
 
-    /// Returns the estimate from which the touches are fitted. A rigid finger of another radius
-    /// than stated meets everything that much earlier or later; from a start elsewhere that would
-    /// look like outliers.
-    pub(super) fn started(&self, body: CalibrationBody) -> HandEyeEstimate {
+    /// Fits the touches. A rigid finger of another radius than stated meets everything that much
+    /// earlier or later, which would look like outliers; so its fit is also started at the median
+    /// of its depths, and the start that explains more is kept.
+    ///
+    /// # Errors
+    /// If no start leads to a fit.
+    pub fn fit(&self, body: CalibrationBody) -> Result<Solution<HandEyeEstimate>, FitError> {
         let mut start = Self::start(body);
         if self.outline.pad().is_some() {
             start.indentation_m = 0.0;
-        } else if !self.outline.is_soft() {
-            let residuals = self.residuals(&start);
-            let mut depths: Vec<f64> = residuals.iter().copied().take(self.touches.len()).collect();
-            depths.sort_by(f64::total_cmp);
-            start.indentation_m -= DEPTH_SD_M * depths.get(depths.len() / 2).unwrap_or(&0.0);
         }
-        start
+        if self.outline.pad().is_some() || self.outline.is_soft() {
+            return fit(self, &start);
+        }
+        let residuals = self.residuals(&start);
+        let mut depths: Vec<f64> = residuals.iter().copied().take(self.touches.len()).collect();
+        depths.sort_by(f64::total_cmp);
+        let median_m = DEPTH_SD_M * depths.get(depths.len() / 2).unwrap_or(&0.0);
+        let indentation_m = start.indentation_m - median_m;
+        let fits = [start, HandEyeEstimate { indentation_m, ..start }].map(|s| robust(self, &s));
+        let [first, second] = fits;
+        let (best, _) = match (first, second) {
+            (Ok(first), Ok(second)) => {
+                if second.1 < first.1 {
+                    second
+                } else {
+                    first
+                }
+            }
+            (first, second) => first.or(second)?,
+        };
+        fit(self, &best)
     }
 
     /// Returns how far from the body each point is that a pad locates, in units of the scatter.

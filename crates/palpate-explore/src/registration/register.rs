@@ -12,7 +12,6 @@ use crate::probe::{Probe, Touch};
 use crate::robot::Robot;
 use crate::task::touch::TouchSettings;
 use nalgebra::Isometry3;
-use palpate_gp::math::least_squares::fit;
 use palpate_gp::math::pose::parts;
 use palpate_input::error::InputError;
 use toml_edit::{Array, DocumentMut, Item, Table, value};
@@ -219,8 +218,7 @@ pub fn conclude(
 ) -> Result<RegistrationResult, InputError> {
     let outline = FingerOutline::new(robot);
     let problem = HandEyeFit::new(&outline, touches);
-    let fitted = fit(&problem, &problem.started(*body))
-        .map_err(|error| InputError::new(error.to_string()))?;
+    let fitted = problem.fit(*body).map_err(|error| InputError::new(error.to_string()))?;
     let named = parameters(body);
     let depths_m = depths_m(&fitted, problem.depth_count());
     let used: Vec<f64> =
