@@ -114,8 +114,7 @@ impl Run {
         let row = self.row(trial, planner)?;
         let experiment = &self.0.experiment;
         let known = if experiment.scene.whole_object.is_some() {
-            let touches = row.touches.get(..touch as usize).unwrap_or_default();
-            whole_object::belief(experiment, touches).map_err(errors::other)?.map(Known::from)
+            whole_object::belief(experiment, row, touch).map_err(errors::other)?.map(Known::from)
         } else {
             let replay = BeliefReplay::of(experiment, row, touch).map_err(errors::other)?;
             replay.map(|replay| Known::HeightField(replay.belief))

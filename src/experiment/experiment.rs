@@ -393,9 +393,9 @@ impl Validate for Experiment {
         let least = if self.views > 0 { 0.0 } else { 1.0 };
         rules.number("initial_touches", self.initial_touches.into(), least..=self.touches.into());
         rules.number("views", self.views.into(), 0.0..=VIEWS_MAX);
-        let can_look = self.scene.camera.is_some() && self.scene.zone.is_some();
+        let can_look = self.scene.camera.is_some();
         rules.require("views", self.views, self.views == 0 || can_look, || {
-            "0, or a scene with a [zone] and a table [camera]".into()
+            "0, or a scene with a table [camera]".into()
         });
         rules.number("verification_touches", self.verification_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("repeat_touches", self.repeat_touches.into(), 0.0..=TOUCHES_MAX);

@@ -37,8 +37,9 @@ pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> 
         "[[-0.6, 0.6], [-1.0, 0.3], [0.05, 1.5]]    # x, y, z of the cell",
         interlocks.workspace_m.is_some(),
     ));
-    let camera = scene.camera.as_ref().filter(|_| experiment.views > 0);
-    let has_view = camera.is_none_or(|camera| camera.file.is_some());
+    let has_view = scene.camera.as_ref().is_none_or(|camera| {
+        (0..experiment.views as usize).all(|number| camera.at(number).file.is_some())
+    });
     needed.push(("scene.camera.file", "\"view.ply\"    # of the real camera", has_view));
     needed.retain(|(_, _, is_given)| !is_given);
     if kind == BackendKind::Simulated || needed.is_empty() {

@@ -8,7 +8,7 @@ use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::{TouchRow, TrialRow};
+use crate::experiment::trial::row::TrialRow;
 use anyhow::Context;
 use nalgebra::Point3;
 use palpate_explore::task::Task;
@@ -118,7 +118,7 @@ pub fn frame(
     most: usize,
 ) -> anyhow::Result<Option<SurfaceFrame>> {
     let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
-    let Some(belief) = belief(experiment, touches)? else { return Ok(None) };
+    let Some(belief) = belief(experiment, row, count)? else { return Ok(None) };
     let Some(surface) = belief.surface() else { return Ok(None) };
     let mesh = surface.mesh(experiment.space.cells).map(|mesh| decimate(&mesh, most));
     let mesh = mesh.unwrap_or_default();
@@ -141,14 +141,16 @@ pub fn frame(
     }))
 }
 
-/// Returns the belief after `touches`; `None` without a fit then.
+/// Returns the belief after `count` touches of a trial; `None` without a fit then.
 ///
 /// # Errors
 /// If the touches do not belong to the object or cannot be conditioned on.
 pub fn belief(
     experiment: &Experiment,
-    touches: &[TouchRow],
+    row: &TrialRow,
+    count: u32,
 ) -> anyhow::Result<Option<ImplicitSurface>> {
+    let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
     let Some(fit) = touches.last().and_then(|touch| touch.fit.as_ref()) else { return Ok(None) };
     let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
     let scene = &experiment.scene;
@@ -158,6 +160,9 @@ pub fn belief(
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
     let scope = ExplorationSetup::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
+    for view in &row.views {
+        belief.observe_seen(view.seen.clone());
+    }
     for touch in touches {
         let aim = touch
             .target

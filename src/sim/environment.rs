@@ -205,11 +205,11 @@ impl Environment {
         &self.task
     }
 
-    /// Returns what the scene's camera sees, with errors drawn from `rng`.
+    /// Returns what the scene's camera sees in view `number`, with errors drawn from `rng`.
     ///
     /// # Errors
     /// If there is no camera or no object, or its file cannot be read.
-    pub fn look(&self, rng: &mut impl Rng) -> Result<View, InputError> {
+    pub fn look(&self, number: usize, rng: &mut impl Rng) -> Result<View, InputError> {
         let (Some(camera), ObjectShape::Mesh { bvh, .. }) = (&self.scene.camera, &self.shape)
         else {
             return Err(missing_part("camera, or no object,"));
@@ -223,7 +223,7 @@ impl Environment {
         };
         let arm = self.robot().filter(|_| camera.is_hidden_by_arm && self.arm.is_some());
         let capsules_w = arm.as_ref().map(capsules_at_home).unwrap_or_default();
-        camera.look(&VisibleScene { object: bvh, middle_w, capsules_w }, rng)
+        camera.at(number).look(&VisibleScene { object: bvh, middle_w, capsules_w }, rng)
     }
 
     /// Returns the arm or stage with its finger; `None` for a function.

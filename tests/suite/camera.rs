@@ -29,7 +29,7 @@ fn built(errors: &str) -> Arc<Environment> {
 }
 
 fn look(environment: &Environment, number: u64) -> View {
-    environment.look(&mut seed::stream(number, 0, "view")).unwrap()
+    environment.look(0, &mut seed::stream(number, 0, "view")).unwrap()
 }
 
 /// Distance of each point of a view from the object, by the stated pose.

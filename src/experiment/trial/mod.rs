@@ -129,8 +129,11 @@ fn run_touches(
     for number in 0..experiment.views {
         let purpose = format!("view {number}");
         let mut random = seed::stream(experiment.seed, row.trial.into(), &purpose);
-        let view = truth.environment.look(&mut random).map_err(|error| error.to_string())?;
-        let seen = belief.observe_view(&view).ok_or("a view needs a zone")?;
+        let view = truth
+            .environment
+            .look(number as usize, &mut random)
+            .map_err(|error| error.to_string())?;
+        let seen = belief.observe_view(&view);
         if seen.is_empty() {
             return Err(nothing_seen(&view));
         }
@@ -201,7 +204,7 @@ fn run_touches(
     verify(experiment, task, &belief, probe, row)
 }
 
-/// Describes a view without a point of the zone.
+/// Describes a view without a point of the region.
 fn nothing_seen(view: &View) -> String {
     let mut depths_m: Vec<f64> = view.points_c.iter().map(|p_c| p_c.z).collect();
     depths_m.sort_by(f64::total_cmp);
@@ -209,8 +212,8 @@ fn nothing_seen(view: &View) -> String {
     match depths_m.get(depths_m.len() / 2) {
         None => "the view has no points".into(),
         Some(middle_m) => format!(
-            "the view shows nothing of the zone: its points are {middle_m:.3} m ahead of the camera \
-             (median of {}), the zone {ahead_m:.3} m; check camera.position_m, unit and frame",
+            "the view shows nothing of the region: its points are {middle_m:.3} m ahead of the camera \
+             (median of {}), the region {ahead_m:.3} m; check camera.position_m, unit and frame",
             depths_m.len()
         ),
     }

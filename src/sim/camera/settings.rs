@@ -8,6 +8,8 @@ use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -69,6 +71,44 @@ pub struct CameraSettings {
     /// Whether the arm at home hides what is behind it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_hidden_by_arm: bool,
+    /// Further places that it looks from, in the order of their names: the second view is from the
+    /// first of them, and after the last comes the camera's own place again.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub further: BTreeMap<String, CameraPlace>,
+}
+
+/// Table `[camera.further.NAME]`: a further place of the camera; keys as in `[camera]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraPlace {
+    /// Stated position in `W`.
+    pub position_m: [f64; 3],
+    /// Point at which it looks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_at_m: Option<[f64; 3]>,
+    /// Stated rotation of its optical frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_deg: Option<[f64; 3]>,
+    /// File with the view from here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+}
+
+impl Validate for CameraPlace {
+    fn check(&self, rules: &mut Rules) {
+        let Self { position_m, look_at_m, rotation_deg, .. } = self;
+        rules.numbers("position_m", position_m, -1e3..=1e3);
+        look_at_m.iter().for_each(|at| rules.numbers("look_at_m", at, -1e3..=1e3));
+        rotation_deg.iter().for_each(|deg| rules.numbers("rotation_deg", deg, -360.0..=360.0));
+        let is_twofold = look_at_m.is_some() && rotation_deg.is_some();
+        rules.require("look_at_m", "(given)", !is_twofold, || {
+            "either this or rotation_deg, not both".into()
+        });
+        let is_here = *look_at_m == Some(*position_m);
+        rules.require("look_at_m", format!("{position_m:?}"), !is_here, || {
+            "another point than position_m".into()
+        });
+    }
 }
 
 /// Frame of the points of a file.
@@ -136,6 +176,28 @@ impl Default for Quantisation {
 }
 
 impl CameraSettings {
+    /// Returns the camera at the place of its view `number`.
+    pub fn at(&self, number: usize) -> Cow<'_, Self> {
+        let place = (number % (1 + self.further.len())).checked_sub(1);
+        match place.and_then(|place| self.further.values().nth(place)) {
+            None => Cow::Borrowed(self),
+            Some(place) => {
+                let CameraPlace { position_m, look_at_m, rotation_deg, file } = place.clone();
+                Cow::Owned(Self { position_m, look_at_m, rotation_deg, file, ..self.clone() })
+            }
+        }
+    }
+
+    /// Returns its own place.
+    fn place(&self) -> CameraPlace {
+        CameraPlace {
+            position_m: self.position_m,
+            look_at_m: self.look_at_m,
+            rotation_deg: self.rotation_deg,
+            file: self.file.clone(),
+        }
+    }
+
     /// Returns the point of `W` at which the camera looks; `middle_w` is the middle of the region.
     pub fn target_w(&self, middle_w: &Point3<f64>) -> Point3<f64> {
         self.look_at_m.map_or(*middle_w, Point3::from)
@@ -172,6 +234,10 @@ impl CameraSettings {
     /// If the model is unknown or its file cannot be read.
     pub fn resolve(loader: &mut Loader, camera: &str) -> Result<(), ConfigError> {
         loader.resolve_path(&format!("{camera}.file"));
+        let further = format!("{camera}.further");
+        let places: Vec<String> =
+            loader.table_mut(&further).into_iter().flat_map(|t| t.keys().cloned()).collect();
+        places.iter().for_each(|name| loader.resolve_path(&format!("{further}.{name}.file")));
         let key = format!("{camera}.model");
         loader.resolve_path_ending(&key, ".toml");
         let Some(name) = loader.value(&key).and_then(Value::as_str).map(String::from) else {
@@ -190,17 +256,10 @@ impl CameraSettings {
 
 impl Validate for CameraSettings {
     fn check(&self, rules: &mut Rules) {
-        rules.numbers("position_m", &self.position_m, -1e3..=1e3);
-        self.look_at_m.iter().for_each(|at| rules.numbers("look_at_m", at, -1e3..=1e3));
-        self.rotation_deg.iter().for_each(|deg| rules.numbers("rotation_deg", deg, -360.0..=360.0));
-        let is_twofold = self.look_at_m.is_some() && self.rotation_deg.is_some();
-        rules.require("look_at_m", "(given)", !is_twofold, || {
-            "either this or rotation_deg, not both".into()
-        });
-        let is_here = self.look_at_m == Some(self.position_m);
-        rules.require("look_at_m", format!("{:?}", self.position_m), !is_here, || {
-            "another point than position_m".into()
-        });
+        self.place().check(rules);
+        for (name, place) in &self.further {
+            rules.table(&format!("further.{name}"), place);
+        }
         let is_allowed = self.pixels.iter().all(|count| (16..=4096).contains(count));
         rules.require("pixels", format!("{:?}", self.pixels), is_allowed, || {
             "two numbers from 16 to 4096".into()

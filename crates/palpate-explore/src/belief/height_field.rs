@@ -46,6 +46,11 @@ const MARGIN_SIGMAS: f64 = 3.0;
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
 
+/// Number of surface elements of a view.
+// heuristic: as dense as a Gaussian process of a surface with details of a tenth of the image
+// needs; an update grows as the cube.
+const SEEN: usize = 250;
+
 /// Number of seen heights of a view that a fit uses.
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
 const SEEN_FITTED: usize = 64;
@@ -174,7 +179,7 @@ impl HeightField {
             let up = x_wz.inverse_transform_vector(normal_w).y;
             normal_w.into_inner() / up.abs().max(SEEN_NORMAL_Y_MIN)
         };
-        let seen = SeenSurface::new(view, wanted, gradient);
+        let seen = SeenSurface::new(view, (wanted, SEEN), gradient);
         self.observe_seen(seen)
     }
 

@@ -72,18 +72,21 @@ impl Belief {
         }
     }
 
-    /// Adds a view of a camera to a belief over a zone, which changes at the next
-    /// [`refit`](Self::refit). Returns what it shows; `None` around a whole object.
-    pub fn observe_view(&mut self, view: &View) -> Option<&SeenSurface> {
+    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
+    /// it shows.
+    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
         match self {
-            Self::HeightField(field) => Some(field.observe_view(view)),
-            Self::ImplicitSurface(_) => None,
+            Self::HeightField(field) => field.observe_view(view),
+            Self::ImplicitSurface(surface) => surface.observe_view(view),
         }
     }
 
     /// Returns the error of the camera's pose in each view, after a fit.
     pub fn rigid_errors(&self) -> Vec<RigidError> {
-        self.height_field().map_or(Vec::new(), HeightField::rigid_errors)
+        match self {
+            Self::HeightField(field) => field.rigid_errors(),
+            Self::ImplicitSurface(surface) => surface.rigid_errors(),
+        }
     }
 
     /// Fits the hyperparameters by maximum likelihood and conditions on all touches.

@@ -91,14 +91,14 @@ pub struct RigidError {
 }
 
 impl SeenSurface {
-    /// Thins the points of `view` that are `wanted`, given in `W`. `gradient` gives that of the
-    /// field before there is a belief, from a normal.
+    /// [Thins](thin) the points of `view` that are `wanted`, given in `W`, to about `enough`
+    /// elements. `gradient` gives that of the field before there is a belief, from a normal.
     pub fn new(
         view: &View,
-        wanted: impl Fn(&Point3<f64>) -> bool,
+        (wanted, enough): (impl Fn(&Point3<f64>) -> bool, usize),
         gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
     ) -> Self {
-        let elements = thin(view, wanted);
+        let elements = thin(view, wanted, enough);
         let normal_w = |element: &SurfaceElement| view.x_wc.rotation * element.normal_c;
         Self {
             x_wc: view.x_wc,
@@ -135,6 +135,11 @@ impl SeenSurface {
         let [shift, turn] =
             [0, 3].map(|row| self.x_wc.rotation * moved.fixed_rows::<3>(row).into_owned());
         corrected_pose(&self.x_wc, &self.pivot_w, (&shift, &turn))
+    }
+
+    /// Returns the places of the elements in `W` by the stated pose.
+    pub fn stated(&self) -> impl Iterator<Item = Point3<f64>> {
+        self.elements.iter().map(|element| self.x_wc * element.p_c)
     }
 
     /// Depths that the camera states, over the true ones.

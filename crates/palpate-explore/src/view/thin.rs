@@ -31,19 +31,18 @@ pub struct SurfaceElement {
 const LEVELS: u32 = 7;
 const COARSEST: u32 = 3;
 
-/// Number of elements up to which cells are divided that are already explained.
-// heuristic: as dense as a Gaussian process of a surface with details of a tenth of the image
-// needs.
-const ENOUGH: usize = 250;
-
-/// Largest number of elements.
-// heuristic: the belief's update grows as its cube.
-const MOST: usize = 350;
+/// Largest number of elements, over that up to which cells are divided that are already explained.
+// heuristic: what is not explained is where the details are.
+const MOST: f64 = 1.4;
 
 /// Fewest points of a cell, and largest number that is fitted; the others only reduce the noise.
 // heuristic: twice the surface's coefficients; enough to find its misfit.
 const LEAST: usize = 12;
 const FITTED: usize = 256;
+
+/// Fewest points of a cell that is divided although its surface is explained.
+// heuristic: its quarters have twice the fewest points on average, and few are lost.
+const DIVIDED: usize = 8 * LEAST;
 
 /// Robust standard deviations beyond which a point is an outlier, and largest part of a cell's
 /// points that may be outliers; with more it shows an edge.
@@ -64,8 +63,14 @@ const MISFIT: f64 = 0.5;
 // heuristic: at 80° a camera's depths are mostly holes and flying pixels.
 const GRAZING: f64 = 0.17;
 
-/// Returns the surface elements of `view` whose points in `W` are `wanted`.
-pub fn thin(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Vec<SurfaceElement> {
+/// Returns the surface elements of `view` whose points in `W` are `wanted`: about `enough`, or up to
+/// 1.4 times as many if fewer do not explain the view.
+pub fn thin(
+    view: &View,
+    wanted: impl Fn(&Point3<f64>) -> bool,
+    enough: usize,
+) -> Vec<SurfaceElement> {
+    let most = (MOST * enough as f64) as usize;
     let mut image = Image::new(view, wanted);
     let mut leaves: Vec<Leaf> = Vec::new();
     let side = 1 << COARSEST;
@@ -75,14 +80,14 @@ pub fn thin(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Vec<SurfaceEl
     // The worst explained cells first, then the largest.
     loop {
         let count = leaves.iter().filter(|leaf| leaf.element.is_some()).count();
-        if count >= MOST {
+        if count >= most {
             break;
         }
         let worst =
             (0..leaves.len()).max_by(|a, b| leaves[*a].urgency.total_cmp(&leaves[*b].urgency));
         let Some(worst) = worst.filter(|worst| {
             let leaf = &leaves[*worst];
-            leaf.urgency > 1.0 || leaf.urgency > 0.0 && count < ENOUGH
+            leaf.urgency > 1.0 || leaf.urgency > 0.0 && count < enough
         }) else {
             break;
         };
@@ -170,6 +175,7 @@ impl<'a> Image<'a> {
         let is_explained = misfit <= MISFIT;
         let urgency = match (can_divide, is_explained) {
             (false, _) => 0.0,
+            (true, true) if count < DIVIDED => 0.0,
             (true, true) => size,
             (true, false) => 1.0 + misfit.min(1e6),
         };

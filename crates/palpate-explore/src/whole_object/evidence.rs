@@ -4,11 +4,12 @@
 use super::settings::PriorShape;
 use crate::probe::{Contact, SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
+use crate::view::SeenSurface;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
-use palpate_gp::{Observation, Observations, Slope};
+use palpate_gp::{KnownError, Observation, Observations, Slope};
 use serde::{Deserialize, Serialize};
 
 /// All contacts and swept volumes.
@@ -16,6 +17,9 @@ use serde::{Deserialize, Serialize};
 pub struct TouchEvidence {
     contacts: Vec<Contact>,
     ways: Vec<SweptPath>,
+    /// Surfaces that cameras have seen, one per view.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) seen: Vec<SeenSurface>,
 }
 
 /// Path of a fingertip that was free up to its end.
@@ -95,9 +99,15 @@ impl TouchEvidence {
         self.contacts.iter().map(|contact| &contact.p_wc)
     }
 
-    /// Distance of `p_w` from all contacts and all swept paths.
+    /// Returns the points of contact, then those of seen surface elements, in `W`.
+    pub fn points(&self) -> impl Iterator<Item = Point3<f64>> {
+        let seen = self.seen.iter().flat_map(|seen| seen.elements().map(|element| element.p_w));
+        self.contacts().copied().chain(seen)
+    }
+
+    /// Distance of `p_w` from all contacts, all that was seen and all swept paths.
     pub fn distance_to_evidence_m(&self, p_w: &Point3<f64>) -> f64 {
-        let met = self.contacts().map(|contact| (contact - p_w).norm());
+        let met = self.points().map(|point| (point - p_w).norm());
         met.chain(self.ways.iter().map(|way| way.distance_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
@@ -127,8 +137,12 @@ impl TouchEvidence {
             let noise = sd_m.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
             all.push(&Observation { place, height: -field.value, noise, slope, known: None });
         }
+        for number in 0..self.seen.len() {
+            self.push_seen((prior, ball.radius_m), number, noise_m, &mut all);
+        }
+        let points: Vec<Point3<f64>> = self.points().collect();
         for (p_w, radius_m) in self.free(ball) {
-            let distances_m = self.contacts().map(|contact| (contact - p_w).norm());
+            let distances_m = points.iter().map(|point| (point - p_w).norm());
             let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
             let least_m = radius_m.min(nearest_m);
             let sd_m = ((nearest_m - least_m) / 12f64.sqrt()).max(SURE * nearest_m);
@@ -142,7 +156,40 @@ impl TouchEvidence {
         }
         all
     }
+
+    /// Adds what view `source` shows of an object of this radius: the field is 0 at each element,
+    /// but for its own error and the one that the view has in common, and positive in the free
+    /// space before every second one.
+    pub(super) fn push_seen(
+        &self,
+        (prior, radius_m): (&PriorMean, f64),
+        source: usize,
+        noise_m: f64,
+        all: &mut Observations,
+    ) {
+        let before_m = BEFORE * radius_m;
+        for (i, element) in self.seen[source].elements().enumerate() {
+            // A surface that is seen too far out is inside of what was seen.
+            let loadings = element.loadings.map(|loading| -loading);
+            let known =
+                Some(KnownError { variance: element.sd * element.sd, source, loadings: &loadings });
+            let mut push = |p_w: &Point3<f64>, field_m: f64, noise: f64| {
+                let height = field_m - element.removed - prior.field(p_w).value;
+                let place = p_w.coords.as_slice();
+                all.push(&Observation { place, height, noise, slope: None, known });
+            };
+            push(&element.p_w, 0.0, 1.0);
+            if i % 2 == 0 {
+                let free_w = element.p_w + element.normal_w.scale(before_m);
+                push(&free_w, before_m, (SURE * before_m / noise_m).max(1.0));
+            }
+        }
+    }
 }
+
+/// Distance of free points before seen elements, as a fraction of the object's radius.
+// heuristic: near enough to be before the same part of the surface.
+const BEFORE: f64 = 0.1;
 
 /// Prior mean of the field over space.
 #[derive(Clone, Debug, PartialEq)]
@@ -159,14 +206,14 @@ const THINNEST: f64 = 0.1;
 const UNKNOWN: f64 = 0.5;
 
 impl PriorMean {
-    /// Creates the prior around `contacts`, in the `ball` around them.
+    /// Creates the prior around `points` of the surface, in the `ball` around them.
     pub fn about<'a>(
         shape: PriorShape,
         ball: &Ball,
-        contacts: impl Iterator<Item = &'a Point3<f64>>,
+        points: impl Iterator<Item = &'a Point3<f64>>,
     ) -> Self {
         let thinnest_m = THINNEST * ball.radius_m;
-        let (centre_w, radii_m) = match extent(contacts) {
+        let (centre_w, radii_m) = match extent(points) {
             Some([low, high]) if low != high => {
                 let radii_m = (high - low) / 2.0;
                 (nalgebra::center(&low, &high), radii_m.map(|radius_m| radius_m.max(thinnest_m)))

@@ -6,14 +6,16 @@ use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
-use crate::task::{Aim, Approach};
-use nalgebra::Point3;
+use crate::task::{Aim, Approach, Ball};
+use crate::view::{PoseErrors, RigidError, SeenSurface, View, found_by_touch};
+use nalgebra::{Point3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::kernel;
 use palpate_gp::kernel::{Kernel, Matern52};
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::math::optimize::compass;
+use palpate_gp::posterior::Scratch;
 use palpate_gp::{
     Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
 };
@@ -33,6 +35,8 @@ pub struct ImplicitSurface {
     start: Option<Hyperparameters>,
     #[serde(skip)]
     surface: Option<Surface>,
+    #[serde(skip)]
+    rigid_errors: Vec<RigidError>,
 }
 
 /// Kernel in place of that of a stored belief.
@@ -59,12 +63,25 @@ const STEP_FIRST: f64 = 0.7;
 const STEP_NEXT: f64 = 0.35;
 const STEP_LAST: f64 = 0.1;
 
+/// Number of surface elements of a view.
+// heuristic: as many as dozens of touches with their normals, whose cost the belief can bear.
+const SEEN: usize = 120;
+
+/// Largest number of linearisations of a view at its camera's errors.
+// heuristic: errors of 10 mm and 3° settle after three.
+const LINEARISATIONS: usize = 12;
+
+/// Distance from the ball's lowest height, in standard deviations of the camera's position, within
+/// which a view shows what the object stands on.
+const MARGIN_SIGMAS: f64 = 3.0;
+
 impl ImplicitSurface {
     /// Creates a belief without data.
     pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (TouchEvidence::default(), Vec::new());
-        Self { scope, settings, kernel, evidence, asked, fit: None, start: None, surface: None }
+        let (fit, start, surface, rigid_errors) = (None, None, None, Vec::new());
+        Self { scope, settings, kernel, evidence, asked, fit, start, surface, rigid_errors }
     }
 
     /// Adds a touch at `aim` that followed `approach`, and the volume it swept; the belief changes
@@ -77,6 +94,37 @@ impl ImplicitSurface {
     ) {
         self.asked.push(*aim);
         self.evidence.observe(approach, touch, swept, self.settings.free_space_samples);
+    }
+
+    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
+    /// it shows of the ball.
+    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
+        let Ball { centre_w, radius_m, lowest_m } = self.scope.ball;
+        let sds_m = view.accuracy.pose_error.position_sd_m;
+        let margin_m = MARGIN_SIGMAS * sds_m.into_iter().fold(0.0, f64::max);
+        let wanted = |p_w: &Point3<f64>| {
+            // What stands on a table is seen with it.
+            let is_above = lowest_m.is_none_or(|lowest_m| p_w.z > lowest_m + margin_m);
+            is_above && (p_w - centre_w).norm() < radius_m
+        };
+        self.observe_seen(SeenSurface::new(view, (wanted, SEEN), |normal_w| normal_w.into_inner()))
+    }
+
+    /// Adds a view that is thinned already.
+    pub fn observe_seen(&mut self, seen: SeenSurface) -> &SeenSurface {
+        let number = self.evidence.seen.len();
+        self.evidence.seen.push(seen);
+        &self.evidence.seen[number]
+    }
+
+    /// The surfaces that cameras have seen, one per view.
+    pub fn seen(&self) -> &[SeenSurface] {
+        &self.evidence.seen
+    }
+
+    /// Returns the error of the camera's pose in each view, after a fit.
+    pub fn rigid_errors(&self) -> Vec<RigidError> {
+        self.rigid_errors.clone()
     }
 
     /// Fits length scale and noises by maximum likelihood and conditions on all touches.
@@ -128,19 +176,86 @@ impl ImplicitSurface {
         start: Option<Hyperparameters>,
         fit: Fit,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
-        let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), observations)?;
+        let hyperparameters = &fit.hyperparameters;
+        let mut found =
+            (prior, Posterior::new(self.kernel, hyperparameters.clone(), observations)?);
+        for _ in 0..LINEARISATIONS {
+            if !self.relinearise(&found) {
+                break;
+            }
+            let (prior, observations) = self.observations(start.as_ref());
+            let posterior = Posterior::new(self.kernel, hyperparameters.clone(), observations)?;
+            found = (prior, posterior);
+        }
+        let error = |(number, seen): (usize, &SeenSurface)| {
+            let (mean, covariance) = self.pose_errors(&found, number)?;
+            Some(seen.rigid_error(&mean, &covariance))
+        };
+        self.rigid_errors = self.evidence.seen.iter().enumerate().filter_map(error).collect();
+        let (prior, mut posterior) = found;
         posterior.inflate(self.settings.sd_inflation);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
-        let met = (self.contacts(), offset_m);
-        let surface = Surface::new(&self.scope, prior, posterior, met);
+        let points: Vec<Point3<f64>> = self.evidence.points().collect();
+        let surface = Surface::new(&self.scope, prior, posterior, (points.iter(), offset_m));
         self.start = start;
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
 
+    /// Linearises each view at the errors of its camera's pose, and the normals, of an estimate.
+    /// Returns whether that changes the observations.
+    fn relinearise(&mut self, found: &(PriorMean, Posterior)) -> bool {
+        let errors: Vec<Option<PoseErrors>> =
+            (0..self.evidence.seen.len()).map(|number| self.pose_errors(found, number)).collect();
+        let (prior, posterior) = found;
+        let (scratch, mut gradient) = (&mut Scratch::default(), [0.0; 3]);
+        let mut field_gradient = |p_w: &Point3<f64>| {
+            posterior.mean_gradient(p_w.coords.as_slice(), &mut gradient, scratch);
+            Some(prior.field(p_w).gradient + Vector3::from(gradient))
+        };
+        let mut is_changed = false;
+        for (seen, errors) in self.evidence.seen.iter_mut().zip(errors) {
+            is_changed |=
+                errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut field_gradient));
+        }
+        is_changed
+    }
+
+    /// Returns the errors of the pose in view `number` that the touches have found.
+    fn pose_errors(
+        &self,
+        (prior, posterior): &(PriorMean, Posterior),
+        number: usize,
+    ) -> Option<PoseErrors> {
+        let hyperparameters = posterior.hyperparameters();
+        let mut seen = Observations::new(3);
+        let (radius_m, noise_m) = (self.stated_ball().radius_m, hyperparameters.noise_sd);
+        self.evidence.push_seen((prior, radius_m), number, noise_m, &mut seen);
+        let alone = Posterior::new(self.kernel, hyperparameters.clone(), seen).ok()?;
+        found_by_touch(&posterior.common_errors(number)?, &alone.common_errors(number)?)
+    }
+
+    /// Returns the ball around all that was touched or seen.
+    fn estimated_ball(&self) -> Ball {
+        let points: Vec<Point3<f64>> = self.evidence.points().collect();
+        self.scope.estimated_ball(points.iter())
+    }
+
+    /// Returns the points of contact, then those that cameras have seen by their stated poses. A
+    /// prior that followed the corrected poses would let them wander off with it.
+    fn stated_points(&self) -> Vec<Point3<f64>> {
+        let seen = self.evidence.seen.iter().flat_map(SeenSurface::stated);
+        self.contacts().copied().chain(seen).collect()
+    }
+
+    fn stated_ball(&self) -> Ball {
+        self.scope.estimated_ball(self.stated_points().iter())
+    }
+
     /// Returns the observations, in units of the noise of `last`.
     fn observations(&self, last: Option<&Hyperparameters>) -> (PriorMean, Observations) {
-        let ball = self.scope.estimated_ball(self.contacts());
-        let prior = PriorMean::about(self.settings.prior, &ball, self.contacts());
+        let points = self.stated_points();
+        let ball = self.scope.estimated_ball(points.iter());
+        let prior = PriorMean::about(self.settings.prior, &ball, points.iter());
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
         let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
         let observations = self.evidence.observations((&prior, &ball), self.normals(), noise_m);
@@ -157,27 +272,34 @@ impl ImplicitSurface {
         start: Option<&Hyperparameters>,
         observations: &Observations,
     ) -> Result<Fit, CovarianceError> {
-        let radius_m = self.scope.estimated_ball(self.contacts()).radius_m;
+        let radius_m = self.estimated_ball().radius_m;
         let SpatialGpSettings { length_scale, noise, slope_noise, .. } = &self.settings;
         let lengths_m = length_scale.map(|share| share * radius_m);
         let mut ranges = vec![lengths_m, *noise];
         ranges.extend(self.normals().then_some(*slope_noise));
+        // Errors of known size do not grow with the signal, which is then searched too.
+        let signals_m = SIGNAL_RANGE.map(|share| share * radius_m);
+        let is_seen = !self.evidence.seen.is_empty();
+        ranges.extend(is_seen.then_some(signals_m));
         let ranges: Vec<[f64; 2]> = ranges.iter().map(|range| range.map(f64::ln)).collect();
         let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
         let mut begin: Vec<f64> = match start {
             Some(start) => {
                 let (length_m, ratio) = (start.length_scales[0], start.noise_ratio());
-                vec![length_m.ln(), ratio.height.ln(), (ratio.slope * length_m).ln()]
+                let mut begin = vec![length_m.ln(), ratio.height.ln()];
+                begin.extend(self.normals().then(|| (ratio.slope * length_m).ln()));
+                begin.extend(is_seen.then(|| start.signal_sd.ln()));
+                begin
             }
             None => ranges.iter().copied().map(middle).collect(),
         };
-        begin.truncate(ranges.len());
         // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
-        let signal_sd = SignalModel::Profiled(Range::from((
-            SIGNAL_RANGE[0] * radius_m,
-            SIGNAL_RANGE[1] * radius_m,
-        )));
+        let signal_sd = match is_seen {
+            true => SignalModel::Searched,
+            false => SignalModel::Profiled(Range::from((signals_m[0], signals_m[1]))),
+        };
+        let parameters = |logs: &[f64]| parameters(logs, is_seen);
         let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
         let cube = (observations.order() as f64).powi(3);
         // Each fit starts with a different parameter, so that short fits cover all of them.
@@ -211,6 +333,11 @@ impl ImplicitSurface {
         self.evidence.contacts()
     }
 
+    /// Returns the points of contact, then those that cameras have seen, in `W`.
+    pub fn points(&self) -> Vec<Point3<f64>> {
+        self.evidence.points().collect()
+    }
+
     /// Distance of `p_w` from all contacts and swept paths.
     pub fn distance_to_evidence_m(&self, p_w: &Point3<f64>) -> f64 {
         self.evidence.distance_to_evidence_m(p_w)
@@ -233,8 +360,13 @@ impl ImplicitSurface {
 }
 
 /// Returns the length scale, m, and noise ratios from their logarithms; the slopes' noise is per
-/// length scale.
-fn parameters(logs: &[f64]) -> (f64, NoiseRatio) {
+/// length scale. With a view, the last is that of the signal.
+fn parameters(logs: &[f64], is_seen: bool) -> (f64, NoiseRatio) {
+    let (signal, logs) = match logs.split_last() {
+        Some((signal, logs)) if is_seen => (Some(signal), logs),
+        _ => (None, logs),
+    };
     let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());
-    (at(0), NoiseRatio { height: at(1), slope: at(2) / at(0), known: 0.0 })
+    let known = signal.map_or(0.0, |log| (-log).exp());
+    (at(0), NoiseRatio { height: at(1), slope: at(2) / at(0), known })
 }
