@@ -90,10 +90,22 @@ pub struct MeanField {
 
 impl From<&Posterior> for MeanField {
     fn from(posterior: &Posterior) -> Self {
+        Self::of(posterior, posterior.hyperparameters().mean, posterior.weights())
+    }
+}
+
+impl MeanField {
+    /// Returns the change of a posterior's mean if the observed numbers change by `column`.
+    pub fn response(posterior: &Posterior, mut column: Vec<f64>) -> Self {
+        posterior.solve(&mut column);
+        Self::of(posterior, 0.0, &column)
+    }
+
+    /// Returns the field with this mean and these weights of all observed numbers.
+    fn of(posterior: &Posterior, mean: f64, all: &[f64]) -> Self {
         let observations = posterior.observations();
         let (count, dimension) = (observations.len(), observations.dimension());
-        let parameters = posterior.hyperparameters();
-        let (lengths, all) = (parameters.length_scales.clone(), posterior.weights());
+        let lengths = posterior.hyperparameters().length_scales.clone();
         let weight = |i: usize, number: usize| {
             let at = observations.start(i) + number;
             if at < observations.start(i + 1) { all[at] } else { 0.0 }
@@ -104,7 +116,7 @@ impl From<&Posterior> for MeanField {
         let zeros = || vec![0.0; count];
         Self {
             kernel: posterior.kernel(),
-            mean: parameters.mean,
+            mean,
             columns: (0..dimension).map(column).collect(),
             heights: (0..count).map(|i| weight(i, 0)).collect(),
             slopes: (0..dimension)
@@ -117,9 +129,7 @@ impl From<&Posterior> for MeanField {
             lengths,
         }
     }
-}
 
-impl MeanField {
     /// Returns the mean at `place`.
     pub fn value(&mut self, place: &[f64]) -> f64 {
         self.walk(place);

@@ -222,7 +222,7 @@ impl Observations {
     }
 
     /// Returns the columns of loadings of the errors of source `number` on all observed numbers.
-    pub(super) fn loadings(&self, number: usize) -> Vec<Vec<f64>> {
+    pub fn loadings(&self, number: usize) -> Vec<Vec<f64>> {
         let Some(source) = self.sources.iter().find(|source| source.number == number) else {
             return Vec::new();
         };

@@ -351,6 +351,12 @@ impl Posterior {
         self.factor.solve_lower(&mut scratch.solved)
     }
 
+    /// Solves A·x = `column` in place for the covariance s²·A of all observed numbers.
+    pub(super) fn solve(&self, column: &mut [f64]) {
+        self.factor.solve_lower(column);
+        self.factor.solve_upper(column);
+    }
+
     /// The weights A⁻¹·(y − m).
     pub(super) fn weights(&self) -> &[f64] {
         &self.weights

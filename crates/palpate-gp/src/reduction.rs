@@ -5,6 +5,7 @@
 
 use super::batch::{MANY, add_squares};
 use super::cholesky::subtract_products;
+use super::means::MeanField;
 use super::observations::Observations;
 use super::posterior::Posterior;
 use crate::math::simd::widest_fn;
@@ -17,6 +18,8 @@ pub struct VarianceReduction<'a> {
     weights: Vec<f64>,
     /// L⁻¹·k(X, r) of each reference place r, one after the other.
     whitened: Vec<f64>,
+    /// Fields that errors in common add to the surface, and their values at the references.
+    common: Vec<(MeanField, Vec<f64>)>,
 }
 
 impl<'a> VarianceReduction<'a> {
@@ -31,7 +34,29 @@ impl<'a> VarianceReduction<'a> {
                 whitened.extend(lanes.iter().map(|lanes| lanes[lane]));
             }
         });
-        Self { posterior, weights: vec![1.0; places.len()], references, whitened }
+        Self {
+            posterior,
+            weights: vec![1.0; places.len()],
+            references,
+            whitened,
+            common: Vec::new(),
+        }
+    }
+
+    /// Adds errors that the places have in common to the posterior: the surface is also off by
+    /// Σ e·`field`, with an independent standard normal e for each field.
+    pub fn with_common(mut self, fields: impl IntoIterator<Item = MeanField>) -> Self {
+        let dimension = self.references.dimension();
+        let mut place = vec![0.0; dimension];
+        for mut field in fields {
+            let values = (0..self.references.len()).map(|i| {
+                (0..dimension).for_each(|axis| place[axis] = self.references.column(axis)[i]);
+                field.value(&place)
+            });
+            let values = values.collect();
+            self.common.push((field, values));
+        }
+        self
     }
 
     /// Sets a weight for each reference; missing weights are 0.
@@ -49,6 +74,7 @@ impl<'a> VarianceReduction<'a> {
         let signal2 = hyperparameters.signal_sd.powi(2);
         let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();
         let scale = signal2 / self.references.len().max(1) as f64;
+        let mut common = self.common.clone();
         let mut covariances = vec![[0.0; MANY]; self.references.len()];
         let mut reductions = Vec::with_capacity(places.len());
         self.posterior.whitened(places, |solved, explained, count| {
@@ -60,11 +86,22 @@ impl<'a> VarianceReduction<'a> {
             }
             self.posterior.kernel().correlate(covariances.as_flattened_mut());
             subtract_products(&self.whitened, solved, &mut covariances);
+            let mut shared2 = [0.0; MANY];
+            for (field, at_references) in &mut common {
+                let at: [f64; MANY] =
+                    std::array::from_fn(|lane| field.value(block[lane.min(count - 1)]));
+                for (covariances, reference) in covariances.iter_mut().zip(at_references.iter()) {
+                    for lane in 0..MANY {
+                        covariances[lane] += reference * at[lane] / signal2;
+                    }
+                }
+                (0..MANY).for_each(|lane| shared2[lane] += at[lane] * at[lane] / signal2);
+            }
             let squares = weighted_squares(&covariances, &self.weights);
-            let falls = squares.iter().zip(explained).take(count);
-            reductions.extend(
-                falls.map(|(sum, explained)| scale * sum / ((1.0 - explained).max(0.0) + noise2)),
-            );
+            let falls = squares.iter().zip(explained).zip(shared2).take(count);
+            reductions.extend(falls.map(|((sum, explained), shared2)| {
+                scale * sum / ((1.0 - explained).max(0.0) + shared2 + noise2)
+            }));
         });
         reductions
     }

@@ -47,6 +47,7 @@ fn around(search: &mut Search, surface: &ImplicitSurface) -> Plan {
         let places = all.iter().map(|candidate| candidate.p_w.coords.as_slice());
         let places: Vec<&[f64]> = places.collect();
         let posterior = candidates.surface().posterior();
-        VarianceReduction::new(posterior, places.iter().copied()).at(&places)
+        let common = candidates.surface().pose_errors().iter().cloned();
+        VarianceReduction::new(posterior, places.iter().copied()).with_common(common).at(&places)
     })
 }

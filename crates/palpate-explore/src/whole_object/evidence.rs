@@ -4,8 +4,8 @@
 use super::settings::PriorShape;
 use crate::probe::{Contact, SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
-use crate::view::SeenSurface;
-use nalgebra::{Point3, Vector3};
+use crate::view::{RigidError, SeenSurface};
+use nalgebra::{DMatrix, Point3, Vector3};
 use palpate_geometry::implicit::Field;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
@@ -57,6 +57,15 @@ impl SweptPath {
             self.end.p_w - self.end.direction_w.scale(back_m)
         })
     }
+}
+
+/// What a belief takes the poses of cameras to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum CameraPose {
+    /// Those that registration to the contacts finds.
+    Registered,
+    /// Unknown but for their prior.
+    Uncertain,
 }
 
 /// Smallest standard deviation of a free point's field, as a fraction of its distance from the
@@ -125,7 +134,7 @@ impl TouchEvidence {
         &self,
         (prior, ball): (&PriorMean, &Ball),
         normals: bool,
-        noise_m: f64,
+        (noise_m, pose): (f64, CameraPose),
     ) -> Observations {
         let mut all = Observations::new(3);
         for Contact { p_wc: p_w, normal_w, has_normal, sd_m, .. } in &self.contacts {
@@ -138,7 +147,7 @@ impl TouchEvidence {
             all.push(&Observation { place, height: -field.value, noise, slope, known: None });
         }
         for number in 0..self.seen.len() {
-            self.push_seen((prior, ball.radius_m), number, noise_m, &mut all);
+            self.push_seen((prior, ball.radius_m), number, (noise_m, pose), &mut all);
         }
         let points: Vec<Point3<f64>> = self.points().collect();
         for (p_w, radius_m) in self.free(ball) {
@@ -164,17 +173,20 @@ impl TouchEvidence {
         &self,
         (prior, radius_m): (&PriorMean, f64),
         source: usize,
-        noise_m: f64,
+        (noise_m, pose): (f64, CameraPose),
         all: &mut Observations,
     ) {
         let before_m = BEFORE * radius_m;
         for (i, element) in self.seen[source].elements().enumerate() {
             // A surface that is seen too far out is inside of what was seen.
             let loadings = element.loadings.map(|loading| -loading);
-            let known =
-                Some(KnownError { variance: element.sd * element.sd, source, loadings: &loadings });
+            let (loadings, removed): (&[f64], f64) = match pose {
+                CameraPose::Uncertain => (&loadings, element.removed),
+                CameraPose::Registered => (&[], 0.0),
+            };
+            let known = Some(KnownError { variance: element.sd * element.sd, source, loadings });
             let mut push = |p_w: &Point3<f64>, field_m: f64, noise: f64| {
-                let height = field_m - element.removed - prior.field(p_w).value;
+                let height = field_m - removed - prior.field(p_w).value;
                 let place = p_w.coords.as_slice();
                 all.push(&Observation { place, height, noise, slope: None, known });
             };
@@ -184,6 +196,17 @@ impl TouchEvidence {
                 push(&free_w, before_m, (SURE * before_m / noise_m).max(1.0));
             }
         }
+    }
+
+    /// Registers each view to the contacts, and returns the errors of its camera's
+    /// pose, and their covariance in prior standard deviations.
+    pub(super) fn register(&mut self) -> Vec<(RigidError, DMatrix<f64>)> {
+        let contacts = &self.contacts;
+        let error = |seen: &mut SeenSurface| {
+            let (mean, covariance) = seen.register(contacts);
+            (seen.rigid_error(&mean, &covariance), covariance)
+        };
+        self.seen.iter_mut().map(error).collect()
     }
 }
 

@@ -1,21 +1,21 @@
 //! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
 //! inside (Williams & Fitzgibbon 2007).
 
-use super::evidence::{PriorMean, TouchEvidence};
+use super::evidence::{CameraPose, PriorMean, TouchEvidence};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
-use crate::view::{PoseErrors, RigidError, SeenSurface, View, found_by_touch};
-use nalgebra::{Point3, Vector3};
+use crate::view::{RigidError, SeenSurface, View};
+use nalgebra::{DMatrix, Point3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::kernel;
 use palpate_gp::kernel::{Kernel, Matern52};
 use palpate_gp::likelihood::Likelihood;
 use palpate_gp::math::optimize::compass;
-use palpate_gp::posterior::Scratch;
+use palpate_gp::means::MeanField;
 use palpate_gp::{
     Hyperparameters, MeanModel, NoiseRatio, Observations, Posterior, Range, SignalModel,
 };
@@ -37,6 +37,9 @@ pub struct ImplicitSurface {
     surface: Option<Surface>,
     #[serde(skip)]
     rigid_errors: Vec<RigidError>,
+    /// Covariance of the errors of each camera's pose, in prior standard deviations.
+    #[serde(skip)]
+    pose_covariances: Vec<DMatrix<f64>>,
 }
 
 /// Kernel in place of that of a stored belief.
@@ -67,10 +70,6 @@ const STEP_LAST: f64 = 0.1;
 // heuristic: as many as dozens of touches with their normals, whose cost the belief can bear.
 const SEEN: usize = 120;
 
-/// Largest number of linearisations of a view at its camera's errors.
-// heuristic: errors of 10 mm and 3° settle after three.
-const LINEARISATIONS: usize = 12;
-
 /// Distance from the ball's lowest height, in standard deviations of the camera's position, within
 /// which a view shows what the object stands on.
 const MARGIN_SIGMAS: f64 = 3.0;
@@ -80,8 +79,20 @@ impl ImplicitSurface {
     pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (TouchEvidence::default(), Vec::new());
-        let (fit, start, surface, rigid_errors) = (None, None, None, Vec::new());
-        Self { scope, settings, kernel, evidence, asked, fit, start, surface, rigid_errors }
+        let (fit, start, surface) = (None, None, None);
+        let (rigid_errors, pose_covariances) = (Vec::new(), Vec::new());
+        Self {
+            scope,
+            settings,
+            kernel,
+            evidence,
+            asked,
+            fit,
+            start,
+            surface,
+            rigid_errors,
+            pose_covariances,
+        }
     }
 
     /// Adds a touch at `aim` that followed `approach`, and the volume it swept; the belief changes
@@ -176,62 +187,38 @@ impl ImplicitSurface {
         start: Option<Hyperparameters>,
         fit: Fit,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
-        let hyperparameters = &fit.hyperparameters;
-        let mut found =
-            (prior, Posterior::new(self.kernel, hyperparameters.clone(), observations)?);
-        for _ in 0..LINEARISATIONS {
-            if !self.relinearise(&found) {
-                break;
-            }
-            let (prior, observations) = self.observations(start.as_ref());
-            let posterior = Posterior::new(self.kernel, hyperparameters.clone(), observations)?;
-            found = (prior, posterior);
-        }
-        let error = |(number, seen): (usize, &SeenSurface)| {
-            let (mean, covariance) = self.pose_errors(&found, number)?;
-            Some(seen.rigid_error(&mean, &covariance))
+        let given = match self.evidence.seen.is_empty() {
+            true => observations.clone(),
+            false => self.observations_given(start.as_ref(), CameraPose::Registered).1,
         };
-        self.rigid_errors = self.evidence.seen.iter().enumerate().filter_map(error).collect();
-        let (prior, mut posterior) = found;
+        let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), given)?;
+        let pose_errors = self.pose_errors(&posterior, &observations);
         posterior.inflate(self.settings.sd_inflation);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
         let points: Vec<Point3<f64>> = self.evidence.points().collect();
-        let surface = Surface::new(&self.scope, prior, posterior, (points.iter(), offset_m));
+        let surface =
+            Surface::new(&self.scope, prior, (posterior, pose_errors), (points.iter(), offset_m));
         self.start = start;
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
 
-    /// Linearises each view at the errors of its camera's pose, and the normals, of an estimate.
-    /// Returns whether that changes the observations.
-    fn relinearise(&mut self, found: &(PriorMean, Posterior)) -> bool {
-        let errors: Vec<Option<PoseErrors>> =
-            (0..self.evidence.seen.len()).map(|number| self.pose_errors(found, number)).collect();
-        let (prior, posterior) = found;
-        let (scratch, mut gradient) = (&mut Scratch::default(), [0.0; 3]);
-        let mut field_gradient = |p_w: &Point3<f64>| {
-            posterior.mean_gradient(p_w.coords.as_slice(), &mut gradient, scratch);
-            Some(prior.field(p_w).gradient + Vector3::from(gradient))
-        };
-        let mut is_changed = false;
-        for (seen, errors) in self.evidence.seen.iter_mut().zip(errors) {
-            is_changed |=
-                errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut field_gradient));
+    /// Returns the fields that the errors of the cameras' poses add to the mean of `given`, each
+    /// with a standard normal factor. `uncertain` are the same observations with these errors.
+    fn pose_errors(&self, given: &Posterior, uncertain: &Observations) -> Vec<MeanField> {
+        let mut fields = Vec::new();
+        for (number, covariance) in self.pose_covariances.iter().enumerate() {
+            let loadings = uncertain.loadings(number);
+            let Some(factor) = covariance.clone().cholesky() else { continue };
+            for error in factor.l().column_iter() {
+                let mut column = vec![0.0; uncertain.order()];
+                for (loadings, error) in loadings.iter().zip(error.iter()) {
+                    let terms = column.iter_mut().zip(loadings);
+                    terms.for_each(|(sum, loading)| *sum += error * loading);
+                }
+                fields.push(MeanField::response(given, column));
+            }
         }
-        is_changed
-    }
-
-    /// Returns the errors of the pose in view `number` that the touches have found.
-    fn pose_errors(
-        &self,
-        (prior, posterior): &(PriorMean, Posterior),
-        number: usize,
-    ) -> Option<PoseErrors> {
-        let hyperparameters = posterior.hyperparameters();
-        let mut seen = Observations::new(3);
-        let (radius_m, noise_m) = (self.stated_ball().radius_m, hyperparameters.noise_sd);
-        self.evidence.push_seen((prior, radius_m), number, noise_m, &mut seen);
-        let alone = Posterior::new(self.kernel, hyperparameters.clone(), seen).ok()?;
-        found_by_touch(&posterior.common_errors(number)?, &alone.common_errors(number)?)
+        fields
     }
 
     /// Returns the ball around all that was touched or seen.
@@ -240,25 +227,29 @@ impl ImplicitSurface {
         self.scope.estimated_ball(points.iter())
     }
 
-    /// Returns the points of contact, then those that cameras have seen by their stated poses. A
-    /// prior that followed the corrected poses would let them wander off with it.
-    fn stated_points(&self) -> Vec<Point3<f64>> {
-        let seen = self.evidence.seen.iter().flat_map(SeenSurface::stated);
-        self.contacts().copied().chain(seen).collect()
-    }
-
-    fn stated_ball(&self) -> Ball {
-        self.scope.estimated_ball(self.stated_points().iter())
-    }
-
     /// Returns the observations, in units of the noise of `last`.
-    fn observations(&self, last: Option<&Hyperparameters>) -> (PriorMean, Observations) {
-        let points = self.stated_points();
+    fn observations(&mut self, last: Option<&Hyperparameters>) -> (PriorMean, Observations) {
+        (self.rigid_errors, self.pose_covariances) = self.evidence.register().into_iter().unzip();
+        self.observations_given(last, CameraPose::Uncertain)
+    }
+
+    /// Returns the observations for these poses of the cameras.
+    ///
+    /// A Gaussian process that infers the poses itself is misled by its prior: the surface may fit
+    /// a smoother one if it is elsewhere. So the poses are those of registration, and their errors
+    /// are added to the deviations: a cut of the inference (Plummer 2015).
+    fn observations_given(
+        &self,
+        last: Option<&Hyperparameters>,
+        pose: CameraPose,
+    ) -> (PriorMean, Observations) {
+        let points = self.points();
         let ball = self.scope.estimated_ball(points.iter());
         let prior = PriorMean::about(self.settings.prior, &ball, points.iter());
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
         let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
-        let observations = self.evidence.observations((&prior, &ball), self.normals(), noise_m);
+        let observations =
+            self.evidence.observations((&prior, &ball), self.normals(), (noise_m, pose));
         (prior, observations)
     }
 

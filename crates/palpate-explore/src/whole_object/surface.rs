@@ -17,6 +17,9 @@ use palpate_gp::means::MeanField;
 pub struct Surface {
     prior: PriorMean,
     posterior: Posterior,
+    /// Fields that the errors of the cameras' poses add to the mean, each with a standard normal
+    /// factor.
+    pose_errors: Vec<MeanField>,
     contacts: Vec<Point3<f64>>,
     /// Standard deviation of the error common to all contacts.
     offset_m: f64,
@@ -45,7 +48,7 @@ impl Surface {
     pub(super) fn new<'a>(
         scope: &ExplorationSetup,
         prior: PriorMean,
-        posterior: Posterior,
+        (posterior, pose_errors): (Posterior, Vec<MeanField>),
         (contacts, offset_m): (impl Iterator<Item = &'a Point3<f64>>, f64),
     ) -> Self {
         let contacts: Vec<Point3<f64>> = contacts.copied().collect();
@@ -61,7 +64,7 @@ impl Surface {
                 ]
             }
         };
-        Self { prior, posterior, contacts, offset_m, bounds }
+        Self { prior, posterior, pose_errors, contacts, offset_m, bounds }
     }
 
     /// Returns an evaluator of its mean at many points.
@@ -73,7 +76,12 @@ impl Surface {
     pub fn sds_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
         let places: Vec<Vec<f64>> =
             points_w.iter().map(|p_w| p_w.coords.as_slice().into()).collect();
-        let variances = self.posterior.variances(&places, &mut []);
+        let mut variances = self.posterior.variances(&places, &mut []);
+        for mut error in self.pose_errors.iter().cloned() {
+            for (variance, place) in variances.iter_mut().zip(&places) {
+                *variance += error.value(place).powi(2);
+            }
+        }
         let offset2 = self.offset_m * self.offset_m;
         variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
     }
@@ -85,7 +93,13 @@ impl Surface {
         sds_m.map(|(sd_m, p_w)| sd_m / steepness(&field.at(p_w).gradient)).collect()
     }
 
-    /// The posterior of the field.
+    /// Returns the fields that the errors of the cameras' poses add to the mean, each with an
+    /// independent standard normal factor.
+    pub fn pose_errors(&self) -> &[MeanField] {
+        &self.pose_errors
+    }
+
+    /// The posterior of the field given the poses of the cameras.
     pub fn posterior(&self) -> &Posterior {
         &self.posterior
     }
