@@ -4,6 +4,7 @@ mod accuracy;
 mod benchmark;
 mod calibrate;
 mod calibrate_band;
+mod camera;
 mod check;
 mod choices;
 mod columns;

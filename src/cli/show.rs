@@ -1,5 +1,6 @@
 //! Command `palpate show`.
 
+use super::camera;
 use super::find::{SCENES, find, is_experiment};
 use super::output::Overwrite;
 use super::picture::picture;
@@ -32,6 +33,7 @@ Examples:
   palpate show scenes/container.toml --png container.png     a picture of the zone on the object
   palpate show scenes/bird_around_pa10.toml --png bird.png   reachable surface of a whole object
   palpate show scenes/bird_pa10.toml --render bird.png       the whole scene with its robot
+  palpate show scenes/container_camera.toml --camera view.png    what the depth camera sees
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy
   palpate show scenes/bird_pa10.toml --watch                 a trial of active in a window
@@ -59,6 +61,9 @@ pub(super) struct Args {
     /// Draw a scene's object with its zone, or the reachable surface of a whole object.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    /// Draw what the depth camera of a scene sees.
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
     /// Render a scene and its robot with MuJoCo (needs a build with `--features render`).
     #[arg(long, value_name = "FILE")]
     render: Option<PathBuf>,
@@ -86,6 +91,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         ("--mjcf", args.mjcf.is_some(), is_scene, "a scene (.toml)"),
         ("--png", args.png.is_some(), is_scene, "a scene (.toml)"),
         ("--render", args.render.is_some(), is_scene, "a scene (.toml)"),
+        ("--camera", args.camera.is_some(), is_scene, "a scene (.toml)"),
         ("--watch", args.watch.watch, is_toml, "a scene or an experiment (.toml)"),
         ("--json", args.json, is_folder, "a run's folder"),
         ("--set", !args.set.is_empty(), is_toml, "a scene or an experiment (.toml)"),
@@ -98,7 +104,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         ("--unit", args.unit.is_some(), is_mesh, "a mesh; in a scene use object.unit"),
     ];
     check_applicable(&path, &options)?;
-    for file in [&args.mjcf, &args.png, &args.render].into_iter().flatten() {
+    for file in [&args.mjcf, &args.png, &args.render, &args.camera].into_iter().flatten() {
         args.force.check_file(file)?;
     }
     if args.watch.watch {
@@ -151,6 +157,9 @@ fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
             picture(&environment, shape).context("--png: this scene has no object to draw")?;
         store::write_whole(path, png(&svg)?)?;
         text += &format!("picture: {}\n", path.display());
+    }
+    if let Some(path) = &args.camera {
+        text += &camera::draw(&environment, path)?;
     }
     if let Some(model) = mjcf::scene(&environment, mjcf::ModelPurpose::Picture) {
         text += &report_slow_steps(talk, |tell| {

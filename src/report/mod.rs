@@ -4,6 +4,7 @@ pub mod accuracy;
 pub mod animation;
 pub mod axes;
 pub mod benchmark;
+pub mod camera_view;
 pub mod canvas;
 pub mod check;
 pub mod compare;

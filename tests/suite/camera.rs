@@ -1,13 +1,15 @@
 //! Tests of depth cameras: exact depths, each error, the rigid error of the pose, and files.
 
 use crate::common::shipped::{environment, scene};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use palpate::config::Loader;
 use palpate::experiment::{Experiment, Simulation, real_robot};
 use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::probe::Touch;
-use palpate::explore::view::{RigidError, View, corrected_pose};
+use palpate::explore::probe::{Contact, Touch};
+use palpate::explore::view::{
+    CameraAccuracy, PixelNoise, PoseError, RigidError, SeenSurface, View, corrected_pose, thin,
+};
 use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
 use palpate::ros::settings::BackendKind;
@@ -169,6 +171,123 @@ fn the_rigid_error_is_found_within_its_deviation() {
         assert!(rms < 1.5, "{rms}");
         assert!(worst_mm < 1.5, "{worst_mm} mm");
     }
+}
+
+/// Registration to contacts on the seen part finds the errors of the pose within their stated
+/// deviations over 200 draws; contacts elsewhere say nothing. Of errors of 10 mm and 3°, which eight
+/// contacts hardly determine along a container, a few are far off.
+#[test]
+fn a_view_is_registered_to_contacts() {
+    for (position_m, turn_deg, least) in [(0.003, 0.7, 0.92), (0.010, 3.0, 0.88)] {
+        let errors = format!(
+            ", pixels = [240, 135], noise = {{}}, pose_error = {{ position_sd_m = [{position_m}, \
+             {position_m}, {position_m}], rotation_sd_deg = [{turn_deg}, {turn_deg}, {turn_deg}] }}"
+        );
+        let camera =
+            format!("camera={{ model = \"d405\", position_m = [0.15, -0.40, 0.6]{errors} }}");
+        let environment = environment("container_around.toml", &[&camera]);
+        let mesh = MeshBvh::new(environment.mesh().unwrap().clone());
+        let (mut squares, mut within, mut count) = (0.0, 0.0, 0.0);
+        for number in 0..200 {
+            let view = look(&environment, number);
+            let mut random = seed::stream(number, 0, "view");
+            let drawn: [f64; 6] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
+            let mut seen = SeenSurface::new(&view, (|_: &Point3<f64>| true, 120), |n| **n);
+            let (mean, covariance) = seen.register(&[]);
+            assert!(mean.amax() == 0.0 && covariance.is_identity(1e-12));
+            let contacts: Vec<Contact> = (0..8)
+                .filter_map(|_| {
+                    let p_c = view.points_c[random.random_range(0..view.points_c.len())];
+                    let ahead = view.x_wc.rotation * UnitVector3::new_normalize(p_c.coords);
+                    let eye_w = view.x_wc.translation.vector.into();
+                    mesh.ray(&eye_w, &ahead, 2.0).map(|hit| Contact::new(hit.point, hit.normal))
+                })
+                .collect();
+            let (mean, covariance) = seen.register(&contacts);
+            for i in 0..6 {
+                let off = (mean[i] - drawn[i]) / covariance[(i, i)].sqrt();
+                squares += off * off;
+                within += f64::from(u8::from(off.abs() < 1.96));
+                count += 1.0;
+            }
+        }
+        let rms = (squares / count).sqrt();
+        println!("{position_m} m, {turn_deg}°: {rms:.2} deviations, {:.3} within", within / count);
+        assert!(rms < 2.0 && within / count > least, "{rms} {}", within / count);
+    }
+}
+
+/// Small and large images of a plane keep most of their points, and its place as exactly as
+/// their noise allows.
+#[test]
+fn images_of_any_size_are_thinned() {
+    for side in [16_usize, 30, 45, 64, 90, 128, 200, 400] {
+        let mut random = seed::stream(side as u64, 0, "plane");
+        let noise = PixelNoise { noise_m: 1e-3, noise_ratio: 0.0, noise_px: 1 };
+        let place = |i: usize| (i as f64 - 0.5 * side as f64) / 340.0;
+        let point = |i: usize| {
+            let noise: f64 = StandardNormal.sample(&mut random);
+            Point3::from(
+                Vector3::new(place(i % side), place(i / side), 1.0) * (0.33 + 1e-3 * noise),
+            )
+        };
+        let points_c: Vec<Point3<f64>> = (0..side * side).map(point).collect();
+        let accuracy = CameraAccuracy { noise, pose_error: PoseError::NONE };
+        let (x_wc, pivot_w) = (Isometry3::identity(), Point3::origin());
+        let view = View { x_wc, points_c, pivot_w, accuracy };
+        let elements = thin(&view, |_| true, 120);
+        let kept: usize = elements.iter().map(|element| element.count).sum();
+        assert!(kept * 10 > side * side * 7, "{side}: {kept}");
+        assert!(elements.len() <= 168, "{side}: {}", elements.len());
+        for element in &elements {
+            let off = (element.p_c.z - 0.33) / element.sd_m;
+            assert!(off.abs() < 6.0, "{side}: {off}");
+        }
+    }
+}
+
+/// A view of a thin pole, a few pixels wide, has finite surface elements.
+#[test]
+fn a_pole_a_few_pixels_wide_is_seen() {
+    let mut random = seed::stream(4, 0, "pole");
+    for width in 1..8_usize {
+        let mut points_c = Vec::new();
+        for i in 0..width * 200 {
+            let noise: f64 = StandardNormal.sample(&mut random);
+            let ray = Vector3::new((i % width) as f64 / 340.0, (i / width) as f64 / 340.0, 1.0);
+            points_c.push(Point3::from(ray * (0.33 + 1e-3 * noise)));
+        }
+        let noise = PixelNoise { noise_m: 1e-3, noise_ratio: 0.0, noise_px: 1 };
+        let accuracy = CameraAccuracy { noise, pose_error: PoseError::NONE };
+        let (x_wc, pivot_w) = (Isometry3::identity(), Point3::origin());
+        let view = View { x_wc, points_c, pivot_w, accuracy };
+        for element in thin(&view, |_| true, 120) {
+            assert!(element.sd_m > 0.0 && element.sd_m.is_finite(), "{width}: {element:?}");
+            assert!(element.p_c.coords.iter().all(|x| x.is_finite()), "{width}: {element:?}");
+        }
+    }
+}
+
+/// Two views of a whole object leave much less error than the finger alone, and the row
+/// says where the cameras were.
+#[test]
+fn views_help_around_a_whole_object() {
+    let camera = "camera={ model = \"d405\", position_m = [0.2, -0.40, 0.68], noise = {}, \
+                  pose_error = {}, further = { behind = { position_m = [-0.2, -0.9, 0.32] } } }";
+    let scene = scene("container_around.toml", &[camera]);
+    let names = ["integrated_variance"];
+    let errors_mm = [0, 2].map(|views| {
+        let mut experiment = Experiment::with_defaults(&scene, &names, 1, 8);
+        (experiment.views, experiment.initial_touches) = (views, 2);
+        let simulation = Simulation::new(experiment).unwrap();
+        let row = simulation.trial(simulation.planner(names[0]).unwrap(), 0);
+        assert_eq!((&row.failure, row.views.len()), (&None, views as usize));
+        assert!(row.views.iter().all(|view| view.error.as_ref().unwrap().prior_sds < 4.0));
+        let shape = row.touches[7].shape.as_ref().unwrap();
+        1e3 * shape.chamfer_m.unwrap()
+    });
+    println!("{errors_mm:?}");
+    assert!(errors_mm[1] < 0.7 * errors_mm[0], "{errors_mm:?}");
 }
 
 /// Points that are anywhere, a twentieth of all, do not pull the surface.

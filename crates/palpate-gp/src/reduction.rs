@@ -123,7 +123,7 @@ widest_fn! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::Matern52;
+    use crate::kernel::{Kernel, Matern52};
     use crate::posterior::Scratch;
     use crate::{Hyperparameters, NoiseRatio, Observation, Slope};
     use proptest::prelude::*;
@@ -164,6 +164,65 @@ mod tests {
                 let twin = falls.sum::<f64>() / at.len() as f64;
                 prop_assert!((found - twin).abs() < 1e-10, "{found} {twin}");
             }
+        }
+
+        /// With errors in common, the reduction is that of the covariance k(a, b) + Σ φ(a)·φ(b).
+        #[test]
+        fn errors_in_common_are_reduced_too(
+            touches in prop::collection::vec((place(), -1.0..1.0), 2..20),
+            references in prop::collection::vec(place(), 1..10),
+            places in prop::collection::vec(place(), 1..20),
+        ) {
+            let mut observations = Observations::new(2);
+            touches.iter().for_each(|(at, _)| observations.push_height(at, at[0]));
+            let noise = NoiseRatio { height: 0.05, slope: 0.1, known: 0.0 };
+            let hyperparameters = Hyperparameters::new(2.0, vec![0.4, 0.7], noise, 0.0);
+            let posterior = Posterior::new(&Matern52, hyperparameters.clone(), observations).unwrap();
+            let column = touches.iter().map(|(_, change)| *change).collect();
+            let field = MeanField::response(&posterior, column);
+            let mut scratch = Scratch::default();
+            let mut covariance = |a: &[f64; 2], b: &[f64; 2]| {
+                let with_b = posterior.mean_with_correlations(b, &mut scratch).1.to_vec();
+                let explained = MeanField::response(&posterior, with_b).value(a);
+                let lengths = &hyperparameters.length_scales;
+                let mut prior = [(0..2).map(|i| ((a[i] - b[i]) / lengths[i]).powi(2)).sum()];
+                Matern52.correlate(&mut prior);
+                let mut shared = field.clone();
+                4.0 * (prior[0] - explained) + shared.value(a) * shared.value(b)
+            };
+            let asked: Vec<&[f64]> = places.iter().map(<[f64; 2]>::as_slice).collect();
+            let reduction =
+                VarianceReduction::new(&posterior, references.iter().map(<[f64; 2]>::as_slice))
+                    .with_common([field.clone()]);
+            for (place, found) in places.iter().zip(reduction.at(&asked)) {
+                let noise2 = hyperparameters.noise_sd.powi(2) + 4.0 * posterior.jitter();
+                let variance = covariance(place, place) + noise2;
+                let falls = references.iter().map(|at| covariance(at, place).powi(2) / variance);
+                let twin = falls.sum::<f64>() / references.len() as f64;
+                prop_assert!((found - twin).abs() < 1e-8 * (1.0 + twin), "{found} {twin}");
+            }
+        }
+
+        /// The response to a change of the observed heights is the change of the mean.
+        #[test]
+        fn a_response_is_the_change_of_the_mean(
+            touches in prop::collection::vec((place(), -1.0..1.0, -1.0..1.0), 2..20),
+            at in place(),
+        ) {
+            let noise = NoiseRatio { height: 0.05, slope: 0.1, known: 0.0 };
+            let hyperparameters = Hyperparameters::new(2.0, vec![0.4, 0.7], noise, 0.3);
+            let posterior = |share: f64| {
+                let mut observations = Observations::new(2);
+                for (place, height, change) in &touches {
+                    observations.push_height(place, height + share * change);
+                }
+                Posterior::new(&Matern52, hyperparameters.clone(), observations).unwrap()
+            };
+            let column = touches.iter().map(|(_, _, change)| *change).collect();
+            let response = MeanField::response(&posterior(0.0), column).value(&at);
+            let scratch = &mut Scratch::default();
+            let change = posterior(1.0).mean(&at, scratch) - posterior(0.0).mean(&at, scratch);
+            prop_assert!((response - change).abs() < 1e-9, "{response} {change}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Simulated depth camera: rays on the exact mesh, and the errors that the scene calls for.
 
 mod file;
+mod intrinsics;
 pub mod settings;
 
 pub use settings::CameraSettings;
@@ -78,15 +79,26 @@ impl CameraSettings {
         Ok(View { x_wc: stated, points_c, pivot_w, accuracy })
     }
 
-    /// Returns the vector (x/z, y/z, 1) along pixel `i`.
-    fn ray(&self, i: usize) -> Vector3<f64> {
+    /// Returns focal lengths and principal point, pixels.
+    fn intrinsics(&self) -> [f64; 4] {
         let [width, height] = self.pixels.map(|count| count as f64);
-        let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at as f64);
         let focal = 0.5 * width / (0.5 * self.fov_deg).to_radians().tan();
         // The middle of the image is between its pixels.
         let centred = [focal, focal, 0.5 * (width - 1.0), 0.5 * (height - 1.0)];
-        let [fx, fy, cx, cy] = self.intrinsics_px.unwrap_or(centred);
+        self.intrinsics_px.unwrap_or(centred)
+    }
+
+    /// Returns the vector (x/z, y/z, 1) along pixel `i`.
+    fn ray(&self, i: usize) -> Vector3<f64> {
+        let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at as f64);
+        let [fx, fy, cx, cy] = self.intrinsics();
         Vector3::new((column - cx) / fx, (row - cy) / fy, 1.0)
+    }
+
+    /// Returns the pixel, from the top left, of a point in the camera's frame.
+    pub fn pixel(&self, p_c: &Point3<f64>) -> [f64; 2] {
+        let [fx, fy, cx, cy] = self.intrinsics();
+        [fx * p_c.x / p_c.z + cx, fy * p_c.y / p_c.z + cy]
     }
 
     /// Draws where the camera is, and the scale of its depths; the inverse of the correction by

@@ -1,11 +1,14 @@
 //! Settings of a depth camera: where it is, its model, and the errors that a scene calls for.
 
+use super::intrinsics::{self, Intrinsics};
 use crate::sim::model_file;
 use crate::sim::unit::Unit;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use palpate_explore::view::{CameraAccuracy, PixelNoise, PoseError};
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
+use palpate_input::error::InputError;
+use palpate_input::files;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -238,6 +241,7 @@ impl CameraSettings {
         let places: Vec<String> =
             loader.table_mut(&further).into_iter().flat_map(|t| t.keys().cloned()).collect();
         places.iter().for_each(|name| loader.resolve_path(&format!("{further}.{name}.file")));
+        Self::resolve_intrinsics(loader, camera)?;
         let key = format!("{camera}.model");
         loader.resolve_path_ending(&key, ".toml");
         let Some(name) = loader.value(&key).and_then(Value::as_str).map(String::from) else {
@@ -249,6 +253,34 @@ impl CameraSettings {
         if let Some(table) = loader.table_mut(camera) {
             table.remove("model");
             model_file::overlay(table, &model);
+        }
+        Ok(())
+    }
+}
+
+impl CameraSettings {
+    /// Replaces the file under `intrinsics` by its numbers, unless the scene states them too.
+    fn resolve_intrinsics(loader: &mut Loader, camera: &str) -> Result<(), ConfigError> {
+        let key = format!("{camera}.intrinsics");
+        loader.resolve_path(&key);
+        let Some(name) = loader.value(&key).and_then(Value::as_str).map(String::from) else {
+            return Ok(());
+        };
+        let found = files::text(Path::new(&name), files::TEXT_MAX)
+            .map_err(|cause| InputError::new(format!("cannot be read: {cause}")))
+            .and_then(|text| intrinsics::parse(&text));
+        let Intrinsics { pixels, size } = found.map_err(|cause| {
+            let allowed = format!("a file of a camera's intrinsics ({cause})");
+            loader.not_allowed(&key, &format!("\"{name}\""), &allowed)
+        })?;
+        if let Some(table) = loader.table_mut(camera) {
+            table.remove("intrinsics");
+            let entry = table.entry("intrinsics_px");
+            entry.or_insert_with(|| pixels.map(Value::from).to_vec().into());
+            if let Some(size) = size {
+                let size = size.map(|count| Value::from(count as i64));
+                table.entry("pixels").or_insert_with(|| size.to_vec().into());
+            }
         }
         Ok(())
     }

@@ -11,12 +11,10 @@
 //! alone finds is therefore taken away from what a belief of the view and the touches finds.
 
 use super::{PoseError, SurfaceElement, View, thin};
-use crate::probe::Contact;
 use nalgebra::{
-    DMatrix, DVector, Isometry3, Point3, SMatrix, SVector, Translation3, UnitQuaternion,
-    UnitVector3, Vector3,
+    DMatrix, DVector, Isometry3, Point3, SVector, Translation3, UnitQuaternion, UnitVector3,
+    Vector3,
 };
-use palpate_gp::math::least_squares::huber_weight;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -26,30 +24,11 @@ pub const ERRORS: usize = 7;
 
 /// Change of an error, in standard deviations, below which its linearisation is kept.
 // heuristic: the remaining error is the square of it, far below a view's noise.
-const SETTLED: f64 = 0.02;
+pub(super) const SETTLED: f64 = 0.02;
 
 /// Relative change of a gradient below which it is kept.
 // heuristic: with an error of a few millimetres it shifts the surface by a tenth of one.
 const TURNED: f64 = 0.03;
-
-/// Largest number of rounds of a registration.
-// heuristic: several times the usual number.
-const REGISTRATIONS: usize = 20;
-
-/// Distance beside a contact up to which elements count, in spacings of the elements.
-// heuristic: the elements around it.
-const AROUND: f64 = 1.5;
-
-/// Prior standard deviations of the position up to which a contact may be off.
-const FAR: f64 = 4.0;
-
-/// Smallest cosine between the normals of a contact and an element of the same surface.
-// heuristic: between the two sides of a thin wall it is negative, around an edge small.
-const ALIKE: f64 = 0.7;
-
-/// Error of the chord's direction between an element and a contact, rad.
-// heuristic: of an element's normal by its noise.
-const SLANT: f64 = 0.1;
 
 /// Surface that one view shows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -59,7 +38,7 @@ pub struct SeenSurface {
     #[schemars(with = "[f64; 3]")]
     pivot_w: Point3<f64>,
     pose_error: PoseError,
-    elements: Vec<SurfaceElement>,
+    pub(super) elements: Vec<SurfaceElement>,
     /// Gradients in `W`, at the elements, of a field that is 0 on the surface and positive outside.
     /// They are those of the belief: the normals of a few points are so noisy that the camera would
     /// seem to be elsewhere, and a gradient of another length would fix where it is.
@@ -69,7 +48,7 @@ pub struct SeenSurface {
     is_believed: bool,
     /// Errors at which the view is linearised, in standard deviations.
     #[schemars(with = "[f64; ERRORS]")]
-    errors: SVector<f64, ERRORS>,
+    pub(super) errors: SVector<f64, ERRORS>,
 }
 
 /// An element of the surface, corrected by the errors at which a view is linearised, and what is
@@ -143,7 +122,7 @@ impl SeenSurface {
     }
 
     /// Standard deviation of each error.
-    fn sds(&self) -> SVector<f64, ERRORS> {
+    pub(super) fn sds(&self) -> SVector<f64, ERRORS> {
         let PoseError { position_sd_m, rotation_sd_deg, scale_sd } = self.pose_error;
         let turns = rotation_sd_deg.map(f64::to_radians);
         let sds = position_sd_m.into_iter().chain(turns).chain([scale_sd]);
@@ -151,7 +130,7 @@ impl SeenSurface {
     }
 
     /// Pose of the camera in `W`, corrected by the present errors.
-    fn corrected(&self) -> Isometry3<f64> {
+    pub(super) fn corrected(&self) -> Isometry3<f64> {
         let moved = self.errors.component_mul(&self.sds());
         let [shift, turn] =
             [0, 3].map(|row| self.x_wc.rotation * moved.fixed_rows::<3>(row).into_owned());
@@ -164,24 +143,33 @@ impl SeenSurface {
     }
 
     /// Depths that the camera states, over the true ones.
-    fn scale(&self) -> f64 {
+    pub(super) fn scale(&self) -> f64 {
         1.0 + self.errors[ERRORS - 1] * self.pose_error.scale_sd
+    }
+
+    /// Returns the change of a field with a gradient in `W` at a seen point, which is `away_w` from
+    /// the camera, per standard deviation of each error.
+    pub(super) fn loadings(
+        &self,
+        (p_w, away_w): (&Point3<f64>, &Vector3<f64>),
+        gradient_w: &Vector3<f64>,
+    ) -> SVector<f64, ERRORS> {
+        let turned_w = (p_w - self.pivot_w).cross(gradient_w);
+        let [along, turned] =
+            [gradient_w, &turned_w].map(|w| self.x_wc.rotation.inverse_transform_vector(w));
+        let scaled = gradient_w.dot(away_w);
+        let shifts = [along.x, along.y, along.z, turned.x, turned.y, turned.z, scaled];
+        SVector::from(shifts).component_mul(&self.sds())
     }
 
     /// Returns the surface elements, corrected and linearised at the present errors.
     pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
-        let (sds, x_wc, scale) = (self.sds(), self.corrected(), self.scale());
+        let (x_wc, scale) = (self.corrected(), self.scale());
         self.elements.iter().zip(&self.gradients_w).map(move |(element, gradient_w)| {
             let p_w = x_wc * Point3::from(element.p_c.coords / scale);
             let normal_w = x_wc.rotation * element.normal_c;
             let away = p_w.coords - x_wc.translation.vector;
-            let turned_w = (p_w - self.pivot_w).cross(gradient_w);
-            let along = self.x_wc.rotation.inverse_transform_vector(gradient_w);
-            let turned = self.x_wc.rotation.inverse_transform_vector(&turned_w);
-            let shifts = [along.x, along.y, along.z, turned.x, turned.y, turned.z];
-            let loadings = std::array::from_fn(|i| {
-                sds[i] * shifts.get(i).copied().unwrap_or(gradient_w.dot(&away))
-            });
+            let loadings: [f64; ERRORS] = self.loadings((&p_w, &away), gradient_w).into();
             let removed = |(loading, error): (&f64, &f64)| loading * error;
             let removed = loadings.iter().zip(&self.errors).map(removed).sum();
             let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
@@ -216,108 +204,6 @@ impl SeenSurface {
             self.gradients_w = gradients_w;
         }
         is_changed
-    }
-
-    /// Linearises at the errors of the camera's pose that `contacts` on the seen part find, and
-    /// returns them: each contact, a point of the surface with its normal and standard deviation,
-    /// lies on the surface between the elements around it.
-    ///
-    /// Gauss-Newton on the posterior of the errors given their prior, with contacts that are far
-    /// off counting less (Huber 1964). From an element with normal nₑ to a contact with normal n_c,
-    /// (nₑ + n_c)/2 is perpendicular to the chord of every quadratic surface.
-    pub fn register(&mut self, contacts: &[Contact]) -> PoseErrors {
-        let mut covariance = SMatrix::<f64, ERRORS, ERRORS>::identity();
-        self.errors = SVector::zeros();
-        for _ in 0..REGISTRATIONS {
-            let spacing_m = self.spacing_m();
-            let mut information = SMatrix::<f64, ERRORS, ERRORS>::identity();
-            let mut sum = SVector::<f64, ERRORS>::zeros();
-            for contact in contacts {
-                let Some((off_m, loadings, variance)) = self.offset(contact, spacing_m) else {
-                    continue;
-                };
-                let predicted = loadings.dot(&self.errors);
-                let weight = huber_weight(
-                    off_m / (variance + (covariance * loadings).dot(&loadings)).sqrt(),
-                ) / variance;
-                information += loadings * loadings.transpose() * weight;
-                sum += loadings * (weight * (off_m + predicted));
-            }
-            let Some(inverse) = information.try_inverse() else { break };
-            covariance = inverse;
-            let errors = covariance * sum;
-            let is_settled = (errors - self.errors).amax() < SETTLED;
-            self.errors = errors;
-            if is_settled {
-                break;
-            }
-        }
-        (
-            DVector::from_column_slice(self.errors.as_slice()),
-            DMatrix::from_column_slice(ERRORS, ERRORS, covariance.as_slice()),
-        )
-    }
-
-    /// Returns the median distance between an element and its nearest neighbour.
-    fn spacing_m(&self) -> f64 {
-        let nearest = |(i, element): (usize, &SurfaceElement)| {
-            let others = self.elements.iter().enumerate().filter(|(j, _)| *j != i);
-            others.map(|(_, other)| (other.p_c - element.p_c).norm()).fold(f64::INFINITY, f64::min)
-        };
-        let mut all: Vec<f64> = self.elements.iter().enumerate().map(nearest).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(0.0)
-    }
-
-    /// Returns how far the seen surface is outside of a contact, its change by the errors, and its
-    /// variance; `None` if the contact is not on the seen part.
-    fn offset(
-        &self,
-        contact: &Contact,
-        spacing_m: f64,
-    ) -> Option<(f64, SVector<f64, ERRORS>, f64)> {
-        let (sds, x_wc, scale) = (self.sds(), self.corrected(), self.scale());
-        let contact_sd_m = contact.sd_m.unwrap_or(0.0);
-        let (mut off, mut loadings, mut weights) = (0.0, SVector::<f64, ERRORS>::zeros(), 0.0);
-        for element in &self.elements {
-            let p_w = x_wc * Point3::from(element.p_c.coords / scale);
-            let away = contact.p_wc - p_w;
-            let fitted_w = x_wc.rotation * element.normal_c;
-            if away.norm() > AROUND * spacing_m + FAR * sds.rows(0, 3).max() {
-                continue;
-            }
-            if contact.has_normal && fitted_w.dot(&contact.normal_w) < ALIKE {
-                continue;
-            }
-            let measured_w = if contact.has_normal { contact.normal_w } else { *fitted_w };
-            let normal_w = (fitted_w.into_inner() + measured_w).normalize();
-            let along_m = normal_w.dot(&away);
-            let beside_m = (away - normal_w * along_m).norm();
-            if beside_m > AROUND * spacing_m {
-                continue;
-            }
-            let ray = p_w.coords - x_wc.translation.vector;
-            let sd_m = element.sd_m * ray.normalize().dot(&normal_w).abs();
-            let weight = 1.0 / (sd_m.powi(2) + (SLANT * beside_m).powi(2));
-            let turned_w = (p_w - self.pivot_w).cross(&normal_w);
-            let along = self.x_wc.rotation.inverse_transform_vector(&normal_w);
-            let turned = self.x_wc.rotation.inverse_transform_vector(&turned_w);
-            let shifts = SVector::<f64, ERRORS>::from_column_slice(&[
-                along.x,
-                along.y,
-                along.z,
-                turned.x,
-                turned.y,
-                turned.z,
-                normal_w.dot(&ray),
-            ]);
-            off -= weight * along_m;
-            loadings += shifts.component_mul(&sds) * weight;
-            weights += weight;
-        }
-        (weights > 0.0).then(|| {
-            (off / weights, loadings / weights, 1.0 / weights + contact_sd_m * contact_sd_m)
-        })
     }
 
     /// Returns the errors of the camera's pose from their posterior mean and covariance, in prior

@@ -26,23 +26,22 @@ pub struct SurfaceElement {
     pub count: usize,
 }
 
-/// Number of levels of the quadtree below the whole image, and of that with the largest cells.
+/// Number of levels of the quadtree below the whole image.
 // heuristic: an image of 640 × 480 has five pixels along the side of the smallest cells.
 const LEVELS: u32 = 7;
-const COARSEST: u32 = 3;
 
 /// Largest number of elements, over that up to which cells are divided that are already explained.
 // heuristic: what is not explained is where the details are.
 const MOST: f64 = 1.4;
 
-/// Fewest points of a cell, and largest number that is fitted; the others only reduce the noise.
+/// Fewest points of a cell, and largest number that is fitted.
 // heuristic: twice the surface's coefficients; enough to find its misfit.
 const LEAST: usize = 12;
 const FITTED: usize = 256;
 
 /// Fewest points of a cell that is divided although its surface is explained.
-// heuristic: its quarters have twice the fewest points on average, and few are lost.
-const DIVIDED: usize = 8 * LEAST;
+// heuristic: its quarters have the fewest points on average.
+const DIVIDED: usize = 4 * LEAST;
 
 /// Robust standard deviations beyond which a point is an outlier, and largest part of a cell's
 /// points that may be outliers; with more it shows an edge.
@@ -72,11 +71,7 @@ pub fn thin(
 ) -> Vec<SurfaceElement> {
     let most = (MOST * enough as f64) as usize;
     let mut image = Image::new(view, wanted);
-    let mut leaves: Vec<Leaf> = Vec::new();
-    let side = 1 << COARSEST;
-    for cell in 0..side * side {
-        leaves.extend(image.leaf(COARSEST, cell));
-    }
+    let mut leaves: Vec<Leaf> = image.leaf(0, 0).into_iter().collect();
     // The worst explained cells first, then the largest.
     loop {
         let count = leaves.iter().filter(|leaf| leaf.element.is_some()).count();
@@ -232,12 +227,16 @@ impl<'a> Image<'a> {
         // All points of the cell count, those with equal noise once; a fit to fewer than its
         // coefficients is no better than a point.
         let equal = (noise.noise_px * noise.noise_px) as f64;
-        let independent = (share * count as f64 / equal).max(1.0);
-        let left = ((part * n) / independent).min(1.0);
+        let independent = (share * count as f64 / equal).min(n).max(1.0);
+        // Of a row of pixels rounding leaves nothing of a surface's variance.
+        let left = if part > 0.0 { (part * n / independent).min(1.0) } else { 1.0 };
         let variance_m2 = scatter2.max(noise_m * noise_m) * left + 0.25 * misfit2;
         let sd_m = variance_m2.sqrt() * ray.norm();
         let misfit = misfit2.sqrt() / noise_m.max(1e-6);
         let p_c = Point3::from(ray * z);
+        if !(sd_m.is_finite() && p_c.coords.iter().all(|x| x.is_finite())) {
+            return None;
+        }
         Some((SurfaceElement { p_c, normal_c, sd_m, count }, misfit))
     }
 }
