@@ -1,5 +1,5 @@
-//! Registration of a seen surface to contacts: the errors of the camera's pose, from the contacts on
-//! the part that it has seen.
+//! Registration of a seen surface to contacts: the errors of the camera's pose, from the contacts
+//! on the part that it has seen.
 
 use super::seen::{ERRORS, PoseErrors, SETTLED, SeenSurface};
 use crate::probe::Contact;
@@ -26,8 +26,8 @@ const ALIKE: f64 = 0.7;
 // heuristic: of an element's normal by its noise.
 const SLANT: f64 = 0.1;
 
-/// What a contact says: how far outside of it the seen surface is, the change of that by each of
-/// the errors, and its variance.
+/// Offset of the seen surface outwards from a contact, its change by each of the errors, and its
+/// variance.
 struct Offset {
     off_m: f64,
     loadings_m: SVector<f64, ERRORS>,

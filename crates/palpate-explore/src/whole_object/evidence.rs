@@ -59,7 +59,7 @@ impl SweptPath {
     }
 }
 
-/// What a belief takes the poses of cameras to be.
+/// Poses of cameras that a belief assumes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CameraPose {
     /// Those that registration to the contacts finds.
