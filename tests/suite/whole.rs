@@ -52,7 +52,7 @@ fn last_share(row: &TrialRow) -> f64 {
 
 /// The surface after the touches of a row.
 fn surface(simulation: &Simulation, row: &TrialRow) -> Surface {
-    let belief = whole_object::belief(simulation.experiment(), &row, row.touches.len() as u32)
+    let belief = whole_object::belief(simulation.experiment(), row, row.touches.len() as u32)
         .unwrap()
         .unwrap();
     belief.surface().unwrap().clone()
