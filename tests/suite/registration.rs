@@ -164,6 +164,44 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// The nearest point of a rigid finger's capsule is that of its slow twin, among points all over
+    /// the outline.
+    #[test]
+    fn the_nearest_point_of_a_capsule_is_exact(
+        centre in (-0.015..0.04, -0.04..0.04, -0.04..0.04),
+        normal in prop::array::uniform3(-1.0..1.0_f64),
+        is_ball: bool,
+    ) {
+        let outline = FingerOutline::new(&pa10(false));
+        let (x, y, z) = centre;
+        let normal_w = Vector3::from(normal);
+        prop_assume!(Vector3::new(x, y, z).norm() > 0.015 && normal_w.norm() > 0.1);
+        // From before the finger: its heel is not part of the outline.
+        let normal_w = UnitVector3::new_normalize(Vector3::new(-normal_w.x.abs(), normal_w.y, normal_w.z));
+        let body = match is_ball {
+            true => CalibrationBody::Ball { centre_w: Point3::new(x, y, z), radius_m: 5e-3 },
+            false => CalibrationBody::Plate { point_w: Point3::new(x, y, z), normal_w },
+        };
+        let x_wt = Isometry3::identity();
+        let (p_t, distance_m) = outline.nearest(&body, &x_wt);
+        prop_assert!((body.distance_m(&p_t) - distance_m).abs() < 1e-12);
+        let (length_m, radius_m) = (outline.length_m(), outline.radius_m());
+        let places = (0..300).flat_map(|i| (0..300).map(move |j| (f64::from(i), f64::from(j))));
+        let twin_m = places
+            .map(|(i, j)| {
+                let along_m = (i + 0.5) / 300.0 * (length_m + radius_m) - length_m;
+                let turn = j / 300.0 * std::f64::consts::TAU;
+                body.distance_m(&outline.at(along_m, turn).0)
+            })
+            .fold(f64::INFINITY, f64::min);
+        prop_assert!(distance_m <= twin_m + 1e-9, "{distance_m} {twin_m}");
+        prop_assert!(distance_m > twin_m - 2e-4, "{distance_m} {twin_m}");
+    }
+}
+
 /// The more compliant a finger, the farther it moves, also for negative compliance; a fit that
 /// tries negative values recovers.
 #[test]

@@ -118,10 +118,6 @@ impl CalibrationBody {
 const ALONG: usize = 48;
 const AROUND: usize = 64;
 
-/// Fraction of the point spacing to which a rigid finger's nearest point is refined; a heuristic:
-/// the square of it is the error of the distance, in fractions of a millimetre.
-const REFINED: f64 = 1e-5;
-
 /// Largest distance of a point behind the foremost for contact, as a fraction of the radius; a
 /// heuristic: no readable contact is as deep.
 const DEEPEST: f64 = 0.5;
@@ -143,8 +139,6 @@ pub struct FingerOutline {
 
 #[derive(Clone, Debug)]
 struct Sample {
-    /// Coordinates: m along the finger, rad around it.
-    place: [f64; 2],
     p_t: Point3<f64>,
     area_m2: f64,
     /// Whether there is fluid under the skin.
@@ -178,7 +172,7 @@ impl FingerOutline {
         let (start, direction) = self.profile.ray(x_m, turn);
         let wet = self.profile.layers(start.x, &direction).has_fluid;
         let area_m2 = along.cross(&around).norm();
-        Sample { place, p_t: self.profile.skin_t(x_m, turn), area_m2, wet }
+        Sample { p_t: self.profile.skin_t(x_m, turn), area_m2, wet }
     }
 
     /// Returns the vectors across a surface element, along the finger and around it.
@@ -263,33 +257,42 @@ impl FingerOutline {
     }
 
     /// Returns the outline's point nearest to `body` for the fingertip pose `x_wt`, and its signed
-    /// distance; negative inside.
+    /// distance; negative inside. It is exact for the capsule of a rigid finger, and one of the
+    /// samples for a soft one.
     pub fn nearest(&self, body: &CalibrationBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
-        let far = |p_t: &Point3<f64>| body.distance_m(&(x_wt * p_t));
-        let first = |best: ([f64; 2], f64), point: &Sample| {
-            let distance_m = far(&point.p_t);
-            if distance_m < best.1 { (point.place, distance_m) } else { best }
-        };
-        let (mut place, mut distance_m) = self.points.iter().fold(([0.0; 2], f64::INFINITY), first);
-        let at = |[x_m, turn]: [f64; 2]| {
-            let x_m = x_m.clamp(-self.profile.length_m, self.profile.radius_m);
-            self.profile.skin_t(x_m, turn)
-        };
-        let mut part = 0.5;
-        while part > REFINED {
-            let around = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-            let tried = around.map(|[along, across]| {
-                let step = [along * self.steps[0] * part, across * self.steps[1] * part];
-                let place = [place[0] + step[0], place[1] + step[1]];
-                (place, far(&at(place)))
-            });
-            let better = tried.into_iter().filter(|(_, tried_m)| *tried_m < distance_m);
-            match better.min_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some(better) => (place, distance_m) = better,
-                None => part *= 0.5,
-            }
+        if !self.is_soft {
+            return self.nearest_of_capsule(body, x_wt);
         }
-        (at(place), distance_m)
+        let first = |best: (Point3<f64>, f64), point: &Sample| {
+            let distance_m = body.distance_m(&(x_wt * point.p_t));
+            if distance_m < best.1 { (point.p_t, distance_m) } else { best }
+        };
+        self.points.iter().fold((Point3::origin(), f64::INFINITY), first)
+    }
+
+    /// Returns the point of the capsule nearest to `body`, and its signed distance: its axis ends
+    /// at the origin of `T`.
+    fn nearest_of_capsule(
+        &self,
+        body: &CalibrationBody,
+        x_wt: &Isometry3<f64>,
+    ) -> (Point3<f64>, f64) {
+        let (length_m, radius_m) = (self.profile.length_m, self.profile.radius_m);
+        let on_axis = |x_m: f64| Point3::new(x_m.clamp(-length_m, 0.0), 0.0, 0.0);
+        let (axis_t, towards_t) = match body {
+            CalibrationBody::Ball { centre_w, .. } => {
+                let centre_t = x_wt.inverse_transform_point(centre_w);
+                let axis_t = on_axis(centre_t.x);
+                (axis_t, centre_t - axis_t)
+            }
+            CalibrationBody::Plate { normal_w, .. } => {
+                let towards_t = -x_wt.inverse_transform_vector(normal_w);
+                (on_axis(if towards_t.x < 0.0 { -length_m } else { 0.0 }), towards_t)
+            }
+        };
+        let towards_t = towards_t.try_normalize(0.0).unwrap_or(-Vector3::z());
+        let p_t = axis_t + towards_t * radius_m;
+        (p_t, body.distance_m(&(x_wt * p_t)))
     }
 
     /// Returns the pad before the hull, and its pose in `T`.
