@@ -123,17 +123,10 @@ impl<'a> HandEyeFit<'a> {
         depths.sort_by(f64::total_cmp);
         let median_m = DEPTH_SD_M * depths.get(depths.len() / 2).unwrap_or(&0.0);
         let indentation_m = start.indentation_m - median_m;
-        let fits = [start, HandEyeEstimate { indentation_m, ..start }].map(|s| robust(self, &s));
-        let [first, second] = fits;
-        let (best, _) = match (first, second) {
-            (Ok(first), Ok(second)) => {
-                if second.1 < first.1 {
-                    second
-                } else {
-                    first
-                }
-            }
-            (first, second) => first.or(second)?,
+        let starts = [start, HandEyeEstimate { indentation_m, ..start }];
+        let (best, _) = match starts.map(|start| robust(self, &start)) {
+            [Ok(first), Ok(second)] if second.1 < first.1 => second,
+            [first, second] => first.or(second)?,
         };
         fit(self, &best)
     }

@@ -187,15 +187,19 @@ impl ImplicitSurface {
         start: Option<Hyperparameters>,
         fit: Fit,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
-        let given = match self.evidence.seen.is_empty() {
-            true => observations.clone(),
-            false => self.observations_given(start.as_ref(), CameraPose::Registered).1,
+        let posterior = |all| Posterior::new(self.kernel, fit.hyperparameters.clone(), all);
+        let (mut posterior, pose_errors) = match self.evidence.seen.is_empty() {
+            true => (posterior(observations)?, Vec::new()),
+            false => {
+                let (_, all) = self.observations_given(start.as_ref(), CameraPose::Registered);
+                let given = posterior(all)?;
+                let errors = self.pose_errors(&given, &observations);
+                (given, errors)
+            }
         };
-        let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), given)?;
-        let pose_errors = self.pose_errors(&posterior, &observations);
         posterior.inflate(self.settings.sd_inflation);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
-        let points: Vec<Point3<f64>> = self.evidence.points().collect();
+        let points = self.points();
         let surface =
             Surface::new(&self.scope, prior, (posterior, pose_errors), (points.iter(), offset_m));
         self.start = start;
@@ -223,8 +227,7 @@ impl ImplicitSurface {
 
     /// Returns the ball around all that was touched or seen.
     fn estimated_ball(&self) -> Ball {
-        let points: Vec<Point3<f64>> = self.evidence.points().collect();
-        self.scope.estimated_ball(points.iter())
+        self.scope.estimated_ball(self.points().iter())
     }
 
     /// Returns the observations, in units of the noise of `last`.
