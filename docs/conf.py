@@ -42,52 +42,18 @@ napoleon_numpy_docstring = False
 # `like this` in a docstring.
 default_role = "code"
 
-# What the sidebar lists. The index is a page of its own that is read on a forge too.
-CONTENTS = """
+# The sidebar beside the pages that the index links in its lists, which a forge shows without a sidebar.
+PROJECT = ["../README", "../models/SOURCE", "../models/pa10/SOURCE"]
 
-```{toctree}
-:hidden:
-:caption: Guide
-install
-first-experiment
-your-object
-your-planner
-your-robot
-arms
-safety
-results
-benchmark
-many-runs
-physics
-whole-objects
-python
-python-reference
-reference
-faq
-```
 
-```{toctree}
-:hidden:
-:caption: Background
-belief
-finger
-paper
-validation
-hard-cases
-```
-
-```{toctree}
-:hidden:
-:caption: The project
-../README
-../experiments/README
-../models/SOURCE
-../models/pa10/SOURCE
-../ARCHITECTURE
-../CONTRIBUTING
-../CHANGELOG
-```
-"""
+def contents(index):
+    """The sidebar: for each section of the index, the pages that its list links."""
+    for title, text in re.findall(r"^## (.*)\n((?:(?!## ).*\n?)*)", index, re.MULTILINE):
+        items = "\n".join(line for line in text.splitlines() if line.startswith("- "))
+        pages = re.findall(r"\]\(([^)#]+)\.md\)", items)
+        if pages:
+            yield title, pages
+    yield "The project", PROJECT
 
 
 # The command for the Rust API in the index, and the link that replaces it: the site contains the API.
@@ -96,11 +62,13 @@ RUST_LINK = '<a href="../rust/palpate/index.html">Rust</a>'
 
 
 def add_contents(app, docname, source):
-    """Links the Rust API from the index, and appends the sidebar's list."""
+    """Links the Rust API from the index, and appends the sidebar."""
     if docname == root_doc:
         if RUST_COMMAND not in source[0]:
             raise ExtensionError(f"{docname} lacks the text {RUST_COMMAND}")
-        source[0] = source[0].replace(RUST_COMMAND, RUST_LINK) + CONTENTS
+        source[0] = source[0].replace(RUST_COMMAND, RUST_LINK)
+        for title, pages in contents(source[0]):
+            source[0] += "\n".join(["\n```{toctree}", ":hidden:", f":caption: {title}", *pages, "```\n"])
 
 
 # Docstrings of attributes as they are written, by name.
