@@ -315,7 +315,7 @@ fn checked_trial(run: &Run, args: &Args) -> anyhow::Result<(u32, u32)> {
             _ => bail!("{asked}: {planner} has finished no trial"),
         }
     };
-    let (first, last) = (run.experiment.initial_touches, row.touches.len() as u32);
+    let (first, last) = (run.experiment.first_fit(), row.touches.len() as u32);
     let touches = args.touches.unwrap_or(last);
     ensure!(
         (first..=last).contains(&touches),

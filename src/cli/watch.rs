@@ -141,6 +141,10 @@ impl Probe for ReportingProbe {
     fn time_s(&self) -> Option<f64> {
         self.servo.time_s()
     }
+
+    fn rest(&mut self, time_s: f64) {
+        self.servo.rest(time_s);
+    }
 }
 
 fn ending(row: &TrialRow) -> String {

@@ -47,6 +47,10 @@ pub struct Experiment {
     /// Views of the scene's camera before the touches.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub views: u32,
+    /// Largest number of further views, from other places of the camera, that a planner may ask for
+    /// between its touches.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub further_views: u32,
     /// Held-out touches after the trial's `touches`, at low-discrepancy places: they test the
     /// predictions of the belief without ground truth.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -131,6 +135,7 @@ impl Experiment {
             initial_touches: 5.min(touches),
             touches,
             views: 0,
+            further_views: 0,
             verification_touches: 0,
             repeat_touches: 0,
             grid: GRID,
@@ -275,7 +280,7 @@ impl Experiment {
     /// Number of touches of a baseline whose error is the goal of the other planners.
     pub fn goal_touches(&self) -> u32 {
         let goal = self.report.goal_touches.unwrap_or(self.touches);
-        goal.clamp(self.initial_touches, self.touches)
+        goal.clamp(self.first_fit(), self.touches)
     }
 
     /// Touch counts in tables: those drawn, and the last.
@@ -285,6 +290,11 @@ impl Experiment {
             counts.push(self.touches);
         }
         counts
+    }
+
+    /// Number of touches after which rows have the first fit.
+    pub fn first_fit(&self) -> u32 {
+        self.initial_touches.max(1)
     }
 
     /// Whether the belief after `count` touches is compared with the ground truth. Around a whole
@@ -393,10 +403,13 @@ impl Validate for Experiment {
         let least = if self.views > 0 { 0.0 } else { 1.0 };
         rules.number("initial_touches", self.initial_touches.into(), least..=self.touches.into());
         rules.number("views", self.views.into(), 0.0..=VIEWS_MAX);
+        rules.number("further_views", self.further_views.into(), 0.0..=VIEWS_MAX);
         let can_look = self.scene.camera.is_some();
-        rules.require("views", self.views, self.views == 0 || can_look, || {
-            "0, or a scene with a table [camera]".into()
-        });
+        for (key, views) in [("views", self.views), ("further_views", self.further_views)] {
+            rules.require(key, views, views == 0 || can_look, || {
+                "0, or a scene with a table [camera]".into()
+            });
+        }
         rules.number("verification_touches", self.verification_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("repeat_touches", self.repeat_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("grid", self.grid.into(), 2.0..=2001.0);

@@ -38,7 +38,9 @@ pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> 
         interlocks.workspace_m.is_some(),
     ));
     let has_view = scene.camera.as_ref().is_none_or(|camera| {
-        (0..experiment.views as usize).all(|number| camera.at(number).file.is_some())
+        let asked = if experiment.further_views > 0 { camera.further.len() + 1 } else { 0 };
+        let views = asked.max(experiment.views as usize);
+        (0..views).all(|number| camera.at(number).file.is_some())
     });
     needed.push(("scene.camera.file", "\"view.ply\"    # of the real camera", has_view));
     needed.retain(|(_, _, is_given)| !is_given);

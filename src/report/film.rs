@@ -80,7 +80,7 @@ pub fn counts(run: &Run, row: &TrialRow, last: u32) -> Vec<u32> {
         let is_fitted = touch.is_some_and(|touch| touch.fit.is_some());
         is_fitted && (count == last || experiment.is_evaluated(count))
     };
-    let all: Vec<u32> = (experiment.initial_touches..=last).filter(is_drawn).collect();
+    let all: Vec<u32> = (experiment.first_fit()..=last).filter(is_drawn).collect();
     let step = all.len().saturating_sub(1).div_ceil(FRAMES_MAX - 1).max(1);
     let mut counts: Vec<u32> = all.iter().rev().step_by(step).copied().collect();
     if counts.last() != all.first() {
@@ -245,7 +245,7 @@ impl<'a> FilmLayout<'a> {
             colour: style::planner(&experiment.planners, &row.planner),
             trial: rank_words(run, &row.planner, row.trial),
             touches: experiment.touches,
-            errors: (experiment.initial_touches..=last).filter_map(error).collect(),
+            errors: (experiment.first_fit()..=last).filter_map(error).collect(),
             panel_px,
             width_px: (panel_px[0] * panels as f64).max(WIDTH_MIN_PX),
             has_bar: run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),

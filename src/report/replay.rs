@@ -61,7 +61,7 @@ impl<'a> BeliefReplay<'a> {
         let finger = &experiment.scene.finger;
         let belief = HeightField::new(zone.clone(), experiment.gp.clone());
         let mut belief = belief.with_finger(finger.clone());
-        for view in &row.views {
+        for view in row.views.iter().filter(|view| view.after < count) {
             belief.observe_seen(view.seen.clone());
         }
         for touch in touches {

@@ -37,7 +37,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     }
     let truth = truth(run);
     let planners = experiment.drawn_planners();
-    let counts = counts(experiment.initial_touches, experiment.touches, planners.len(), TRIANGLES);
+    let counts = counts(experiment.first_fit(), experiment.touches, planners.len(), TRIANGLES);
     let sequences = sequences(run, &planners, &counts, truth.as_ref())?;
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
     solid::section(&sequences, mesh, experiment.report.trial)
@@ -160,7 +160,7 @@ pub fn belief(
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
     let scope = ExplorationSetup::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
-    for view in &row.views {
+    for view in row.views.iter().filter(|view| view.after < count) {
         belief.observe_seen(view.seen.clone());
     }
     for touch in touches {

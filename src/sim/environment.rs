@@ -14,7 +14,7 @@ use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
-use palpate_explore::view::View;
+use palpate_explore::view::{Offer, View};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::holes::{Hole, find_holes};
 use palpate_geometry::implicit::ImplicitSolid;
@@ -214,16 +214,31 @@ impl Environment {
         else {
             return Err(missing_part("camera, or no object,"));
         };
-        let middle_w = match self.task.region() {
+        let middle_w = self.middle_w();
+        let arm = self.robot().filter(|_| camera.is_hidden_by_arm && self.arm.is_some());
+        let capsules_w = arm.as_ref().map(capsules_at_home).unwrap_or_default();
+        camera.at(number).look(&VisibleScene { object: bvh, middle_w, capsules_w }, rng)
+    }
+
+    /// Returns the looks of the scene's camera but those with the numbers `taken`; a touch takes
+    /// `touch_s`.
+    pub fn offers(&self, taken: &[u32], touch_s: f64) -> Vec<Offer> {
+        let Some(camera) = &self.scene.camera else { return Vec::new() };
+        let numbers = (0..=camera.further.len() as u32).filter(|number| !taken.contains(number));
+        let offer =
+            |number: u32| camera.at(number as usize).offer(number, &self.middle_w(), touch_s);
+        numbers.map(offer).collect()
+    }
+
+    /// Middle of the region in `W`.
+    fn middle_w(&self) -> Point3<f64> {
+        match self.task.region() {
             Region::Ball(ball) => ball.centre_w,
             Region::Zone(zone) => {
                 let [near_m, far_m] = self.task.depth_m();
                 zone.x_wz() * zone.local(&zone.at(&[0.5, 0.5]), -0.5 * (near_m + far_m))
             }
-        };
-        let arm = self.robot().filter(|_| camera.is_hidden_by_arm && self.arm.is_some());
-        let capsules_w = arm.as_ref().map(capsules_at_home).unwrap_or_default();
-        camera.at(number).look(&VisibleScene { object: bvh, middle_w, capsules_w }, rng)
+        }
     }
 
     /// Returns the arm or stage with its finger; `None` for a function.

@@ -109,7 +109,7 @@ pub fn equal_error<'a>(
 
 /// Touch counts, from the last initial touch on, after which beliefs are compared.
 fn compared(experiment: &Experiment) -> Vec<u32> {
-    let counts = experiment.initial_touches..=experiment.touches;
+    let counts = experiment.first_fit()..=experiment.touches;
     counts.filter(|&count| experiment.is_evaluated(count)).collect()
 }
 

@@ -73,7 +73,7 @@ pub struct EventCounts {
 
 /// Curve of one planner, from its first fit to its last touch.
 pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<CurvePoint> {
-    (experiment.initial_touches..=experiment.touches)
+    (experiment.first_fit()..=experiment.touches)
         .filter_map(|touches| {
             let fitted = fitted(rows, planner, touches);
             let of = |measure: &Measure| -> Vec<f64> {

@@ -1,6 +1,7 @@
 //! A trial, Algorithm 1 of Yi et al. 2016: touch, fit and plan in a loop; and its row.
 
 mod belief_shape;
+mod looks;
 mod oracle;
 pub mod planner_names;
 pub mod recorded_trial;
@@ -12,16 +13,16 @@ pub mod view;
 pub(super) use oracle::{GroundTruth, OracleFactory};
 
 use self::belief_shape::{BelievedShape, shape};
-use self::row::{TouchRow, TrialRow, ViewRow};
+use self::looks::Looks;
+use self::row::{TouchRow, TrialRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
-use palpate_explore::planner::{self, Fallback, Plan, PlannerFactory};
+use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Approach, Target, Task};
-use palpate_explore::view::View;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 use std::cell::OnceCell;
@@ -126,26 +127,27 @@ fn run_touches(
     let writes_normals = experiment.gp.normals || is_around;
     let uses_tips = experiment.gp.free_space || experiment.gp.band.learned().is_some();
     let writes_tips = uses_tips || is_around;
+    let mut looks = Looks::new(experiment, &truth.environment, row.trial);
     for number in 0..experiment.views {
-        let purpose = format!("view {number}");
-        let mut random = seed::stream(experiment.seed, row.trial.into(), &purpose);
-        let view = truth
-            .environment
-            .look(number as usize, &mut random)
-            .map_err(|error| error.to_string())?;
-        let seen = belief.observe_view(&view);
-        if seen.is_empty() {
-            return Err(nothing_seen(&view));
-        }
-        row.views.push(ViewRow { seen: seen.clone(), error: None });
+        row.views.push(looks.look((number, 0), probe, &mut belief)?);
     }
     if experiment.views > 0 {
         belief.refit().map_err(|error| format!("fit after the views: {error}"))?;
     }
     for count in 1..=experiment.touches {
-        let is_start = count <= experiment.initial_touches;
-        let plan = if is_start { start.plan(&belief) } else { planner.plan(&belief) };
-        let mut plan = plan.map_err(|error| format!("touch {count}: {error}"))?;
+        let failed = |error: PlanError| format!("touch {count}: {error}");
+        let mut plan = if count <= experiment.initial_touches {
+            start.plan(&belief).map_err(failed)?
+        } else {
+            loop {
+                let plan = planner.plan(&belief).map_err(failed)?;
+                let offers = looks.offers(probe, count - 1);
+                let asked = planner.look(&belief, &offers, &plan.target);
+                let Some(offer) = asked.and_then(|asked| offers.get(asked)) else { break plan };
+                row.views.push(looks.look((offer.number, count - 1), probe, &mut belief)?);
+                belief.refit().map_err(|error| format!("fit before touch {count}: {error}"))?;
+            }
+        };
         let mut approach = approach_to(task, &plan.target, count)?;
         let (target, believed) = (&plan.target, &belief);
         let next = NextTouch { count, target, approach: &approach, belief: believed };
@@ -202,21 +204,6 @@ fn run_touches(
         view.error = Some(error);
     }
     verify(experiment, task, &belief, probe, row)
-}
-
-/// Describes a view without a point of the region.
-fn nothing_seen(view: &View) -> String {
-    let mut depths_m: Vec<f64> = view.points_c.iter().map(|p_c| p_c.z).collect();
-    depths_m.sort_by(f64::total_cmp);
-    let ahead_m = view.x_wc.inverse_transform_point(&view.pivot_w).z;
-    match depths_m.get(depths_m.len() / 2) {
-        None => "the view has no points".into(),
-        Some(middle_m) => format!(
-            "the view shows nothing of the region: its points are {middle_m:.3} m ahead of the camera \
-             (median of {}), the region {ahead_m:.3} m; check camera.position_m, unit and frame",
-            depths_m.len()
-        ),
-    }
 }
 
 /// Returns the approach to the target of touch `count`.

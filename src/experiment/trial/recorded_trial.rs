@@ -208,4 +208,11 @@ impl Probe for ResumedProbe<'_> {
             None => self.probe.time_s().map(|time_s| self.begun_s + time_s),
         }
     }
+
+    fn rest(&mut self, time_s: f64) {
+        // The times of the touches made before contain it.
+        if self.made.as_slice().is_empty() {
+            self.probe.rest(time_s);
+        }
+    }
 }

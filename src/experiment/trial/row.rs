@@ -33,7 +33,7 @@ pub struct TrialRow {
     /// Reason of an early end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Views of a camera before the touches.
+    /// Views of a camera.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<ViewRow>,
     /// Touches in order.
@@ -46,6 +46,9 @@ pub struct TrialRow {
 /// One view of a camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ViewRow {
+    /// Number of touches made before it.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub after: u32,
     /// Surface that it shows, thinned.
     pub seen: SeenSurface,
     /// Error of the camera's pose after the last touch.
@@ -223,6 +226,10 @@ pub fn planner_rows<'a>(
     planner: &'a str,
 ) -> impl Iterator<Item = &'a TrialRow> {
     rows.iter().filter(move |row| row.planner == planner)
+}
+
+fn is_first(after: &u32) -> bool {
+    *after == 0
 }
 
 fn is_zero(jitter: &f64) -> bool {

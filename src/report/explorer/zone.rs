@@ -98,7 +98,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     let Some(axis) = Axis::around(heights_m, MARGIN[kind], 5.0) else { return Ok(None) };
     let grid = Grid::new(run, zone.dimension(), PLACES_MAX[kind])?;
     let places: Vec<&[f64]> = grid.places().collect();
-    let (first, last) = (experiment.initial_touches, experiment.touches);
+    let (first, last) = (experiment.first_fit(), experiment.touches);
     let touch_counts = counts(first, last, BYTES_OF_PLACE * names().len() * places.len());
     let mut beliefs = Vec::new();
     for name in names() {

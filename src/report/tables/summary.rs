@@ -106,7 +106,7 @@ pub fn claims(run: &Run) -> Table {
     let planners = &run.experiment.planners;
     let heads = ["paper", "reported", "touches", "measure"].map(Column::new).into_iter();
     let mut table = Table::new(heads.chain(planners.iter().map(Column::new)));
-    let possible = run.experiment.initial_touches..=run.experiment.touches;
+    let possible = run.experiment.first_fit()..=run.experiment.touches;
     let claims = run.experiment.report.claims.iter();
     for claim in claims.filter(|claim| possible.contains(&claim.touches)) {
         let asked = claim.measures.iter().filter_map(|id| measure::by_id(id));

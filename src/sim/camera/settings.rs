@@ -74,6 +74,9 @@ pub struct CameraSettings {
     /// Whether the arm at home hides what is behind it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_hidden_by_arm: bool,
+    /// Time of a look, s, which a planner weighs against that of touches.
+    #[serde(default = "look_s")]
+    pub look_s: f64,
     /// Further places that it looks from, in the order of their names: the second view is from the
     /// first of them, and after the last comes the camera's own place again.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -123,6 +126,11 @@ pub enum Frame {
     Camera,
     /// The world frame `W`, by the stated pose.
     World,
+}
+
+fn look_s() -> f64 {
+    // heuristic: some images and their transfer, by a camera that stands still.
+    1.0
 }
 
 fn pixels() -> [usize; 2] {
@@ -296,6 +304,7 @@ impl Validate for CameraSettings {
         rules.require("pixels", format!("{:?}", self.pixels), is_allowed, || {
             "two numbers from 16 to 4096".into()
         });
+        rules.number("look_s", self.look_s, 0.0..=3600.0);
         rules.number("fov_deg", self.fov_deg, 1.0..=170.0);
         if let Some([fx, fy, cx, cy]) = self.intrinsics_px {
             rules.numbers("intrinsics_px", &[fx, fy], 1.0..=1e5);

@@ -43,7 +43,7 @@ fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Optio
 /// touch hides, and needs the fewest trials of all measures.
 pub static CHECK_MEASURES: &[CheckMeasure] = &[
     CheckMeasure::log("mean_log_rmse", "mean log error over the touches", |row, of| {
-        let after = of.initial_touches.max(1)..=of.touches;
+        let after = of.first_fit()..=of.touches;
         let whole = row.touches.len() >= of.touches as usize;
         let logs = after.filter_map(|n| error_m(row, n).map(log));
         let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));

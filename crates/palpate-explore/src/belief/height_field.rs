@@ -6,7 +6,7 @@ use crate::probe::{Contact, SweptVolume, Touch};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
-use crate::view::{PoseErrors, RigidError, SeenSurface, View, found_by_touch};
+use crate::view::{Offer, PoseErrors, RigidError, SeenSurface, View, found_by_touch};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -173,14 +173,38 @@ impl HeightField {
                 |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
             zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
         };
-        // Of the field that is the height above the surface.
-        let x_wz = zone.x_wz();
-        let gradient = |normal_w: &UnitVector3<f64>| {
-            let up = x_wz.inverse_transform_vector(normal_w).y;
-            normal_w.into_inner() / up.abs().max(SEEN_NORMAL_Y_MIN)
-        };
+        let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
         let seen = SeenSurface::new(view, (wanted, SEEN), gradient);
         self.observe_seen(seen)
+    }
+
+    /// Returns the gradient in `W` of the height above a surface with this normal.
+    fn height_gradient(&self, normal_w: &UnitVector3<f64>) -> Vector3<f64> {
+        let up = self.zone.x_wz().inverse_transform_vector(normal_w).y;
+        normal_w.into_inner() / up.abs().max(SEEN_NORMAL_Y_MIN)
+    }
+
+    /// Returns what a look would show at `places` if the surface is the mean; `None` before the
+    /// first fit.
+    pub fn imagined(&self, offer: &Offer, places: &[Vec<f64>]) -> Option<SeenSurface> {
+        let (posterior, zone) = (self.surface.as_ref()?, &self.zone);
+        let scratch = &mut Scratch::default();
+        let mut slopes = vec![0.0; zone.dimension()];
+        let mut point = |place: &Vec<f64>| {
+            let height_m = posterior.mean_gradient(place, &mut slopes, scratch);
+            let slope = |axis: usize| slopes.get(axis).copied().unwrap_or(0.0);
+            let normal_z = Vector3::new(-slope(0), 1.0, -slope(1));
+            let normal_w = UnitVector3::new_normalize(zone.x_wz().rotation * normal_z);
+            (zone.point(place, height_m), normal_w)
+        };
+        let points: Vec<_> = places.iter().map(&mut point).collect();
+        let is_free = |p_w: &Point3<f64>| {
+            let place = zone.place(p_w);
+            !zone.contains(&place) || zone.height_m(p_w) > posterior.mean(&place, scratch)
+        };
+        let hides = (zone.widest_m(), is_free);
+        let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
+        Some(SeenSurface::imagined(offer, points.into_iter(), hides, gradient))
     }
 
     /// Adds a view that is thinned already.

@@ -6,6 +6,7 @@ mod active;
 pub mod candidates;
 mod grid;
 mod integrated_variance;
+pub mod look;
 mod plan;
 mod random;
 pub mod sample;

@@ -3,6 +3,7 @@
 use super::settings::PlanningSettings;
 use crate::belief::{Belief, HeightField};
 use crate::task::Target;
+use crate::view::Offer;
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,12 @@ pub trait Planner: Send {
     /// # Errors
     /// If the planner returns no target; this ends the trial.
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError>;
+
+    /// Returns which of the `offers` of a camera to take before a touch at `target`, after which it
+    /// plans anew; by default the one that [pays](super::look::worthwhile).
+    fn look(&mut self, belief: &Belief, offers: &[Offer], target: &Target) -> Option<usize> {
+        super::look::worthwhile(belief, offers, target)
+    }
 }
 
 /// The choice of a planner.

@@ -95,6 +95,9 @@ pub trait Probe: Send {
     fn time_s(&self) -> Option<f64> {
         None
     }
+
+    /// Adds `time_s` in which the robot rested, e.g. while a camera looked.
+    fn rest(&mut self, _time_s: f64) {}
 }
 
 /// Volume swept by a touch, which is free: the hull at the end of an approach along the zone's

@@ -4,10 +4,12 @@
 //! [`thin`] turns the thousands of points of a [`View`] into a few hundred surface elements. A
 //! [`SeenSurface`] is the evidence that a belief takes from them.
 
+mod offer;
 mod register;
 mod seen;
 mod thin;
 
+pub use offer::Offer;
 pub use seen::{
     CorrectedElement, ERRORS, PoseErrors, RigidError, SeenSurface, corrected_pose, found_by_touch,
 };

@@ -98,12 +98,21 @@ impl SeenSurface {
         (wanted, enough): (impl Fn(&Point3<f64>) -> bool, usize),
         gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
     ) -> Self {
-        let elements = thin(view, wanted, enough);
-        let normal_w = |element: &SurfaceElement| view.x_wc.rotation * element.normal_c;
+        let camera = (&view.x_wc, &view.pivot_w, &view.accuracy.pose_error);
+        Self::of(thin(view, wanted, enough), camera, gradient)
+    }
+
+    /// Creates it from surface elements, the camera's stated pose, its pivot and its error.
+    pub(super) fn of(
+        elements: Vec<SurfaceElement>,
+        (x_wc, pivot_w, pose_error): (&Isometry3<f64>, &Point3<f64>, &PoseError),
+        gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
+    ) -> Self {
+        let normal_w = |element: &SurfaceElement| x_wc.rotation * element.normal_c;
         Self {
-            x_wc: view.x_wc,
-            pivot_w: view.pivot_w,
-            pose_error: view.accuracy.pose_error.clone(),
+            x_wc: *x_wc,
+            pivot_w: *pivot_w,
+            pose_error: pose_error.clone(),
             gradients_w: elements.iter().map(|element| gradient(&normal_w(element))).collect(),
             elements,
             is_believed: false,

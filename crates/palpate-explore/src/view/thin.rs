@@ -60,7 +60,7 @@ const MISFIT: f64 = 0.5;
 
 /// Smallest cosine between a ray and the normal.
 // heuristic: at 80° a camera's depths are mostly holes and flying pixels.
-const GRAZING: f64 = 0.17;
+pub(super) const GRAZING: f64 = 0.17;
 
 /// Returns the surface elements of `view` whose points in `W` are `wanted`: about `enough`, or up
 /// to 1.4 times as many if fewer do not explain the view.

@@ -7,8 +7,8 @@ use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
-use crate::view::{RigidError, SeenSurface, View};
-use nalgebra::{DMatrix, Point3};
+use crate::view::{Offer, RigidError, SeenSurface, View};
+use nalgebra::{DMatrix, Point3, UnitVector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::kernel;
@@ -119,6 +119,18 @@ impl ImplicitSurface {
             is_above && (p_w - centre_w).norm() < radius_m
         };
         self.observe_seen(SeenSurface::new(view, (wanted, SEEN), |normal_w| normal_w.into_inner()))
+    }
+
+    /// Returns what a look would show of `points` of the estimated surface with their normals;
+    /// `None` before the first fit.
+    pub fn imagined(
+        &self,
+        offer: &Offer,
+        points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
+    ) -> Option<SeenSurface> {
+        let mut field = self.surface()?.field();
+        let hides = (2.0 * self.scope.ball.radius_m, |p_w: &Point3<f64>| field.value(p_w) > 0.0);
+        Some(SeenSurface::imagined(offer, points, hides, |normal_w| normal_w.into_inner()))
     }
 
     /// Adds a view that is thinned already.

@@ -44,6 +44,8 @@ pub struct Servo {
     command: Command,
     /// Time of the last reading.
     time_s: f64,
+    /// Time that the backend does not know of.
+    rested_s: f64,
     /// Part of the last command that a real robot applied.
     applied_ratio: f64,
     q: Vec<f64>,
@@ -82,6 +84,7 @@ impl Servo {
             control,
             settings,
             time_s,
+            rested_s: 0.0,
             applied_ratio: 1.0,
             q,
             swept: None,
@@ -480,6 +483,10 @@ impl Probe for Servo {
     }
 
     fn time_s(&self) -> Option<f64> {
-        Some(self.time_s)
+        Some(self.time_s + self.rested_s)
+    }
+
+    fn rest(&mut self, time_s: f64) {
+        self.rested_s += time_s;
     }
 }
