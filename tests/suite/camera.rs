@@ -193,8 +193,9 @@ fn a_view_is_registered_to_contacts() {
             let mut random = seed::stream(number, 0, "view");
             let drawn: [f64; 6] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
             let mut seen = SeenSurface::new(&view, (|_: &Point3<f64>| true, 120), |n| **n);
-            let (mean, covariance) = seen.register(&[]);
-            assert!(mean.amax() == 0.0 && covariance.is_identity(1e-12));
+            seen.register(&[]);
+            let unknown = seen.rigid_error();
+            assert_eq!((unknown.shift_m, unknown.shift_sd_m), ([0.0; 3], [position_m; 3]));
             let contacts: Vec<Contact> = (0..8)
                 .filter_map(|_| {
                     let p_c = view.points_c[random.random_range(0..view.points_c.len())];
@@ -203,9 +204,14 @@ fn a_view_is_registered_to_contacts() {
                     mesh.ray(&eye_w, &ahead, 2.0).map(|hit| Contact::new(hit.point, hit.normal))
                 })
                 .collect();
-            let (mean, covariance) = seen.register(&contacts);
+            seen.register(&contacts);
+            let RigidError { shift_m, shift_sd_m, turn_deg: turns, turn_sd_deg, .. } =
+                seen.rigid_error();
             for i in 0..6 {
-                let off = (mean[i] - drawn[i]) / covariance[(i, i)].sqrt();
+                let off = match i {
+                    0..3 => (shift_m[i] - position_m * drawn[i]) / shift_sd_m[i],
+                    _ => (turns[i - 3] - turn_deg * drawn[i]) / turn_sd_deg[i - 3],
+                };
                 squares += off * off;
                 within += f64::from(u8::from(off.abs() < 1.96));
                 count += 1.0;
@@ -330,6 +336,29 @@ fn one_touch_corrects_a_view() {
         let error = row.views[0].error.as_ref().unwrap();
         assert!(error.prior_sds < 4.5 && error.shift_sd_m[2] < 0.5e-3, "{error:?}");
     }
+}
+
+/// A planner takes a further look if it pays: at once if it takes no time, never if it takes an hour.
+#[test]
+fn a_further_look_is_taken_if_it_pays() {
+    let views = |look_s: f64| {
+        let camera = format!(
+            "camera={{ model = \"d405\", position_m = [0.15, -0.4, 0.6], pixels = [160, 90], \
+             noise = {{}}, pose_error = {{}}, look_s = {look_s}, further = {{ beside = {{ \
+             position_m = [-0.15, -0.4, 0.6] }} }} }}"
+        );
+        let scene = scene("container.toml", &[&camera]);
+        let mut experiment = Experiment::with_defaults(&scene, &["active"], 1, 2);
+        (experiment.views, experiment.initial_touches, experiment.gp) = (1, 0, settings());
+        experiment.further_views = 2;
+        let simulation = Simulation::new(experiment).unwrap();
+        let row = simulation.trial(simulation.planner("active").unwrap(), 0);
+        assert_eq!(row.failure, None);
+        row.views.iter().map(|view| view.after).collect::<Vec<u32>>()
+    };
+    // There is one further place.
+    assert_eq!(views(0.0), [0, 0]);
+    assert_eq!(views(3600.0), [0]);
 }
 
 /// A cloud in either frame and an image of depths give the view that they were written from; one in

@@ -10,7 +10,6 @@ use super::dense::NotPositiveDefinite;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{Observation, Observations};
 use crate::math::simd::widest_dot;
-use nalgebra::{DMatrix, DVector};
 
 /// Buffers of a query, so that queries do not allocate.
 #[derive(Clone, Debug, Default)]
@@ -205,25 +204,6 @@ impl Posterior {
         self.covariances(place, None, scratch);
         let Scratch { derivatives, row, .. } = scratch;
         self.gradient_with_slopes(weights, (derivatives, row), gradient);
-    }
-
-    /// Returns mean and covariance of the errors that the heights of source `number` have in
-    /// common, in units of their prior standard deviations; `None` if there are none.
-    pub fn common_errors(&self, number: usize) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let loadings = self.observations.loadings(number);
-        let (signal_sd, count) = (self.hyperparameters.signal_sd, loadings.len());
-        let explains = |column: &Vec<f64>| widest_dot(column, &self.weights) / signal_sd.powi(2);
-        let mean = DVector::from_iterator(count, loadings.iter().map(explains));
-        let whitened = loadings.into_iter().map(|mut column| {
-            self.factor.solve_lower(&mut column);
-            column
-        });
-        let whitened: Vec<Vec<f64>> = whitened.collect();
-        let explained = |i: usize, j: usize| widest_dot(&whitened[i], &whitened[j]);
-        let covariance = DMatrix::from_fn(count, count, |i, j| {
-            f64::from(u8::from(i == j)) - explained(i, j) / signal_sd.powi(2)
-        });
-        (count > 0).then_some((mean, covariance))
     }
 
     /// Returns the leave-one-out z-scores of the heights: z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the

@@ -1,5 +1,6 @@
-//! A real camera's view, read from a file: a PLY cloud, or an image of depths (16-bit PNG).
+//! A real camera's view, read from a file: a cloud (PLY, PCD), or an image of depths (16-bit PNG).
 
+use super::pcd;
 use super::settings::{CameraSettings, Frame};
 use crate::sim::unit::Unit;
 use nalgebra::{Isometry3, Point3};
@@ -17,7 +18,7 @@ const LARGEST: u64 = 1 << 29;
 /// Returns the points of the file that `camera` names, in the camera's frame, for its stated pose.
 ///
 /// # Errors
-/// If the file cannot be read, or is neither a PLY cloud nor a 16-bit grey PNG.
+/// If the file cannot be read, or is neither a PLY or PCD cloud nor a 16-bit grey PNG.
 pub(super) fn points(
     camera: &CameraSettings,
     path: &Path,
@@ -32,16 +33,19 @@ pub(super) fn points(
     if is_image {
         return depths(camera, &bytes, scale).map_err(at);
     }
-    if !bytes.starts_with(b"ply") {
-        return Err(at(InputError::new("is neither a PLY cloud nor a PNG image")
-            .remedy("allowed are .ply, and .png with 16-bit depths")));
+    let is_pcd = bytes.starts_with(b"# .PCD") || bytes.starts_with(b"VERSION");
+    if !is_pcd && !bytes.starts_with(b"ply") {
+        return Err(at(InputError::new("is neither a PLY or PCD cloud nor a PNG image")
+            .remedy("allowed are .ply, .pcd, and .png with 16-bit depths")));
     }
-    let cloud = ply::points(&bytes).map_err(at)?;
+    let cloud = if is_pcd { pcd::points(&bytes) } else { ply::vertices(&bytes) }.map_err(at)?;
     let moved = |p: Point3<f64>| match camera.frame {
         Frame::Camera => p * scale,
         Frame::World => x_wc.inverse_transform_point(&(p * scale)),
     };
-    Ok(cloud.into_iter().map(moved).collect())
+    // A pixel without a depth is no number.
+    let is_seen = |p: &Point3<f64>| p.iter().all(|x| x.is_finite());
+    Ok(cloud.into_iter().filter(is_seen).map(moved).collect())
 }
 
 /// Returns the points of an image of depths; 0 is a pixel without one.

@@ -2,6 +2,7 @@
 
 mod file;
 mod intrinsics;
+mod pcd;
 pub mod settings;
 
 pub use settings::CameraSettings;

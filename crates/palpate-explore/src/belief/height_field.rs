@@ -6,7 +6,7 @@ use crate::probe::{Contact, SweptVolume, Touch};
 use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
-use crate::view::{Offer, PoseErrors, RigidError, SeenSurface, View, found_by_touch};
+use crate::view::{Offer, RigidError, SeenSurface, View};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -55,9 +55,9 @@ const SEEN: usize = 250;
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
 const SEEN_FITTED: usize = 64;
 
-/// Largest number of linearisations of a view at its camera's errors.
-// heuristic: errors of 10 mm and 3° settle after three.
-const LINEARISATIONS: usize = 12;
+/// Largest number of times that a seen surface takes the slopes of the belief.
+// heuristic: they settle after two.
+const TURNS: usize = 8;
 
 /// Belief of a height field over a zone.
 #[derive(Clone, Serialize, Deserialize)]
@@ -71,6 +71,9 @@ pub struct HeightField {
     /// that a fit takes no longer than without them.
     #[serde(default)]
     patches: Observations,
+    /// Contacts to which views are registered.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    touched: Vec<Contact>,
     /// Surfaces that cameras have seen, one per view.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     seen: Vec<SeenSurface>,
@@ -116,6 +119,7 @@ impl HeightField {
             settings,
             patches: contacts.clone(),
             seen: Vec::new(),
+            touched: Vec::new(),
             contacts,
             targets: Vec::new(),
             unreached: Vec::new(),
@@ -138,6 +142,7 @@ impl HeightField {
         let reached = match touch {
             Touch::Contact(contact) => {
                 self.presence.add_contact(target, contact);
+                self.touched.push(contact.clone());
                 for (i, point) in contact.points().enumerate() {
                     let slope = self.slope(&point.normal_w).filter(|_| point.has_normal);
                     let slope =
@@ -221,21 +226,7 @@ impl HeightField {
 
     /// Returns the error of the camera's pose in each view, after a fit.
     pub fn rigid_errors(&self) -> Vec<RigidError> {
-        let Some(surface) = &self.surface else { return Vec::new() };
-        let error = |number: usize| {
-            let (mean, covariance) = self.pose_errors(surface, number)?;
-            Some(self.seen[number].rigid_error(&mean, &covariance))
-        };
-        (0..self.seen.len()).filter_map(error).collect()
-    }
-
-    /// Returns the errors of the pose in view `number` that the touches have found.
-    fn pose_errors(&self, surface: &Posterior, number: usize) -> Option<PoseErrors> {
-        let mut seen = Observations::new(self.zone.dimension());
-        self.push_seen(number, usize::MAX, &mut seen);
-        let hyperparameters = surface.hyperparameters().clone();
-        let alone = Posterior::new(self.kernels.kernel(), hyperparameters, seen).ok()?;
-        found_by_touch(&surface.common_errors(number)?, &alone.common_errors(number)?)
+        self.seen.iter().map(SeenSurface::rigid_error).collect()
     }
 
     /// Returns the seen heights, at most about `most` of each view.
@@ -255,18 +246,21 @@ impl HeightField {
             if normal_y < SEEN_NORMAL_Y_MIN || !self.zone.contains(&place) {
                 continue;
             }
-            let height = self.zone.height_m(&element.p_w) + element.removed;
+            let height = self.zone.height_m(&element.p_w);
             let variance = element.sd * element.sd;
             let known = Some(KnownError { variance, source, loadings: &element.loadings });
             all.push(&Observation { place: &place, height, noise: 1.0, slope: None, known });
         }
     }
 
-    /// Linearises each view at the errors of its camera's pose, and the slopes, that `posterior`
-    /// finds. Returns whether that changes the observations.
-    fn relinearise(&mut self, posterior: &Posterior) -> bool {
-        let errors: Vec<Option<PoseErrors>> =
-            (0..self.seen.len()).map(|number| self.pose_errors(posterior, number)).collect();
+    /// Registers the views to the contacts.
+    fn register(&mut self) {
+        self.seen.iter_mut().for_each(|seen| seen.register(&self.touched));
+    }
+
+    /// Takes the slopes of `posterior` for the seen surface. Returns whether that changes the
+    /// observations.
+    fn turn(&mut self, posterior: &Posterior) -> bool {
         let (zone, scratch) = (&self.zone, &mut Scratch::default());
         let x_wz = zone.x_wz();
         let mut gradient = vec![0.0; zone.dimension()];
@@ -280,9 +274,8 @@ impl HeightField {
             Some(x_wz.rotation * Vector3::new(-slope(0), 1.0, -slope(1)))
         };
         let mut is_changed = false;
-        for (seen, errors) in self.seen.iter_mut().zip(errors) {
-            is_changed |=
-                errors.is_some_and(|(mean, _)| seen.relinearise(&mean, &mut field_gradient));
+        for seen in &mut self.seen {
+            is_changed |= seen.turn(&mut field_gradient);
         }
         is_changed
     }
@@ -329,10 +322,11 @@ impl HeightField {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
+        self.register();
         let start_sd = self.fit.as_ref().map(|fit| fit.hyperparameters.signal_sd);
         let mut fit = self.most_likely(start_sd);
         if start_sd.is_none() && !self.seen.is_empty() {
-            self.linearised_posterior(&fit.hyperparameters)?;
+            self.turned_posterior(&fit.hyperparameters)?;
             fit = self.most_likely(Some(fit.hyperparameters.signal_sd));
         }
         if self.settings.band == Band::Named(BandName::LeaveOneOut) {
@@ -343,7 +337,7 @@ impl HeightField {
             // Conditioned again below, so that the recorded numbers are reproduced to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
-        let (posterior, left_sd) = self.linearised_posterior(&fit.hyperparameters)?;
+        let (posterior, left_sd) = self.turned_posterior(&fit.hyperparameters)?;
         fit.nystrom_residual_sd = left_sd;
         self.explore(&posterior)?;
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
@@ -372,7 +366,8 @@ impl HeightField {
     /// If the covariance of the contacts cannot be factored.
     pub fn condition(&mut self, fit: &Fit) -> Result<(), CovarianceError> {
         self.kernels.select(fit);
-        let (posterior, _) = self.linearised_posterior(&fit.hyperparameters)?;
+        self.register();
+        let (posterior, _) = self.turned_posterior(&fit.hyperparameters)?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
         self.fit = Some(fit.clone());
@@ -404,14 +399,14 @@ impl HeightField {
         }
     }
 
-    /// Returns the posterior with each view linearised at the errors that it finds.
-    fn linearised_posterior(
+    /// Returns the posterior, whose slopes are those of the seen surfaces.
+    fn turned_posterior(
         &mut self,
         hyperparameters: &Hyperparameters,
     ) -> Result<(Posterior, Option<f64>), CovarianceError> {
         let mut found = self.posterior(hyperparameters.clone())?;
-        for _ in 0..LINEARISATIONS {
-            if !self.relinearise(&found.0) {
+        for _ in 0..TURNS {
+            if !self.turn(&found.0) {
                 break;
             }
             found = self.posterior(hyperparameters.clone())?;

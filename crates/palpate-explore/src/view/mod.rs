@@ -10,9 +10,7 @@ mod seen;
 mod thin;
 
 pub use offer::Offer;
-pub use seen::{
-    CorrectedElement, ERRORS, PoseErrors, RigidError, SeenSurface, corrected_pose, found_by_touch,
-};
+pub use seen::{CorrectedElement, ERRORS, RigidError, SeenSurface, corrected_pose};
 pub use thin::{SurfaceElement, thin};
 
 use nalgebra::{Isometry3, Point3};

@@ -1,10 +1,14 @@
 //! Registration of a seen surface to contacts: the errors of the camera's pose, from the contacts
 //! on the part that it has seen.
 
-use super::seen::{ERRORS, PoseErrors, SETTLED, SeenSurface};
+use super::seen::{ERRORS, SeenSurface};
 use crate::probe::Contact;
-use nalgebra::{DMatrix, DVector, Point3, SMatrix, SVector};
+use nalgebra::{Cholesky, Point3, SMatrix, SVector};
 use palpate_gp::math::least_squares::huber_weight;
+
+/// Change of an error, in prior standard deviations, at which the rounds end.
+// heuristic: far below what contacts tell.
+const SETTLED: f64 = 0.02;
 
 /// Largest number of rounds.
 // heuristic: several times the usual number.
@@ -35,15 +39,14 @@ struct Offset {
 }
 
 impl SeenSurface {
-    /// Linearises at the errors of the camera's pose that `contacts` on the seen part find, and
-    /// returns them: the surface between the elements around a contact goes through it.
+    /// Finds the errors of the camera's pose from `contacts` on the seen part: the surface between the elements around a contact goes through it.
     ///
     /// Gauss-Newton on the posterior given the prior of the errors; contacts that are far off count
     /// with their absolute value (Huber 1964).
-    pub fn register(&mut self, contacts: &[Contact]) -> PoseErrors {
+    pub fn register(&mut self, contacts: &[Contact]) {
         let reach_m = BESIDE * self.spacing_m();
         let mut covariance = SMatrix::<f64, ERRORS, ERRORS>::identity();
-        self.errors = SVector::zeros();
+        (self.errors, self.factor) = (SVector::zeros(), SMatrix::identity());
         for _ in 0..ROUNDS {
             let mut information = SMatrix::identity();
             let mut sum = SVector::zeros();
@@ -65,8 +68,9 @@ impl SeenSurface {
                 break;
             }
         }
-        let mean = DVector::from_column_slice(self.errors.as_slice());
-        (mean, DMatrix::from_column_slice(ERRORS, ERRORS, covariance.as_slice()))
+        if let Some(factor) = Cholesky::new(covariance) {
+            self.factor = factor.l();
+        }
     }
 
     /// Returns the median distance between an element and the nearest other one.

@@ -6,14 +6,14 @@
 //! c))·s: linear in seven numbers, which all points of the view have in common. t and r are along
 //! the camera's axes.
 //!
-//! A view alone says nothing about these numbers, because a surface can be anywhere. Its linear
-//! model does: a surface that is as smooth somewhere else seems rougher. What a belief of the view
-//! alone finds is therefore taken away from what a belief of the view and the touches finds.
+//! A view alone says nothing about these numbers, because a surface can be anywhere. A Gaussian
+//! process that infers them does not know that: a surface that is as smooth somewhere else seems
+//! rougher. So [registration](SeenSurface::register) to the contacts finds them, and the belief
+//! gets its mean and covariance as their prior.
 
 use super::{PoseError, SurfaceElement, View, thin};
 use nalgebra::{
-    DMatrix, DVector, Isometry3, Point3, SVector, Translation3, UnitQuaternion, UnitVector3,
-    Vector3,
+    Isometry3, Point3, SMatrix, SVector, Translation3, UnitQuaternion, UnitVector3, Vector3,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,10 +21,6 @@ use std::fmt;
 
 /// Number of errors of a camera: translation, rotation, scale.
 pub const ERRORS: usize = 7;
-
-/// Change of an error, in standard deviations, below which its linearisation is kept.
-// heuristic: the remaining error is the square of it, far below a view's noise.
-pub(super) const SETTLED: f64 = 0.02;
 
 /// Relative change of a gradient below which it is kept.
 // heuristic: with an error of a few millimetres it shifts the surface by a tenth of one.
@@ -44,14 +40,15 @@ pub struct SeenSurface {
     /// seem to be elsewhere, and a gradient of another length would fix where it is.
     #[schemars(with = "Vec<[f64; 3]>")]
     gradients_w: Vec<Vector3<f64>>,
-    /// Whether these are those of a belief.
-    is_believed: bool,
-    /// Errors at which the view is linearised, in standard deviations.
+    /// Errors that registration has found, in prior standard deviations.
     #[schemars(with = "[f64; ERRORS]")]
     pub(super) errors: SVector<f64, ERRORS>,
+    /// Cholesky factor of their covariance.
+    #[schemars(with = "[[f64; ERRORS]; ERRORS]")]
+    pub(super) factor: SMatrix<f64, ERRORS, ERRORS>,
 }
 
-/// An element of the surface, corrected by the errors at which a view is linearised, and what is
+/// An element of the surface, corrected by the errors that registration has found, and what is
 /// known of the error of the field there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CorrectedElement {
@@ -61,10 +58,8 @@ pub struct CorrectedElement {
     pub normal_w: UnitVector3<f64>,
     /// Standard deviation of its own error.
     pub sd: f64,
-    /// Change per standard deviation of each of the camera's errors.
+    /// Change per standard deviation of each of the remaining, independent errors of the camera.
     pub loadings: [f64; ERRORS],
-    /// Change that the correction has removed, in the linearised model.
-    pub removed: f64,
 }
 
 /// Error of a camera's pose, as touches and prior tell it.
@@ -115,8 +110,8 @@ impl SeenSurface {
             pose_error: pose_error.clone(),
             gradients_w: elements.iter().map(|element| gradient(&normal_w(element))).collect(),
             elements,
-            is_believed: false,
             errors: SVector::zeros(),
+            factor: SMatrix::identity(),
         }
     }
 
@@ -171,56 +166,38 @@ impl SeenSurface {
         SVector::from(shifts).component_mul(&self.sds())
     }
 
-    /// Returns the surface elements, corrected and linearised at the present errors.
+    /// Returns the surface elements, corrected by the errors that registration has found.
     pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
         let (x_wc, scale) = (self.corrected(), self.scale());
         self.elements.iter().zip(&self.gradients_w).map(move |(element, gradient_w)| {
             let p_w = x_wc * Point3::from(element.p_c.coords / scale);
             let normal_w = x_wc.rotation * element.normal_c;
             let away = p_w.coords - x_wc.translation.vector;
-            let loadings: [f64; ERRORS] = self.loadings((&p_w, &away), gradient_w).into();
-            let removed = |(loading, error): (&f64, &f64)| loading * error;
-            let removed = loadings.iter().zip(&self.errors).map(removed).sum();
+            let loadings = self.factor.tr_mul(&self.loadings((&p_w, &away), gradient_w)).into();
             let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
-            CorrectedElement { p_w, normal_w, sd, loadings, removed }
+            CorrectedElement { p_w, normal_w, sd, loadings }
         })
     }
 
-    /// Linearises at the posterior mean of the errors, with the `gradient` of the belief's field at
-    /// each corrected element in `W`, if there is one. Returns whether that changes the elements.
-    pub fn relinearise(
-        &mut self,
-        errors: &DVector<f64>,
-        mut gradient: impl FnMut(&Point3<f64>) -> Option<Vector3<f64>>,
-    ) -> bool {
-        // Errors that noisy normals have given mean nothing.
-        let mut is_changed = !self.is_believed;
-        if self.is_believed {
-            let new = SVector::from_fn(|i, _| errors.get(i).copied().unwrap_or(0.0));
-            is_changed = (new - self.errors).amax() > SETTLED;
-            self.errors = if is_changed { new } else { self.errors };
-        }
-        self.is_believed = true;
+    /// Takes the `gradient` of the belief's field at each corrected element in `W`, if there is one.
+    /// Returns whether that changes the elements.
+    pub fn turn(&mut self, gradient: impl FnMut(&Point3<f64>) -> Option<Vector3<f64>>) -> bool {
         let places: Vec<Point3<f64>> = self.elements().map(|element| element.p_w).collect();
-        let mut gradients_w = self.gradients_w.clone();
-        for (gradient_w, p_w) in gradients_w.iter_mut().zip(&places) {
-            *gradient_w = gradient(p_w).unwrap_or(*gradient_w);
-        }
-        let turned =
+        let found = places.iter().map(gradient).zip(&self.gradients_w);
+        let found: Vec<Vector3<f64>> = found.map(|(new, old)| new.unwrap_or(*old)).collect();
+        let is_turned =
             |(new, old): (&Vector3<f64>, &Vector3<f64>)| (new - old).norm() > TURNED * old.norm();
-        if gradients_w.iter().zip(&self.gradients_w).any(turned) {
-            is_changed = true;
-            self.gradients_w = gradients_w;
+        let is_changed = found.iter().zip(&self.gradients_w).any(is_turned);
+        if is_changed {
+            self.gradients_w = found;
         }
         is_changed
     }
 
-    /// Returns the errors of the camera's pose from their posterior mean and covariance, in prior
-    /// standard deviations.
-    pub fn rigid_error(&self, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> RigidError {
-        let sds = self.sds();
-        let x_wc = Self { errors: SVector::from_fn(|i, _| mean[i]), ..self.clone() }.corrected();
-        let sd = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+    /// Returns the errors of the camera's pose that registration has found.
+    pub fn rigid_error(&self) -> RigidError {
+        let (mean, sds, x_wc) = (&self.errors, self.sds(), self.corrected());
+        let sd = |i: usize| self.factor.row(i).norm();
         let axes = [0, 1, 2];
         let rotation = x_wc.rotation.coords;
         RigidError {
@@ -248,23 +225,6 @@ pub fn corrected_pose(
     let back = UnitQuaternion::from_scaled_axis(-turn);
     let p_w = pivot_w.coords + back * (stated.translation.vector - pivot_w.coords - shift);
     Isometry3::from_parts(Translation3::from(p_w), back * stated.rotation)
-}
-
-/// Mean and covariance of the errors of a camera's pose, in prior standard deviations.
-pub type PoseErrors = (DVector<f64>, DMatrix<f64>);
-
-/// Returns the errors of a pose that touches have found, from those that a belief of view and
-/// touches finds and those that one of the view alone finds: with the information Λ = C⁻¹ of each,
-/// that of the touches and the prior is I + Λ − Λ₀.
-pub fn found_by_touch((mean, all): &PoseErrors, (own, alone): &PoseErrors) -> Option<PoseErrors> {
-    let (all, alone) = (all.clone().try_inverse()?, alone.clone().try_inverse()?);
-    let count = mean.len();
-    // Rounding must not leave less than the prior.
-    let mut spectrum = (&all - &alone).symmetric_eigen();
-    spectrum.eigenvalues.apply(|value| *value = 1.0 / (1.0 + value.max(0.0)));
-    let covariance = spectrum.recompose();
-    let found = &covariance * (all * mean - alone * own);
-    (found.len() == count && found.iter().all(|x| x.is_finite())).then_some((found, covariance))
 }
 
 impl fmt::Display for RigidError {

@@ -4,8 +4,8 @@
 use super::settings::PriorShape;
 use crate::probe::{Contact, SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
-use crate::view::{RigidError, SeenSurface};
-use nalgebra::{DMatrix, Point3, Vector3};
+use crate::view::SeenSurface;
+use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
 use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
@@ -59,12 +59,12 @@ impl SweptPath {
     }
 }
 
-/// Poses of cameras that a belief assumes.
+/// What a belief assumes of the cameras' poses that registration has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CameraPose {
-    /// Those that registration to the contacts finds.
-    Registered,
-    /// Unknown but for their prior.
+    /// They are exact.
+    Certain,
+    /// They have the errors that registration states.
     Uncertain,
 }
 
@@ -180,13 +180,13 @@ impl TouchEvidence {
         for (i, element) in self.seen[source].elements().enumerate() {
             // A surface that is seen too far out is inside of what was seen.
             let loadings = element.loadings.map(|loading| -loading);
-            let (loadings, removed): (&[f64], f64) = match pose {
-                CameraPose::Uncertain => (&loadings, element.removed),
-                CameraPose::Registered => (&[], 0.0),
+            let loadings: &[f64] = match pose {
+                CameraPose::Uncertain => &loadings,
+                CameraPose::Certain => &[],
             };
             let known = Some(KnownError { variance: element.sd * element.sd, source, loadings });
             let mut push = |p_w: &Point3<f64>, field_m: f64, noise: f64| {
-                let height = field_m - removed - prior.field(p_w).value;
+                let height = field_m - prior.field(p_w).value;
                 let place = p_w.coords.as_slice();
                 all.push(&Observation { place, height, noise, slope: None, known });
             };
@@ -198,15 +198,9 @@ impl TouchEvidence {
         }
     }
 
-    /// Registers each view to the contacts, and returns the errors of its camera's
-    /// pose, and their covariance in prior standard deviations.
-    pub(super) fn register(&mut self) -> Vec<(RigidError, DMatrix<f64>)> {
-        let contacts = &self.contacts;
-        let error = |seen: &mut SeenSurface| {
-            let (mean, covariance) = seen.register(contacts);
-            (seen.rigid_error(&mean, &covariance), covariance)
-        };
-        self.seen.iter_mut().map(error).collect()
+    /// Registers the views to the contacts.
+    pub(super) fn register(&mut self) {
+        self.seen.iter_mut().for_each(|seen| seen.register(&self.contacts));
     }
 }
 

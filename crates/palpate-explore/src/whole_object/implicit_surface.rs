@@ -8,7 +8,7 @@ use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
 use crate::view::{Offer, RigidError, SeenSurface, View};
-use nalgebra::{DMatrix, Point3, UnitVector3};
+use nalgebra::{Point3, UnitVector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::kernel;
@@ -35,11 +35,6 @@ pub struct ImplicitSurface {
     start: Option<Hyperparameters>,
     #[serde(skip)]
     surface: Option<Surface>,
-    #[serde(skip)]
-    rigid_errors: Vec<RigidError>,
-    /// Covariance of the errors of each camera's pose, in prior standard deviations.
-    #[serde(skip)]
-    pose_covariances: Vec<DMatrix<f64>>,
 }
 
 /// Kernel in place of that of a stored belief.
@@ -80,19 +75,7 @@ impl ImplicitSurface {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (TouchEvidence::default(), Vec::new());
         let (fit, start, surface) = (None, None, None);
-        let (rigid_errors, pose_covariances) = (Vec::new(), Vec::new());
-        Self {
-            scope,
-            settings,
-            kernel,
-            evidence,
-            asked,
-            fit,
-            start,
-            surface,
-            rigid_errors,
-            pose_covariances,
-        }
+        Self { scope, settings, kernel, evidence, asked, fit, start, surface }
     }
 
     /// Adds a touch at `aim` that followed `approach`, and the volume it swept; the belief changes
@@ -147,7 +130,7 @@ impl ImplicitSurface {
 
     /// Returns the error of the camera's pose in each view, after a fit.
     pub fn rigid_errors(&self) -> Vec<RigidError> {
-        self.rigid_errors.clone()
+        self.seen().iter().map(SeenSurface::rigid_error).collect()
     }
 
     /// Fits length scale and noises by maximum likelihood and conditions on all touches.
@@ -203,7 +186,7 @@ impl ImplicitSurface {
         let (mut posterior, pose_errors) = match self.evidence.seen.is_empty() {
             true => (posterior(observations)?, Vec::new()),
             false => {
-                let (_, all) = self.observations_given(start.as_ref(), CameraPose::Registered);
+                let (_, all) = self.observations_given(start.as_ref(), CameraPose::Certain);
                 let given = posterior(all)?;
                 let errors = self.pose_errors(&given, &observations);
                 (given, errors)
@@ -221,20 +204,8 @@ impl ImplicitSurface {
     /// Returns the fields that the errors of the cameras' poses add to the mean of `given`, each
     /// with a standard normal factor. `uncertain` are the same observations with these errors.
     fn pose_errors(&self, given: &Posterior, uncertain: &Observations) -> Vec<MeanField> {
-        let mut fields = Vec::new();
-        for (number, covariance) in self.pose_covariances.iter().enumerate() {
-            let loadings = uncertain.loadings(number);
-            let Some(factor) = covariance.clone().cholesky() else { continue };
-            for error in factor.l().column_iter() {
-                let mut column = vec![0.0; uncertain.order()];
-                for (loadings, error) in loadings.iter().zip(error.iter()) {
-                    let terms = column.iter_mut().zip(loadings);
-                    terms.for_each(|(sum, loading)| *sum += error * loading);
-                }
-                fields.push(MeanField::response(given, column));
-            }
-        }
-        fields
+        let loadings = (0..self.seen().len()).flat_map(|number| uncertain.loadings(number));
+        loadings.map(|column| MeanField::response(given, column)).collect()
     }
 
     /// Returns the ball around all that was touched or seen.
@@ -242,9 +213,9 @@ impl ImplicitSurface {
         self.scope.estimated_ball(self.points().iter())
     }
 
-    /// Returns the observations, in units of the noise of `last`.
+    /// Registers the views, and returns the observations, in units of the noise of `last`.
     fn observations(&mut self, last: Option<&Hyperparameters>) -> (PriorMean, Observations) {
-        (self.rigid_errors, self.pose_covariances) = self.evidence.register().into_iter().unzip();
+        self.evidence.register();
         self.observations_given(last, CameraPose::Uncertain)
     }
 

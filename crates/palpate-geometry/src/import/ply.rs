@@ -39,13 +39,23 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
 /// # Errors
 /// If it is invalid, or a coordinate is not finite.
 pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
-    let (vertices, _) = elements(bytes)?;
-    let is_lost = |vertex: &Vertex| !vertex.0.iter().all(|coordinate| coordinate.is_finite());
-    if let Some(lost) = vertices.iter().position(is_lost) {
-        let at_m = vertices[lost].0;
-        return Err(InputError::new(format!("PLY: vertex {lost} is not finite: {at_m:?}")));
+    let vertices = vertices(bytes)?;
+    let is_lost = |vertex: &Point3<f64>| !vertex.iter().all(|coordinate| coordinate.is_finite());
+    match vertices.iter().position(is_lost) {
+        Some(lost) => {
+            let at = <[f64; 3]>::from(vertices[lost]);
+            Err(InputError::new(format!("PLY: vertex {lost} is not finite: {at:?}")))
+        }
+        None => Ok(vertices),
     }
-    Ok(vertices.iter().map(|vertex| Point3::from(vertex.0)).collect())
+}
+
+/// Returns the vertices of a PLY file in its unit, also those that are not finite.
+///
+/// # Errors
+/// If it is invalid.
+pub fn vertices(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
+    Ok(elements(bytes)?.0.into_iter().map(|vertex| Point3::from(vertex.0)).collect())
 }
 
 fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), InputError> {
