@@ -97,6 +97,14 @@ pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
 /// Legend entry of missed touches.
 pub const MISS: (Swatch, &str) = (Swatch::Diamond(PLANNED), "touch without contact");
 
+/// Returns the legend entry of what cameras have seen, if they have.
+pub fn seen_entry(run: &Run) -> Option<(Swatch, &'static str)> {
+    run.rows.iter().any(|row| !row.views.is_empty()).then_some(SEEN)
+}
+
+/// Legend entry of what cameras have seen.
+pub const SEEN: (Swatch, &str) = (Swatch::Dot, "seen by the camera");
+
 /// Returns the legend entries of touches that a surface may hide.
 pub fn touch_entries() -> [(Swatch, &'static str); 3] {
     [
@@ -116,6 +124,8 @@ pub enum Swatch {
     Cross(&'static str),
     /// Circle with these attributes.
     Circle(String),
+    /// Point that a camera has seen.
+    Dot,
     /// Hollow diamond in this colour.
     Diamond(&'static str),
     /// Filled box in this colour.
@@ -130,6 +140,7 @@ impl Swatch {
             Self::Band(colour) => canvas.rect(area, &style::fill(colour, style::BAND_OPACITY)),
             Self::Cross(colour) => canvas.cross([x, y], colour),
             Self::Circle(attributes) => canvas.circle([x, y], 3.6, attributes),
+            Self::Dot => canvas.circle([x, y], style::SEEN_PX, &style::seen()),
             Self::Diamond(colour) => canvas.diamond([x, y], &style::stroke(colour, 1.3)),
             Self::Box(colour) => canvas.rect(area, &style::fill(colour, 1.0)),
         }

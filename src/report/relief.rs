@@ -299,6 +299,20 @@ impl Relief {
         (self.faces.iter()).any(|face| face.nearness > nearness && contains(&face.outline, at))
     }
 
+    /// Draws points that a camera has seen, where the surface does not hide them.
+    pub fn dots(
+        &self,
+        canvas: &mut Canvas,
+        camera: &Camera,
+        points: impl IntoIterator<Item = Vector3<f64>>,
+    ) {
+        for p in points {
+            if !self.hides(camera, &p) {
+                canvas.circle(camera.at(&p), style::SEEN_PX, &style::seen());
+            }
+        }
+    }
+
     /// Draws a touch at a point; hollow if the surface hides it.
     pub fn mark(
         &self,

@@ -124,6 +124,14 @@ pub fn visible_touch(colour: &str) -> String {
     format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
 }
 
+/// Radius of a point that a camera has seen.
+pub const SEEN_PX: f64 = 1.1;
+
+/// Returns its attributes.
+pub fn seen() -> String {
+    fill(INK, 0.55)
+}
+
 /// Returns the attributes of a touch that a surface hides.
 pub fn hidden_touch(colour: &str) -> String {
     format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)

@@ -137,6 +137,7 @@ pub fn frame(
         sd_m: surface.offsets_m(&mesh.0),
         error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
         score: shape.map(score).unwrap_or_default(),
+        seen_w: belief.seen().iter().flat_map(|it| it.elements()).map(|it| it.p_w).collect(),
         mesh,
     }))
 }

@@ -5,14 +5,15 @@ use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{FigureLayout, miss_entry, touch_entries};
+use crate::report::legend::{FigureLayout, miss_entry, seen_entry, touch_entries};
 use crate::report::relief::{
     ON_RELIEF, Relief, ReliefPanel, Space, height_colour, unreachable_colour,
 };
 use crate::report::replay::{self, BeliefReplay, Grid, NO_BELIEF, drawn_caption};
 use crate::report::style;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
+use palpate_explore::view::SeenSurface;
 use palpate_gp::posterior::Scratch;
 use palpate_input::format::counted;
 
@@ -55,7 +56,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let unit = Length::of(zone);
     let (width, rows) = ((counts.len() as f64 + 1.0) * PANEL.0, planners.len() as f64);
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX];
-    let entries = touch_entries().into_iter().chain(miss_entry(run));
+    let entries = touch_entries().into_iter().chain(miss_entry(run)).chain(seen_entry(run));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
     let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
     let [low, high] = space.height_m;
@@ -90,6 +91,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                 let reach = replay.belief.is_reachable(&places);
                 let relief = relief(canvas, &panel, heights.collect(), &reach);
                 canvas.grouped(ON_RELIEF, |canvas| {
+                    relief.dots(canvas, &panel.camera, seen(&replay, space));
                     mark(&panel, canvas, zone, &relief, replay.marks());
                 });
             }
@@ -107,6 +109,23 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let bar = Area { left, top: sheet.bottom - FOOT_PX + 14.0, width: 320.0, height: 13.0 };
     height_bar(&mut sheet.canvas, bar, unit, space.height_m);
     Ok(Some(sheet.canvas.finish()))
+}
+
+/// Returns what a camera has seen within `space`, in its axes.
+fn seen(replay: &BeliefReplay, space: Space) -> Vec<Vector3<f64>> {
+    let Space { x_m, z_m, height_m } = space;
+    let zone = replay.belief.zone();
+    let elements = replay.belief.seen().iter().flat_map(SeenSurface::elements);
+    let point = |p_w: &Point3<f64>| match zone.place(p_w)[..] {
+        [x, z] => Vector3::new(x, zone.height_m(p_w), z),
+        _ => Vector3::repeat(f64::NAN),
+    };
+    let is_in = |p: &Vector3<f64>| {
+        [(x_m, p.x), (height_m, p.y), (z_m, p.z)]
+            .iter()
+            .all(|([low, high], at)| (*low..=*high).contains(at))
+    };
+    elements.map(|element| point(&element.p_w)).filter(is_in).collect()
 }
 
 /// Returns the drawn space: the zone, and heights around the truth and the drawn touches; `None`

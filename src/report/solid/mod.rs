@@ -56,6 +56,8 @@ pub struct SurfaceFrame {
     pub error_m: Vec<f64>,
     /// Agreement with the truth, as text; may be empty.
     pub score: String,
+    /// What cameras have seen, in `W`.
+    pub seen_w: Vec<Point3<f64>>,
 }
 
 impl SurfaceFrame {
