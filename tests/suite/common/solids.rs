@@ -78,6 +78,7 @@ fn frame(touches: &[SolidTouch], most: usize, cell_m: f64) -> SurfaceFrame {
         sd_m: mesh.0.iter().map(sd_m).collect(),
         error_m: mesh.0.iter().map(ring_m).collect(),
         mesh,
+        seen_w: Vec::new(),
         score: format!("Chamfer {:.1} mm", 10.0 * (1.0 - share)),
     }
 }

@@ -253,9 +253,16 @@ impl HeightField {
         }
     }
 
-    /// Registers the views to the contacts.
+    /// Registers the views to the contacts, and leaves out what the finger went through.
     fn register(&mut self) {
-        self.seen.iter_mut().for_each(|seen| seen.register(&self.touched));
+        let (zone, ceiling) = (&self.zone, &self.ceiling);
+        let inside_m = |p_w: &Point3<f64>, beside_m: f64| match ceiling {
+            Some(ceiling) => {
+                zone.height_m(p_w) - ceiling.around_m(zone, (&zone.place(p_w), beside_m))
+            }
+            None => f64::NEG_INFINITY,
+        };
+        self.seen.iter_mut().for_each(|seen| seen.align(&self.touched, inside_m));
     }
 
     /// Takes the slopes of `posterior` for the seen surface. Returns whether that changes the

@@ -6,6 +6,7 @@
 
 mod offer;
 mod register;
+mod reject;
 mod seen;
 mod thin;
 

@@ -75,14 +75,19 @@ impl SeenSurface {
 
     /// Returns the median distance between an element and the nearest other one.
     fn spacing_m(&self) -> f64 {
+        let mut all = self.spacings_m();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// Returns the distance between each element and the nearest other one.
+    pub(super) fn spacings_m(&self) -> Vec<f64> {
         let places: Vec<Point3<f64>> = self.stated().collect();
         let nearest = |(i, p): (usize, &Point3<f64>)| {
             let others = places.iter().enumerate().filter(|(j, _)| *j != i);
             others.map(|(_, other)| (other - p).norm()).fold(f64::INFINITY, f64::min)
         };
-        let mut all: Vec<f64> = places.iter().enumerate().map(nearest).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(0.0)
+        places.iter().enumerate().map(nearest).collect()
     }
 
     /// Returns what a contact says, from the elements within `reach_m` beside it; `None` if it is
@@ -94,7 +99,7 @@ impl SeenSurface {
         let (x_wc, scale) = (self.corrected(), self.scale());
         let far_m = FAR * self.sds().fixed_rows::<3>(0).max();
         let (mut off_m, mut loadings_m, mut weights) = (0.0, SVector::zeros(), 0.0);
-        for element in &self.elements {
+        for (_, element) in self.elements.iter().enumerate().filter(|(i, _)| self.is_kept(*i)) {
             let p_w = x_wc * Point3::from(element.p_c.coords / scale);
             let to_contact = contact.p_wc - p_w;
             if to_contact.norm() > reach_m + far_m {

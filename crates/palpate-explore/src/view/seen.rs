@@ -43,6 +43,9 @@ pub struct SeenSurface {
     /// Errors that registration has found, in prior standard deviations.
     #[schemars(with = "[f64; ERRORS]")]
     pub(super) errors: SVector<f64, ERRORS>,
+    /// Whether each element is not on the object; empty if all are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) rejected: Vec<bool>,
     /// Cholesky factor of their covariance.
     #[schemars(with = "[[f64; ERRORS]; ERRORS]")]
     pub(super) factor: SMatrix<f64, ERRORS, ERRORS>,
@@ -112,6 +115,7 @@ impl SeenSurface {
             elements,
             errors: SVector::zeros(),
             factor: SMatrix::identity(),
+            rejected: Vec::new(),
         }
     }
 
@@ -166,8 +170,19 @@ impl SeenSurface {
         SVector::from(shifts).component_mul(&self.sds())
     }
 
-    /// Returns the surface elements, corrected by the errors that registration has found.
+    /// Returns the surface elements of the object, corrected by the errors that registration has
+    /// found.
     pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
+        self.all().enumerate().filter(|(i, _)| self.is_kept(*i)).map(|(_, element)| element)
+    }
+
+    /// Whether an element is on the object.
+    pub(super) fn is_kept(&self, element: usize) -> bool {
+        !self.rejected.get(element).is_some_and(|is_rejected| *is_rejected)
+    }
+
+    /// Returns all surface elements, corrected.
+    pub(super) fn all(&self) -> impl Iterator<Item = CorrectedElement> {
         let (x_wc, scale) = (self.corrected(), self.scale());
         self.elements.iter().zip(&self.gradients_w).map(move |(element, gradient_w)| {
             let p_w = x_wc * Point3::from(element.p_c.coords / scale);
@@ -182,7 +197,7 @@ impl SeenSurface {
     /// Takes the `gradient` of the belief's field at each corrected element in `W`, if there is one.
     /// Returns whether that changes the elements.
     pub fn turn(&mut self, gradient: impl FnMut(&Point3<f64>) -> Option<Vector3<f64>>) -> bool {
-        let places: Vec<Point3<f64>> = self.elements().map(|element| element.p_w).collect();
+        let places: Vec<Point3<f64>> = self.all().map(|element| element.p_w).collect();
         let found = places.iter().map(gradient).zip(&self.gradients_w);
         let found: Vec<Vector3<f64>> = found.map(|(new, old)| new.unwrap_or(*old)).collect();
         let is_turned =

@@ -198,9 +198,14 @@ impl TouchEvidence {
         }
     }
 
-    /// Registers the views to the contacts.
+    /// Registers the views to the contacts, and leaves out what the finger went through.
     pub(super) fn register(&mut self) {
-        self.seen.iter_mut().for_each(|seen| seen.register(&self.contacts));
+        let ways = &self.ways;
+        let inside_m = |p_w: &Point3<f64>, beside_m: f64| {
+            let depths_m = ways.iter().map(|way| -way.distance_m(p_w) - beside_m);
+            depths_m.fold(f64::NEG_INFINITY, f64::max)
+        };
+        self.seen.iter_mut().for_each(|seen| seen.align(&self.contacts, inside_m));
     }
 }
 
