@@ -30,6 +30,7 @@ class ExperimentSettings(TypedDict, total=False):
     verification_touches: int
     repeat_touches: int
     views: int
+    further_views: int
     grid: int
     gp: _File | _Table
     planning: _Table

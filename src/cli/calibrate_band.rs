@@ -92,12 +92,15 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         path.display(),
         experiments.len()
     );
+    let sampled = COUNTS.into_iter().find(|&count| count >= first.first_fit());
+    let least = sampled.unwrap_or(COUNTS[0]);
     ensure!(
-        first.touches >= COUNTS[0],
-        "{}: touches = {}; allowed is at least {}",
+        sampled.is_some_and(|least| first.touches >= least),
+        "{}: touches = {}, of which {} are initial; allowed is at least {least}, with a fit after one of \
+         the counts {COUNTS:?}",
         path.display(),
         first.touches,
-        COUNTS[0]
+        first.first_fit(),
     );
     let band = first.gp.band.learned().cloned();
     ensure!(

@@ -17,8 +17,7 @@ use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// Touch counts after which beliefs are sampled, if there is a fit: without a view not before the
-/// first touches are made.
+/// Touch counts after which beliefs are sampled, once there is a fit.
 pub const COUNTS: [u32; 10] = [1, 2, 4, 7, 10, 15, 20, 30, 45, 60];
 
 /// Step between the test places of a grid.
@@ -103,7 +102,9 @@ pub fn sample_trial(
         let TrialEvent::Finished(touch) = event else { return Ok(None) };
         tell();
         let Belief::HeightField(field) = touch.belief else { return Ok(None) };
-        let features = COUNTS.contains(&touch.count).then(|| field.band_features(&places));
+        let is_sampled =
+            COUNTS.contains(&touch.count) && touch.count >= simulation.experiment().first_fit();
+        let features = is_sampled.then(|| field.band_features(&places));
         let features = features.flatten().unwrap_or_default().into_iter().zip(&known);
         samples.extend(features.map(|(features, (i, height_m))| BandSample {
             count: touch.count,

@@ -361,7 +361,8 @@ fn one_touch_corrects_a_view() {
     }
 }
 
-/// A planner takes a further look if it pays: at once if it takes no time, never if it takes an hour.
+/// A planner takes a further look if it pays: at once if it takes no time, never if it takes an
+/// hour.
 #[test]
 fn a_further_look_is_taken_if_it_pays() {
     let views = |look_s: f64| {

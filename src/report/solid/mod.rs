@@ -56,7 +56,7 @@ pub struct SurfaceFrame {
     pub error_m: Vec<f64>,
     /// Agreement with the truth, as text; may be empty.
     pub score: String,
-    /// What cameras have seen, in `W`.
+    /// Points that cameras have seen, in `W`.
     pub seen_w: Vec<Point3<f64>>,
 }
 

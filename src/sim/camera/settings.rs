@@ -36,8 +36,8 @@ pub struct CameraSettings {
     /// y, then z of `W`; replaces `look_at_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<[f64; 3]>,
-    /// File with the view of a real camera, a cloud (PLY, PCD) or a 16-bit PNG of depths, relative to the
-    /// scene file; without it the view is simulated.
+    /// File with the view of a real camera, a cloud (PLY, PCD) or a 16-bit PNG of depths, relative
+    /// to the scene file; without it the view is simulated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Unit of the file; default: `m` for a cloud, `mm` for depths.

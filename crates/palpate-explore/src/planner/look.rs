@@ -1,7 +1,6 @@
 //! Whether another look pays: the reduction of the variance over the surface per time, against that
 //! of the next touch.
 
-use super::sobol;
 use crate::belief::{Belief, HeightField};
 use crate::task::Target;
 use crate::view::Offer;
@@ -11,7 +10,7 @@ use palpate_gp::reduction::VarianceReduction;
 
 /// Number of places at which the variance is summed, and that a look would show.
 // heuristic: a mean over them is within a few percent.
-const PLACES: u32 = 100;
+const PLACES: usize = 100;
 
 /// Cells along the longest side of a whole object's box.
 // heuristic: as for candidates.
@@ -39,7 +38,8 @@ type Gains = (f64, Vec<f64>);
 
 fn in_zone(field: &HeightField, offers: &[Offer], place: &[f64]) -> Option<Gains> {
     let (posterior, fit) = (field.planning_posterior()?, field.fit()?);
-    let places = sobol::places(field.zone(), PLACES, 0);
+    let per_side = (PLACES as f64).powf(1.0 / field.zone().dimension() as f64);
+    let places = field.zone().grid(per_side.round() as usize);
     let reduction = VarianceReduction::new(posterior, places.iter().map(Vec::as_slice));
     let variance =
         |field: &HeightField| Some(mean(&field.planning_posterior()?.variances(&places, &mut [])));
@@ -58,7 +58,7 @@ fn in_zone(field: &HeightField, offers: &[Offer], place: &[f64]) -> Option<Gains
 fn around(surface: &ImplicitSurface, offers: &[Offer], p_w: &Point3<f64>) -> Option<Gains> {
     let (believed, fit) = (surface.surface()?, surface.fit()?);
     let mesh = believed.mesh(CELLS)?;
-    let step = mesh.vertices().len().div_ceil(PLACES as usize).max(1);
+    let step = mesh.vertices().len().div_ceil(PLACES).max(1);
     let points: Vec<Point3<f64>> = mesh.vertices().iter().step_by(step).copied().collect();
     let places = points.iter().map(|point| point.coords.as_slice());
     let common = believed.pose_errors().iter().cloned();

@@ -39,7 +39,8 @@ struct Offset {
 }
 
 impl SeenSurface {
-    /// Finds the errors of the camera's pose from `contacts` on the seen part: the surface between the elements around a contact goes through it.
+    /// Finds the errors of the camera's pose from `contacts` on the seen part: the surface between
+    /// the elements around a contact goes through it.
     ///
     /// Gauss-Newton on the posterior given the prior of the errors; contacts that are far off count
     /// with their absolute value (Huber 1964).

@@ -1,4 +1,4 @@
-//! What a view shows that is not the object, as a hand before it: the finger went through it.
+//! Surfaces of a view that are not the object, as a hand before it: the finger went through them.
 
 use super::{CorrectedElement, SeenSurface};
 use crate::probe::Contact;
@@ -18,16 +18,17 @@ const BESIDE_SIGMAS: f64 = 3.0;
 // heuristic: a single one may be a hole that the driver filled.
 const FEWEST: usize = 2;
 
-/// Distance of elements of one surface, in that of the nearest one, and largest distance of each from the plane of
-/// the other, as a fraction of it.
+/// Distance of elements of one surface, in that of the nearest one, and largest distance of each
+/// from the plane of the other, as a fraction of it.
 // heuristic: an element's neighbours; a step between two surfaces is steeper.
 const NEAR: f64 = 2.0;
 const STEP: f64 = 0.4;
 
 impl SeenSurface {
     /// [Registers](Self::register) to `contacts`, and leaves out each surface through which the
-    /// finger went: `inside_m` gives the depth of a point of `W` within space that was swept up to
-    /// a distance beside it, negative outside. If that is most of what was seen, the pose is wrong, and nothing is left out.
+    /// finger went: `inside_m` gives the depth of a point of `W` within space that was swept up to a
+    /// distance beside it, negative outside. If that is most of what was seen, the pose is wrong,
+    /// and nothing is left out.
     pub fn align(&mut self, contacts: &[Contact], inside_m: impl Fn(&Point3<f64>, f64) -> f64) {
         self.rejected = vec![false; self.len()];
         self.register(contacts);

@@ -59,7 +59,7 @@ impl SweptPath {
     }
 }
 
-/// What a belief assumes of the cameras' poses that registration has found.
+/// Assumption about the cameras' poses that registration has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CameraPose {
     /// They are exact.
