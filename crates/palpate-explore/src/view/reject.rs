@@ -26,9 +26,9 @@ const STEP: f64 = 0.4;
 
 impl SeenSurface {
     /// [Registers](Self::register) to `contacts`, and leaves out each surface through which the
-    /// finger went: `inside_m` gives the depth of a point of `W` within space that was swept up to a
-    /// distance beside it, negative outside. If that is most of what was seen, the pose is wrong,
-    /// and nothing is left out.
+    /// finger went: `inside_m` gives the depth of a point of `W` within space that was swept up to
+    /// a distance beside it, negative outside. If that is most of what was seen, the pose is
+    /// wrong, and nothing is left out.
     pub fn align(&mut self, contacts: &[Contact], inside_m: impl Fn(&Point3<f64>, f64) -> f64) {
         self.rejected = vec![false; self.len()];
         self.register(contacts);
