@@ -194,8 +194,8 @@ impl SeenSurface {
         })
     }
 
-    /// Takes the `gradient` of the belief's field at each corrected element in `W`, if there is one.
-    /// Returns whether that changes the elements.
+    /// Takes the `gradient` of the belief's field at each corrected element in `W`, if there is
+    /// one. Returns whether that changes the elements.
     pub fn turn(&mut self, gradient: impl FnMut(&Point3<f64>) -> Option<Vector3<f64>>) -> bool {
         let places: Vec<Point3<f64>> = self.all().map(|element| element.p_w).collect();
         let found = places.iter().map(gradient).zip(&self.gradients_w);
