@@ -26,12 +26,11 @@ fn main() {
         let settings = Loader::read(&home.join(format!("experiments/beliefs/{name}.toml")));
         settings.ok().and_then(|loader| loader.finish::<GpSettings>().ok()).unwrap_or_default()
     };
-    let sets = ["camera.pixels=[640,480]".to_string()];
+    let camera = "camera={ model = \"d405\", position_m = [0.15, -0.4, 0.6], pixels = [640, 480], \
+                  noise = {}, pose_error = {}, holes = {}, flying_pixels = {}, quantisation = {} }";
     for name in ["container", "bird"] {
-        let camera = "camera={ model = \"d405\", position_m = [0.15, -0.4, 0.6], noise = {}, \
-                      pose_error = {}, holes = {}, flying_pixels = {}, quantisation = {} }";
         let path = home.join(format!("scenes/{name}.toml"));
-        let scene = Scene::load(&path, &[camera.to_string(), sets[0].clone()]);
+        let scene = Scene::load(&path, &[camera.into()]);
         let Some(environment) = scene.ok().and_then(|scene| Environment::build(scene).ok()) else {
             continue;
         };

@@ -194,13 +194,9 @@ impl HeightField {
     pub fn imagined(&self, offer: &Offer, places: &[Vec<f64>]) -> Option<SeenSurface> {
         let (posterior, zone) = (self.surface.as_ref()?, &self.zone);
         let scratch = &mut Scratch::default();
-        let mut slopes = vec![0.0; zone.dimension()];
         let mut point = |place: &Vec<f64>| {
-            let height_m = posterior.mean_gradient(place, &mut slopes, scratch);
-            let slope = |axis: usize| slopes.get(axis).copied().unwrap_or(0.0);
-            let normal_z = Vector3::new(-slope(0), 1.0, -slope(1));
-            let normal_w = UnitVector3::new_normalize(zone.x_wz().rotation * normal_z);
-            (zone.point(place, height_m), normal_w)
+            let (height_m, gradient_w) = mean_with_gradient((zone, posterior), place, scratch);
+            (zone.point(place, height_m), UnitVector3::new_normalize(gradient_w))
         };
         let points: Vec<_> = places.iter().map(&mut point).collect();
         let is_free = |p_w: &Point3<f64>| {
@@ -269,16 +265,10 @@ impl HeightField {
     /// observations.
     fn turn(&mut self, posterior: &Posterior) -> bool {
         let (zone, scratch) = (&self.zone, &mut Scratch::default());
-        let x_wz = zone.x_wz();
-        let mut gradient = vec![0.0; zone.dimension()];
         let mut field_gradient = |p_w: &Point3<f64>| {
             let place = zone.place(p_w);
-            if !zone.contains(&place) {
-                return None;
-            }
-            posterior.mean_gradient(&place, &mut gradient, scratch);
-            let slope = |axis: usize| gradient.get(axis).copied().unwrap_or(0.0);
-            Some(x_wz.rotation * Vector3::new(-slope(0), 1.0, -slope(1)))
+            let is_in = zone.contains(&place);
+            is_in.then(|| mean_with_gradient((zone, posterior), &place, scratch).1)
         };
         let mut is_changed = false;
         for seen in &mut self.seen {
@@ -548,6 +538,17 @@ impl HeightField {
     pub fn targets(&self) -> &[Vec<f64>] {
         &self.targets
     }
+}
+
+/// Returns the mean height at `place`, and the gradient in `W` of the height above the mean.
+fn mean_with_gradient(
+    (zone, posterior): (&Zone, &Posterior),
+    place: &[f64],
+    scratch: &mut Scratch,
+) -> (f64, Vector3<f64>) {
+    let mut slopes = [0.0; 2];
+    let height_m = posterior.mean_gradient(place, &mut slopes[..place.len()], scratch);
+    (height_m, zone.x_wz().rotation * Vector3::new(-slopes[0], 1.0, -slopes[1]))
 }
 
 /// Returns the calibration factor of the 95 % band: the smallest that covers (n + 1)·95 % of the n

@@ -64,8 +64,7 @@ fn hyperparameters() -> Hyperparameters {
     Hyperparameters::new(0.7, vec![0.4, 0.6], 0.05.into(), 0.1)
 }
 
-/// Mean and variance at a place, and mean and covariance of the errors of source 1, from the dense
-/// matrices of the linear mixed model.
+/// Mean and variance at a place, from the dense matrices of the linear mixed model.
 fn slow_twin(rows: &[Row], at: &[f64; 2]) -> [f64; 2] {
     let Hyperparameters { signal_sd, length_scales, noise_sd, mean, .. } = hyperparameters();
     let covariance = |a: &[f64; 2], b: &[f64; 2]| {
