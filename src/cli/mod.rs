@@ -17,6 +17,7 @@ mod find;
 mod host;
 mod known_body;
 mod list;
+mod look;
 mod new;
 mod output;
 mod picture;
@@ -101,6 +102,8 @@ enum Command {
     Accuracy(accuracy::Args),
     /// Serve a simulated robot over ROS topics in real time.
     Serve(serve::Args),
+    /// Save a view of a depth camera from its ROS topic.
+    Look(look::Args),
     /// Register the finger, a ball, a plate or an object by touch.
     Register(register::Args),
     /// Replay a recorded trial and compare commands and results.
@@ -123,7 +126,7 @@ enum Command {
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "report", "show", "export"]),
     ("Evaluate", &["compare", "sensors", "benchmark", "check", "accuracy", "calibrate-band"]),
-    ("Robot", &["serve", "register", "replay", "calibrate"]),
+    ("Robot", &["serve", "look", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
 
@@ -197,6 +200,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Check(args) => check::run(&args, talk, host),
         Command::Accuracy(args) => accuracy::run(&args, talk),
         Command::Serve(args) => serve::run(&args, talk),
+        Command::Look(args) => look::run(&args),
         Command::Register(args) => register::run(&args, talk),
         Command::Replay(args) => replay::run(&args, talk),
         Command::Calibrate(args) => calibrate::run(&args),

@@ -66,7 +66,7 @@ pub(super) struct Args {
     set: Vec<String>,
 }
 
-fn kind(text: &str) -> Result<BackendKind, String> {
+pub(super) fn kind(text: &str) -> Result<BackendKind, String> {
     let kinds = [BackendKind::Ros2, BackendKind::Ros1];
     kinds.into_iter().find(|kind| kind.name() == text).ok_or("allowed are ros2, ros1".into())
 }

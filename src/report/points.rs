@@ -3,6 +3,18 @@
 use nalgebra::{Point3, Vector3};
 use std::fmt::Write;
 
+/// Formats points without normals as a binary PLY file with a comment.
+pub fn binary_ply(comment: &str, points: &[Point3<f64>]) -> Vec<u8> {
+    let header = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment palpate\ncomment {}\nelement vertex {}\n\
+         property float x\nproperty float y\nproperty float z\nend_header\n",
+        comment.replace(['\n', '\r'], " "),
+        points.len()
+    );
+    let numbers = points.iter().flat_map(|p| [p.x, p.y, p.z]);
+    header.into_bytes().into_iter().chain(numbers.flat_map(|x| (x as f32).to_le_bytes())).collect()
+}
+
 /// Points in `W`, in metres, optionally joined to a surface.
 #[derive(Default)]
 pub struct PointCloud {

@@ -56,6 +56,7 @@ mod installed;
 mod interlocks;
 #[cfg(feature = "mujoco")]
 mod lab;
+mod lab_camera;
 #[cfg(feature = "mujoco")]
 mod lab_faults;
 #[cfg(feature = "mujoco")]

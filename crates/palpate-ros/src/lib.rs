@@ -5,6 +5,7 @@
 //! | [`arm`] | the arm: a [`Backend`](palpate_explore::backend::Backend) over topics |
 //! | [`profile`], [`ur`] | the drivers of arms, and where they differ |
 //! | [`topics`], [`message`] | the topics and services of an arm, and their messages |
+//! | [`camera`] | one view of a depth camera |
 //! | [`view`] | messages that RViz, Foxglove and other viewers draw |
 //! | [`transport`] | sends and receives packets; [`connect`] creates one from settings |
 //! | [`server`] | a simulated robot behind the same topics, in real time |
@@ -26,6 +27,7 @@
 
 pub mod arm;
 mod calls;
+pub mod camera;
 pub mod definition;
 pub mod joints;
 pub mod link;
@@ -75,18 +77,23 @@ pub fn connect(
         BackendKind::Ros1 => Ok(Box::new(move || {
             Ok(Box::new(ros1::Ros1::open(&owned, side, services)?) as Box<dyn transport::Transport>)
         })),
-        BackendKind::Simulated | BackendKind::Franka => Err(InputError::new(format!(
-            "kind = \"{}\" has no topics; allowed are \"ros2\", \"ros1\"",
-            settings.kind.name()
-        ))),
-        #[cfg(not(all(feature = "ros1", feature = "ros2")))]
         kind => {
             drop((owned, side, services));
-            let kind = kind.name();
-            Err(InputError::new(format!(
-                "kind = \"{kind}\" needs a build with the feature `{kind}`: \
-                 cargo build --release --features {kind}"
-            )))
+            Err(no_transport(kind))
         }
     }
+}
+
+/// Returns the error of a kind of backend without topics, or whose transport this build lacks.
+fn no_transport(kind: BackendKind) -> InputError {
+    let name = kind.name();
+    InputError::new(match kind {
+        BackendKind::Simulated | BackendKind::Franka => {
+            format!("kind = \"{name}\" has no topics; allowed are \"ros2\", \"ros1\"")
+        }
+        BackendKind::Ros1 | BackendKind::Ros2 => format!(
+            "kind = \"{name}\" needs a build with the feature `{name}`: \
+             cargo build --release --features {name}"
+        ),
+    })
 }

@@ -1,5 +1,6 @@
 //! ROS 1 transport by roslibrust, for drivers of ROS 1.
 
+pub mod camera;
 mod master;
 mod wire;
 

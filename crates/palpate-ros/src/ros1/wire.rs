@@ -1,10 +1,12 @@
 //! Wire format of ROS 1 messages: as in ROS 2, except that the header has a sequence number.
 
+use crate::camera::CameraInfo;
 use crate::definition::{HasDefinition, Text};
 use crate::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     TriggerResponse, WrenchStamped,
 };
+use crate::view::PointCloud2;
 use roslibrust::{MessageDescriptor, RosMessageType, RosServiceType};
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +44,10 @@ ros1! {
         "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37";
     SequencedMessage<Image>: Image =
         "sensor_msgs/Image", "060021388200f6f0f447d0fcd9c64743";
+    SequencedMessage<PointCloud2>: PointCloud2 =
+        "sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181";
+    SequencedMessage<CameraInfo>: CameraInfo =
+        "sensor_msgs/CameraInfo", "c9a58c1b0b154e0e6da7578cb991d214";
     Touching: Touching = "std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a";
     SequencedMessage<DiagnosticArray>: DiagnosticArray =
         "diagnostic_msgs/DiagnosticArray", "60810da900de1dd6ddd437c3503511da";

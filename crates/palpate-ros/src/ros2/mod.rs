@@ -1,6 +1,7 @@
 //! ROS 2 transport by RustDDS, without an installation of ROS.
 
 mod calls;
+pub mod camera;
 mod endpoint;
 
 use crate::definition::HasDefinition;
@@ -73,6 +74,23 @@ fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
     netdev::get_interfaces().into_iter().map(|one| (one.name.clone(), addresses(&one))).collect()
 }
 
+/// Opens a node of this name in the network of `settings`.
+fn open_node(settings: &BackendSettings, name: &str) -> Result<(Context, Node), InputError> {
+    let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
+        .map_err(cannot_open("the network"))?;
+    let mut participant = DomainParticipantBuilder::new(domain);
+    if let Some(addresses) = addresses {
+        participant = participant.with_only_networks(addresses);
+    }
+    let participant = participant.build().map_err(cannot_open("a DDS participant"))?;
+    let context =
+        Context::from_domain_participant(participant).map_err(cannot_open("a DDS participant"))?;
+    let name = NodeName::new("/palpate", name).map_err(cannot_open("a node"))?;
+    let options = NodeOptions::new().start_parameter_services(false);
+    let node = context.new_node(name, options).map_err(cannot_open("a node"))?;
+    Ok((context, node))
+}
+
 impl Ros2 {
     /// Opens one side of the arm of `settings`; `services` are those that are called or served.
     ///
@@ -83,22 +101,13 @@ impl Ros2 {
         side: Endpoint,
         services: Vec<Service>,
     ) -> Result<Self, InputError> {
-        let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
-            .map_err(cannot_open("the network"))?;
-        let mut participant = DomainParticipantBuilder::new(domain);
-        if let Some(addresses) = addresses {
-            participant = participant.with_only_networks(addresses);
-        }
-        let participant = participant.build().map_err(cannot_open("a DDS participant"))?;
-        let context = Context::from_domain_participant(participant)
-            .map_err(cannot_open("a DDS participant"))?;
-        let name = match side {
-            Endpoint::Explorer => "explorer",
-            Endpoint::Arm => "arm",
-        };
-        let name = NodeName::new("/palpate", name).map_err(cannot_open("a node"))?;
-        let options = NodeOptions::new().start_parameter_services(false);
-        let node = context.new_node(name, options).map_err(cannot_open("a node"))?;
+        let (context, node) = open_node(
+            settings,
+            match side {
+                Endpoint::Explorer => "explorer",
+                Endpoint::Arm => "arm",
+            },
+        )?;
         let poll = Poll::new().map_err(cannot_open("a poll"))?;
         let waker = mio1::Waker::new(poll.registry(), WAKE).map_err(cannot_open("a waker"))?;
         let mut end = Self {
@@ -196,9 +205,7 @@ impl Ros2 {
         qos: &QosProfile,
     ) -> Result<(String, rustdds::Topic), InputError> {
         let name = self.settings.topics.name(topic);
-        let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
-        let path = Name::parse(&name).map_err(cannot_open(&name))?;
-        let dds = self.node.create_topic(&path, type_name, qos).map_err(cannot_open(&name))?;
+        let dds = dds_topic::<M>(&mut self.node, &name, qos)?;
         Ok((name, dds))
     }
 
@@ -277,6 +284,17 @@ impl Ros2 {
             self.clients[i].1 = ServiceClient::open(place, service, release).ok();
         }
     }
+}
+
+/// Creates the DDS topic of messages of type `M` under this name.
+fn dds_topic<M: HasDefinition>(
+    node: &mut Node,
+    name: &str,
+    qos: &QosProfile,
+) -> Result<rustdds::Topic, InputError> {
+    let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
+    let path = Name::parse(name).map_err(cannot_open(name))?;
+    node.create_topic(&path, type_name, qos).map_err(cannot_open(name))
 }
 
 /// Returns the mapping of a service for a server of this vendor.
