@@ -124,7 +124,9 @@ impl ExplorationScene {
     fn touch_row(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
         let mut row = match (self.task().region(), target) {
             (Region::Zone(zone), Target::Place(place)) => self.zone_row(zone, place, met),
-            (Region::Zone(zone), Target::Tilted { place, .. }) => self.zone_row(zone, place, met),
+            (Region::Zone(zone), Target::Tilted { place, .. } | Target::Stroke { place, .. }) => {
+                self.zone_row(zone, place, met)
+            }
             (Region::Ball(ball), Target::Aim(aim)) => {
                 let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
                 let mut row: Vec<f64> = aim.direction_w.iter().map(|ahead| -ahead).collect();

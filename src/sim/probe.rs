@@ -9,6 +9,7 @@ use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::SensedContact;
 use palpate_explore::task::Approach;
 use palpate_explore::task::approach::BEYOND_M;
+use palpate_explore::task::stroke::{SAMPLE_M, STEEPEST};
 use palpate_geometry::bvh::SweepHit;
 use palpate_geometry::sweep::Capsule;
 use std::sync::Arc;
@@ -52,8 +53,9 @@ impl Probe for ExactProbe {
             let p_tc = x_wt.inverse_transform_point(&hit.point);
             (x_wt, SensedContact::new(p_tc, x_wt.inverse_transform_vector(&hit.normal)))
         });
-        Ok(found.map_or(Touch::Miss, |RestingPose { hit, .. }| {
-            Touch::Contact(Contact::new(hit.point, hit.normal))
+        Ok(found.map_or(Touch::Miss, |rest| {
+            let patch = slide(environment, approach, rest).collect();
+            Touch::Contact(Contact { patch, ..Contact::new(rest.hit.point, rest.hit.normal) })
         }))
     }
 
@@ -64,6 +66,28 @@ impl Probe for ExactProbe {
     fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
         self.sensed.as_ref()
     }
+}
+
+/// Returns the contacts along the slide of an approach from the pose `rest`, up to a wall or an
+/// edge.
+fn slide<'a>(
+    environment: &'a Environment,
+    approach: &'a Approach,
+    rest: RestingPose,
+) -> impl Iterator<Item = Contact> + 'a {
+    let length_m = approach.slide_w.map_or(0.0, |way_w| way_w.norm());
+    let count = (length_m / SAMPLE_M).round() as usize;
+    let ahead_w = approach.direction_w();
+    let mut last_w = rest.p_wt;
+    (1..=count).map_while(move |i| {
+        let rest = resting_pose(environment, &approach.slid(i as f64 / count as f64))?;
+        let step_w = rest.p_wt - last_w;
+        let deeper_m = step_w.dot(&ahead_w);
+        let across_m = (step_w - ahead_w.scale(deeper_m)).norm();
+        last_w = rest.p_wt;
+        let is_steep = deeper_m.abs() > STEEPEST * across_m;
+        (!is_steep).then(|| Contact::new(rest.hit.point, rest.hit.normal))
+    })
 }
 
 /// Returns the finger with the pitch of an approach: its own, or a further one.

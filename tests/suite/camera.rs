@@ -241,7 +241,7 @@ fn images_of_any_size_are_thinned() {
         let points_c: Vec<Point3<f64>> = (0..side * side).map(point).collect();
         let accuracy = CameraAccuracy { noise, pose_error: PoseError::NONE };
         let (x_wc, pivot_w) = (Isometry3::identity(), Point3::origin());
-        let view = View { x_wc, points_c, pivot_w, accuracy };
+        let view = View { x_wc, points_c, image: None, pivot_w, accuracy };
         let elements = thin(&view, |_| true, 120);
         let kept: usize = elements.iter().map(|element| element.count).sum();
         assert!(kept * 10 > side * side * 7, "{side}: {kept}");
@@ -267,7 +267,7 @@ fn a_pole_a_few_pixels_wide_is_seen() {
         let noise = PixelNoise { noise_m: 1e-3, noise_ratio: 0.0, noise_px: 1 };
         let accuracy = CameraAccuracy { noise, pose_error: PoseError::NONE };
         let (x_wc, pivot_w) = (Isometry3::identity(), Point3::origin());
-        let view = View { x_wc, points_c, pivot_w, accuracy };
+        let view = View { x_wc, points_c, image: None, pivot_w, accuracy };
         for element in thin(&view, |_| true, 120) {
             assert!(element.sd_m > 0.0 && element.sd_m.is_finite(), "{width}: {element:?}");
             assert!(element.p_c.coords.iter().all(|x| x.is_finite()), "{width}: {element:?}");

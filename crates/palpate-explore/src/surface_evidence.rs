@@ -18,6 +18,7 @@
 use super::probe::{Contact, SweptVolume};
 use crate::robot::Finger;
 use crate::task::Zone;
+use crate::view::{DepthMap, Sight, View};
 use nalgebra::{Point3, Vector2};
 use palpate_gp::kernel::SquaredExponential;
 use palpate_gp::likelihood::Likelihood;
@@ -39,6 +40,13 @@ const LESS_AT_THE_RIM: f64 = 0.9;
 /// Number of evidence points along a missed hull; two and five perform the same.
 const MISS_PLACES: usize = 3;
 
+/// Places along the longer side of the zone of which a view tells the presence of a surface.
+// heuristic: two diameters of a finger in a zone as wide as a hand.
+const SEEN_PER_SIDE: usize = 12;
+
+/// Probability of a surface where a view saw none.
+const SEEN_THROUGH: f64 = 0.1;
+
 /// Evidence from touches for the presence of a surface.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SurfaceEvidence {
@@ -54,6 +62,9 @@ pub struct SurfaceEvidence {
     misses: Vec<Stadium>,
     /// Hull of the last touch; for another target it is translated.
     hull: Option<Stadium>,
+    /// Places where a camera saw a surface, or that there is none, with its probability.
+    #[serde(default)]
+    seen: Vec<(Vector2<f64>, f64)>,
     zone: Zone,
 }
 
@@ -66,6 +77,7 @@ impl SurfaceEvidence {
             hulls: Vec::new(),
             misses: Vec::new(),
             hull: None,
+            seen: Vec::new(),
             zone: zone.clone(),
         }
     }
@@ -90,6 +102,46 @@ impl SurfaceEvidence {
             last.get_or_insert_with(|| hull.clone());
         }
         self.hull = Some(hull);
+    }
+
+    /// Adds what a view says of the presence of a surface, at a few places of the zone; nothing if
+    /// the zone has no depth.
+    pub(super) fn add_view(&mut self, view: &View) {
+        let Some([near_m, far_m]) = self.zone.depth_m else { return };
+        let extents_m = self.zone.extents_m();
+        let step_m = extents_m.iter().copied().fold(0.0, f64::max) / SEEN_PER_SIDE as f64;
+        let margin_m = view.accuracy.pose_error.position_sd_m.into_iter().fold(0.0, f64::max);
+        let map = DepthMap::new(view, 0.25 * step_m);
+        let counts = extents_m.iter().map(|side| ((side / step_m).round() as usize).max(1));
+        let counts: Vec<usize> = counts.collect();
+        let deep = ((far_m - near_m) / (0.25 * step_m)).ceil().max(1.0) as usize;
+        for k in 0..counts.iter().product() {
+            let (i, j) = (k % counts[0], k / counts[0]);
+            let share = |at: usize, axis: usize| (at as f64 + 0.5) / counts[axis] as f64;
+            let shares: Vec<f64> = [i, j]
+                .into_iter()
+                .enumerate()
+                .take(counts.len())
+                .map(|(axis, at)| share(at, axis))
+                .collect();
+            let place = self.zone.at(&shares);
+            let line = (0..=deep).map(|d| {
+                let depth_m = near_m + (far_m - near_m) * d as f64 / deep as f64;
+                self.zone.x_wz() * self.zone.local(&place, -depth_m)
+            });
+            let presence = match map.sight(line, margin_m) {
+                Sight::Surface => 1.0,
+                Sight::Nothing => SEEN_THROUGH,
+                Sight::Unknown => continue,
+            };
+            self.seen.push((flat(&self.zone.local(&place, 0.0)), presence));
+        }
+    }
+
+    /// Returns the places where a camera saw that there is no surface.
+    pub(super) fn seen_through(&self) -> Vec<Vec<f64>> {
+        let empty = self.seen.iter().filter(|(_, presence)| *presence < 0.5);
+        empty.map(|(place, _)| place.as_slice()[..self.zone.dimension()].into()).collect()
     }
 
     /// Returns the estimated silhouette.
@@ -117,6 +169,7 @@ impl SurfaceEvidence {
                 labels.push((miss.start + miss.along * (i as f64 / (MISS_PLACES - 1) as f64), 0.0));
             }
         }
+        labels.extend(&self.seen);
         labels
     }
 }

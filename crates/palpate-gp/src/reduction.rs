@@ -4,7 +4,7 @@
 //! of them, and each number read serves sixteen operations.
 
 use super::batch::{MANY, add_squares};
-use super::cholesky::subtract_products;
+use super::cholesky::{Factor, subtract_products};
 use super::means::MeanField;
 use super::observations::Observations;
 use super::posterior::Posterior;
@@ -64,6 +64,58 @@ impl<'a> VarianceReduction<'a> {
         weights.resize(self.references.len(), 0.0);
         self.weights = weights;
         self
+    }
+
+    /// Returns the mean reductions of the variance at the references by observations at the first
+    /// place of `line`, at the first two together, and so on, for at most sixteen places:
+    /// (1/m)·Σ_r w_r·|M⁻¹·k(line, r)|², with the factor M of the places' posterior covariance plus
+    /// noise. Errors in common are not taken into account.
+    pub fn along(&self, line: &[&[f64]]) -> Vec<f64> {
+        let line = &line[..line.len().min(MANY)];
+        let hyperparameters = self.posterior.hyperparameters();
+        let signal2 = hyperparameters.signal_sd.powi(2);
+        let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();
+        let scale = signal2 / self.references.len().max(1) as f64;
+        let mut own = Observations::new(self.references.dimension());
+        line.iter().for_each(|place| own.push_height(place, 0.0));
+        let mut falls = Vec::with_capacity(line.len());
+        self.posterior.whitened(line, |solved, _, count| {
+            let at_line: Vec<f64> =
+                (0..count).flat_map(|lane| solved.iter().map(move |lanes| lanes[lane])).collect();
+            let covariances = |others: &Observations, whitened: &[f64]| {
+                let mut covariances = vec![[0.0; MANY]; others.len()];
+                for (axis, length) in hyperparameters.length_scales.iter().enumerate() {
+                    let at = std::array::from_fn(|lane| line[lane.min(count - 1)][axis]);
+                    add_squares(&mut covariances, at, others.column(axis), 1.0 / length);
+                }
+                self.posterior.kernel().correlate(covariances.as_flattened_mut());
+                subtract_products(whitened, solved, &mut covariances);
+                covariances
+            };
+            let (mut factor, mut order) = (Factor::default(), 0);
+            for row in &mut covariances(&own, &at_line) {
+                row[order] += noise2;
+                // Places that are one to rounding add nothing.
+                if factor.append(row).is_err() {
+                    break;
+                }
+                order += 1;
+            }
+            let mut sums = [0.0; MANY];
+            for (row, weight) in
+                covariances(&self.references, &self.whitened).iter_mut().zip(&self.weights)
+            {
+                factor.solve_lower(&mut row[..order]);
+                let squares = row[..order].iter().map(|x| weight * x * x);
+                sums.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
+            }
+            let mut fall = 0.0;
+            falls.extend(sums.iter().take(count).map(|sum| {
+                fall += scale * sum;
+                fall
+            }));
+        });
+        falls
     }
 
     /// Returns the mean reduction of the variance at the references by an observation at each of
@@ -163,6 +215,37 @@ mod tests {
                 });
                 let twin = falls.sum::<f64>() / at.len() as f64;
                 prop_assert!((found - twin).abs() < 1e-10, "{found} {twin}");
+            }
+        }
+
+        /// The reductions along a line are the mean falls of the variances when its places are
+        /// observed one after the other.
+        #[test]
+        fn the_falls_along_a_line(
+            touches in prop::collection::vec(place(), 1..30),
+            references in prop::collection::vec((place(), 0.0..1.0), 1..20),
+            line in prop::collection::vec(place(), 1..20),
+        ) {
+            let mut observations = Observations::new(2);
+            touches.iter().for_each(|at| observations.push_height(at, at[0]));
+            let noise = NoiseRatio { height: 0.05, slope: 0.1, known: 0.0 };
+            let hyperparameters = Hyperparameters::new(2.0, vec![0.4, 0.7], noise, 0.0);
+            let posterior = Posterior::new(&Matern52, hyperparameters, observations).unwrap();
+            let (at, weights): (Vec<[f64; 2]>, Vec<f64>) = references.into_iter().unzip();
+            let references = at.iter().map(<[f64; 2]>::as_slice);
+            let reduction = VarianceReduction::new(&posterior, references).weighted(weights.clone());
+            let asked: Vec<&[f64]> = line.iter().map(<[f64; 2]>::as_slice).collect();
+            let found = reduction.along(&asked);
+            prop_assert_eq!(found.len(), line.len().min(16));
+            let mut scratch = Scratch::default();
+            let mut after = posterior.clone();
+            for (place, found) in line.iter().zip(found) {
+                after.add(place, 0.0).unwrap();
+                let falls = at.iter().zip(&weights).map(|(at, weight)| {
+                    weight * (posterior.variance(at, &mut scratch) - after.variance(at, &mut scratch))
+                });
+                let twin = falls.sum::<f64>() / at.len() as f64;
+                prop_assert!((found - twin).abs() < 1e-9, "{found} {twin}");
             }
         }
 

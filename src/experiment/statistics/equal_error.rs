@@ -8,7 +8,7 @@
 //! planners; the intervals describe that distribution.
 
 use crate::experiment::experiment::Experiment;
-use crate::experiment::measure::{MEASURES, Measure};
+use crate::experiment::measure::{MEASURES, Measure, ROBOT_TIME};
 use crate::experiment::statistics::comparison::pairs;
 use crate::experiment::statistics::{BootstrapSamples, RankedValues, central_95};
 use crate::experiment::trial::row::{TrialRow, planner_rows};
@@ -51,6 +51,9 @@ pub struct EqualError<'a> {
     pub ratio: IntervalEstimate,
     /// Ratio of the median lateral path lengths from the initial touches to the goal.
     pub path_ratio: IntervalEstimate,
+    /// Ratio of the median times of the robot from its start to the goal; not finite without
+    /// motion.
+    pub time_ratio: IntervalEstimate,
 }
 
 /// Compares every planner with every baseline in every error that both have.
@@ -85,11 +88,11 @@ pub fn equal_error<'a>(
         |after: f64| compared.get(after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
     let mut met = |sample: &[usize]| {
         let met = reach_goal(&medians, sample, goal_index, &mut counts);
-        met.map(|(after, path_m)| [touches(after), path_m])
+        met.map(|(after, path_m, time_s)| [touches(after), path_m, time_s])
     };
     let found = met(&everyone);
     let samples = BootstrapSamples::new(pairs.len(), experiment.seed).each(met);
-    let estimate = |of: fn([[f64; 2]; 2]) -> f64| {
+    let estimate = |of: fn([[f64; 3]; 2]) -> f64| {
         let values = samples.iter().map(|met| of(*met)).collect();
         let interval = (!samples.is_empty()).then(|| central_95(values));
         IntervalEstimate { value: of(found), interval }
@@ -104,6 +107,7 @@ pub fn equal_error<'a>(
         baseline_touches: found[1][0],
         ratio: estimate(|[ours, theirs]| ours[0] / theirs[0]),
         path_ratio: estimate(|[ours, theirs]| ours[1] / theirs[1]),
+        time_ratio: estimate(|[ours, theirs]| ours[2] / theirs[2]),
     })
 }
 
@@ -119,6 +123,8 @@ struct ErrorCurve<T> {
     errors: Vec<T>,
     /// Lateral path length since the last initial touch.
     paths_m: Vec<T>,
+    /// Time of the robot since its start; not finite without motion.
+    times_s: Vec<T>,
 }
 
 impl ErrorCurve<RankedValues> {
@@ -131,6 +137,7 @@ impl ErrorCurve<RankedValues> {
         Self {
             errors: ranked(&|curve, index| curve.errors[index]),
             paths_m: ranked(&|curve, index| curve.paths_m[index]),
+            times_s: ranked(&|curve, index| curve.times_s[index]),
         }
     }
 }
@@ -149,31 +156,34 @@ fn curves(
         let start_m = row.path_m(experiment.initial_touches)?;
         let paths_m: Option<Vec<f64>> =
             counts.iter().map(|&count| Some(row.path_m(count)? - start_m)).collect();
-        Some(ErrorCurve { errors: errors?, paths_m: paths_m? })
+        let time_s = |count: &u32| ROBOT_TIME.value(row, *count).unwrap_or(f64::NAN);
+        let times_s = counts.iter().map(time_s).collect();
+        Some(ErrorCurve { errors: errors?, paths_m: paths_m?, times_s })
     };
     planner_rows(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
 }
 
 /// Returns the index at which each planner reaches the second one's median error at `goal_index`,
-/// and the median path length to it, m. The index counts compared touch counts: over a zone,
+/// the median path length to it, m, and the median time, s. The index counts compared touch counts: over a zone,
 /// touches after the initial ones.
 fn reach_goal(
     medians: &[ErrorCurve<RankedValues>; 2],
     sample: &[usize],
     goal_index: usize,
     counts: &mut Vec<u32>,
-) -> [(f64, f64); 2] {
+) -> [(f64, f64, f64); 2] {
     let goal = medians[1].errors.get(goal_index).and_then(|error| error.median(sample, counts));
     let goal = goal.unwrap_or(f64::NAN);
-    medians.each_ref().map(|ErrorCurve { errors, paths_m }| {
+    medians.each_ref().map(|ErrorCurve { errors, paths_m, times_s }| {
         let mut is_met =
             |index: usize| errors[index].median(sample, counts).is_some_and(|error| error <= goal);
         let met = match is_met(goal_index) {
             true => (0..=goal_index).rev().take_while(|&index| is_met(index)).last(),
             false => (goal_index + 1..errors.len()).find(|&index| is_met(index)),
         };
-        let path = met.and_then(|index| paths_m[index].median(sample, counts));
-        (met.map_or(f64::INFINITY, |index| index as f64), path.unwrap_or(f64::INFINITY))
+        let mut at = |of: &[RankedValues]| met.and_then(|index| of[index].median(sample, counts));
+        let [path_m, time_s] = [at(paths_m), at(times_s)].map(|at| at.unwrap_or(f64::INFINITY));
+        (met.map_or(f64::INFINITY, |index| index as f64), path_m, time_s)
     })
 }
 
@@ -189,6 +199,7 @@ mod tests {
                     .map(|i| (1.0 + 0.01 * f64::from(trial)) * error(f64::from(i)))
                     .collect(),
                 paths_m: (0..41).map(|i| step_m * f64::from(i)).collect(),
+                times_s: (0..41).map(|i| 2.0 * step_m * f64::from(i)).collect(),
             })
             .collect()
     }
@@ -197,7 +208,7 @@ mod tests {
         ours: &[ErrorCurve<f64>],
         theirs: &[ErrorCurve<f64>],
         goal_index: usize,
-    ) -> [(f64, f64); 2] {
+    ) -> [(f64, f64, f64); 2] {
         let sample: Vec<usize> = (0..ours.len()).map(|i| i / 2).collect();
         let medians = [ours, theirs].map(|curves| ErrorCurve::new(curves.iter()));
         reach_goal(&medians, &sample, goal_index, &mut Vec::new())
@@ -208,7 +219,7 @@ mod tests {
     fn twice_as_fast_needs_half_the_touches() {
         let (fast, slow) = (trials(|n| (-0.2 * n).exp(), 3.0), trials(|n| (-0.1 * n).exp(), 1.0));
         let [ours, theirs] = reached(&fast, &slow, 40);
-        assert_eq!((ours, theirs), ((20.0, 60.0), (40.0, 40.0)));
+        assert_eq!((ours, theirs), ((20.0, 60.0, 120.0), (40.0, 40.0, 80.0)));
         let [slower, itself] = reached(&slow, &fast, 10);
         assert_eq!((slower.0, itself.0), (20.0, 10.0));
     }

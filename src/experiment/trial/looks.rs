@@ -10,7 +10,7 @@ use palpate_gp::math::seed;
 
 /// Time of a touch of a probe that does not move, and of the first touch, s.
 // heuristic: a simulated PA-10 takes five to eight.
-const TOUCH_S: f64 = 6.0;
+pub(super) const TOUCH_S: f64 = 6.0;
 
 /// Camera of a trial.
 pub(super) struct Looks<'a> {
@@ -59,10 +59,14 @@ impl<'a> Looks<'a> {
         if self.experiment.further_views == 0 || self.taken.len() >= most as usize {
             return Vec::new();
         }
-        let looked_s = self.look_s() * self.taken.len() as f64;
-        let mean_s = probe.time_s().map(|time_s| (time_s - looked_s) / f64::from(after));
+        let mean_s = probe.time_s().map(|time_s| (time_s - self.looked_s()) / f64::from(after));
         let touch_s = mean_s.filter(|_| after > 0).unwrap_or(TOUCH_S);
         self.environment.offers(&self.taken, touch_s)
+    }
+
+    /// Time of the looks so far, s.
+    pub(super) fn looked_s(&self) -> f64 {
+        self.look_s() * self.taken.len() as f64
     }
 
     fn look_s(&self) -> f64 {

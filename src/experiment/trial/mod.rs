@@ -7,6 +7,7 @@ pub mod planner_names;
 pub mod recorded_trial;
 pub mod replay;
 pub mod row;
+mod strokes;
 mod verification;
 pub mod view;
 
@@ -15,6 +16,7 @@ pub(super) use oracle::{GroundTruth, OracleFactory};
 use self::belief_shape::{BelievedShape, shape};
 use self::looks::Looks;
 use self::row::{TouchRow, TrialRow};
+use self::strokes::Strokes;
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
@@ -128,6 +130,7 @@ fn run_touches(
     let uses_tips = experiment.gp.free_space || experiment.gp.band.learned().is_some();
     let writes_tips = uses_tips || is_around;
     let mut looks = Looks::new(experiment, &truth.environment, row.trial);
+    let mut strokes = Strokes::new(task);
     for number in 0..experiment.views {
         row.views.push(looks.look((number, 0), probe, &mut belief)?);
     }
@@ -140,10 +143,16 @@ fn run_touches(
             start.plan(&belief).map_err(failed)?
         } else {
             loop {
-                let plan = planner.plan(&belief).map_err(failed)?;
+                let mut plan = planner.plan(&belief).map_err(failed)?;
                 let offers = looks.offers(probe, count - 1);
                 let asked = planner.look(&belief, &offers, &plan.target);
-                let Some(offer) = asked.and_then(|asked| offers.get(asked)) else { break plan };
+                let Some(offer) = asked.and_then(|asked| offers.get(asked)) else {
+                    let offer = strokes.offer(probe, looks.looked_s());
+                    if let Some(offer) = offer.filter(|_| !factory.taps()) {
+                        plan.target = planner.stroke(&belief, &offer, plan.target);
+                    }
+                    break plan;
+                };
                 row.views.push(looks.look((offer.number, count - 1), probe, &mut belief)?);
                 belief.refit().map_err(|error| format!("fit before touch {count}: {error}"))?;
             }
@@ -159,6 +168,7 @@ fn run_touches(
         let touch = probe.touch(&approach).map_err(|fault| format!("touch {count}: {fault}"))?;
         let swept = probe.swept_volume();
         belief.observe(&plan.target, &approach, (&touch, swept.as_ref()));
+        strokes.add(&plan.target, &touch);
         let swept = swept.filter(|_| writes_tips || touch == Touch::Miss);
         let contact = match &touch {
             Touch::Contact(contact) => Some(contact),

@@ -1,6 +1,6 @@
 //! Names that an experiment may list: planners, and the oracle.
 
-use palpate_explore::planner::{PLANNERS, is_external};
+use palpate_explore::planner::{PLANNERS, TAPPING, is_external};
 
 /// Name of the oracle in an experiment's list of planners.
 pub const ORACLE: &str = "oracle";
@@ -13,7 +13,8 @@ pub fn known_planners() -> impl Iterator<Item = (&'static str, &'static str)> {
 }
 
 /// Names allowed in place of `name`: the [`known_planners`], and `name` itself if it names an
-/// [external](is_external) planner.
+/// [external](is_external) planner, or one that only taps.
 pub fn allowed_names(name: &str) -> Vec<&str> {
-    known_planners().map(|(name, _)| name).chain(is_external(name).then_some(name)).collect()
+    let is_other = is_external(name) || TAPPING.iter().any(|entry| entry.name == name);
+    known_planners().map(|(name, _)| name).chain(is_other.then_some(name)).collect()
 }

@@ -169,7 +169,7 @@ impl TrialRow {
     /// of a zone; around an object between contacts, or the aimed points of touches without
     /// contact. `None` for a trial with fewer touches.
     pub fn path_m(&self, touches: u32) -> Option<f64> {
-        let places = self.touches.get(..touches as usize)?.iter().map(TouchRow::place);
+        let places = self.touches.get(..touches as usize)?.iter().flat_map(TouchRow::places);
         let steps = places.clone().zip(places.skip(1));
         let lengths = steps.map(|(from, to)| {
             let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));
@@ -209,11 +209,19 @@ impl TouchRow {
         contact.patch.iter().map(numbers).collect()
     }
 
-    /// Position of the finger for [travel](TrialRow::path_m).
+    /// Positions of the finger for [travel](TrialRow::path_m): one, or both ends of a stroke.
+    fn places(&self) -> impl Iterator<Item = &[f64]> + Clone {
+        let end = match &self.target {
+            Target::Stroke { to, .. } => Some(to.as_slice()),
+            _ => None,
+        };
+        std::iter::once(self.place()).chain(end)
+    }
+
     fn place(&self) -> &[f64] {
         match (&self.target, &self.contact) {
             (Target::Place(place), _) => place,
-            (Target::Tilted { place, .. }, _) => place,
+            (Target::Tilted { place, .. } | Target::Stroke { place, .. }, _) => place,
             (Target::Aim(_), Some(contact)) => contact,
             (Target::Aim(aim), None) => aim.p_w.coords.as_slice(),
         }

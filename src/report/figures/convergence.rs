@@ -1,7 +1,7 @@
 //! Figure of errors against touches, Fig. 4 of Yi et al. 2016.
 
 use super::ReportFigure;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, PanelAxis, R, metrics};
+use crate::experiment::measure::{Aggregate, MEASURES, Measure, PanelAxis, R, ROBOT_TIME, metrics};
 use crate::experiment::statistics::curve_table;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
@@ -27,7 +27,7 @@ fn caption(run: &Run) -> String {
         )
     });
     format!(
-        "Accuracy of the belief against the number of touches, n = {} of each planner; all planners share \
+        "Accuracy of the belief against the number of touches, and its error against the robot's time, n = {} of each planner; all planners share \
          the {}. Bands: one standard error of a mean, 95 % bootstrap \
          interval of a median.{score} Corresponds to Fig. 4 of the paper.",
         counted(run.experiment.trials, "trial"),
@@ -68,22 +68,31 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         })
         .filter(|measure| points().any(|point| point.of(measure).is_some()))
         .collect();
+    let over_touches = shown.iter().map(|measure| (*measure, false));
+    let is_over_time =
+        |measure: &&&Measure| measure.is_error && measure.aggregate == Aggregate::Both;
+    // Errors over the robot's time, where it moves.
+    let times = Axis::around(points().filter_map(time_s), 0.02, 6.0);
+    let over_time = shown.iter().filter(|_| times.is_some()).filter(is_over_time);
+    let panels: Vec<(&Measure, bool)> =
+        over_touches.chain(over_time.map(|measure| (*measure, true))).collect();
     let constant = constant_r(run);
     let swatches = curves
         .iter()
         .zip(planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
     let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
-    let rows = shown.len().div_ceil(2) as f64;
+    let rows = panels.len().div_ceil(2) as f64;
     let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
     let legend = (WIDTH - 2.0 * LEFT_PX, "");
     let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
-    let panels = (first, [PANEL.0 + GAP.0, PANEL.1 + GAP.1]);
-    let mut sheet = FigureLayout::new(size, panels, legend, swatches.chain(dashed));
-    for (i, measure) in shown.into_iter().enumerate() {
+    let places = (first, [PANEL.0 + GAP.0, PANEL.1 + GAP.1]);
+    let mut sheet = FigureLayout::new(size, places, legend, swatches.chain(dashed));
+    for (i, (measure, over_time)) in panels.into_iter().enumerate() {
         let area = sheet.area(i % 2, (i / 2) as f64);
         let constant = constant.filter(|_| measure.id == R.id);
-        draw_measure(&mut sheet.canvas, area, run, measure, (&x, &curves, constant));
+        let time_axis = times.as_ref().filter(|_| over_time);
+        draw_measure(&mut sheet.canvas, area, run, measure, (&x, time_axis, &curves, constant));
     }
     Ok(Some(sheet.canvas.finish()))
 }
@@ -93,12 +102,18 @@ fn draw_measure(
     area: Area,
     run: &Run,
     measure: &Measure,
-    (x, curves, constant): (&Axis, &[Curve], Option<f64>),
+    (touches, times, curves, constant): (&Axis, Option<&Axis>, &[Curve], Option<f64>),
 ) {
     let read: Vec<(&str, Vec<Reading>)> = curves
         .iter()
         .map(|(colour, points)| {
-            let of = |point: &CurvePoint| reading(run, measure, point);
+            let of = |point: &CurvePoint| {
+                let reading = reading(run, measure, point)?;
+                match times {
+                    Some(_) => Some((time_s(point)?, reading.1, reading.2, reading.3)),
+                    None => Some(reading),
+                }
+            };
             (*colour, points.par_iter().filter_map(of).collect())
         })
         .collect();
@@ -117,10 +132,11 @@ fn draw_measure(
         PanelAxis::Linear | PanelAxis::Undrawn => Axis::around(values, 0.04, 5.0),
     };
     let Some(y) = y else { return };
-    let panel = Panel { area, x: x.clone(), y };
-    panel.titled_frame(canvas, &statistics_label(measure), "touches", &named(measure));
+    let panel = Panel { area, x: times.unwrap_or(touches).clone(), y };
+    let along = if times.is_some() { "robot time (s), mean" } else { "touches" };
+    panel.titled_frame(canvas, &statistics_label(measure), along, &named(measure));
     if let Some(score) = constant {
-        let (low, high) = x.range();
+        let (low, high) = touches.range();
         panel.curve(canvas, &[(low, score), (high, score)], &constant_line());
     }
     for (colour, readings) in &read {
@@ -147,6 +163,11 @@ fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> 
     let in_unit = |value: f64| per_si * value;
     let touches = point.touches.into();
     Some((touches, in_unit(value), beside.map(in_unit), band.map(|ends| ends.map(in_unit))))
+}
+
+/// Returns the mean time of the robot, s.
+fn time_s(point: &CurvePoint) -> Option<f64> {
+    point.of(&ROBOT_TIME).map(|time_s| time_s.mean)
 }
 
 /// Returns the name of a measure with its display unit.

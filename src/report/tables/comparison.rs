@@ -89,11 +89,14 @@ pub fn equal_error_file(found: &[EqualError]) -> Table {
         Column::new("path_ratio")
             .note("Ratio of the planner's lateral travel after the initial touches to the baseline's.")
             .interval(),
+        Column::new("time_ratio")
+            .note("Ratio of the robot's time from its start to the baseline's; empty without motion.")
+            .interval(),
     ]);
     for it in found {
         let names = [it.planner, it.baseline, it.measure.id].map(Cell::from);
         let numbers = [it.trials.into(), it.goal.into(), it.baseline_touches.into()];
-        let estimates = [it.touches, it.ratio, it.path_ratio].map(Cell::estimate);
+        let estimates = [it.touches, it.ratio, it.path_ratio, it.time_ratio].map(Cell::estimate);
         table.rows.push(names.into_iter().chain(numbers).chain(estimates).collect());
     }
     table
@@ -129,8 +132,8 @@ pub fn equal_errors_note(run: &Run) -> String {
     format!(
         "Touches, including the initial ones, after which a planner\u{2019}s median error stays at or \
          below the goal in the column\u{2019}s head, the baseline\u{2019}s error after {}. After \
-         \u{d7}: their ratio to the baseline\u{2019}s own count; then the ratio of the lateral travel \
-         after the initial touches. All with the 95 % interval of a bootstrap over trials. Bold values \
+         \u{d7}: their ratio to the baseline\u{2019}s own count; then the ratios of the lateral travel \
+         after the initial touches and of the robot\u{2019}s time. All with the 95 % interval of a bootstrap over trials. Bold values \
          with a verdict: the interval of the touches\u{2019} ratio excludes 1.",
         counted(run.experiment.goal_touches(), "touch")
     )
@@ -147,12 +150,15 @@ fn effort(equal: &EqualError, most: u32) -> Cell {
         with_interval(estimate.value, estimate.interval, shown)
     };
     let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };
-    let words = format!(
+    let mut words = format!(
         "{} \u{d7} {}; travel \u{d7} {}",
         shown(&equal.touches, &|count| touches(count, most)),
         shown(&equal.ratio, &ratio),
         shown(&equal.path_ratio, &ratio),
     );
+    if equal.time_ratio.value.is_finite() {
+        words += &format!("; time \u{d7} {}", shown(&equal.time_ratio, &ratio));
+    }
     Cell::from(words).with_verdict(equal.ratio.interval, 1.0, Direction::Minimise)
 }
 

@@ -59,7 +59,7 @@ impl CameraSettings {
         let (pivot_w, accuracy) = (self.target_w(&scene.middle_w), self.accuracy());
         if let Some(path) = &self.file {
             let points_c = file::points(self, path, &stated)?;
-            return Ok(View { x_wc: stated, points_c, pivot_w, accuracy });
+            return Ok(View { x_wc: stated, points_c, image: None, pivot_w, accuracy });
         }
         let (x_wc, scale) = self.true_pose(&stated, &pivot_w, rng);
         let mut image = self.render(scene, &x_wc);
@@ -77,7 +77,9 @@ impl CameraSettings {
         }
         let seen = image.depths_m.iter().enumerate().filter(|(_, depth_m)| depth_m.is_finite());
         let points_c = seen.map(|(i, depth_m)| (self.ray(i) * *depth_m).into()).collect();
-        Ok(View { x_wc: stated, points_c, pivot_w, accuracy })
+        let corner = |i| [self.ray(i).x, self.ray(i).y];
+        let image = Some([0, self.pixels[0] * self.pixels[1] - 1].map(corner));
+        Ok(View { x_wc: stated, points_c, image, pivot_w, accuracy })
     }
 
     /// Returns the offer of view `number` from here; a touch takes `touch_s`.

@@ -1,7 +1,7 @@
 //! Measures of the regression test.
 
 use crate::experiment::Experiment;
-use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE};
+use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE, ROBOT_TIME};
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use serde::Serialize;
 
@@ -58,6 +58,9 @@ pub static CHECK_MEASURES: &[CheckMeasure] = &[
         |row, of| CENTRED_R.value(row, of.touches).map(|r| log(1.0 - r)),
     ),
     CheckMeasure::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
+    CheckMeasure::log("log_time", "robot time", |row, of| {
+        ROBOT_TIME.value(row, of.touches).map(log)
+    }),
     CheckMeasure::share("missed", "share of touches without contact", |row, of| {
         share(row, of, |touch| touch.contact.is_none())
     }),

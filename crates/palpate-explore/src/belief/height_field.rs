@@ -55,6 +55,14 @@ const SEEN: usize = 250;
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
 const SEEN_FITTED: usize = 64;
 
+/// Smallest distance between two points of a stroke, as a fraction of the zone's longer side.
+// heuristic: a few points for each length over which a surface changes.
+const STROKE_STEP: f64 = 0.03;
+
+/// Of a stroke's points, the number of which one takes part in fits.
+// heuristic: the points between hardly change a fit, whose time grows as their cube.
+const STROKE_FITTED: usize = 3;
+
 /// Largest number of times that a seen surface takes the slopes of the belief.
 // heuristic: they settle after two.
 const TURNS: usize = 8;
@@ -135,8 +143,33 @@ impl HeightField {
         self
     }
 
+    /// Adds a stroke that began at `target`, thinned; the belief changes at the next
+    /// [`refit`](Self::refit).
+    pub fn observe_stroke(&mut self, target: &[f64], touch: &Touch) {
+        let thinned = match touch {
+            Touch::Contact(contact) => {
+                let apart_m = STROKE_STEP * self.zone.widest_m();
+                let mut last_w = contact.p_wc;
+                let is_next = |point: &&Contact| {
+                    let is_apart = (point.p_wc - last_w).norm() >= apart_m;
+                    last_w = if is_apart { point.p_wc } else { last_w };
+                    is_apart
+                };
+                let patch = contact.patch.iter().filter(is_next).cloned().collect();
+                Touch::Contact(Contact { patch, ..contact.clone() })
+            }
+            other => other.clone(),
+        };
+        self.observe_points((target, &thinned), STROKE_FITTED);
+    }
+
     /// Adds a touch; the belief changes at the next [`refit`](Self::refit).
     pub fn observe(&mut self, target: &[f64], touch: &Touch) {
+        self.observe_points((target, touch), usize::MAX);
+    }
+
+    /// Adds a touch, of whose further points every `fitted`-th takes part in fits.
+    fn observe_points(&mut self, (target, touch): (&[f64], &Touch), fitted: usize) {
         self.targets.push(target.into());
         self.has_missed = *touch == Touch::Miss;
         let reached = match touch {
@@ -149,7 +182,8 @@ impl HeightField {
                         slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
                     let place = self.zone.place(&point.p_wc);
                     let (height, noise) = (self.zone.height_m(&point.p_wc), self.noise(point));
-                    let to = if i == 0 { &mut self.contacts } else { &mut self.patches };
+                    let is_fitted = i % fitted == 0;
+                    let to = if is_fitted { &mut self.contacts } else { &mut self.patches };
                     to.push(&Observation { place: &place, height, noise, slope, known: None });
                 }
                 let place = self.zone.place(&contact.p_wc);
@@ -178,6 +212,7 @@ impl HeightField {
                 |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
             zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
         };
+        self.presence.add_view(view);
         let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
         let seen = SeenSurface::new(view, (wanted, SEEN), gradient);
         self.observe_seen(seen)
@@ -437,11 +472,13 @@ impl HeightField {
         Ok((posterior, left_sd))
     }
 
-    /// Conditions the variance of `surface` on the unreached targets.
+    /// Conditions the variance of `surface` on the unreached targets, and on places where a camera
+    /// saw that there is nothing.
     fn explore(&mut self, surface: &Posterior) -> Result<(), CovarianceError> {
-        let unreached = self.unreached.iter().map(Vec::as_slice);
+        let empty = self.presence.seen_through();
+        let unreached = self.unreached.iter().chain(&empty).map(Vec::as_slice);
         self.planning_posterior = match self.inducing() {
-            _ if self.unreached.is_empty() => None,
+            _ if self.unreached.is_empty() && empty.is_empty() => None,
             None => Some(surface.fantasize(unreached)?),
             Some(most) => {
                 let mut all = self.observations();

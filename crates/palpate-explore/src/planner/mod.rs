@@ -9,12 +9,15 @@ mod integrated_variance;
 pub mod look;
 mod plan;
 mod random;
+mod random_strokes;
+mod raster;
 pub mod sample;
 pub mod search;
 pub mod settings;
 mod silhouette;
 mod slope;
 mod sobol;
+pub mod stroke;
 mod travel;
 mod ucb;
 
@@ -22,18 +25,34 @@ pub use plan::{Fallback, Plan, PlanError, Planner, PlannerEntry, PlannerFactory,
 pub use sample::uniform;
 pub use settings::PlanningSettings;
 
-/// All built-in planners; add one line per planner.
-pub const PLANNERS: &[PlannerEntry] = &[
-    active::ENTRY,
-    random::ENTRY,
-    sobol::ENTRY,
-    grid::ENTRY,
-    integrated_variance::ENTRY,
-    silhouette::ENTRY,
-    slope::ENTRY,
-    travel::ENTRY,
-    ucb::ENTRY,
-];
+/// Lists the planners of some modules, and each with the suffix `(taps)`.
+macro_rules! planners {
+    ($($module:ident: $name:literal,)*) => {
+        /// All built-in planners; add one line per planner.
+        pub const PLANNERS: &[PlannerEntry] =
+            &[$(PlannerEntry { name: $name, ..$module::ENTRY },)*];
+
+        /// The same planners, which tap where the scene allows strokes too.
+        pub const TAPPING: &[PlannerEntry] = &[$(PlannerEntry {
+            name: concat!($name, "(taps)"),
+            ..$module::ENTRY
+        },)*];
+    };
+}
+
+planners! {
+    active: "active",
+    random: "random",
+    sobol: "sobol",
+    grid: "grid",
+    integrated_variance: "integrated_variance",
+    silhouette: "silhouette",
+    slope: "slope",
+    travel: "travel",
+    ucb: "ucb",
+    random_strokes: "random_strokes",
+    raster: "raster",
+}
 
 /// Whether `name` names an external planner, `MODULE:NAME` or `MODULE:NAME(ARGUMENTS)`. An
 /// experiment may list external planners: a program that runs it needs
@@ -50,5 +69,5 @@ pub fn is_external(name: &str) -> bool {
 
 /// Returns the planner with this name.
 pub fn by_name(name: &str) -> Option<&'static PlannerEntry> {
-    PLANNERS.iter().find(|entry| entry.name == name)
+    PLANNERS.iter().chain(TAPPING).find(|entry| entry.name == name)
 }

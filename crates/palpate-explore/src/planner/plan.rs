@@ -1,6 +1,7 @@
 //! The planner trait: selects the next target from the belief alone.
 
 use super::settings::PlanningSettings;
+use super::stroke::StrokeOffer;
 use crate::belief::{Belief, HeightField};
 use crate::task::Target;
 use crate::view::Offer;
@@ -32,6 +33,12 @@ pub trait Planner: Send {
     /// # Errors
     /// If the planner returns no target; this ends the trial.
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError>;
+
+    /// Returns the touch to make where this planner would tap at `target`, in a scene that allows
+    /// strokes; by default the tap or stroke that [pays](super::stroke::worthwhile).
+    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
+        super::stroke::worthwhile(belief, offer, target)
+    }
 
     /// Returns which of the `offers` of a camera to take before a touch at `target`, after which it
     /// plans anew; by default the one that [pays](super::look::worthwhile).
@@ -137,6 +144,11 @@ pub trait PlannerFactory: Send + Sync {
         None
     }
 
+    /// Whether it only taps, where the scene allows strokes.
+    fn taps(&self) -> bool {
+        false
+    }
+
     /// Creates a planner for a trial; the generator is its only source of randomness.
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner>;
 }
@@ -148,6 +160,10 @@ impl PlannerFactory for PlannerEntry {
 
     fn zone_only(&self) -> Option<&str> {
         self.zone_only
+    }
+
+    fn taps(&self) -> bool {
+        self.name.ends_with("(taps)")
     }
 
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {

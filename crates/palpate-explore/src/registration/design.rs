@@ -400,7 +400,14 @@ fn approach(x_wt: &Isometry3<f64>, side_w: &UnitVector3<f64>, finger: &Finger) -
     // The servo offsets an approach by the hull's bulge and radius.
     let ahead_m = [finger.bulge_m() - MARGIN_M, MARGIN_M - finger.radius_m];
     let [p_near_w, p_far_w] = ahead_m.map(|ahead_m| p_wt - side_w.scale(ahead_m));
-    Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation, obstacle: None }
+    Approach {
+        p_near_w,
+        p_far_w,
+        r_wa,
+        r_at: r_wa.inverse() * x_wt.rotation,
+        obstacle: None,
+        slide_w: None,
+    }
 }
 
 /// Whether `robot` has a posture at both ends of the approach.

@@ -30,6 +30,9 @@ pub struct Approach {
     /// Ball to avoid between approaches; `None` if the finger moves straight from one to the
     /// next.
     pub obstacle: Option<Ball>,
+    /// Way of the tip across the approach, in `W`, along the surface after contact; `None` for a
+    /// tap.
+    pub slide_w: Option<Vector3<f64>>,
 }
 
 impl Approach {
@@ -51,11 +54,23 @@ impl Approach {
         self.r_wa * p_a
     }
 
+    /// Returns the approach as it would be after the tip has slid `along` of its way: from 0 to 1.
+    pub fn slid(&self, along: f64) -> Self {
+        let by_w = self.slide_w.unwrap_or_default() * along;
+        Self { p_near_w: self.p_near_w + by_w, p_far_w: self.p_far_w + by_w, ..*self }
+    }
+
     /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let points = [self.p_near_w.coords, self.p_far_w.coords];
         let turns = [self.r_wa.coords, self.r_at.coords];
-        points.iter().flatten().chain(turns.iter().flatten()).all(|number| number.is_finite())
+        let slide = self.slide_w.iter().flatten();
+        points
+            .iter()
+            .flatten()
+            .chain(turns.iter().flatten())
+            .chain(slide)
+            .all(|number| number.is_finite())
     }
 }
 
@@ -164,7 +179,7 @@ impl Ball {
         }
         let [p_near_w, p_far_w] = [near_m, far_m].map(|way_m| aim.p_w + ahead_w * way_m);
         let around = Some(self.keep_out(finger, standoff_m));
-        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), obstacle: around }
+        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), obstacle: around, slide_w: None }
     }
 
     /// Returns the ball that a fingertip stays out of between approaches, to keep the stand-off.

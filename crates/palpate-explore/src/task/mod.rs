@@ -1,6 +1,7 @@
 //! Task of the robot: where to explore, how to touch, and the approach of each touch.
 
 pub mod approach;
+pub mod stroke;
 mod target;
 #[allow(clippy::module_inception)]
 mod task;

@@ -18,17 +18,33 @@ pub enum Target {
         /// Pitch of the finger, one of the further pitches of its settings, deg.
         pitch_deg: f64,
     },
+    /// The place (x, z) of a zone, m, from which the finger slides along the surface to above
+    /// another.
+    Stroke {
+        /// The place of the touch.
+        place: [f64; 2],
+        /// The place at which the stroke ends.
+        to: [f64; 2],
+    },
     /// A point of a ball, and the direction of the approach.
     Aim(Aim),
 }
 
 impl Target {
-    /// Returns the place of a zone, if it is one.
+    /// Returns the place of a zone that is touched, if it is one.
     pub fn place(&self) -> Option<&[f64]> {
         match self {
             Self::Place(place) => Some(place),
-            Self::Tilted { place, .. } => Some(place),
+            Self::Tilted { place, .. } | Self::Stroke { place, .. } => Some(place),
             Self::Aim(_) => None,
+        }
+    }
+
+    /// Returns the place of a zone where the finger leaves the surface, if nothing stops it.
+    pub fn end(&self) -> Option<&[f64]> {
+        match self {
+            Self::Stroke { to, .. } => Some(to),
+            _ => self.place(),
         }
     }
 
@@ -36,24 +52,25 @@ impl Target {
     pub fn pitch_deg(&self) -> Option<f64> {
         match self {
             Self::Tilted { pitch_deg, .. } => Some(*pitch_deg),
-            Self::Place(_) | Self::Aim(_) => None,
+            Self::Place(_) | Self::Stroke { .. } | Self::Aim(_) => None,
         }
     }
 
     /// Returns the aim into a ball, if it is one.
     pub fn aim(&self) -> Option<&Aim> {
         match self {
-            Self::Place(_) | Self::Tilted { .. } => None,
             Self::Aim(aim) => Some(aim),
+            _ => None,
         }
     }
 
     /// Returns the coordinates for a table: (x) or (x, z) of a place, followed by the pitch in
-    /// degrees if the finger is tilted; for an aim, x, y and z of the point, then of the direction.
+    /// degrees if the finger is tilted, or by the end of a stroke; for an aim, x, y and z of the point, then of the direction.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Place(place) => place.clone(),
             Self::Tilted { place: [x, z], pitch_deg } => vec![*x, *z, *pitch_deg],
+            Self::Stroke { place: [x, z], to: [u, v] } => vec![*x, *z, *u, *v],
             Self::Aim(aim) => {
                 aim.p_w.coords.iter().chain(aim.direction_w.iter()).copied().collect()
             }
@@ -61,12 +78,13 @@ impl Target {
     }
 
     /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, three for
-    /// a place and a pitch, six for an aim. Returns `None` for another count, and for an aim
+    /// a place and a pitch, four for a stroke, six for an aim. Returns `None` for another count, and for an aim
     /// without a direction.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match *numbers {
             [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
             [x, z, pitch_deg] => Some(Self::Tilted { place: [x, z], pitch_deg }),
+            [x, z, u, v] => Some(Self::Stroke { place: [x, z], to: [u, v] }),
             [x, y, z, u, v, w] => Some(Self::Aim(Aim::along([x, y, z], [u, v, w])?)),
             _ => None,
         }
@@ -141,6 +159,13 @@ enum TargetOut {
         /// Pitch of the finger, deg.
         pitch_deg: f64,
     },
+    /// A touch at a place of a zone, and a slide along the surface.
+    Stroke {
+        /// The place (x, z), m.
+        place: [f64; 2],
+        /// The place at which the slide ends, m.
+        to: [f64; 2],
+    },
     /// An approach to a whole object.
     Aim {
         /// The point aimed at, in `W`, m.
@@ -155,6 +180,7 @@ impl From<Target> for TargetOut {
         match target {
             Target::Place(place) => Self::Place(place),
             Target::Tilted { place, pitch_deg } => Self::Tilted { place, pitch_deg },
+            Target::Stroke { place, to } => Self::Stroke { place, to },
             Target::Aim(Aim { p_w, direction_w: ahead_w }) => {
                 Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
             }
@@ -179,14 +205,16 @@ impl TryFrom<TargetIn> for Target {
             TargetIn::Written(TargetOut::Tilted { place, pitch_deg }) => {
                 Ok(Self::Tilted { place, pitch_deg })
             }
+            TargetIn::Written(TargetOut::Stroke { place, to }) => Ok(Self::Stroke { place, to }),
             TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
                 let aim = Aim::along(p_w, ahead_w);
                 aim.map(Self::Aim).ok_or_else(|| {
                     format!("the direction {ahead_w:?} has length zero or is not finite")
                 })
             }
-            TargetIn::Numbers(numbers) => Self::from_numbers(&numbers)
-                .ok_or_else(|| format!("a target has 1, 2, 3 or 6 numbers, not {}", numbers.len())),
+            TargetIn::Numbers(numbers) => Self::from_numbers(&numbers).ok_or_else(|| {
+                format!("a target has 1, 2, 3, 4 or 6 numbers, not {}", numbers.len())
+            }),
         }
     }
 }
@@ -205,7 +233,8 @@ mod tests {
         ) {
             let aim = Aim::against(Point3::from(at), &Vector3::from(outward));
             let tilted = Target::Tilted { place: [at[0], at[1]], pitch_deg: at[2] };
-            for target in [Target::from(aim), Target::from(at[..2].to_vec()), tilted] {
+            let stroke = Target::Stroke { place: [at[0], at[1]], to: [at[2], at[0]] };
+            for target in [Target::from(aim), Target::from(at[..2].to_vec()), tilted, stroke] {
                 let json = serde_json::to_string(&target).unwrap();
                 prop_assert_eq!(&serde_json::from_str::<Target>(&json).unwrap(), &target);
                 let numbers = serde_json::to_string(&target.numbers()).unwrap();
@@ -226,7 +255,7 @@ mod tests {
     fn an_aim_has_a_point_and_a_direction() {
         assert!(Aim::along([0.0; 3], [0.0; 3]).is_none());
         assert!(Aim::along([0.0; 3], [0.0, 0.0, f64::NAN]).is_none());
-        assert!(Target::from_numbers(&[0.0; 4]).is_none());
+        assert!(Target::from_numbers(&[0.0; 5]).is_none());
         assert_eq!(*Aim::along([0.0; 3], [0.0, 0.0, -2.0]).unwrap().direction_w, -Vector3::z());
     }
 }

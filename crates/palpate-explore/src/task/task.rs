@@ -41,12 +41,16 @@ impl Region {
     pub fn contains(&self, target: &Target) -> bool {
         match (self, target) {
             (Self::Ball(ball), Target::Aim(aim)) => ball.contains(aim),
-            (Self::Zone(zone), _) => target.place().is_some_and(|place| zone.contains(place)),
+            (Self::Zone(zone), _) => {
+                let ends = [target.place(), target.end()];
+                ends.iter().all(|place| place.is_some_and(|place| zone.contains(place)))
+            }
             (Self::Ball(_), _) => false,
         }
     }
 
-    /// Straight-line distance between two targets, m: between places of the zone, or between the
+    /// Straight-line distance between two targets, m: from where the finger leaves a place of the
+    /// zone, or between the
     /// points where two approaches enter the ball. 0 if one is not a target of the region.
     pub fn travel_m(&self, from: &Target, to: &Target) -> f64 {
         match (self, from, to) {
@@ -54,7 +58,7 @@ impl Region {
                 let entrance_w = |aim: &Aim| aim.p_w + aim.direction_w.scale(ball.chord_m(aim)[0]);
                 (entrance_w(from) - entrance_w(to)).norm()
             }
-            (Self::Zone(_), ..) => from.place().zip(to.place()).map_or(0.0, |(from, to)| {
+            (Self::Zone(_), ..) => from.end().zip(to.place()).map_or(0.0, |(from, to)| {
                 from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
             }),
             (Self::Ball(_), ..) => 0.0,
@@ -198,7 +202,11 @@ impl Task {
                 let [p_near_w, p_far_w] =
                     self.depth_m.map(|depth_m| x_wz * zone.local(place, -depth_m));
                 let (r_wa, r_at) = (x_wz.rotation, finger.r_at());
-                Some(Approach { p_near_w, p_far_w, r_wa, r_at, obstacle: None })
+                let slide_w = target
+                    .end()
+                    .filter(|end| *end != place)
+                    .map(|end| x_wz.rotation * (zone.local(end, 0.0) - zone.local(place, 0.0)));
+                Some(Approach { p_near_w, p_far_w, r_wa, r_at, obstacle: None, slide_w })
             }
             (Region::Ball(_), _) => None,
         }

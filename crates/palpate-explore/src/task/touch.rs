@@ -1,5 +1,6 @@
 //! Settings of a touch by a moving robot: travel, approach, contact, settle, read, retract.
 
+use super::stroke::StrokeSettings;
 use crate::robot::finger::Detection;
 use crate::robot::finger::contact_point::ContactEstimate;
 use crate::robot::finger::frame::FRAME_S;
@@ -39,6 +40,9 @@ pub struct TouchSettings {
     pub pressure_limit_counts: f64,
     /// Point of the finger that is recorded as the contact.
     pub point: ContactEstimate,
+    /// Slides along the surface after contact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stroke: Option<StrokeSettings>,
 }
 
 impl Default for TouchSettings {
@@ -59,6 +63,7 @@ impl Default for TouchSettings {
             force_limit_n: 15.0,
             pressure_limit_counts: 1500.0,
             point: ContactEstimate::Skin,
+            stroke: None,
         }
     }
 }
@@ -100,5 +105,12 @@ impl Validate for TouchSettings {
             .require("frames", self.frames, (1..=100).contains(&self.frames), || "1 to 100".into());
         rules.number("force_limit_n", self.force_limit_n, 0.01..=1e4);
         rules.number("pressure_limit_counts", self.pressure_limit_counts, 1.0..=4095.0);
+        if let Some(stroke) = &self.stroke {
+            rules.table("stroke", stroke);
+            let is_below = stroke.force_n < self.force_limit_n;
+            rules.require("stroke.force_n", stroke.force_n, is_below, || {
+                format!("less than force_limit_n, {}", self.force_limit_n)
+            });
+        }
     }
 }

@@ -8,10 +8,12 @@ mod offer;
 mod register;
 mod reject;
 mod seen;
+mod sight;
 mod thin;
 
 pub use offer::Offer;
 pub use seen::{CorrectedElement, ERRORS, RigidError, SeenSurface, corrected_pose};
+pub use sight::{DepthMap, Sight};
 pub use thin::{SurfaceElement, thin};
 
 use nalgebra::{Isometry3, Point3};
@@ -26,6 +28,8 @@ pub struct View {
     pub x_wc: Isometry3<f64>,
     /// Points in the camera's frame.
     pub points_c: Vec<Point3<f64>>,
+    /// Lowest and highest (x/z, y/z) of its image, if known: a pixel without a point shows none.
+    pub image: Option<[[f64; 2]; 2]>,
     /// Point about which the error of the pose is stated, in `W`: near what the camera looks at,
     /// where a calibration is tested.
     pub pivot_w: Point3<f64>,

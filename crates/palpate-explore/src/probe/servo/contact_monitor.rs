@@ -104,6 +104,20 @@ impl ContactMonitor {
             || self.approach_end() == Some(ApproachEnd::Overload)
     }
 
+    /// Whether the sensors measure the force on the finger.
+    pub(super) fn measures_force(&self) -> bool {
+        self.force_at_rest_n.is_some()
+            || self.sensors.iter().any(|sensor| sensor.force_n().is_some())
+    }
+
+    /// Returns the load on the finger: the force, N, or else a signal that rises with it.
+    pub(super) fn load(&self) -> Option<f64> {
+        match self.measures_force() {
+            true => Some(self.force_n),
+            false => self.sensors.iter().find_map(|sensor| sensor.load()),
+        }
+    }
+
     /// Number of samples required by the next [`tare`](Self::tare).
     pub(super) fn samples_of_tare(&self) -> usize {
         let wanted = self.sensors.iter().map(|sensor| sensor.tare_sample_count());

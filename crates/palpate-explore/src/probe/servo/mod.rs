@@ -2,6 +2,7 @@
 
 mod contact_monitor;
 mod reach;
+mod slide;
 mod trajectory;
 
 use super::{Contact, Probe, SweptVolume, Touch, check_finite};
@@ -459,9 +460,16 @@ impl Probe for Servo {
         let touch = match end {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
-            Some(ApproachEnd::Contact) => {
-                self.read(approach, &above)?.map_or(Touch::Overload, Touch::Contact)
-            }
+            Some(ApproachEnd::Contact) => match self.read(approach, &above)? {
+                Some(contact) => {
+                    let patch = match approach.slide_w {
+                        Some(_) => self.slide(approach, &contact, &above)?,
+                        None => contact.patch,
+                    };
+                    Touch::Contact(Contact { patch, ..contact })
+                }
+                None => Touch::Overload,
+            },
         };
         let here_w = self.x_wt().translation.vector;
         let back_w = approach.project_to_level(&here_w, &above.translation.vector);

@@ -17,6 +17,7 @@ pub struct BioTac {
     tare: Option<Frame>,
     frames: Vec<Frame>,
     last_s: Option<f64>,
+    last_pdc_counts: Option<f64>,
 }
 
 impl BioTac {
@@ -37,6 +38,7 @@ impl BioTac {
             tare: None,
             frames: Vec::new(),
             last_s: None,
+            last_pdc_counts: None,
         }
     }
 }
@@ -49,6 +51,7 @@ impl Sensor for BioTac {
                 continue;
             }
             self.last_s = Some(time_s);
+            self.last_pdc_counts = frame.pdc_counts;
             if self.tare.is_some() {
                 self.touching = self.detector.update(frame);
             }
@@ -88,9 +91,13 @@ impl Sensor for BioTac {
     }
 
     fn is_overloaded(&self) -> bool {
-        let rest = self.tare.as_ref().and_then(|tare| tare.pdc_counts);
-        let now = self.frames.last().and_then(|frame| frame.pdc_counts);
-        rest.zip(now).is_some_and(|(rest, now)| now - rest > self.pressure_limit_counts)
+        self.load().is_some_and(|rise_counts| rise_counts > self.pressure_limit_counts)
+    }
+
+    /// Returns the rise of the pressure, counts.
+    fn load(&self) -> Option<f64> {
+        let rest = self.tare.as_ref().and_then(|tare| tare.pdc_counts)?;
+        self.last_pdc_counts.map(|now| now - rest)
     }
 
     fn locate(&self, finger: &Finger, _: f64) -> Result<SensedContact, Doubt> {

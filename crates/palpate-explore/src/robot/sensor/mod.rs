@@ -109,6 +109,11 @@ pub trait Sensor: Send {
         None
     }
 
+    /// Signal that rises with the force on the finger, since the last [`tare`](Self::tare).
+    fn load(&self) -> Option<f64> {
+        self.force_n()
+    }
+
     /// Locates the contact with `finger` from the samples collected since
     /// [`clear_samples`](Self::clear_samples); the tip has moved by `moved_m` since the sensor was
     /// tared.

@@ -1,0 +1,38 @@
+//! Planner `random_strokes`: strokes between random places of the zone, a baseline.
+
+use super::plan::{Plan, PlanError, Planner, PlannerEntry};
+use super::sample::random_target;
+use super::stroke::StrokeOffer;
+use crate::belief::Belief;
+use crate::task::Target;
+use rand_chacha::ChaCha8Rng;
+
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
+    name: "random_strokes",
+    about: "strokes from random places to random ones, as long as allowed; without strokes, `random`",
+    zone_only: Some("strokes are along a zone"),
+    make: |_, rng| Box::new(RandomStrokes { rng }),
+};
+
+struct RandomStrokes {
+    rng: ChaCha8Rng,
+}
+
+impl Planner for RandomStrokes {
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        Ok(Plan::at(random_target(belief, &mut self.rng)))
+    }
+
+    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
+        let other = random_target(belief, &mut self.rng);
+        match (target.place(), other.place()) {
+            (Some([x, z]), Some([u, v])) => {
+                let length_m = (u - x).hypot(v - z);
+                let part = (offer.longest_m / length_m).min(1.0);
+                let to = [x + (u - x) * part, z + (v - z) * part];
+                Target::Stroke { place: [*x, *z], to }
+            }
+            _ => target,
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Slide along the surface: speed along its tangent, load along the approach, until the way is
+//! done or the surface ends.
+
+use super::contact_monitor::ApproachEnd;
+use super::{PRESS_SPEED, Servo};
+use crate::backend::Fault;
+use crate::control::Goal;
+use crate::probe::Contact;
+use crate::task::Approach;
+use crate::task::stroke::{SAMPLE_M, STEEPEST};
+use nalgebra::{Isometry3, UnitVector3, Vector3, Vector6};
+
+/// Rate at which the load approaches its set point, 1/s.
+// heuristic: a third of what a contact as stiff as a rod at 250 Hz allows.
+const RATE_PER_S: f64 = 15.0;
+
+/// Largest depth by which the finger is pressed before it slides, m.
+// heuristic: less than the skin of a soft finger is thick.
+const PRESSED_M: f64 = 1e-3;
+
+/// Smallest depth over which the stiffness of the contact is measured, m.
+// heuristic: an order above what a joint resolves.
+const MEASURED_M: f64 = 5e-5;
+
+/// Fraction of the set load below which contact counts as lost, and multiple above which there is
+/// a wall; and time for which it must be, s.
+// heuristic: ten times as long as the load needs back to a fifth.
+const LOST: f64 = 0.3;
+const WALL: f64 = 4.0;
+const LASTS_S: f64 = 0.1;
+
+/// Distance of the tip behind its set point at which it counts as stuck, m.
+// heuristic: what a servo lags at the largest speed of a stroke.
+const STUCK_M: f64 = 4e-3;
+
+/// Weight of a new normal in the estimate.
+// heuristic: noise of electrodes is averaged over two millimetres.
+const NEW_NORMAL: f64 = 0.4;
+
+/// Load that is held, in the unit of the sensor, and its rise per metre of depth.
+struct Hold {
+    load: f64,
+    per_m: f64,
+}
+
+impl Servo {
+    /// Slides along the way of `approach` after contact at `first`. Returns the contacts along it,
+    /// up to where the surface ended, was too steep, or the finger was stuck or overloaded.
+    pub(super) fn slide(
+        &mut self,
+        approach: &Approach,
+        first: &Contact,
+        tared: &Isometry3<f64>,
+    ) -> Result<Vec<Contact>, Fault> {
+        let (Some(way_w), Some(stroke)) = (approach.slide_w, self.settings.stroke.clone()) else {
+            return Ok(Vec::new());
+        };
+        let ahead_w = approach.direction_w();
+        let Some(across_w) = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9)
+        else {
+            return Ok(Vec::new());
+        };
+        let Some(hold) = self.press_for_slide(&ahead_w, stroke.force_n)? else {
+            return Ok(Vec::new());
+        };
+        let mut normal_w = if first.has_normal { first.normal_w } else { -ahead_w.into_inner() };
+        let start = self.x_wt();
+        let mut goal = start;
+        let (mut contacts, mut sampled_m, mut off_s) = (Vec::new(), 0.0, 0.0);
+        let (mut sum_w, mut count) = (Vector3::zeros(), 0.0);
+        self.monitor.clear_samples();
+        loop {
+            let steep = -normal_w.dot(&across_w) / normal_w.dot(&ahead_w).min(-1e-3);
+            let done_m = (goal.translation.vector - start.translation.vector).dot(&across_w);
+            let is_over = done_m >= way_w.norm() || steep.abs() > STEEPEST;
+            if is_over || off_s > LASTS_S {
+                break;
+            }
+            let across_m_s = stroke.speed_m_s / (1.0 + steep * steep).sqrt();
+            let most_m_s = STEEPEST * stroke.speed_m_s;
+            let load = self.monitor.load();
+            let push_m_s = load.map_or(0.0, |load| {
+                (RATE_PER_S * (hold.load - load) / hold.per_m).clamp(-most_m_s, most_m_s)
+            });
+            let velocity_w =
+                across_w.scale(across_m_s) + ahead_w.scale(across_m_s * steep + push_m_s);
+            let passed_s = self.passed_s();
+            goal.translation.vector += velocity_w * passed_s;
+            let twist = Vector6::new(velocity_w.x, velocity_w.y, velocity_w.z, 0.0, 0.0, 0.0);
+            self.tick(&Goal { x_wt: goal, twist })?;
+            let here = self.x_wt();
+            let behind_m = (goal.translation.vector - here.translation.vector).norm();
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) || behind_m > STUCK_M {
+                break;
+            }
+            let is_off = self
+                .monitor
+                .load()
+                .is_some_and(|load| !(LOST * hold.load..=WALL * hold.load).contains(&load));
+            off_s = if is_off { off_s + passed_s } else { 0.0 };
+            sum_w += here.translation.vector;
+            count += 1.0;
+            let is_read = self.monitor.last_sample_s().is_none()
+                || self.monitor.collected() >= self.settings.frames;
+            if !is_read || is_off || done_m < sampled_m + SAMPLE_M {
+                if is_off {
+                    self.monitor.clear_samples();
+                    (sum_w, count) = (Vector3::zeros(), 0.0);
+                }
+                continue;
+            }
+            // The samples are of the way since the last ones, on average of its middle.
+            let x_wt = Isometry3::from_parts((sum_w / count).into(), here.rotation);
+            let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
+            if let Ok(sensed) = self.monitor.contact(&self.robot.finger, moved_m) {
+                let contact = Contact::sensed(&x_wt, &sensed);
+                if contact.has_normal {
+                    let turned_w = normal_w.lerp(&contact.normal_w, NEW_NORMAL);
+                    normal_w = turned_w.try_normalize(1e-6).unwrap_or(normal_w);
+                }
+                contacts.push(Contact { patch: Vec::new(), ..contact });
+            }
+            self.monitor.clear_samples();
+            (sampled_m, sum_w, count) = (done_m, Vector3::zeros(), 0.0);
+        }
+        Ok(contacts)
+    }
+
+    /// Presses the finger until it has the force to slide with, or by a tenth of a millimetre if
+    /// the sensor measures no force. Returns the load to hold, or `None` at overload.
+    fn press_for_slide(
+        &mut self,
+        ahead_w: &UnitVector3<f64>,
+        force_n: f64,
+    ) -> Result<Option<Hold>, Fault> {
+        let wanted = self.monitor.measures_force().then_some(force_n);
+        let (start, first) = (self.x_wt(), self.monitor.load().unwrap_or(0.0));
+        let speed_m_s = PRESS_SPEED * self.settings.approach_m_s;
+        let velocity_w = ahead_w.scale(speed_m_s);
+        let twist = Vector6::new(velocity_w.x, velocity_w.y, velocity_w.z, 0.0, 0.0, 0.0);
+        let mut goal = start;
+        loop {
+            let depth_m = (self.x_wt().translation.vector - start.translation.vector).dot(ahead_w);
+            let load = self.monitor.load().unwrap_or(0.0);
+            let is_enough = match wanted {
+                Some(force_n) => load >= force_n && depth_m >= MEASURED_M,
+                None => depth_m >= 2.0 * MEASURED_M,
+            };
+            if is_enough || depth_m >= PRESSED_M || load > wanted.unwrap_or(f64::INFINITY) * 2.0 {
+                let per_m = (load - first) / depth_m.max(MEASURED_M);
+                // A contact so soft that nothing is felt is not followed by its load.
+                let least = wanted.unwrap_or(load).abs().max(f64::MIN_POSITIVE) / PRESSED_M;
+                return Ok(Some(Hold { load: wanted.unwrap_or(load), per_m: per_m.max(least) }));
+            }
+            goal.translation.vector += velocity_w * self.passed_s();
+            self.tick(&Goal { x_wt: goal, twist })?;
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
+                return Ok(None);
+            }
+        }
+    }
+}
