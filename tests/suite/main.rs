@@ -101,6 +101,7 @@ mod shell_accuracy;
 mod shell_elements;
 mod shell_reference;
 mod solid;
+mod strokes;
 mod sweeps;
 mod twin;
 mod twin_faults;

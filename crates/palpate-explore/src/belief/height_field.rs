@@ -63,6 +63,9 @@ const STROKE_STEP: f64 = 0.03;
 // heuristic: the points between hardly change a fit, whose time grows as their cube.
 const STROKE_FITTED: usize = 3;
 
+/// Number of the first stroke among the sources of errors in common, above those of views.
+const STROKES: usize = 1 << 20;
+
 /// Largest number of times that a seen surface takes the slopes of the belief.
 // heuristic: they settle after two.
 const TURNS: usize = 8;
@@ -160,16 +163,23 @@ impl HeightField {
             }
             other => other.clone(),
         };
-        self.observe_points((target, &thinned), STROKE_FITTED);
+        let number = STROKES + self.targets.len();
+        self.observe_points((target, &thinned), STROKE_FITTED, Some(number));
     }
 
     /// Adds a touch; the belief changes at the next [`refit`](Self::refit).
     pub fn observe(&mut self, target: &[f64], touch: &Touch) {
-        self.observe_points((target, touch), usize::MAX);
+        self.observe_points((target, touch), usize::MAX, None);
     }
 
-    /// Adds a touch, of whose further points every `fitted`-th takes part in fits.
-    fn observe_points(&mut self, (target, touch): (&[f64], &Touch), fitted: usize) {
+    /// Adds a touch, of whose further points every `fitted`-th takes part in fits. With a `source`,
+    /// the errors that their sensor states are one that they have in common.
+    fn observe_points(
+        &mut self,
+        (target, touch): (&[f64], &Touch),
+        fitted: usize,
+        source: Option<usize>,
+    ) {
         self.targets.push(target.into());
         self.has_missed = *touch == Touch::Miss;
         let reached = match touch {
@@ -181,10 +191,17 @@ impl HeightField {
                     let slope =
                         slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
                     let place = self.zone.place(&point.p_wc);
-                    let (height, noise) = (self.zone.height_m(&point.p_wc), self.noise(point));
+                    let (height, stated) = (self.zone.height_m(&point.p_wc), self.noise(point));
+                    let common = [stated * self.noise_unit_m()];
+                    let known = source.map(|source| KnownError {
+                        variance: 0.0,
+                        source,
+                        loadings: &common,
+                    });
+                    let noise = if source.is_some() { 1.0 } else { stated };
                     let is_fitted = i % fitted == 0;
                     let to = if is_fitted { &mut self.contacts } else { &mut self.patches };
-                    to.push(&Observation { place: &place, height, noise, slope, known: None });
+                    to.push(&Observation { place: &place, height, noise, slope, known });
                 }
                 let place = self.zone.place(&contact.p_wc);
                 self.zone.distance(&place, target) <= REACHED_WITHIN
@@ -317,8 +334,13 @@ impl HeightField {
     fn noise(&self, contact: &Contact) -> f64 {
         let normal_y = self.zone.x_wz().inverse_transform_vector(&contact.normal_w).y;
         let sd_m = contact.sd_m.unwrap_or(0.0) / normal_y.max(NORMAL_Y_MIN);
+        (sd_m / self.noise_unit_m()).max(1.0)
+    }
+
+    /// Standard deviation of a contact that counts as exact, m.
+    fn noise_unit_m(&self) -> f64 {
         let given_m = self.settings.noise_sd_m.or(self.settings.noise_sd_min_m);
-        (sd_m / given_m.unwrap_or(SD_UNIT_M)).max(1.0)
+        given_m.unwrap_or(SD_UNIT_M)
     }
 
     /// Adds the volume swept by the last touch: the surface is below it after a contact, and absent
@@ -418,7 +440,8 @@ impl HeightField {
     /// Number of inducing touches, if the posterior is not exact.
     fn inducing(&self) -> Option<usize> {
         // Inducing points cannot represent errors in common.
-        let most = self.settings.inducing_touches.filter(|_| self.seen.is_empty())? as usize;
+        let has_common = !self.seen.is_empty() || self.contacts.has_known_errors();
+        let most = self.settings.inducing_touches.filter(|_| !has_common)? as usize;
         (self.contacts.len() > most).then_some(most)
     }
 

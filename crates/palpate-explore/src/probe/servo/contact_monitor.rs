@@ -110,6 +110,12 @@ impl ContactMonitor {
             || self.sensors.iter().any(|sensor| sensor.force_n().is_some())
     }
 
+    /// Whether contacts are located on the finger's hull as it is without load.
+    pub(super) fn locates_on_hull(&self) -> bool {
+        let present = self.sensors.iter().find(|sensor| sensor.is_present());
+        present.is_some_and(|sensor| sensor.locates_on_hull())
+    }
+
     /// Returns the load on the finger: the force, N, or else a signal that rises with it.
     pub(super) fn load(&self) -> Option<f64> {
         match self.measures_force() {

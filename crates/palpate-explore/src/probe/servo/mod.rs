@@ -57,6 +57,8 @@ pub struct Servo {
     doubt: Option<Doubt>,
     /// Reach of an arm, which checks each path around an object before moving.
     reach: Option<ArmReach>,
+    /// Force per depth by which the finger yields, N/m, if the scene allows strokes.
+    yields_n_m: Option<f64>,
 }
 
 impl Servo {
@@ -92,6 +94,7 @@ impl Servo {
             sensed: None,
             doubt: None,
             reach,
+            yields_n_m: None,
         })
     }
 
@@ -461,12 +464,10 @@ impl Probe for Servo {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
             Some(ApproachEnd::Contact) => match self.read(approach, &above)? {
-                Some(contact) => {
-                    let patch = match approach.slide_w {
-                        Some(_) => self.slide(approach, &contact, &above)?,
-                        None => contact.patch,
-                    };
-                    Touch::Contact(Contact { patch, ..contact })
+                Some(mut contact) => {
+                    let further = self.slide(approach, &mut contact, &above)?;
+                    contact.patch.extend(further);
+                    Touch::Contact(contact)
                 }
                 None => Touch::Overload,
             },

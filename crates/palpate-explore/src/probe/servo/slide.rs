@@ -22,12 +22,14 @@ const PRESSED_M: f64 = 1e-3;
 // heuristic: an order above what a joint resolves.
 const MEASURED_M: f64 = 5e-5;
 
-/// Fraction of the set load below which contact counts as lost, and multiple above which there is
-/// a wall; and time for which it must be, s.
-// heuristic: ten times as long as the load needs back to a fifth.
+/// Fraction of the set load below which contact counts as lost, and time for which it must be, s.
+// heuristic: long enough for the load to rise again behind a ridge.
 const LOST: f64 = 0.3;
-const WALL: f64 = 4.0;
 const LASTS_S: f64 = 0.1;
+
+/// Multiple of the set load, or of that at the start if it is larger, that shows a wall ahead.
+// heuristic: a stiff finger still brakes well below a usual limit of force.
+const WALL: f64 = 3.0;
 
 /// Distance of the tip behind its set point at which it counts as stuck, m.
 // heuristic: what a servo lags at the largest speed of a stroke.
@@ -37,35 +39,52 @@ const STUCK_M: f64 = 4e-3;
 // heuristic: noise of electrodes is averaged over two millimetres.
 const NEW_NORMAL: f64 = 0.4;
 
-/// Load that is held, in the unit of the sensor, and its rise per metre of depth.
+/// Load that is held, in the unit of the sensor, and its rise per metre of depth along the normal.
 struct Hold {
     load: f64,
     per_m: f64,
 }
 
+/// Distance by which a finger yields under a load, m.
+fn yields_m(load: f64, per_m: f64) -> f64 {
+    (load / per_m).clamp(0.0, PRESSED_M)
+}
+
 impl Servo {
-    /// Slides along the way of `approach` after contact at `first`. Returns the contacts along it,
-    /// up to where the surface ended, was too steep, or the finger was stuck or overloaded.
+    /// Slides along the way of `approach`, if it has one, after contact at `first`. Returns the
+    /// contacts along it, up to where the surface ended, was too steep, or the finger was stuck or
+    /// overloaded. In a scene with strokes, `first` is corrected by what the finger yields.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
-        first: &Contact,
+        first: &mut Contact,
         tared: &Isometry3<f64>,
     ) -> Result<Vec<Contact>, Fault> {
-        let (Some(way_w), Some(stroke)) = (approach.slide_w, self.settings.stroke.clone()) else {
-            return Ok(Vec::new());
-        };
+        let Some(stroke) = self.settings.stroke.clone() else { return Ok(Vec::new()) };
         let ahead_w = approach.direction_w();
-        let Some(across_w) = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9)
-        else {
-            return Ok(Vec::new());
-        };
-        let Some(hold) = self.press_for_slide(&ahead_w, stroke.force_n)? else {
-            return Ok(Vec::new());
-        };
+        let way_w = approach.slide_w.unwrap_or_default();
+        let across_w = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9);
         let mut normal_w = if first.has_normal { first.normal_w } else { -ahead_w.into_inner() };
+        let facing = -normal_w.dot(&ahead_w);
+        let is_on_hull = self.monitor.locates_on_hull();
+        let load = self.monitor.load().unwrap_or(0.0);
+        if let (None, Some(per_m)) = (across_w, self.yields_n_m.filter(|_| is_on_hull)) {
+            first.p_wc += first.normal_w * yields_m(load, per_m);
+        }
+        if across_w.is_none() && (self.yields_n_m.is_some() || !is_on_hull) {
+            return Ok(Vec::new());
+        }
+        let Some(hold) = self.press_for_slide((&ahead_w, facing), stroke.force_n)? else {
+            return Ok(Vec::new());
+        };
+        if is_on_hull {
+            self.yields_n_m = Some(hold.per_m);
+            first.p_wc += first.normal_w * yields_m(load, hold.per_m);
+        }
+        let Some(across_w) = across_w else { return Ok(Vec::new()) };
         let start = self.x_wt();
         let mut goal = start;
+        let wall = WALL * hold.load.max(self.monitor.load().unwrap_or(0.0));
         let (mut contacts, mut sampled_m, mut off_s) = (Vec::new(), 0.0, 0.0);
         let (mut sum_w, mut count) = (Vector3::zeros(), 0.0);
         self.monitor.clear_samples();
@@ -93,10 +112,11 @@ impl Servo {
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) || behind_m > STUCK_M {
                 break;
             }
-            let is_off = self
-                .monitor
-                .load()
-                .is_some_and(|load| !(LOST * hold.load..=WALL * hold.load).contains(&load));
+            let load = self.monitor.load();
+            if load.is_some_and(|load| load > wall) {
+                break;
+            }
+            let is_off = load.is_some_and(|load| load < LOST * hold.load);
             off_s = if is_off { off_s + passed_s } else { 0.0 };
             sum_w += here.translation.vector;
             count += 1.0;
@@ -113,7 +133,10 @@ impl Servo {
             let x_wt = Isometry3::from_parts((sum_w / count).into(), here.rotation);
             let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
             if let Ok(sensed) = self.monitor.contact(&self.robot.finger, moved_m) {
-                let contact = Contact::sensed(&x_wt, &sensed);
+                let mut contact = Contact::sensed(&x_wt, &sensed);
+                if let Some(load) = load.filter(|_| is_on_hull) {
+                    contact.p_wc += contact.normal_w * yields_m(load, hold.per_m);
+                }
                 if contact.has_normal {
                     let turned_w = normal_w.lerp(&contact.normal_w, NEW_NORMAL);
                     normal_w = turned_w.try_normalize(1e-6).unwrap_or(normal_w);
@@ -127,10 +150,11 @@ impl Servo {
     }
 
     /// Presses the finger until it has the force to slide with, or by a tenth of a millimetre if
-    /// the sensor measures no force. Returns the load to hold, or `None` at overload.
+    /// the sensor measures no force; `facing` is the cosine between approach and normal. Returns the
+    /// load to hold, or `None` at overload.
     fn press_for_slide(
         &mut self,
-        ahead_w: &UnitVector3<f64>,
+        (ahead_w, facing): (&UnitVector3<f64>, f64),
         force_n: f64,
     ) -> Result<Option<Hold>, Fault> {
         let wanted = self.monitor.measures_force().then_some(force_n);
@@ -142,15 +166,15 @@ impl Servo {
         loop {
             let depth_m = (self.x_wt().translation.vector - start.translation.vector).dot(ahead_w);
             let load = self.monitor.load().unwrap_or(0.0);
-            let is_enough = match wanted {
-                Some(force_n) => load >= force_n && depth_m >= MEASURED_M,
-                None => depth_m >= 2.0 * MEASURED_M,
-            };
-            if is_enough || depth_m >= PRESSED_M || load > wanted.unwrap_or(f64::INFINITY) * 2.0 {
-                let per_m = (load - first) / depth_m.max(MEASURED_M);
+            // A contact so stiff that the force doubles is measured over a shorter way.
+            let is_measured = depth_m >= MEASURED_M || load > 2.0 * first.max(force_n);
+            let is_enough = wanted.is_none_or(|force_n| load >= force_n) && is_measured;
+            if is_enough || depth_m >= PRESSED_M {
+                let per_m = (load - first) / (depth_m.max(1e-6) * facing.clamp(0.1, 1.0));
                 // A contact so soft that nothing is felt is not followed by its load.
                 let least = wanted.unwrap_or(load).abs().max(f64::MIN_POSITIVE) / PRESSED_M;
-                return Ok(Some(Hold { load: wanted.unwrap_or(load), per_m: per_m.max(least) }));
+                let load = wanted.unwrap_or(load);
+                return Ok(Some(Hold { load, per_m: per_m.max(least) }));
             }
             goal.translation.vector += velocity_w * self.passed_s();
             self.tick(&Goal { x_wt: goal, twist })?;

@@ -174,6 +174,10 @@ impl Sensor for ForceTorqueTip {
     }
 
     /// Locates the contact on the hull, with the hull's normal there.
+    fn locates_on_hull(&self) -> bool {
+        true
+    }
+
     fn locate(&self, finger: &Finger, moved_m: f64) -> Result<SensedContact, Doubt> {
         let rest = self.at_rest.as_ref().filter(|_| self.now.count > 0.0);
         let rest = rest.ok_or(Doubt::NoSignal)?;

@@ -109,6 +109,11 @@ pub trait Sensor: Send {
         None
     }
 
+    /// Whether contacts are located on the hull of a finger that does not yield.
+    fn locates_on_hull(&self) -> bool {
+        false
+    }
+
     /// Signal that rises with the force on the finger, since the last [`tare`](Self::tare).
     fn load(&self) -> Option<f64> {
         self.force_n()

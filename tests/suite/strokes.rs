@@ -1,0 +1,283 @@
+//! Strokes: laws of a slide along known surfaces, and surfaces along which a finger cannot slide.
+
+use crate::common::program::folder;
+use crate::common::shipped::{contact, environment};
+use nalgebra::{Point3, Vector3};
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::belief::Belief;
+use palpate::explore::gp_settings::GpSettings;
+use palpate::explore::planner::stroke::{StrokeOffer, best};
+use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::robot::sensor::Sample;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use palpate::task::{Target, Zone};
+use proptest::prelude::*;
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+/// Backend that keeps the force of each tick.
+struct Felt {
+    inner: Box<dyn Backend>,
+    forces_n: Arc<Mutex<Vec<f64>>>,
+}
+
+impl Backend for Felt {
+    fn capabilities(&self) -> &Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.inner.reset(seed)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let reading = self.inner.step(command)?;
+        let force_n = reading.samples.iter().find_map(|sample| match sample {
+            Sample::Ideal(contact) => Some(contact.force_n),
+            _ => None,
+        });
+        self.forces_n.lock().unwrap().push(force_n.unwrap_or(0.0));
+        Ok(reading)
+    }
+}
+
+/// Half of the zone's width and height, m, and its middle's z.
+const HALF_M: f64 = 0.04;
+const MIDDLE_M: f64 = 0.5;
+
+/// Writes a block whose front is at y = `front[i].1` at x = `front[i].0`, the same for all z, as an
+/// OBJ file.
+fn write_block(path: &Path, front: &[[f64; 2]]) {
+    let (mut text, mut quads) = (String::new(), Vec::new());
+    for [x, y] in front {
+        for (y, z) in [(*y, 0.4), (*y, 0.6), (-0.8, 0.4), (-0.8, 0.6)] {
+            writeln!(text, "v {x} {y} {z}").unwrap();
+        }
+    }
+    // Front low, front high, back low, back high of each place.
+    for i in 0..front.len() - 1 {
+        let [a, b] = [4 * i + 1, 4 * i + 5];
+        quads.push([a, a + 1, b + 1, b]);
+        if front[i][0] < front[i + 1][0] {
+            quads.extend([
+                [a + 2, b + 2, b + 3, a + 3],
+                [a, b, b + 2, a + 2],
+                [a + 1, a + 3, b + 3, b + 1],
+            ]);
+        }
+    }
+    let last = 4 * (front.len() - 1) + 1;
+    quads.extend([[1, 3, 4, 2], [last, last + 1, last + 3, last + 2]]);
+    for [a, b, c, d] in quads {
+        writeln!(text, "f {a} {b} {c}\nf {a} {c} {d}").unwrap();
+    }
+    fs::write(path, text).unwrap();
+}
+
+/// Returns the environment of a block with this front, touched by a ball, with more settings.
+fn block(front: &[[f64; 2]], effects: &str) -> Arc<Environment> {
+    let folder = folder();
+    write_block(&folder.path().join("block.obj"), front);
+    let scene = format!(
+        "simulator = \"kinematic\"\n[object]\nmesh = \"block.obj\"\nunit = \"m\"\n\
+         [zone]\nx_m = [-{HALF_M}, {HALF_M}]\nz_m = [{}, {}]\ndatum_y_m = -0.65\n\
+         depth_m = [0.6, 0.75]\n[finger]\nradius_m = 0.005\nlength_m = 0.0\n\
+         [touch.stroke]\nforce_n = 1.0\n{effects}\n",
+        MIDDLE_M - HALF_M,
+        MIDDLE_M + HALF_M
+    );
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, scene).unwrap();
+    Arc::new(Environment::build(Scene::load(&path, &[]).unwrap()).unwrap())
+}
+
+const RIGID: &str = "[effects.rigid_tip]";
+const SOFT: &str = "[effects.skin]\n[effects.fluid]";
+
+/// Slides from `x` to `to`; returns the contacts and the forces of all ticks.
+fn slide(environment: &Arc<Environment>, x: f64, to: f64) -> (Vec<Contact>, Vec<f64>) {
+    let simulator = Simulator::new(Arc::clone(environment)).unwrap();
+    let forces_n = Arc::<Mutex<Vec<f64>>>::default();
+    let inner = simulator.body().unwrap().unwrap();
+    let body = Felt { inner, forces_n: Arc::clone(&forces_n) };
+    let mut servo = simulator.servo(Box::new(body), 0).unwrap();
+    let target = Target::Stroke { place: [x, MIDDLE_M], to: [to, MIDDLE_M] };
+    let approach = environment.task().approach(&target).unwrap();
+    let touched = contact(servo.touch(&approach).unwrap());
+    let forces_n = forces_n.lock().unwrap().clone();
+    (touched.points().cloned().collect(), forces_n)
+}
+
+/// Height of a front at `x`, by linear interpolation.
+fn front_m(front: &[[f64; 2]], x: f64) -> f64 {
+    let part = front.windows(2).find(|two| (two[0][0]..=two[1][0]).contains(&x)).unwrap();
+    let [[x0, y0], [x1, y1]] = [part[0], part[1]];
+    if x1 > x0 { y0 + (y1 - y0) * (x - x0) / (x1 - x0) } else { y0.max(y1) }
+}
+
+const WIDE_M: f64 = 0.07;
+
+/// Along a plane at any slope up to 45°, a stroke goes to its end, in samples a millimetre apart,
+/// on the surface; the force is that set within a quarter while it slides, and never above twice.
+#[test]
+fn a_stroke_along_a_plane_keeps_force_and_surface() {
+    for (effects, off_m) in [(RIGID, 2e-4), (SOFT, 1.5e-3)] {
+        for slope in [0.0, 0.5, -1.0] {
+            let front = [[-WIDE_M, -0.65 - slope * WIDE_M], [WIDE_M, -0.65 + slope * WIDE_M]];
+            let (contacts, forces_n) = slide(&block(&front, effects), -0.03, 0.03);
+            let lengths: Vec<f64> =
+                contacts.windows(2).map(|two| (two[1].p_wc - two[0].p_wc).x).collect();
+            assert!(contacts.len() >= 45, "{effects} {slope}: {} samples", contacts.len());
+            assert!(lengths.iter().all(|x| (0.0..2.5e-3).contains(x)), "{lengths:?}");
+            let last_x = contacts[contacts.len() - 1].p_wc.x;
+            assert!((last_x - contacts[0].p_wc.x - 0.06).abs() < 4e-3, "{last_x}");
+            for point in &contacts {
+                let off = (point.p_wc.y - front_m(&front, point.p_wc.x)) / slope.hypot(1.0);
+                assert!(off.abs() < off_m, "{effects} {slope}: {off} m");
+            }
+            let felt: Vec<f64> = forces_n.iter().copied().filter(|n| *n > 0.3).collect();
+            let mean_n = felt.iter().sum::<f64>() / felt.len() as f64;
+            let worst_n = felt.iter().copied().fold(0.0, f64::max);
+            println!("{effects} {slope}: mean {mean_n:.3} N, worst {worst_n:.3} N");
+            assert!((mean_n - 1.0).abs() < 0.25, "{effects} {slope}: mean {mean_n} N");
+            assert!(worst_n < 2.0, "{effects} {slope}: {worst_n} N");
+        }
+    }
+}
+
+/// At an edge, a step up, a groove, a hole and a thin wall, a stroke ends or goes on; all it
+/// returns is on the surface, and nothing is pressed harder than the limit.
+#[test]
+fn a_stroke_ends_where_the_surface_does() {
+    let step = |to: f64| vec![[-WIDE_M, -0.65], [0.0, -0.65], [0.0, to], [WIDE_M, to]];
+    let notch = |half: f64, to: f64| {
+        vec![
+            [-WIDE_M, -0.65],
+            [-half, -0.65],
+            [-half, to],
+            [half, to],
+            [half, -0.65],
+            [WIDE_M, -0.65],
+        ]
+    };
+    // Each with the range in which the last contact must be.
+    let cases = [
+        ("edge", step(-0.74), -1e-3..6e-3),
+        ("step up of 5 mm", step(-0.645), -6e-3..1e-3),
+        ("groove of 3 mm", notch(1.5e-3, -0.66), 0.025..0.032),
+        ("hole of 20 mm", notch(0.01, -0.74), -0.0115..-4e-3),
+        ("thin wall", notch(1e-3, -0.63), -7e-3..1e-3),
+    ];
+    for effects in [RIGID, SOFT, "[effects.skin]\n[effects.friction]\ncoefficient = 1.2"] {
+        for (name, front, ends) in &cases {
+            let environment = block(front, effects);
+            let (contacts, forces_n) = slide(&environment, -0.03, 0.03);
+            let last = contacts[contacts.len() - 1].p_wc;
+            let worst_n = forces_n.iter().copied().fold(0.0, f64::max);
+            println!(
+                "{effects:?} {name}: {} points to {:.4}, {worst_n:.2} N",
+                contacts.len(),
+                last.x
+            );
+            assert!(worst_n < environment.task().touch().force_limit_n, "{name}: {worst_n} N");
+            assert!(contacts.len() >= 10, "{name}: {}", contacts.len());
+            if effects == RIGID {
+                assert!(ends.contains(&last.x), "{name}: the last contact is at x = {} m", last.x);
+                let bvh = palpate::geometry::bvh::MeshBvh::new(environment.mesh().unwrap().clone());
+                for point in &contacts {
+                    let off_m = (bvh.closest_point(&point.p_wc).point - point.p_wc).norm();
+                    assert!(off_m < 6e-4, "{name}: {off_m} m at {}", point.p_wc);
+                }
+            }
+        }
+    }
+}
+
+/// The exact probe and the servo with a ball give the same contacts along the container.
+#[test]
+fn exact_and_moving_probe_slide_along_the_same_line() {
+    let shared = ["finger.radius_m=0.005", "finger.length_m=0.0", "touch.stroke={}"];
+    let kinematic = ["simulator=\"kinematic\"", "effects.rigid_tip={}"];
+    let exact = environment("container.toml", &shared);
+    let moving = environment("container.toml", &[&shared[..], &kinematic].concat());
+    let target = Target::Stroke { place: [-0.02, 0.47], to: [0.02, 0.53] };
+    let [exact, moving] = [exact, moving].map(|environment| {
+        let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
+        contact(probe.touch(&environment.task().approach(&target).unwrap()).unwrap())
+    });
+    assert!(exact.patch.len() > 50 && moving.patch.len() > 40);
+    for point in &moving.patch {
+        let nearest = exact.patch.iter().map(|other| (other.p_wc - point.p_wc).norm());
+        // Samples are a millimetre apart on slopes of up to two.
+        assert!(nearest.fold(f64::INFINITY, f64::min) < 1.5e-3, "{}", point.p_wc);
+    }
+}
+
+/// A row with strokes is replayed to the same belief.
+#[test]
+fn a_row_with_strokes_is_replayed() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/container.toml");
+    let sets = ["scene.touch.stroke={}", "touches=6", "trials=1", "planners=[\"raster\"]"];
+    let experiment = Experiment::load(&path, &sets.map(String::from)).unwrap();
+    let simulation = Simulation::new(experiment).unwrap();
+    let raster = simulation.planner("raster").unwrap();
+    let row = simulation.trial(raster, 0);
+    assert_eq!(row.failure, None);
+    let last = &row.touches[5];
+    assert!(matches!(last.target, Target::Stroke { .. }) && last.patch.len() > 20);
+    let mut belief = Belief::new(
+        simulation.task(),
+        (&simulation.experiment().scene.finger, false),
+        &simulation.experiment().gp,
+        &simulation.experiment().space,
+    );
+    for touch in &row.touches {
+        let approach = simulation.task().approach(&touch.target).unwrap();
+        let against_w = -approach.direction_w().into_inner();
+        belief.observe(&touch.target, &approach, (&touch.touch(against_w), None));
+    }
+    let found = belief.refit().unwrap().hyperparameters.length_scales.clone();
+    let written = &last.fit.as_ref().unwrap().hyperparameters.length_scales;
+    for (found, written) in found.iter().zip(written) {
+        assert!((found / written - 1.0).abs() < 0.05, "{found} {written}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// A planned stroke is in the zone and no longer than allowed, for any touches and any time of
+    /// a tap.
+    #[test]
+    fn a_planned_stroke_is_in_the_zone(
+        touches in prop::collection::vec(([0.0..1.0, 0.0..1.0], -0.01..0.01), 3..12),
+        at in [0.0..1.0, 0.0..1.0],
+        longest_m in 0.005..0.3,
+        extreme in 0..3_usize,
+    ) {
+        let mut zone = Zone::new([-0.05, 0.03], Some([0.4, 0.6]));
+        zone.datum_y_m = Some(0.0);
+        let mut field = palpate::explore::belief::HeightField::new(zone.clone(), GpSettings::default());
+        for (fractions, height) in &touches {
+            let place = zone.at(fractions);
+            let p_wc: Point3<f64> = zone.point(&place, *height);
+            field.observe(&place, &Touch::Contact(Contact::new(p_wc, Vector3::y())));
+        }
+        field.refit().unwrap();
+        let [tap_s, speed_m_s] = [[3.0, 0.02], [1e-6, 1e-6], [10.0, 1e6]][extreme];
+        let offer = StrokeOffer { longest_m, speed_m_s, tap_s, travel_m_s: 0.1, from: None };
+        match best(&field, &offer, &[zone.at(&at)]).unwrap() {
+            Target::Stroke { place, to } => {
+                prop_assert!(zone.contains(&place) && zone.contains(&to));
+                let length_m = (place[0] - to[0]).hypot(place[1] - to[1]);
+                prop_assert!(length_m <= longest_m * (1.0 + 1e-9), "{length_m}");
+            }
+            Target::Place(place) => prop_assert!(zone.contains(&place)),
+            other => prop_assert!(false, "{other:?}"),
+        }
+    }
+}
