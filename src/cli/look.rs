@@ -6,7 +6,8 @@ use super::terminal::{Outcome, print};
 use crate::experiment::store::write_whole;
 use crate::report::points::binary_ply;
 use anyhow::ensure;
-use palpate_ros::camera::{CameraTopics, view};
+use palpate_ros::camera::CameraTopics;
+use palpate_ros::look;
 use palpate_ros::settings::{BackendKind, BackendSettings};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -55,7 +56,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let settings = BackendSettings { kind: args.kind, domain: args.domain, master, ..usual };
     let timeout = Duration::from_secs(args.timeout.into());
     let topics = CameraTopics { view: &args.topic, info: args.info.as_deref(), timeout };
-    let cloud = view(&settings, &topics)?;
+    let cloud = look(&settings, &topics)?;
     let (count, pixels) = (cloud.points_m.len(), cloud.pixels);
     ensure!(count > 0, "{}: none of {pixels} pixels has a depth", args.topic);
     write_whole(&args.out, binary_ply(&format!("frame {}", cloud.frame), &cloud.points_m))?;

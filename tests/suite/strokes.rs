@@ -8,12 +8,14 @@ use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner::stroke::{StrokeOffer, best};
+use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::robot::sensor::Sample;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Target, Zone};
 use proptest::prelude::*;
+use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -245,6 +247,38 @@ fn a_row_with_strokes_is_replayed() {
     for (found, written) in found.iter().zip(written) {
         assert!((found / written - 1.0).abs() < 0.05, "{found} {written}");
     }
+}
+
+/// A planner's stroke that the scene does not allow ends the trial with the reason.
+#[test]
+fn a_stroke_needs_a_scene_that_allows_it() {
+    struct Slides;
+    impl PlannerFactory for Slides {
+        fn name(&self) -> &str {
+            "own:Slides"
+        }
+        fn make(&self, _: &PlanningSettings, _: ChaCha8Rng) -> Box<dyn Planner> {
+            Box::new(|belief: &Belief| -> Result<Plan, PlanError> {
+                let zone = belief.height_field().ok_or("zones only")?.zone().clone();
+                let [from, to] = [zone.at(&[0.1, 0.5]), zone.at(&[0.9, 0.5])];
+                let target = Target::Stroke { place: [from[0], from[1]], to: [to[0], to[1]] };
+                Ok(Plan::at(target))
+            })
+        }
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/container.toml");
+    let run = |set: &str| {
+        let sets = ["touches=6", "planners=[\"own:Slides\"]", set].map(String::from);
+        let experiment = Experiment::load(&path, &sets).unwrap();
+        let row = Simulation::new(experiment).unwrap().trial(&Slides, 0);
+        row.failure.unwrap_or_default()
+    };
+    let without = run("trials=1");
+    assert!(without.contains("the scene has no [touch.stroke]"), "{without}");
+    let longest = run("scene.touch.stroke.longest_m=0.05");
+    assert!(longest.contains("touch.stroke.longest_m is 0.05"), "{longest}");
+    let longest = run("scene.touch.stroke={}");
+    assert!(longest.is_empty(), "{longest}");
 }
 
 proptest! {

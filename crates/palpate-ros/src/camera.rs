@@ -1,55 +1,10 @@
 //! One view of a depth camera, from the topics of its driver.
 
-use super::definition::{Definition, HasDefinition, messages};
-use super::message::{Header, Image};
-use super::settings::{BackendKind, BackendSettings};
-use super::view::PointCloud2;
+use super::message::Image;
+use super::view::{CameraInfo, PointCloud2};
 use nalgebra::Point3;
 use palpate_input::error::InputError;
-use serde::{Deserialize, Serialize};
 use std::time::Duration;
-
-messages! {
-    /// Part of a sensor that an image shows.
-    sensor_msgs/RegionOfInterest {
-        /// First column.
-        uint32 x_offset,
-        /// First row.
-        uint32 y_offset,
-        /// Number of rows; 0 for all.
-        uint32 height,
-        /// Number of columns; 0 for all.
-        uint32 width,
-        /// Whether the part was chosen for rectification.
-        bool do_rectify,
-    }
-
-    /// Intrinsics of a camera.
-    sensor_msgs/CameraInfo {
-        /// Time and frame.
-        std_msgs/Header header,
-        /// Number of rows.
-        uint32 height,
-        /// Number of columns.
-        uint32 width,
-        /// Name of the model of the distortion.
-        string distortion_model,
-        /// Coefficients of the distortion.
-        float64[] d,
-        /// Matrix of the image as taken, row by row: fx, 0, cx; 0, fy, cy; 0, 0, 1.
-        float64[9] k,
-        /// Rotation that rectifies a pair of images.
-        float64[9] r,
-        /// Matrix of the rectified image: of its rows of four, the first three as in `k`.
-        float64[12] p,
-        /// Pixels that were averaged into one, along the width; 0 for 1.
-        uint32 binning_x,
-        /// The same along the height.
-        uint32 binning_y,
-        /// Part that the image shows.
-        sensor_msgs/RegionOfInterest roi,
-    }
-}
 
 /// A message of a depth camera's driver.
 pub enum CameraMessage {
@@ -107,43 +62,46 @@ impl CameraTopics<'_> {
     }
 }
 
-/// Receives one view.
-///
-/// # Errors
-/// If none arrives within the time, its message is invalid, or this build lacks the transport.
-pub fn view(settings: &BackendSettings, topics: &CameraTopics) -> Result<Cloud, InputError> {
-    let (mut points, mut image, mut info) = (None, None, None);
-    let mut take = |message| {
+/// The first messages of a camera's topics.
+#[derive(Default)]
+pub struct FirstMessages {
+    points: Option<PointCloud2>,
+    image: Option<Image>,
+    info: Option<Box<CameraInfo>>,
+}
+
+impl FirstMessages {
+    /// Keeps a message. Returns whether a view is complete.
+    pub fn take(&mut self, message: CameraMessage) -> bool {
         match message {
-            CameraMessage::Points(message) => points = Some(message),
-            CameraMessage::Depths(message) => image = Some(message),
-            CameraMessage::Info(message) => info = Some(message),
+            CameraMessage::Points(message) => self.points = Some(message),
+            CameraMessage::Depths(message) => self.image = Some(message),
+            CameraMessage::Info(message) => self.info = Some(message),
         }
-        points.is_some() || image.is_some() && info.is_some()
-    };
-    let published = match settings.kind {
-        #[cfg(feature = "ros2")]
-        BackendKind::Ros2 => super::ros2::camera::listen(settings, topics, &mut take)?,
-        #[cfg(feature = "ros1")]
-        BackendKind::Ros1 => super::ros1::camera::listen(settings, topics, &mut take)?,
-        kind => {
-            let _: &mut dyn FnMut(CameraMessage) -> bool = &mut take;
-            return Err(super::no_transport(kind));
+        self.points.is_some() || self.image.is_some() && self.info.is_some()
+    }
+
+    /// Returns the view, of the `topics` of which those are `published`.
+    ///
+    /// # Errors
+    /// If it is not complete, or its message is invalid.
+    pub fn cloud(self, topics: &CameraTopics, published: &[String]) -> Result<Cloud, InputError> {
+        let (name, span_s) = (topics.view, topics.timeout.as_secs_f64());
+        let missing = |what: &str, topic: &str| {
+            let error = InputError::new(format!("no {what} on {topic} within {span_s} s"));
+            match published {
+                [] => {
+                    error.remedy("no camera publishes here: is its driver running, in this domain?")
+                }
+                names => error.remedy(format!("published are {}", names.join(", "))),
+            }
+        };
+        match (self.points, self.image, self.info) {
+            (Some(points), ..) => points.cloud().map_err(|error| error.at(name)),
+            (None, Some(image), Some(info)) => info.cloud(&image).map_err(|error| error.at(name)),
+            (None, Some(_), None) => Err(missing("CameraInfo", &topics.info())),
+            (None, None, _) => Err(missing("PointCloud2 or Image", name)),
         }
-    };
-    let (name, span_s) = (topics.view, topics.timeout.as_secs_f64());
-    let missing = |what: &str, topic: &str| {
-        let error = InputError::new(format!("no {what} on {topic} within {span_s} s"));
-        match published.as_slice() {
-            [] => error.remedy("no camera publishes here: is its driver running, in this domain?"),
-            names => error.remedy(format!("published are {}", names.join(", "))),
-        }
-    };
-    match (points, image, info) {
-        (Some(points), ..) => points.cloud().map_err(|error| error.at(name)),
-        (None, Some(image), Some(info)) => info.cloud(&image).map_err(|error| error.at(name)),
-        (None, Some(_), None) => Err(missing("CameraInfo", &topics.info())),
-        (None, None, _) => Err(missing("PointCloud2 or Image", name)),
     }
 }
 

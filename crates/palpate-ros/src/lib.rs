@@ -50,6 +50,7 @@ pub mod transport;
 pub mod ur;
 pub mod view;
 
+use camera::{CameraMessage, CameraTopics, Cloud, FirstMessages};
 use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
 pub use ros1::disable_tls_certificates;
@@ -82,6 +83,26 @@ pub fn connect(
             Err(no_transport(kind))
         }
     }
+}
+
+/// Receives one view of a depth camera.
+///
+/// # Errors
+/// If none arrives within the time, its message is invalid, or this build lacks the transport.
+pub fn look(settings: &BackendSettings, topics: &CameraTopics) -> Result<Cloud, InputError> {
+    let mut first = FirstMessages::default();
+    let mut take = |message| first.take(message);
+    let published = match settings.kind {
+        #[cfg(feature = "ros2")]
+        BackendKind::Ros2 => ros2::camera::listen(settings, topics, &mut take)?,
+        #[cfg(feature = "ros1")]
+        BackendKind::Ros1 => ros1::camera::listen(settings, topics, &mut take)?,
+        kind => {
+            let _: &mut dyn FnMut(CameraMessage) -> bool = &mut take;
+            return Err(no_transport(kind));
+        }
+    };
+    first.cloud(topics, &published)
 }
 
 /// Returns the error of a kind of backend without topics, or whose transport this build lacks.

@@ -1,4 +1,5 @@
-//! Messages that viewers draw: shapes, points with their uncertainty, and frames.
+//! Messages that viewers draw: shapes, points with their uncertainty, and frames; and those of
+//! cameras.
 
 use super::definition::{Definition, HasDefinition, messages};
 use super::message::{Header, Marker, Quaternion, Time, Vector3};
@@ -45,6 +46,46 @@ messages! {
         uint8[] data,
         /// Whether no point is invalid.
         bool is_dense,
+    }
+
+    /// Part of a sensor that an image shows.
+    sensor_msgs/RegionOfInterest {
+        /// First column.
+        uint32 x_offset,
+        /// First row.
+        uint32 y_offset,
+        /// Number of rows; 0 for all.
+        uint32 height,
+        /// Number of columns; 0 for all.
+        uint32 width,
+        /// Whether the part was chosen for rectification.
+        bool do_rectify,
+    }
+
+    /// Intrinsics of a camera.
+    sensor_msgs/CameraInfo {
+        /// Time and frame.
+        std_msgs/Header header,
+        /// Number of rows.
+        uint32 height,
+        /// Number of columns.
+        uint32 width,
+        /// Name of the model of the distortion.
+        string distortion_model,
+        /// Coefficients of the distortion.
+        float64[] d,
+        /// Matrix of the image as taken, row by row: fx, 0, cx; 0, fy, cy; 0, 0, 1.
+        float64[9] k,
+        /// Rotation that rectifies a pair of images.
+        float64[9] r,
+        /// Matrix of the rectified image: of its rows of four, the first three as in `k`.
+        float64[12] p,
+        /// Pixels that were averaged into one, along the width; 0 for 1.
+        uint32 binning_x,
+        /// The same along the height.
+        uint32 binning_y,
+        /// Part that the image shows.
+        sensor_msgs/RegionOfInterest roi,
     }
 
     /// Translation and rotation.

@@ -216,11 +216,27 @@ fn run_touches(
     verify(experiment, task, &belief, probe, row)
 }
 
+/// Relative rounding of a stroke's length.
+const ROUNDING: f64 = 1e-9;
+
 /// Returns the approach to the target of touch `count`.
 ///
 /// # Errors
-/// If the region does not contain the target, or the finger cannot reach it.
+/// If the region does not contain the target, the finger cannot reach it, or it is a stroke that
+/// the scene does not allow.
 fn approach_to(task: &Task, target: &Target, count: u32) -> Result<Approach, String> {
+    if let Target::Stroke { place, to } = target {
+        let length_m = (to[0] - place[0]).hypot(to[1] - place[1]);
+        let longest_m = task.touch().stroke.as_ref().map(|stroke| stroke.longest_m);
+        let longest_m = longest_m.ok_or_else(|| {
+            format!("touch {count}: a stroke is planned, and the scene has no [touch.stroke]")
+        })?;
+        if length_m > longest_m * (1.0 + ROUNDING) {
+            return Err(format!(
+                "touch {count}: a stroke of {length_m} m is planned; touch.stroke.longest_m is {longest_m}"
+            ));
+        }
+    }
     let is_inside = task.region().contains(target);
     task.approach(target).filter(|_| is_inside).ok_or_else(|| {
         let beyond = match task.ball() {

@@ -3,6 +3,7 @@
 mod height_field;
 mod quantiles;
 mod reach;
+mod touches;
 
 pub use height_field::HeightField;
 pub use quantiles::BAND;

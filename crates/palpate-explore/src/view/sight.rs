@@ -3,7 +3,7 @@
 use super::View;
 use nalgebra::Point3;
 
-/// What a view says of a line.
+/// Verdict of a view on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
     /// A point was seen on it.

@@ -1,11 +1,11 @@
 //! Subscriptions to the topics of a depth camera.
 
 use super::wire::SequencedMessage;
-use crate::camera::{CameraInfo, CameraMessage, CameraTopics};
+use crate::camera::{CameraMessage, CameraTopics};
 use crate::message::Image;
 use crate::settings::BackendSettings;
 use crate::transport::cannot_open;
-use crate::view::PointCloud2;
+use crate::view::{CameraInfo, PointCloud2};
 use palpate_input::error::InputError;
 use roslibrust::RosMessageType;
 use roslibrust::ros1::NodeHandle;

@@ -1,12 +1,11 @@
 //! Wire format of ROS 1 messages: as in ROS 2, except that the header has a sequence number.
 
-use crate::camera::CameraInfo;
 use crate::definition::{HasDefinition, Text};
 use crate::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     TriggerResponse, WrenchStamped,
 };
-use crate::view::PointCloud2;
+use crate::view::{CameraInfo, PointCloud2};
 use roslibrust::{MessageDescriptor, RosMessageType, RosServiceType};
 use serde::{Deserialize, Serialize};
 

@@ -2,12 +2,12 @@
 
 use super::endpoint::{WAKE, best_effort, reliable, watch};
 use super::{dds_topic, open_node};
-use crate::camera::{CameraInfo, CameraMessage, CameraTopics};
+use crate::camera::{CameraMessage, CameraTopics};
 use crate::definition::HasDefinition;
 use crate::message::Image;
 use crate::settings::BackendSettings;
 use crate::transport::cannot_open;
-use crate::view::PointCloud2;
+use crate::view::{CameraInfo, PointCloud2};
 use palpate_input::error::InputError;
 use ros2_client::Node;
 use rustdds::mio1::{Events, Poll};

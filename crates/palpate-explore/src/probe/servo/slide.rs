@@ -84,6 +84,8 @@ impl Servo {
         let Some(across_w) = across_w else { return Ok(Vec::new()) };
         let start = self.x_wt();
         let mut goal = start;
+        // A sensor that tells a load may tell none without contact.
+        let is_felt = self.monitor.load().is_some();
         let wall = WALL * hold.load.max(self.monitor.load().unwrap_or(0.0));
         let (mut contacts, mut sampled_m, mut off_s) = (Vec::new(), 0.0, 0.0);
         let (mut sum_w, mut count) = (Vector3::zeros(), 0.0);
@@ -97,7 +99,7 @@ impl Servo {
             }
             let across_m_s = stroke.speed_m_s / (1.0 + steep * steep).sqrt();
             let most_m_s = STEEPEST * stroke.speed_m_s;
-            let load = self.monitor.load();
+            let load = is_felt.then(|| self.monitor.load().unwrap_or(0.0));
             let push_m_s = load.map_or(0.0, |load| {
                 (RATE_PER_S * (hold.load - load) / hold.per_m).clamp(-most_m_s, most_m_s)
             });
@@ -112,7 +114,7 @@ impl Servo {
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) || behind_m > STUCK_M {
                 break;
             }
-            let load = self.monitor.load();
+            let load = is_felt.then(|| self.monitor.load().unwrap_or(0.0));
             if load.is_some_and(|load| load > wall) {
                 break;
             }
@@ -149,9 +151,9 @@ impl Servo {
         Ok(contacts)
     }
 
-    /// Presses the finger until it has the force to slide with, or by a tenth of a millimetre if
-    /// the sensor measures no force; `facing` is the cosine between approach and normal. Returns the
-    /// load to hold, or `None` at overload.
+    /// Presses the finger until it has the force to slide with, or a little if the sensor measures
+    /// no force; `facing` is the cosine between approach and normal. Returns the load to hold, or
+    /// `None` at overload.
     fn press_for_slide(
         &mut self,
         (ahead_w, facing): (&UnitVector3<f64>, f64),
