@@ -105,7 +105,7 @@ impl FirstMessages {
     }
 }
 
-/// Type of a number in a `PointField`: its size, bytes; only numbers of these types are coordinates.
+/// Types of a number in a `PointField`, and their sizes, bytes; only these are coordinates.
 const NUMBERS: [(u8, usize); 2] = [(7, 4), (8, 8)];
 
 impl PointCloud2 {

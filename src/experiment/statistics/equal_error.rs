@@ -164,8 +164,8 @@ fn curves(
 }
 
 /// Returns the index at which each planner reaches the second one's median error at `goal_index`,
-/// the median path length to it, m, and the median time, s. The index counts compared touch counts: over a zone,
-/// touches after the initial ones.
+/// the median path length to it, m, and the median time, s. The index counts compared touch counts:
+/// over a zone, touches after the initial ones.
 fn reach_goal(
     medians: &[ErrorCurve<RankedValues>; 2],
     sample: &[usize],

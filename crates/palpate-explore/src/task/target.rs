@@ -65,7 +65,8 @@ impl Target {
     }
 
     /// Returns the coordinates for a table: (x) or (x, z) of a place, followed by the pitch in
-    /// degrees if the finger is tilted, or by the end of a stroke; for an aim, x, y and z of the point, then of the direction.
+    /// degrees if the finger is tilted, or by the end of a stroke; for an aim, x, y and z of the
+    /// point, then of the direction.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Place(place) => place.clone(),
@@ -78,8 +79,8 @@ impl Target {
     }
 
     /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, three for
-    /// a place and a pitch, four for a stroke, six for an aim. Returns `None` for another count, and for an aim
-    /// without a direction.
+    /// a place and a pitch, four for a stroke, six for an aim. Returns `None` for another count, and
+    /// for an aim without a direction.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match *numbers {
             [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
