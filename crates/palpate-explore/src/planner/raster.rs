@@ -15,6 +15,9 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     make: |_, _| Box::new(Raster { line: 0, done_m: 0.0 }),
 };
 
+/// Relative rounding of a line's length.
+const ROUNDING: f64 = 1e-9;
+
 struct Raster {
     /// Number of the line.
     line: u32,
@@ -41,7 +44,7 @@ impl Raster {
 impl Planner for Raster {
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
         let zone = belief.height_field().ok_or("this planner supports zones only")?.zone();
-        if zone.dimension() == 1 || self.done_m >= zone.widest_m() {
+        if zone.dimension() == 1 || self.done_m >= zone.widest_m() * (1.0 - ROUNDING) {
             (self.line, self.done_m) = (self.line.wrapping_add(1), 0.0);
         }
         let place = self.at(zone, self.done_m);
@@ -51,9 +54,10 @@ impl Planner for Raster {
 
     fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
         let Some(zone) = belief.height_field().map(|field| field.zone()) else { return target };
-        // `plan` took the whole line.
+        // `plan` took the whole line, of which this is one of equal parts.
         let start_m = self.done_m - zone.widest_m();
-        self.done_m = start_m + offer.longest_m;
+        let parts = (zone.widest_m() / offer.longest_m).ceil();
+        self.done_m = start_m + zone.widest_m() / parts;
         match (target.place(), self.at(zone, self.done_m).as_slice()) {
             (Some([x, z]), [u, v]) => Target::Stroke { place: [*x, *z], to: [*u, *v] },
             _ => target,

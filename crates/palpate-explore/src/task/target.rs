@@ -79,8 +79,8 @@ impl Target {
     }
 
     /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, three for
-    /// a place and a pitch, four for a stroke, six for an aim. Returns `None` for another count, and
-    /// for an aim without a direction.
+    /// a place and a pitch, four for a stroke, six for an aim. Returns `None` for another count,
+    /// and for an aim without a direction.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match *numbers {
             [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
