@@ -10,7 +10,8 @@ use std::path::Path;
 /// Number of touches: the initial ones are taps.
 const TOUCHES: u32 = 12;
 
-const STROKE: &str = "scene.touch.stroke={}";
+/// Strokes, whose force is held by the sensor that the simulated robot has in any case.
+const STROKES: [&str; 2] = ["scene.touch.stroke={}", "scene.effects.wrench={}"];
 
 /// Lines of points along the strokes of a row.
 fn lines(row: &TrialRow) -> impl Iterator<Item = Vec<Point3<f64>>> {
@@ -24,12 +25,13 @@ fn lines(row: &TrialRow) -> impl Iterator<Item = Vec<Point3<f64>>> {
 fn strokes_over_topics_are_those_of_the_simulator() {
     let folder = tempfile::tempdir().unwrap();
     let network = Network::new(13);
-    let twin = TwinProcess::new(&network, EXPERIMENT, &[]);
+    let twin = TwinProcess::new(&network, EXPERIMENT, &["--set", STROKES[1]]);
     let mut run = network.run("raster", TOUCHES, folder.path());
-    let output = run.args(["--set", STROKE]).output().unwrap();
+    let output = run.args(["--set", STROKES[0], "--set", STROKES[1]]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     twin.end();
-    let sets = ["trials=1", "planners=[\"raster\"]", STROKE, CELL[0]].map(String::from);
+    let sets =
+        ["trials=1", "planners=[\"raster\"]", STROKES[0], STROKES[1], CELL[0]].map(String::from);
     let sets = [&sets[..], &touch_sets(TOUCHES)].concat();
     let simulation = Simulation::new(Experiment::load(Path::new(EXPERIMENT), &sets).unwrap());
     let simulation = simulation.unwrap();
