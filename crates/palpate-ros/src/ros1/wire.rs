@@ -2,8 +2,8 @@
 
 use crate::definition::{HasDefinition, Text};
 use crate::message::{
-    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
-    TriggerResponse, WrenchStamped,
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, Image, JointState, JointTrajectory,
+    Touching, TriggerResponse, WrenchStamped,
 };
 use crate::view::{CameraInfo, PointCloud2};
 use roslibrust::{MessageDescriptor, RosMessageType, RosServiceType};
