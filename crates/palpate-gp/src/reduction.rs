@@ -84,12 +84,7 @@ impl<'a> VarianceReduction<'a> {
                 (0..count).flat_map(|lane| solved.iter().map(move |lanes| lanes[lane])).collect();
             let covariances = |others: &Observations, whitened: &[f64]| {
                 let mut covariances = vec![[0.0; MANY]; others.len()];
-                for (axis, length) in hyperparameters.length_scales.iter().enumerate() {
-                    let at = std::array::from_fn(|lane| line[lane.min(count - 1)][axis]);
-                    add_squares(&mut covariances, at, others.column(axis), 1.0 / length);
-                }
-                self.posterior.kernel().correlate(covariances.as_flattened_mut());
-                subtract_products(whitened, solved, &mut covariances);
+                self.covary((&line[..count], solved), (others, whitened), &mut covariances);
                 covariances
             };
             let (mut factor, mut order) = (Factor::default(), 0);
@@ -130,14 +125,8 @@ impl<'a> VarianceReduction<'a> {
         let mut covariances = vec![[0.0; MANY]; self.references.len()];
         let mut reductions = Vec::with_capacity(places.len());
         self.posterior.whitened(places, |solved, explained, count| {
-            covariances.fill([0.0; MANY]);
             let block = &places[reductions.len()..][..count];
-            for (axis, length) in hyperparameters.length_scales.iter().enumerate() {
-                let at = std::array::from_fn(|lane| block[lane.min(count - 1)][axis]);
-                add_squares(&mut covariances, at, self.references.column(axis), 1.0 / length);
-            }
-            self.posterior.kernel().correlate(covariances.as_flattened_mut());
-            subtract_products(&self.whitened, solved, &mut covariances);
+            self.covary((block, solved), (&self.references, &self.whitened), &mut covariances);
             let mut shared2 = [0.0; MANY];
             for (field, at_references) in &mut common {
                 let at: [f64; MANY] =
@@ -156,6 +145,24 @@ impl<'a> VarianceReduction<'a> {
             }));
         });
         reductions
+    }
+
+    /// Writes the posterior covariances of each of `others` with up to sixteen places, in units of
+    /// the signal's variance; both come with their L⁻¹·k(X, ·).
+    fn covary(
+        &self,
+        (block, solved): (&[&[f64]], &[[f64; MANY]]),
+        (others, whitened): (&Observations, &[f64]),
+        covariances: &mut [[f64; MANY]],
+    ) {
+        covariances.fill([0.0; MANY]);
+        let lengths = &self.posterior.hyperparameters().length_scales;
+        for (axis, length) in lengths.iter().enumerate() {
+            let at = std::array::from_fn(|lane| block[lane.min(block.len() - 1)][axis]);
+            add_squares(covariances, at, others.column(axis), 1.0 / length);
+        }
+        self.posterior.kernel().correlate(covariances.as_flattened_mut());
+        subtract_products(whitened, solved, covariances);
     }
 }
 
