@@ -1,8 +1,9 @@
 //! Tests of the dynamic body: agreement with the kinematic one, limits of speed, and contact force.
 
 use crate::common::shipped::{contact, environment};
+use crate::common::tap::Tap;
 use nalgebra::{Isometry3, Translation3};
-use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
+use palpate::backend::{Command, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::{Probe, Touch};
 use palpate::sim::environment::ObjectShape;
@@ -18,28 +19,6 @@ const ARM: &str = "arm={links=\"C\"}";
 const DYNAMIC: &str = "simulator=\"dynamic\"";
 const DRY: &str = "effects={skin={}}";
 const WET: &str = "effects={skin={}, fluid={}}";
-
-/// Wrapper that keeps every reading of a body.
-struct Tap {
-    inner: Box<dyn Backend>,
-    readings: Arc<Mutex<Vec<Reading>>>,
-}
-
-impl Backend for Tap {
-    fn capabilities(&self) -> &Capabilities {
-        self.inner.capabilities()
-    }
-
-    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
-        self.inner.reset(seed)
-    }
-
-    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        let reading = self.inner.step(command)?;
-        self.readings.lock().unwrap().push(reading.clone());
-        Ok(reading)
-    }
-}
 
 /// Returns a touch with all readings during it.
 fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading>) {

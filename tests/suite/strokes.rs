@@ -2,8 +2,9 @@
 
 use crate::common::program::folder;
 use crate::common::shipped::{contact, environment};
+use crate::common::tap::Tap;
 use nalgebra::{Point3, Vector3};
-use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::backend::Reading;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
@@ -20,32 +21,6 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-
-/// Backend that keeps the force of each tick.
-struct Felt {
-    inner: Box<dyn Backend>,
-    forces_n: Arc<Mutex<Vec<f64>>>,
-}
-
-impl Backend for Felt {
-    fn capabilities(&self) -> &Capabilities {
-        self.inner.capabilities()
-    }
-
-    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
-        self.inner.reset(seed)
-    }
-
-    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        let reading = self.inner.step(command)?;
-        let force_n = reading.samples.iter().find_map(|sample| match sample {
-            Sample::Ideal(contact) => Some(contact.force_n),
-            _ => None,
-        });
-        self.forces_n.lock().unwrap().push(force_n.unwrap_or(0.0));
-        Ok(reading)
-    }
-}
 
 /// Half of the zone's width and height, m, and its middle's z.
 const HALF_M: f64 = 0.04;
@@ -103,14 +78,20 @@ const SOFT: &str = "[effects.skin]\n[effects.fluid]";
 /// Slides from `x` to `to`; returns the contacts and the forces of all ticks.
 fn slide(environment: &Arc<Environment>, x: f64, to: f64) -> (Vec<Contact>, Vec<f64>) {
     let simulator = Simulator::new(Arc::clone(environment)).unwrap();
-    let forces_n = Arc::<Mutex<Vec<f64>>>::default();
-    let inner = simulator.body().unwrap().unwrap();
-    let body = Felt { inner, forces_n: Arc::clone(&forces_n) };
+    let readings = Arc::<Mutex<Vec<Reading>>>::default();
+    let body = Tap { inner: simulator.body().unwrap().unwrap(), readings: Arc::clone(&readings) };
     let mut servo = simulator.servo(Box::new(body), 0).unwrap();
     let target = Target::Stroke { place: [x, MIDDLE_M], to: [to, MIDDLE_M] };
     let approach = environment.task().approach(&target).unwrap();
     let touched = contact(servo.touch(&approach).unwrap());
-    let forces_n = forces_n.lock().unwrap().clone();
+    let force_n = |reading: &Reading| {
+        let felt = reading.samples.iter().find_map(|sample| match sample {
+            Sample::Ideal(contact) => Some(contact.force_n),
+            _ => None,
+        });
+        felt.unwrap_or(0.0)
+    };
+    let forces_n = readings.lock().unwrap().iter().map(force_n).collect();
     (touched.points().cloned().collect(), forces_n)
 }
 

@@ -14,3 +14,4 @@ pub mod runs;
 pub mod shapes;
 pub mod shipped;
 pub mod solids;
+pub mod tap;
