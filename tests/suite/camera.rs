@@ -446,6 +446,49 @@ fn views_are_read_from_files() {
     }
 }
 
+/// Places that a camera saw through count as empty, and are in what a row keeps of the view: the
+/// belief that is drawn from a row has the silhouette of the trial's.
+#[test]
+fn places_seen_through_are_kept() {
+    let camera =
+        "camera={model=\"d405\",position_m=[0.15,-0.4,0.6],pose_error={},noise={},holes={}}";
+    let environment = environment("suite/pipe.toml", &[camera]);
+    let (zone, finger) = (environment.task().zone().unwrap(), &environment.scene().finger);
+    let field = || HeightField::new(zone.clone(), settings()).with_finger(finger.clone());
+    let [mut found, mut drawn] = [field(), field()];
+    let seen = found.observe_view(&look(&environment, 0)).clone();
+    drawn.observe_seen(serde_json::from_str(&serde_json::to_string(&seen).unwrap()).unwrap());
+    let mut probe = exact_probe(Arc::clone(&environment));
+    let places = zone.grid(9);
+    let mut touch = |place: &Vec<f64>| {
+        let approach = environment.task().approach(&place.clone().into()).unwrap();
+        (probe.touch(&approach).unwrap(), probe.swept_volume().unwrap())
+    };
+    let touches: Vec<_> = places.iter().map(&mut touch).collect();
+    let missed = touches.iter().position(|(touch, _)| *touch == Touch::Miss).unwrap();
+    for field in [&mut found, &mut drawn] {
+        field.observe(&places[missed], &touches[missed].0);
+        field.observe_swept(&touches[missed].1);
+    }
+    let [found, drawn] = [&found, &drawn].map(|field| {
+        let silhouette = field.surface_evidence().silhouette();
+        silhouette.probabilities(places.iter().map(Vec::as_slice))
+    });
+    assert_eq!(found, drawn);
+    let mean = |is_miss: bool| {
+        let of =
+            touches.iter().zip(&found).filter(|((touch, _), _)| (*touch == Touch::Miss) == is_miss);
+        let shares: Vec<f64> = of.map(|(_, share)| *share).collect();
+        shares.iter().sum::<f64>() / shares.len() as f64
+    };
+    println!(
+        "probability of a surface: {:.2} at contacts, {:.2} at misses",
+        mean(false),
+        mean(true)
+    );
+    assert!(mean(false) > mean(true) + 0.2);
+}
+
 /// A real robot takes no view from the mesh: it needs the file of its camera.
 #[test]
 fn a_real_robot_needs_a_real_view() {

@@ -45,7 +45,37 @@ const MISS_PLACES: usize = 3;
 const SEEN_PER_SIDE: usize = 12;
 
 /// Probability of a surface where a view saw none.
+// heuristic: a steep wall may have left a hole in the view.
 const SEEN_THROUGH: f64 = 0.1;
+
+/// Returns what a view says of the presence of a surface, at a few places of the zone: places (x,
+/// z) with a probability; none if the zone has no depth.
+pub(super) fn seen_presence(zone: &Zone, view: &View) -> Vec<([f64; 2], f64)> {
+    let Some([near_m, far_m]) = zone.depth_m else { return Vec::new() };
+    let step_m = zone.widest_m() / SEEN_PER_SIDE as f64;
+    let margin_m = view.accuracy.pose_error.position_sd_m.into_iter().fold(0.0, f64::max);
+    let map = DepthMap::new(view, 0.25 * step_m);
+    let counts = zone.extents_m().into_iter().map(|side| ((side / step_m).round() as usize).max(1));
+    let counts: Vec<usize> = counts.collect();
+    let deep = ((far_m - near_m) / (0.25 * step_m)).ceil().max(1.0) as usize;
+    let verdict = |k: usize| {
+        let cell = [k % counts[0], k / counts[0]];
+        let middles =
+            cell.iter().zip(&counts).map(|(at, count)| (*at as f64 + 0.5) / *count as f64);
+        let place = zone.at(&middles.collect::<Vec<_>>());
+        let line = (0..=deep).map(|d| {
+            let depth_m = near_m + (far_m - near_m) * d as f64 / deep as f64;
+            zone.x_wz() * zone.local(&place, -depth_m)
+        });
+        let presence = match map.sight(line, margin_m) {
+            Sight::Surface => 1.0,
+            Sight::Nothing => SEEN_THROUGH,
+            Sight::Unknown => return None,
+        };
+        Some((flat(&zone.local(&place, 0.0)).into(), presence))
+    };
+    (0..counts.iter().product()).filter_map(verdict).collect()
+}
 
 /// Evidence from touches for the presence of a surface.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -104,38 +134,9 @@ impl SurfaceEvidence {
         self.hull = Some(hull);
     }
 
-    /// Adds what a view says of the presence of a surface, at a few places of the zone; nothing if
-    /// the zone has no depth.
-    pub(super) fn add_view(&mut self, view: &View) {
-        let Some([near_m, far_m]) = self.zone.depth_m else { return };
-        let extents_m = self.zone.extents_m();
-        let step_m = extents_m.iter().copied().fold(0.0, f64::max) / SEEN_PER_SIDE as f64;
-        let margin_m = view.accuracy.pose_error.position_sd_m.into_iter().fold(0.0, f64::max);
-        let map = DepthMap::new(view, 0.25 * step_m);
-        let counts = extents_m.iter().map(|side| ((side / step_m).round() as usize).max(1));
-        let counts: Vec<usize> = counts.collect();
-        let deep = ((far_m - near_m) / (0.25 * step_m)).ceil().max(1.0) as usize;
-        for k in 0..counts.iter().product() {
-            let (i, j) = (k % counts[0], k / counts[0]);
-            let share = |at: usize, axis: usize| (at as f64 + 0.5) / counts[axis] as f64;
-            let shares: Vec<f64> = [i, j]
-                .into_iter()
-                .enumerate()
-                .take(counts.len())
-                .map(|(axis, at)| share(at, axis))
-                .collect();
-            let place = self.zone.at(&shares);
-            let line = (0..=deep).map(|d| {
-                let depth_m = near_m + (far_m - near_m) * d as f64 / deep as f64;
-                self.zone.x_wz() * self.zone.local(&place, -depth_m)
-            });
-            let presence = match map.sight(line, margin_m) {
-                Sight::Surface => 1.0,
-                Sight::Nothing => SEEN_THROUGH,
-                Sight::Unknown => continue,
-            };
-            self.seen.push((flat(&self.zone.local(&place, 0.0)), presence));
-        }
+    /// Adds places where a view tells whether there is a surface.
+    pub(super) fn add_seen(&mut self, presence: &[([f64; 2], f64)]) {
+        self.seen.extend(presence.iter().map(|(place, share)| (Vector2::from(*place), *share)));
     }
 
     /// Returns the places where a camera saw that there is no surface.

@@ -4,7 +4,7 @@ use crate::free_space::FreeSpaceBound;
 use crate::gp_settings::{Band, BandName, GpSettings};
 use crate::probe::{Contact, SweptVolume};
 use crate::robot::Finger;
-use crate::surface_evidence::SurfaceEvidence;
+use crate::surface_evidence::{SurfaceEvidence, seen_presence};
 use crate::task::Zone;
 use crate::view::{Offer, RigidError, SeenSurface, View};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -138,9 +138,9 @@ impl HeightField {
                 |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
             zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
         };
-        self.presence.add_view(view);
         let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
-        let seen = SeenSurface::new(view, (wanted, SEEN), gradient);
+        let mut seen = SeenSurface::new(view, (wanted, SEEN), gradient);
+        seen.presence = seen_presence(zone, view);
         self.observe_seen(seen)
     }
 
@@ -171,6 +171,7 @@ impl HeightField {
 
     /// Adds a view that is thinned already.
     pub fn observe_seen(&mut self, seen: SeenSurface) -> &SeenSurface {
+        self.presence.add_seen(&seen.presence);
         let number = self.seen.len();
         self.seen.push(seen);
         &self.seen[number]

@@ -18,7 +18,7 @@ pub const STEEPEST: f64 = 1.73;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StrokeSettings {
-    /// Speed across the approach, m/s.
+    /// Speed along the surface, m/s.
     pub speed_m_s: f64,
     /// Force along the approach that is held while sliding, N.
     pub force_n: f64,

@@ -46,6 +46,10 @@ pub struct SeenSurface {
     /// Whether each element is not on the object; empty if all are.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<bool>,
+    /// Places (x, z) of a zone where the view tells whether there is a surface, with its
+    /// probability.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) presence: Vec<([f64; 2], f64)>,
     /// Cholesky factor of their covariance.
     #[schemars(with = "[[f64; ERRORS]; ERRORS]")]
     pub(super) factor: SMatrix<f64, ERRORS, ERRORS>,
@@ -116,6 +120,7 @@ impl SeenSurface {
             errors: SVector::zeros(),
             factor: SMatrix::identity(),
             rejected: Vec::new(),
+            presence: Vec::new(),
         }
     }
 
