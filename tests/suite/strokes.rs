@@ -262,6 +262,16 @@ fn a_stroke_needs_a_scene_that_allows_it() {
     assert!(longest.is_empty(), "{longest}");
 }
 
+/// Strokes around a whole object and along a curve are refused, not left out in silence.
+#[test]
+fn strokes_need_a_zone() {
+    for name in ["container_around.toml", "toy.toml"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+        let error = Scene::load(&path, &["touch.stroke={}".into()]).err().unwrap().to_string();
+        assert!(error.contains("strokes are along a zone"), "{name}: {error}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
