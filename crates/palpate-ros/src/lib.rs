@@ -92,16 +92,18 @@ pub fn connect(
 pub fn look(settings: &BackendSettings, topics: &CameraTopics) -> Result<Cloud, InputError> {
     let mut first = FirstMessages::default();
     let mut take = |message| first.take(message);
-    let published = match settings.kind {
+    let listened = match settings.kind {
         #[cfg(feature = "ros2")]
-        BackendKind::Ros2 => ros2::camera::listen(settings, topics, &mut take)?,
+        BackendKind::Ros2 => ros2::camera::listen(settings, topics, &mut take),
         #[cfg(feature = "ros1")]
-        BackendKind::Ros1 => ros1::camera::listen(settings, topics, &mut take)?,
+        BackendKind::Ros1 => ros1::camera::listen(settings, topics, &mut take),
         kind => {
+            // Without a transport nothing else names its type.
             let _: &mut dyn FnMut(CameraMessage) -> bool = &mut take;
-            return Err(no_transport(kind));
+            Err(no_transport(kind))
         }
     };
+    let published: Vec<String> = listened?;
     first.cloud(topics, &published)
 }
 
