@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-features bench contacts detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -207,6 +207,10 @@ bench: setup
 # Error of contacts located by the electrodes.
 contacts: setup
 	cargo bench --locked --bench contacts
+
+# Error, force and lost contact of strokes at several speeds.
+strokes: setup
+	cargo bench --locked --bench strokes
 
 # Force at which contact is detected, and rate of false detections.
 detection: setup

@@ -146,6 +146,7 @@ pub(crate) fn equal_errors<'py>(
     estimates("touches", |it| it.touches)?;
     estimates("ratio", |it| it.ratio)?;
     estimates("path_ratio", |it| it.path_ratio)?;
+    estimates("time_ratio", |it| it.time_ratio)?;
     Ok(table)
 }
 

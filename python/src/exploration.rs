@@ -127,7 +127,7 @@ impl ExplorationScene {
             (Region::Zone(zone), Target::Tilted { place, .. } | Target::Stroke { place, .. }) => {
                 self.zone_row(zone, place, met)
             }
-            (Region::Ball(ball), Target::Aim(aim)) => {
+            (Region::Ball(ball), Target::Aim(aim) | Target::StrokeAround { aim, .. }) => {
                 let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
                 let mut row: Vec<f64> = aim.direction_w.iter().map(|ahead| -ahead).collect();
                 row.extend(within(aim.p_w).iter());

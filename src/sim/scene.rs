@@ -251,8 +251,9 @@ impl Validate for Scene {
             others.is_empty() || can_tilt,
             || "none, unless simulator = \"swept\" touches a zone with x_m and z_m".into(),
         );
-        let allowed = "none: strokes are along a zone with x_m and z_m";
-        given(rules, "touch.stroke", self.touch.stroke.is_some() && !is_flat, allowed);
+        let allowed = "none: strokes are along a zone with x_m and z_m, or around a whole object";
+        let is_curve = self.whole_object.is_none() && !is_flat;
+        given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
         let body = self.simulator.name();
         if self.simulator == SimulatorKind::Analytic {
             let allowed = "\"toy\", because simulator = \"analytic\"";

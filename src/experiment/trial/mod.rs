@@ -225,8 +225,8 @@ const ROUNDING: f64 = 1e-9;
 /// If the region does not contain the target, the finger cannot reach it, or it is a stroke that
 /// the scene does not allow.
 fn approach_to(task: &Task, target: &Target, count: u32) -> Result<Approach, String> {
-    if let Target::Stroke { place, to } = target {
-        let length_m = (to[0] - place[0]).hypot(to[1] - place[1]);
+    let length_m = target.slide_m();
+    if length_m > 0.0 {
         let longest_m = task.touch().stroke.as_ref().map(|stroke| stroke.longest_m);
         let longest_m = longest_m.ok_or_else(|| {
             format!("touch {count}: a stroke is planned, and the scene has no [touch.stroke]")

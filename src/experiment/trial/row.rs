@@ -213,6 +213,7 @@ impl TouchRow {
     fn places(&self) -> impl Iterator<Item = &[f64]> + Clone {
         let end = match &self.target {
             Target::Stroke { to, .. } => Some(to.as_slice()),
+            Target::StrokeAround { .. } => self.patch.last().map(|point| &point[..3]),
             _ => None,
         };
         std::iter::once(self.place()).chain(end)
@@ -222,8 +223,10 @@ impl TouchRow {
         match (&self.target, &self.contact) {
             (Target::Place(place), _) => place,
             (Target::Tilted { place, .. } | Target::Stroke { place, .. }, _) => place,
-            (Target::Aim(_), Some(contact)) => contact,
-            (Target::Aim(aim), None) => aim.p_w.coords.as_slice(),
+            (Target::Aim(_) | Target::StrokeAround { .. }, Some(contact)) => contact,
+            (Target::Aim(aim) | Target::StrokeAround { aim, .. }, None) => {
+                aim.p_w.coords.as_slice()
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::looks::TOUCH_S;
 use palpate_explore::planner::stroke::StrokeOffer;
 use palpate_explore::probe::{Probe, Touch};
-use palpate_explore::task::{Region, Target, Task};
+use palpate_explore::task::{Target, Task};
 
 /// Strokes of a trial.
 pub(super) struct Strokes<'a> {
@@ -24,9 +24,6 @@ impl<'a> Strokes<'a> {
     /// that the robot rested for a camera.
     pub(super) fn offer(&self, probe: &dyn Probe, looked_s: f64) -> Option<StrokeOffer> {
         let (touch, stroke) = (self.task.touch(), self.task.touch().stroke.as_ref()?);
-        if !matches!(self.task.region(), Region::Zone(_)) {
-            return None;
-        }
         let moved_s = self.travelled_m / touch.travel_m_s + self.slid_m / stroke.speed_m_s;
         let mean_s =
             probe.time_s().map(|time_s| (time_s - looked_s - moved_s) / f64::from(self.count));
@@ -45,7 +42,7 @@ impl<'a> Strokes<'a> {
         if let Some(last) = &self.last {
             self.travelled_m += self.task.region().travel_m(last, target);
         }
-        if let (Touch::Contact(contact), true) = (touch, target.end() != target.place()) {
+        if let (Touch::Contact(contact), true) = (touch, target.slide_m() > 0.0) {
             let points = contact.points().zip(&contact.patch);
             self.slid_m += points.map(|(from, to)| (to.p_wc - from.p_wc).norm()).sum::<f64>();
         }

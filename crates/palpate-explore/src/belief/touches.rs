@@ -35,15 +35,7 @@ impl HeightField {
     pub fn observe_stroke(&mut self, target: &[f64], touch: &Touch) {
         let thinned = match touch {
             Touch::Contact(contact) => {
-                let apart_m = STROKE_STEP * self.zone.widest_m();
-                let mut last_w = contact.p_wc;
-                let is_next = |point: &&Contact| {
-                    let is_apart = (point.p_wc - last_w).norm() >= apart_m;
-                    last_w = if is_apart { point.p_wc } else { last_w };
-                    is_apart
-                };
-                let patch = contact.patch.iter().filter(is_next).cloned().collect();
-                Touch::Contact(Contact { patch, ..contact.clone() })
+                Touch::Contact(contact.thinned(STROKE_STEP * self.zone.widest_m()))
             }
             other => other.clone(),
         };

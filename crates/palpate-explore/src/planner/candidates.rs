@@ -3,10 +3,10 @@
 
 use super::plan::{Fallback, Plan};
 use super::sample::{in_ball, random_aim};
-use crate::task::Aim;
+use crate::task::{Aim, any_orthogonal};
 use crate::whole_object::ImplicitSurface;
 use crate::whole_object::surface::{Surface, SurfaceField, steepness};
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -144,12 +144,6 @@ pub fn free_aim(
         })
 }
 
-/// Returns a unit vector orthogonal to another.
-fn any_orthogonal(to: &UnitVector3<f64>) -> Vector3<f64> {
-    let axis = if to.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
-    to.cross(&axis).normalize()
-}
-
 fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     let near_m = NEAR * belief.scope().radius_m;
     belief.aims().iter().all(|asked| {
@@ -158,7 +152,7 @@ fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
 }
 
 /// Whether the approach of `aim` outside the object is clear of the estimated surface.
-fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> bool {
+pub(super) fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> bool {
     let (ball, radius_m) = (&belief.scope().ball, belief.scope().radius_m);
     let back = |radii: f64| aim.p_w - aim.direction_w.scale(radii * radius_m);
     let mut radii = FIRST;

@@ -57,9 +57,7 @@ fn in_zone(field: &HeightField, offers: &[Offer], place: &[f64]) -> Option<Gains
 
 fn around(surface: &ImplicitSurface, offers: &[Offer], p_w: &Point3<f64>) -> Option<Gains> {
     let (believed, fit) = (surface.surface()?, surface.fit()?);
-    let mesh = believed.mesh(CELLS)?;
-    let step = mesh.vertices().len().div_ceil(PLACES).max(1);
-    let points: Vec<Point3<f64>> = mesh.vertices().iter().step_by(step).copied().collect();
+    let points = believed.points(CELLS, PLACES)?;
     let places = points.iter().map(|point| point.coords.as_slice());
     let common = believed.pose_errors().iter().cloned();
     let reduction = VarianceReduction::new(believed.posterior(), places).with_common(common);

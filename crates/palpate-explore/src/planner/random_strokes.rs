@@ -1,16 +1,18 @@
-//! Planner `random_strokes`: strokes between random places of the zone, a baseline.
+//! Planner `random_strokes`: strokes between random places of the zone, or from a random touch
+//! around an object along a random heading, a baseline.
 
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
 use super::sample::random_target;
 use super::stroke::StrokeOffer;
 use crate::belief::Belief;
 use crate::task::Target;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "random_strokes",
-    about: "strokes from random places to random ones, as long as allowed; without strokes, `random`",
-    zone_only: Some("strokes are along a zone"),
+    about: "strokes from random touches along random ways, as long as allowed; without strokes, `random`",
+    zone_only: None,
     make: |_, rng| Box::new(RandomStrokes { rng }),
 };
 
@@ -24,6 +26,12 @@ impl Planner for RandomStrokes {
     }
 
     fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
+        if let (Belief::ImplicitSurface(surface), Some(aim)) = (belief, target.aim()) {
+            let turn = self.rng.random_range(0.0..std::f64::consts::TAU);
+            let way_w = aim.across_w(turn) * offer.longest_m;
+            let stroke = Target::StrokeAround { aim: *aim, way_w };
+            return if surface.scope().contains(&stroke) { stroke } else { target };
+        }
         let other = random_target(belief, &mut self.rng);
         match (target.place(), other.place()) {
             (Some([x, z]), Some([u, v])) => {

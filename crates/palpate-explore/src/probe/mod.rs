@@ -61,6 +61,18 @@ impl Contact {
         }
     }
 
+    /// Returns the contact with those points of its patch that are `apart_m` from the one before.
+    pub fn thinned(&self, apart_m: f64) -> Self {
+        let mut last_w = self.p_wc;
+        let is_next = |point: &&Self| {
+            let is_apart = (point.p_wc - last_w).norm() >= apart_m;
+            last_w = if is_apart { point.p_wc } else { last_w };
+            is_apart
+        };
+        let patch = self.patch.iter().filter(is_next).cloned().collect();
+        Self { patch, ..self.clone() }
+    }
+
     /// Returns the contact and the further points of its patch.
     pub fn points(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(&self.patch)

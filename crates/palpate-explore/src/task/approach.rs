@@ -60,6 +60,13 @@ impl Approach {
         Self { p_near_w: self.p_near_w + by_w, p_far_w: self.p_far_w + by_w, ..*self }
     }
 
+    /// Returns the approach moved across itself, so that it goes through `p_w`.
+    pub fn through(&self, p_w: &Vector3<f64>) -> Self {
+        let [p_near_w, p_far_w] = [self.p_near_w, self.p_far_w]
+            .map(|level_w| self.project_to_level(p_w, &level_w.coords).into());
+        Self { p_near_w, p_far_w, ..*self }
+    }
+
     /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let points = [self.p_near_w.coords, self.p_far_w.coords];
@@ -169,17 +176,54 @@ impl Ball {
     pub fn approach(&self, aim: &Aim, finger: &Finger, standoff_m: f64, roll_rad: f64) -> Approach {
         let roll = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll_rad);
         let r_wa = attitude(&aim.direction_w) * roll;
+        let [near_m, far_m] = self.reach_m(aim, finger, &r_wa);
+        let [p_near_w, p_far_w] =
+            [near_m, far_m].map(|way_m| aim.p_w + aim.direction_w.scale(way_m));
+        let around = Some(self.keep_out(finger, standoff_m));
+        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), obstacle: around, slide_w: None }
+    }
+
+    /// Distances along an aim's direction, from its point, at which its line enters the ball, and
+    /// leaves it or where the hull would be too low.
+    fn reach_m(&self, aim: &Aim, finger: &Finger, r_wa: &UnitQuaternion<f64>) -> [f64; 2] {
         let ahead_w = aim.direction_w.into_inner();
         let [near_m, mut far_m] = self.chord_m(aim);
         if let Some(room_m) =
-            self.height_above_lowest_m(&aim.p_w, finger, &r_wa).filter(|_| ahead_w.z < 0.0)
+            self.height_above_lowest_m(&aim.p_w, finger, r_wa).filter(|_| ahead_w.z < 0.0)
         {
             let turns_m = room_m / -ahead_w.z;
             far_m = far_m.min(turns_m - finger.radius_m - BEYOND_M);
         }
-        let [p_near_w, p_far_w] = [near_m, far_m].map(|way_m| aim.p_w + ahead_w * way_m);
-        let around = Some(self.keep_out(finger, standoff_m));
-        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), obstacle: around, slide_w: None }
+        [near_m, far_m]
+    }
+
+    /// Returns the `approach` of `aim` with a slide by `way_w`, as far as that is across it: it
+    /// begins before the ball and ends where the hull is not too low all along the way. Returns
+    /// `None` if the hull would be too low at one end.
+    pub fn slide(
+        &self,
+        aim: &Aim,
+        approach: Approach,
+        way_w: &Vector3<f64>,
+        finger: &Finger,
+    ) -> Option<Approach> {
+        let ahead_w = aim.direction_w.into_inner();
+        let way_w = way_w - ahead_w * way_w.dot(&ahead_w);
+        let at = |share: f64| Aim { p_w: aim.p_w + way_w * share, ..*aim };
+        // The ball bulges: its surface is nearest on the line that passes closest to its centre.
+        let closest = way_w.dot(&(self.centre_w - aim.p_w)) / way_w.norm_squared().max(1e-18);
+        let levels_m = [0.0, closest.clamp(0.0, 1.0), 1.0]
+            .map(|share| self.reach_m(&at(share), finger, &approach.r_wa));
+        let near_m = levels_m.iter().fold(f64::INFINITY, |least, [near_m, _]| least.min(*near_m));
+        let far_m = levels_m[0][1].min(levels_m[2][1]);
+        let slide = Approach {
+            p_near_w: aim.p_w + ahead_w * near_m,
+            p_far_w: aim.p_w + ahead_w * far_m,
+            slide_w: Some(way_w),
+            ..approach
+        };
+        let is_free = |share| self.is_free(&at(share), &slide.slid(share), finger);
+        (is_free(0.0) && is_free(1.0)).then_some(slide)
     }
 
     /// Returns the ball that a fingertip stays out of between approaches, to keep the stand-off.
@@ -263,6 +307,33 @@ mod tests {
             }
             let up_w = approach.r_wa * Vector3::z();
             prop_assert!(up_w.z >= -1e-12);
+        }
+
+        /// All along a slide, the approach begins before the ball, and the hull is above the lowest
+        /// z where it turns back.
+        #[test]
+        fn a_slide_is_before_the_ball_and_above_the_lowest(
+            at in prop::array::uniform3(-0.5f64..0.5),
+            ahead in prop::array::uniform3(-1f64..1.0),
+            way in prop::array::uniform3(-0.4f64..0.4),
+            share in 0f64..1.0,
+        ) {
+            let ahead_w = Vector3::from(ahead);
+            prop_assume!(ahead_w.norm() > 0.01);
+            let centre_w = Point3::new(0.1, -0.6, 0.4);
+            let ball = Ball { centre_w, radius_m: 0.9, lowest_m: Some(0.1) };
+            let aim = Aim::against(centre_w + Vector3::from(at), &-ahead_w);
+            let finger = Finger::default();
+            let tap = ball.approach(&aim, &finger, 0.01, 0.0);
+            if let Some(slide) = ball.slide(&aim, tap, &way.into(), &finger) {
+                let slid = slide.slid(share);
+                prop_assert!(slide.slide_w.unwrap().dot(&aim.direction_w).abs() < 1e-9);
+                prop_assert!((slid.p_near_w - centre_w).norm() > 0.9 - 1e-9);
+                let turn_w = slid.p_far_w + aim.direction_w.scale(finger.radius_m + BEYOND_M);
+                let is_down = aim.direction_w.z < 0.0;
+                let room_m = ball.height_above_lowest_m(&turn_w, &finger, &slid.r_wa).unwrap();
+                prop_assert!(!is_down || room_m > -1e-9, "{room_m}");
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ pub mod touch;
 pub mod zone;
 
 pub use approach::{Approach, Ball, RADIUS_M, WholeObject};
+pub(crate) use target::any_orthogonal;
 pub use target::{Aim, Target};
 pub use task::{DIRECTIONS, Region, Task};
 pub use zone::Zone;

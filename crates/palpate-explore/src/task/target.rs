@@ -28,6 +28,13 @@ pub enum Target {
     },
     /// A point of a ball, and the direction of the approach.
     Aim(Aim),
+    /// A touch around a whole object from whose contact the finger slides along the surface.
+    StrokeAround {
+        /// The touch.
+        aim: Aim,
+        /// Way of the finger across the approach, in `W`, m.
+        way_w: Vector3<f64>,
+    },
 }
 
 impl Target {
@@ -36,7 +43,7 @@ impl Target {
         match self {
             Self::Place(place) => Some(place),
             Self::Tilted { place, .. } | Self::Stroke { place, .. } => Some(place),
-            Self::Aim(_) => None,
+            Self::Aim(_) | Self::StrokeAround { .. } => None,
         }
     }
 
@@ -52,43 +59,69 @@ impl Target {
     pub fn pitch_deg(&self) -> Option<f64> {
         match self {
             Self::Tilted { pitch_deg, .. } => Some(*pitch_deg),
-            Self::Place(_) | Self::Stroke { .. } | Self::Aim(_) => None,
+            _ => None,
         }
     }
 
     /// Returns the aim into a ball, if it is one.
     pub fn aim(&self) -> Option<&Aim> {
         match self {
-            Self::Aim(aim) => Some(aim),
+            Self::Aim(aim) | Self::StrokeAround { aim, .. } => Some(aim),
             _ => None,
         }
     }
 
+    /// Returns the length of a stroke across its approach, m; 0 for a tap.
+    pub fn slide_m(&self) -> f64 {
+        match self {
+            Self::Stroke { place, to } => (to[0] - place[0]).hypot(to[1] - place[1]),
+            Self::StrokeAround { way_w, .. } => way_w.norm(),
+            _ => 0.0,
+        }
+    }
+
+    /// Returns the line around a whole object on which the finger leaves it, if nothing stops it.
+    pub(super) fn aim_at_end(&self) -> Option<Aim> {
+        let way_w = match self {
+            Self::StrokeAround { way_w, .. } => *way_w,
+            _ => Vector3::zeros(),
+        };
+        self.aim().map(|aim| Aim { p_w: aim.p_w + way_w, ..*aim })
+    }
+
     /// Returns the coordinates for a table: (x) or (x, z) of a place, followed by the pitch in
     /// degrees if the finger is tilted, or by the end of a stroke; for an aim, x, y and z of the
-    /// point, then of the direction.
+    /// point, then of the direction, followed by those of a stroke's way.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Place(place) => place.clone(),
             Self::Tilted { place: [x, z], pitch_deg } => vec![*x, *z, *pitch_deg],
             Self::Stroke { place: [x, z], to: [u, v] } => vec![*x, *z, *u, *v],
-            Self::Aim(aim) => {
-                aim.p_w.coords.iter().chain(aim.direction_w.iter()).copied().collect()
+            Self::Aim(aim) => aim.numbers().to_vec(),
+            Self::StrokeAround { aim, way_w } => {
+                aim.numbers().iter().chain(way_w).copied().collect()
             }
         }
     }
 
     /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, three for
-    /// a place and a pitch, four for a stroke, six for an aim. Returns `None` for another count,
-    /// and for an aim without a direction.
+    /// a place and a pitch, four for a stroke, six for an aim, nine for a stroke around an object.
+    /// Returns `None` for another count, and for an aim without a direction.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match *numbers {
             [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
             [x, z, pitch_deg] => Some(Self::Tilted { place: [x, z], pitch_deg }),
             [x, z, u, v] => Some(Self::Stroke { place: [x, z], to: [u, v] }),
             [x, y, z, u, v, w] => Some(Self::Aim(Aim::along([x, y, z], [u, v, w])?)),
+            [x, y, z, u, v, w, a, b, c] => Self::stroke_around([x, y, z], [u, v, w], [a, b, c]),
             _ => None,
         }
+    }
+
+    /// Returns the stroke around a whole object with these numbers; `None` as for [`Aim::along`].
+    fn stroke_around(p_w: [f64; 3], ahead_w: [f64; 3], way_w: [f64; 3]) -> Option<Self> {
+        let (aim, way_w) = (Aim::along(p_w, ahead_w)?, Vector3::from(way_w));
+        way_w.iter().all(|number| number.is_finite()).then_some(Self::StrokeAround { aim, way_w })
     }
 }
 
@@ -133,6 +166,19 @@ impl Aim {
         Self { p_w, direction_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
     }
 
+    /// Returns the unit vector across the direction at an angle about it, rad.
+    pub fn across_w(&self, turn_rad: f64) -> Vector3<f64> {
+        let beside_w = any_orthogonal(&self.direction_w);
+        beside_w * turn_rad.cos() + self.direction_w.cross(&beside_w) * turn_rad.sin()
+    }
+
+    /// Coordinates x, y and z of the point, then of the direction.
+    fn numbers(&self) -> [f64; 6] {
+        let [x, y, z]: [f64; 3] = self.p_w.into();
+        let [u, v, w]: [f64; 3] = self.direction_w.into_inner().into();
+        [x, y, z, u, v, w]
+    }
+
     /// Returns an aim at the point `p_w` along `ahead_w`, unchanged if its length is 1. Returns
     /// `None` if a number is not finite or the direction has length zero.
     pub fn along(p_w: [f64; 3], ahead_w: [f64; 3]) -> Option<Self> {
@@ -174,6 +220,15 @@ enum TargetOut {
         /// Unit direction of the approach, in `W`.
         ahead_w: [f64; 3],
     },
+    /// An approach to a whole object, and a slide along the surface.
+    StrokeAround {
+        /// The point aimed at, in `W`, m.
+        p_w: [f64; 3],
+        /// Unit direction of the approach, in `W`.
+        ahead_w: [f64; 3],
+        /// Way of the slide across the approach, in `W`, m.
+        way_w: [f64; 3],
+    },
 }
 
 impl From<Target> for TargetOut {
@@ -185,6 +240,11 @@ impl From<Target> for TargetOut {
             Target::Aim(Aim { p_w, direction_w: ahead_w }) => {
                 Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
             }
+            Target::StrokeAround { aim, way_w } => Self::StrokeAround {
+                p_w: aim.p_w.into(),
+                ahead_w: aim.direction_w.into_inner().into(),
+                way_w: way_w.into(),
+            },
         }
     }
 }
@@ -208,16 +268,26 @@ impl TryFrom<TargetIn> for Target {
             }
             TargetIn::Written(TargetOut::Stroke { place, to }) => Ok(Self::Stroke { place, to }),
             TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
-                let aim = Aim::along(p_w, ahead_w);
-                aim.map(Self::Aim).ok_or_else(|| {
-                    format!("the direction {ahead_w:?} has length zero or is not finite")
-                })
+                Aim::along(p_w, ahead_w).map(Self::Aim).ok_or_else(|| no_direction(ahead_w))
+            }
+            TargetIn::Written(TargetOut::StrokeAround { p_w, ahead_w, way_w }) => {
+                Self::stroke_around(p_w, ahead_w, way_w).ok_or_else(|| no_direction(ahead_w))
             }
             TargetIn::Numbers(numbers) => Self::from_numbers(&numbers).ok_or_else(|| {
-                format!("a target has 1, 2, 3, 4 or 6 numbers, not {}", numbers.len())
+                format!("a target has 1, 2, 3, 4, 6 or 9 numbers, not {}", numbers.len())
             }),
         }
     }
+}
+
+/// Returns a unit vector orthogonal to another.
+pub(crate) fn any_orthogonal(to: &UnitVector3<f64>) -> Vector3<f64> {
+    let axis = if to.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
+    to.cross(&axis).normalize()
+}
+
+fn no_direction(ahead_w: [f64; 3]) -> String {
+    format!("the direction {ahead_w:?} has length zero or is not finite")
 }
 
 #[cfg(test)]
@@ -235,7 +305,8 @@ mod tests {
             let aim = Aim::against(Point3::from(at), &Vector3::from(outward));
             let tilted = Target::Tilted { place: [at[0], at[1]], pitch_deg: at[2] };
             let stroke = Target::Stroke { place: [at[0], at[1]], to: [at[2], at[0]] };
-            for target in [Target::from(aim), Target::from(at[..2].to_vec()), tilted, stroke] {
+            let around = Target::StrokeAround { aim, way_w: outward.into() };
+            for target in [aim.into(), at[..2].to_vec().into(), tilted, stroke, around] {
                 let json = serde_json::to_string(&target).unwrap();
                 prop_assert_eq!(&serde_json::from_str::<Target>(&json).unwrap(), &target);
                 let numbers = serde_json::to_string(&target.numbers()).unwrap();

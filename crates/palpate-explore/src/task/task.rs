@@ -40,29 +40,28 @@ impl Region {
     /// Whether `target` is a place of the zone, or an aim at a point of the ball.
     pub fn contains(&self, target: &Target) -> bool {
         match (self, target) {
-            (Self::Ball(ball), Target::Aim(aim)) => ball.contains(aim),
+            (Self::Ball(ball), _) => target.aim().is_some_and(|aim| ball.contains(aim)),
             (Self::Zone(zone), _) => {
                 let ends = [target.place(), target.end()];
                 ends.iter().all(|place| place.is_some_and(|place| zone.contains(place)))
             }
-            (Self::Ball(_), _) => false,
         }
     }
 
     /// Straight-line distance between two targets, m: from where the finger leaves a place of the
-    /// zone, or between the
-    /// points where two approaches enter the ball. 0 if one is not a target of the region.
+    /// zone, or between the points where the finger leaves and enters the ball. 0 if one is not a
+    /// target of the region.
     pub fn travel_m(&self, from: &Target, to: &Target) -> f64 {
-        match (self, from, to) {
-            (Self::Ball(ball), Target::Aim(from), Target::Aim(to)) => {
+        let distance_m = match self {
+            Self::Ball(ball) => from.aim_at_end().zip(to.aim()).map(|(from, to)| {
                 let entrance_w = |aim: &Aim| aim.p_w + aim.direction_w.scale(ball.chord_m(aim)[0]);
-                (entrance_w(from) - entrance_w(to)).norm()
-            }
-            (Self::Zone(_), ..) => from.end().zip(to.place()).map_or(0.0, |(from, to)| {
+                (entrance_w(&from) - entrance_w(to)).norm()
+            }),
+            Self::Zone(_) => from.end().zip(to.place()).map(|(from, to)| {
                 from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
             }),
-            (Self::Ball(_), ..) => 0.0,
-        }
+        };
+        distance_m.unwrap_or(0.0)
     }
 }
 
@@ -175,7 +174,8 @@ impl Task {
             return true;
         }
         let cell = cell(&-aim.direction_w.into_inner());
-        let find = || self.over(ball, &Aim::against(ball.centre_w, &middle(cell))).is_some();
+        let aim = Aim::against(ball.centre_w, &middle(cell));
+        let find = || self.over(ball, &aim, None).is_some();
         self.cells.get(cell).is_some_and(|found| *found.get_or_init(find))
     }
 
@@ -194,7 +194,10 @@ impl Task {
     /// does not match the region's kind, or cannot be reached.
     pub fn approach(&self, target: &Target) -> Option<Approach> {
         match (&self.region, target) {
-            (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
+            (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim, None),
+            (Region::Ball(ball), Target::StrokeAround { aim, way_w }) => {
+                self.over(ball, aim, Some(way_w))
+            }
             (Region::Zone(zone), _) => {
                 let place = target.place()?;
                 let finger = self.finger.with_pitch(target.pitch_deg())?;
@@ -214,15 +217,16 @@ impl Task {
 
     /// Returns the approach with the smallest roll of the finger for which its hull stays above the
     /// lowest z and the robot reaches it. Returns `None` if there is none.
-    fn over(&self, ball: &Ball, aim: &Aim) -> Option<Approach> {
+    fn over(&self, ball: &Ball, aim: &Aim, way_w: Option<&Vector3<f64>>) -> Option<Approach> {
         let Self { finger, touch, reach, .. } = self;
-        let mut rolled = ROLLS_DEG
-            .iter()
-            .map(|roll_deg| ball.approach(aim, finger, touch.standoff_m, roll_deg.to_radians()));
-        rolled.find(|approach| {
-            ball.is_free(aim, approach, finger)
-                && reach.as_ref().is_none_or(|reach| reach(approach))
-        })
+        let rolled = ROLLS_DEG.iter().map(|roll_deg| {
+            let approach = ball.approach(aim, finger, touch.standoff_m, roll_deg.to_radians());
+            match way_w {
+                Some(way_w) => ball.slide(aim, approach, way_w, finger),
+                None => ball.is_free(aim, &approach, finger).then_some(approach),
+            }
+        });
+        rolled.flatten().find(|approach| reach.as_ref().is_none_or(|reach| reach(approach)))
     }
 }
 

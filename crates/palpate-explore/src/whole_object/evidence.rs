@@ -16,6 +16,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct TouchEvidence {
     contacts: Vec<Contact>,
+    /// Numbers of the contacts of strokes: the first, and one beyond the last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    strokes: Vec<[usize; 2]>,
     ways: Vec<SweptPath>,
     /// Surfaces that cameras have seen, one per view.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -84,8 +87,12 @@ impl TouchEvidence {
         let places = match touch {
             Touch::Contact(contact) => {
                 let points = contact.points();
+                let first = self.contacts.len();
                 self.contacts
                     .extend(points.map(|point| Contact { patch: Vec::new(), ..point.clone() }));
+                if approach.slide_w.is_some() {
+                    self.strokes.push([first, self.contacts.len()]);
+                }
                 places
             }
             Touch::Miss => 2 * places,
@@ -101,6 +108,15 @@ impl TouchEvidence {
             places,
             is_met: matches!(touch, Touch::Contact(_)),
         });
+    }
+
+    /// Whether there are errors of known size: those of views, and of strokes whose sensor states
+    /// its own.
+    pub(super) fn has_known_errors(&self) -> bool {
+        let states = |[from, to]: &[usize; 2]| {
+            self.contacts[*from..*to].iter().any(|contact| contact.sd_m.is_some())
+        };
+        !self.seen.is_empty() || self.strokes.iter().any(states)
     }
 
     /// Points of contact in `W`, in order.
@@ -126,7 +142,8 @@ impl TouchEvidence {
     }
 
     /// Returns the observations of the field relative to `prior`. At each contact the field is 0,
-    /// with the normal as its gradient if `normals` is set. At the centre of each swept ball inside
+    /// with the normal as its gradient if `normals` is set; what the sensor states as the error of a
+    /// stroke's contacts is one that they have in common. At the centre of each swept ball inside
     /// `ball` it is the distance to the nearest contact. That is the upper bound of a distance
     /// there, and the swept radius the lower bound: the standard deviation is that of a uniform
     /// distribution between them. `noise_m` is the unit of the noise.
@@ -137,14 +154,25 @@ impl TouchEvidence {
         (noise_m, pose): (f64, CameraPose),
     ) -> Observations {
         let mut all = Observations::new(3);
-        for Contact { p_wc: p_w, normal_w, has_normal, sd_m, .. } in &self.contacts {
+        let mut strokes = self.strokes.iter().zip(STROKES..).peekable();
+        for (i, contact) in self.contacts.iter().enumerate() {
+            let Contact { p_wc: p_w, normal_w, has_normal, sd_m, .. } = contact;
+            while strokes.next_if(|([_, end], _)| *end <= i).is_some() {}
+            let stroke = strokes.peek().filter(|([first, _], _)| *first <= i);
             let field = prior.field(p_w);
             let gradient = normal_w - field.gradient;
             let slope = (normals && *has_normal)
                 .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
             let place = p_w.coords.as_slice();
-            let noise = sd_m.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
-            all.push(&Observation { place, height: -field.value, noise, slope, known: None });
+            let common = [sd_m.unwrap_or(0.0)];
+            let known = stroke.filter(|_| sd_m.is_some()).map(|(_, source)| KnownError {
+                variance: 0.0,
+                source: *source,
+                loadings: &common,
+            });
+            let noise = sd_m.filter(|_| stroke.is_none());
+            let noise = noise.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
+            all.push(&Observation { place, height: -field.value, noise, slope, known });
         }
         for number in 0..self.seen.len() {
             self.push_seen((prior, ball.radius_m), number, (noise_m, pose), &mut all);
@@ -208,6 +236,9 @@ impl TouchEvidence {
         self.seen.iter_mut().for_each(|seen| seen.align(&self.contacts, inside_m));
     }
 }
+
+/// Number of the first stroke among the sources of errors in common, above those of views.
+const STROKES: usize = 1 << 20;
 
 /// Distance of free points before seen elements, as a fraction of the object's radius.
 // heuristic: near enough to be before the same part of the surface.

@@ -61,6 +61,10 @@ const STEP_FIRST: f64 = 0.7;
 const STEP_NEXT: f64 = 0.35;
 const STEP_LAST: f64 = 0.1;
 
+/// Smallest distance between two points of a stroke, as a fraction of the ball's radius.
+// heuristic: a few points for each length over which a surface changes.
+const STROKE_STEP: f64 = 0.12;
+
 /// Number of surface elements of a view.
 // heuristic: as many as dozens of touches with their normals, whose cost the belief can bear.
 const SEEN: usize = 120;
@@ -87,7 +91,15 @@ impl ImplicitSurface {
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
         self.asked.push(*aim);
-        self.evidence.observe(approach, touch, swept, self.settings.free_space_samples);
+        let apart_m = STROKE_STEP * self.scope.ball.radius_m;
+        let places = self.settings.free_space_samples;
+        match touch {
+            Touch::Contact(contact) if approach.slide_w.is_some() => {
+                let thinned = Touch::Contact(contact.thinned(apart_m));
+                self.evidence.observe(approach, &thinned, swept, places);
+            }
+            _ => self.evidence.observe(approach, touch, swept, places),
+        }
     }
 
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
@@ -209,7 +221,7 @@ impl ImplicitSurface {
     }
 
     /// Returns the ball around all that was touched or seen.
-    fn estimated_ball(&self) -> Ball {
+    pub fn estimated_ball(&self) -> Ball {
         self.scope.estimated_ball(self.points().iter())
     }
 
@@ -256,8 +268,8 @@ impl ImplicitSurface {
         ranges.extend(self.normals().then_some(*slope_noise));
         // Errors of known size do not grow with the signal, which is then searched too.
         let signals_m = SIGNAL_RANGE.map(|share| share * radius_m);
-        let is_seen = !self.evidence.seen.is_empty();
-        ranges.extend(is_seen.then_some(signals_m));
+        let is_known = self.evidence.has_known_errors();
+        ranges.extend(is_known.then_some(signals_m));
         let ranges: Vec<[f64; 2]> = ranges.iter().map(|range| range.map(f64::ln)).collect();
         let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
         let mut begin: Vec<f64> = match start {
@@ -265,18 +277,18 @@ impl ImplicitSurface {
                 let (length_m, ratio) = (start.length_scales[0], start.noise_ratio());
                 let mut begin = vec![length_m.ln(), ratio.height.ln()];
                 begin.extend(self.normals().then(|| (ratio.slope * length_m).ln()));
-                begin.extend(is_seen.then(|| start.signal_sd.ln()));
+                begin.extend(is_known.then(|| start.signal_sd.ln()));
                 begin
             }
             None => ranges.iter().copied().map(middle).collect(),
         };
         // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
-        let signal_sd = match is_seen {
+        let signal_sd = match is_known {
             true => SignalModel::Searched,
             false => SignalModel::Profiled(Range::from((signals_m[0], signals_m[1]))),
         };
-        let parameters = |logs: &[f64]| parameters(logs, is_seen);
+        let parameters = |logs: &[f64]| parameters(logs, is_known);
         let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
         let cube = (observations.order() as f64).powi(3);
         // Each fit starts with a different parameter, so that short fits cover all of them.
@@ -337,10 +349,10 @@ impl ImplicitSurface {
 }
 
 /// Returns the length scale, m, and noise ratios from their logarithms; the slopes' noise is per
-/// length scale. With a view, the last is that of the signal.
-fn parameters(logs: &[f64], is_seen: bool) -> (f64, NoiseRatio) {
+/// length scale. With errors of known size, the last is that of the signal.
+fn parameters(logs: &[f64], is_known: bool) -> (f64, NoiseRatio) {
     let (signal, logs) = match logs.split_last() {
-        Some((signal, logs)) if is_seen => (Some(signal), logs),
+        Some((signal, logs)) if is_known => (Some(signal), logs),
         _ => (None, logs),
     };
     let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());

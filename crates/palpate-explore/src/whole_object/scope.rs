@@ -2,7 +2,7 @@
 
 use crate::robot::Finger;
 use crate::task::touch::TouchSettings;
-use crate::task::{Aim, Ball, Task};
+use crate::task::{Aim, Ball, Target, Task};
 use nalgebra::Point3;
 use palpate_geometry::primitives::extent;
 use palpate_input::error::InputError;
@@ -67,6 +67,11 @@ impl ExplorationSetup {
         let about = Ball::around_box(spanned, self.ball.lowest_m);
         let radius_m = about.radius_m.max(self.radius_m).min(self.ball.radius_m);
         Ball { radius_m, ..about }
+    }
+
+    /// Whether the finger can reach the target: an aim, or both ends of a stroke.
+    pub fn contains(&self, target: &Target) -> bool {
+        self.task.contains(target)
     }
 
     /// Whether the finger can reach the aim.

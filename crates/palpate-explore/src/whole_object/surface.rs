@@ -104,6 +104,13 @@ impl Surface {
         &self.posterior
     }
 
+    /// Returns about `most` vertices of the [mesh](Self::mesh), spread over it.
+    pub fn points(&self, cells: u32, most: usize) -> Option<Vec<Point3<f64>>> {
+        let mesh = self.mesh(cells)?;
+        let step = mesh.vertices().len().div_ceil(most).max(1);
+        Some(mesh.vertices().iter().step_by(step).copied().collect())
+    }
+
     /// Returns the surface as closed triangles, from a grid of `cells` along the longest side of
     /// the box around the contacts: the components that were touched. Returns `None` if the field
     /// has no zeros there.

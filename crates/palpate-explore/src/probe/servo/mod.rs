@@ -473,6 +473,10 @@ impl Probe for Servo {
             },
         };
         let here_w = self.x_wt().translation.vector;
+        let above = match approach.slide_w {
+            Some(_) => standoff(&self.robot, self.settings.standoff_m, &approach.through(&here_w)),
+            None => above,
+        };
         let back_w = approach.project_to_level(&here_w, &above.translation.vector);
         let back = Isometry3::from_parts(back_w.into(), above.rotation);
         self.move_straight("the retract position", back, travel_m_s, false)?;

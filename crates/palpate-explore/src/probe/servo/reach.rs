@@ -259,12 +259,28 @@ impl ArmReach {
             let mut turn = above;
             turn.translation.vector =
                 above.translation.vector.lerp(&below.translation.vector, share);
-            let touch = [(above, turn, self.approach_m_s), (turn, above, self.travel_m_s)];
-            let touch = touch.map(|(from, to, speed_m_s)| {
-                Path::straight(from.translation.vector, to, speed_m_s)
-            });
-            let back = self.follow(there, touch, &clear)?;
-            self.homeward(&back, approach, MARGIN_PLANNED)?;
+            // A stroke may end at once, or be complete.
+            let mut ends = vec![(*approach, vec![turn, above])];
+            if approach.slide_w.is_some() {
+                let left = approach.slid(1.0);
+                let out = standoff(&self.robot, self.standoff_m, &left);
+                let mut along = turn;
+                along.translation.vector =
+                    left.project_to_level(&out.translation.vector, &turn.translation.vector);
+                ends.push((left, vec![turn, along, out]));
+            }
+            for (left, stops) in ends {
+                let mut from = above;
+                let paths = stops.iter().enumerate().map(|(i, to)| {
+                    let is_back = i + 1 == stops.len();
+                    let speed_m_s = if is_back { self.travel_m_s } else { self.approach_m_s };
+                    let path = Path::straight(from.translation.vector, *to, speed_m_s);
+                    from = *to;
+                    path
+                });
+                let back = self.follow(there, paths, &clear)?;
+                self.homeward(&back, &left, MARGIN_PLANNED)?;
+            }
         }
         Some(stop.into_iter().chain([above]).map(PathSegment::Around).collect())
     }

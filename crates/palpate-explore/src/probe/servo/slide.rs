@@ -2,6 +2,7 @@
 //! done or the surface ends.
 
 use super::contact_monitor::ApproachEnd;
+use super::reach::turning_point;
 use super::{PRESS_SPEED, Servo};
 use crate::backend::Fault;
 use crate::control::Goal;
@@ -52,8 +53,8 @@ fn yields_m(load: f64, per_m: f64) -> f64 {
 
 impl Servo {
     /// Slides along the way of `approach`, if it has one, after contact at `first`. Returns the
-    /// contacts along it, up to where the surface ended, was too steep, or the finger was stuck or
-    /// overloaded. In a scene with strokes, `first` is corrected by what the finger yields.
+    /// contacts along it, up to where the surface ended, was too steep or too far, or the finger was
+    /// stuck or overloaded. In a scene with strokes, `first` is corrected by what the finger yields.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
@@ -84,6 +85,7 @@ impl Servo {
         let Some(across_w) = across_w else { return Ok(Vec::new()) };
         let start = self.x_wt();
         let mut goal = start;
+        let deepest_w = turning_point(&self.robot, approach).translation.vector;
         // A sensor that tells a load may tell none without contact.
         let is_felt = self.monitor.load().is_some();
         let wall = WALL * hold.load.max(self.monitor.load().unwrap_or(0.0));
@@ -93,7 +95,8 @@ impl Servo {
         loop {
             let steep = -normal_w.dot(&across_w) / normal_w.dot(&ahead_w).min(-1e-3);
             let done_m = (goal.translation.vector - start.translation.vector).dot(&across_w);
-            let is_over = done_m >= way_w.norm() || steep.abs() > STEEPEST;
+            let is_beyond = (goal.translation.vector - deepest_w).dot(&ahead_w) > 0.0;
+            let is_over = done_m >= way_w.norm() || steep.abs() > STEEPEST || is_beyond;
             if is_over || off_s > LASTS_S {
                 break;
             }
