@@ -76,8 +76,16 @@ fn description(task: &Task, next: &NextTouch, of: u32) -> String {
     let expected = expected.unwrap_or_else(|| {
         format!("surface not yet estimated, turning point after {span_mm:.0} mm")
     });
+    let slide_mm = 1e3 * next.target.slide_m();
+    let slide = match next.approach.slide_w {
+        Some(way_w) => {
+            let along = numbers(way_w.normalize().as_slice());
+            format!("\n  then up to {slide_mm:.0} mm over the surface along ({along})")
+        }
+        None => String::new(),
+    };
     format!(
-        "touch {} of {of}: target ({}) m\n  from ({}) m along ({})\n  {expected}",
+        "touch {} of {of}: target ({}) m\n  from ({}) m along ({})\n  {expected}{slide}",
         next.count,
         numbers(&next.target.numbers()),
         numbers(near_w.coords.as_slice()),

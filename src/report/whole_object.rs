@@ -165,15 +165,15 @@ pub fn belief(
         belief.observe_seen(view.seen.clone());
     }
     for touch in touches {
-        let aim = touch
-            .target
-            .aim()
-            .context("the target has no direction, which a whole object needs")?;
         // The roll of the finger does not change its path.
-        let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
+        let standoff_m = scene.touch.standoff_m;
+        let approach = ball
+            .approach_to(&touch.target, &scene.finger, standoff_m, 0.0)
+            .context("the target has no direction, which a whole object needs")?;
         let swept = swept(&scene.finger, touch);
         let touched = touch.touch(-approach.direction_w().into_inner());
-        belief.observe(aim, &approach, (&touched, swept.as_ref()));
+        let aim = touch.target.aim();
+        aim.into_iter().for_each(|aim| belief.observe(aim, &approach, (&touched, swept.as_ref())));
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))

@@ -338,6 +338,7 @@ proptest! {
         at in [0.0..1.0, 0.0..1.0],
         longest_m in 0.005..0.3,
         extreme in 0..3_usize,
+        ends_per_m in 0.0..1e3,
     ) {
         let mut zone = Zone::new([-0.05, 0.03], Some([0.4, 0.6]));
         zone.datum_y_m = Some(0.0);
@@ -349,7 +350,7 @@ proptest! {
         }
         field.refit().unwrap();
         let [tap_s, speed_m_s] = [[3.0, 0.02], [1e-6, 1e-6], [10.0, 1e6]][extreme];
-        let offer = StrokeOffer { longest_m, speed_m_s, tap_s, travel_m_s: 0.1, from: None };
+        let offer = StrokeOffer { longest_m, speed_m_s, tap_s, travel_m_s: 0.1, from: None, ends_per_m };
         match best(&field, &offer, &[zone.at(&at)]).unwrap() {
             Target::Stroke { place, to } => {
                 prop_assert!(zone.contains(&place) && zone.contains(&to));

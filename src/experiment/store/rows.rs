@@ -76,19 +76,24 @@ fn check_row(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
         return Err(format!("{} of {wanted}", counted(found, "touch")));
     }
     // Coordinates of a target, and length scales of a fit.
-    let dimensions = experiment.scene.zone.as_ref().map_or([6, 3], |zone| [zone.dimension(); 2]);
+    let dimensions = experiment.scene.zone.as_ref().map_or([AIM, 3], |zone| [zone.dimension(); 2]);
     row.touches.iter().zip(1..).try_for_each(|(touch, count)| {
         check_touch(touch, dimensions).map_err(|message| format!("touch {count}: {message}"))
     })
 }
+
+/// Number of coordinates of an aim's point and direction.
+const AIM: usize = 6;
 
 /// Checks the number of coordinates of a touch's target, and the fit's length scales and values.
 ///
 /// # Errors
 /// The reason why the touch does not fit.
 fn check_touch(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
-    let place = touch.target.place().map(<[f64]>::len);
-    let target = place.unwrap_or_else(|| touch.target.numbers().len());
+    let target = match touch.target.place() {
+        Some(place) => place.len(),
+        None => AIM,
+    };
     if target != coordinates {
         return Err(format!("a target has {target} coordinates; needed are {coordinates}"));
     }

@@ -243,6 +243,11 @@ impl HeightField {
     /// there after a miss.
     pub fn observe_swept(&mut self, swept: &SweptVolume) {
         self.presence.add_hull(swept, self.has_missed);
+        self.lower(swept);
+    }
+
+    /// Adds free space above the surface.
+    pub(super) fn lower(&mut self, swept: &SweptVolume) {
         if !self.has_missed && self.settings.band.learned().is_some() {
             self.swept.push(swept.clone());
         }

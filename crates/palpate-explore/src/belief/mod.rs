@@ -63,10 +63,10 @@ impl Belief {
     ) {
         match (self, target.place(), target.aim()) {
             (Self::HeightField(field), Some(place), _) => {
-                match approach.slide_w {
-                    Some(_) => field.observe_stroke(place, touch),
-                    None => field.observe(place, touch),
+                if approach.slide_w.is_some() {
+                    return field.observe_stroke(place, (touch, swept));
                 }
+                field.observe(place, touch);
                 swept.into_iter().for_each(|swept| field.observe_swept(swept));
             }
             (Self::ImplicitSurface(surface), _, Some(aim)) => {

@@ -1,7 +1,7 @@
 //! Observations that a belief takes from touches and strokes.
 
 use super::HeightField;
-use crate::probe::{Contact, Touch};
+use crate::probe::{Contact, SweptVolume, Touch};
 use nalgebra::Vector3;
 use palpate_gp::{KnownError, Observation, Slope};
 
@@ -30,9 +30,13 @@ const STROKE_FITTED: usize = 3;
 const STROKES: usize = 1 << 20;
 
 impl HeightField {
-    /// Adds a stroke that began at `target`, thinned; the belief changes at the next
-    /// [`refit`](Self::refit).
-    pub fn observe_stroke(&mut self, target: &[f64], touch: &Touch) {
+    /// Adds a stroke that began at `target` with the volume swept by then, thinned; the belief
+    /// changes at the next [`refit`](Self::refit).
+    pub fn observe_stroke(
+        &mut self,
+        target: &[f64],
+        (touch, swept): (&Touch, Option<&SweptVolume>),
+    ) {
         let thinned = match touch {
             Touch::Contact(contact) => {
                 Touch::Contact(contact.thinned(STROKE_STEP * self.zone.widest_m()))
@@ -41,6 +45,17 @@ impl HeightField {
         };
         let number = STROKES + self.targets.len();
         self.observe_points((target, &thinned), STROKE_FITTED, Some(number));
+        let Some(swept) = swept else { return };
+        self.observe_swept(swept);
+        if let Touch::Contact(contact) = &thinned {
+            let finger = &swept.finger;
+            for point in contact.patch.iter().filter(|point| point.has_normal) {
+                let p_wt = point.p_wc + point.normal_w * finger.radius_m;
+                self.lower(&SweptVolume { finger: finger.clone(), p_wt });
+                let place = self.zone.local(&self.zone.place(&point.p_wc), 0.0);
+                self.presence.add_seen(&[([place.x, place.z], 1.0)]);
+            }
+        }
     }
 
     /// Adds a touch; the belief changes at the next [`refit`](Self::refit).

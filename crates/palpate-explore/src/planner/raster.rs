@@ -21,6 +21,10 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 /// Relative rounding of a line's length.
 const ROUNDING: f64 = 1e-9;
 
+/// Distance of rings from the poles, in units of their range.
+// heuristic: half of that between sixteen rings.
+const POLES: f64 = 1.0 / 32.0;
+
 /// Number of starts tried until one is reachable.
 // heuristic: all of sixteen rings.
 const TRIED: usize = 500;
@@ -38,13 +42,18 @@ impl Raster {
         (f64::from(self.line.reverse_bits()) / 2f64.powi(32) + 0.5) % 1.0
     }
 
+    /// Sine of a ring's elevation.
+    fn up(&self) -> f64 {
+        1.0 - 2.0 * (self.beside() + POLES)
+    }
+
     /// Length of the line.
     fn length_m(&self, belief: &Belief) -> f64 {
         match belief {
             Belief::HeightField(field) => field.zone().widest_m(),
             Belief::ImplicitSurface(surface) => {
-                let up = 1.0 - 2.0 * self.beside();
-                TAU * surface.scope().ball.radius_m * (1.0 - up * up).sqrt()
+                let out = (1.0 - self.up().powi(2)).sqrt();
+                TAU * surface.scope().ball.radius_m * out
             }
         }
     }
@@ -63,7 +72,7 @@ impl Raster {
 
     /// Returns the aim at the ball's centre at the fraction `part` of the line.
     fn aim(&self, ball: &Ball, part: f64) -> Aim {
-        let (up, (sine, cosine)) = (1.0 - 2.0 * self.beside(), (TAU * part).sin_cos());
+        let (up, (sine, cosine)) = (self.up(), (TAU * part).sin_cos());
         let out = (1.0 - up * up).sqrt();
         Aim::against(ball.centre_w, &Vector3::new(out * cosine, out * sine, up))
     }

@@ -24,6 +24,34 @@ pub struct StrokeOffer {
     pub travel_m_s: f64,
     /// Last target, from whose end the finger comes.
     pub from: Option<Target>,
+    /// Rate at which strokes have ended early, 1/m: at edges, walls and steep slopes.
+    pub ends_per_m: f64,
+}
+
+/// What is expected of a stroke that may end early.
+struct Expected {
+    /// Reduction of the variance, from the first place of the line and to it.
+    gains: [f64; 2],
+    /// Length, m.
+    length_m: f64,
+}
+
+impl StrokeOffer {
+    /// Returns what is expected of the strokes over the first place of a line, the first two and so
+    /// on, `step_m` apart, where `gains` are those of strokes that do not end early.
+    ///
+    /// Those to the first place gain it last, and the others in equal parts.
+    fn expected(&self, gains: &[f64], step_m: f64) -> impl Iterator<Item = Expected> {
+        let (mut before, mut from, mut steps) = (0.0, 0.0, 0.0);
+        gains.iter().enumerate().map(move |(i, gain)| {
+            let lasts = (-self.ends_per_m * i as f64 * step_m).exp();
+            from += lasts * (gain - before);
+            before = *gain;
+            steps += if i > 0 { lasts } else { 0.0 };
+            let to = lasts * gains[0] + steps / i.max(1) as f64 * (gain - gains[0]);
+            Expected { gains: [from, to], length_m: steps * step_m }
+        })
+    }
 }
 
 /// Number of places at which the variance is summed.
@@ -81,7 +109,7 @@ fn inside(zone: &Zone, place: [f64; 2]) -> Option<Vec<f64>> {
 /// Returns the stroke from `target`, or to it, that reduces the variance over the surface the most
 /// per time, or `target` if a tap does so more.
 ///
-/// The finger is assumed to keep contact all along.
+/// A stroke ends early at the rate of those before it; the gains are expectations.
 pub fn worthwhile(belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
     let found = match (belief, &target) {
         (Belief::HeightField(field), Target::Place(place)) => {
@@ -127,15 +155,16 @@ pub fn best(field: &HeightField, offer: &StrokeOffer, places: &[Vec<f64>]) -> Op
             };
             let line: Vec<Vec<f64>> = (0..=POINTS).map_while(along).collect();
             let points: Vec<&[f64]> = line.iter().map(Vec::as_slice).collect();
-            for (i, gain) in reduction.along(&points).into_iter().enumerate() {
-                let (end, length_m) = ([line[i][0], line[i][1]], i as f64 * step_m);
+            let gains = reduction.along(&points);
+            for (i, expected) in offer.expected(&gains, step_m).enumerate() {
+                let (end, length_m) = ([line[i][0], line[i][1]], expected.length_m);
                 if i == 0 {
-                    consider(gain / time_s(&at, 0.0), Target::Place(place.clone()));
+                    consider(gains[0] / time_s(&at, 0.0), Target::Place(place.clone()));
                 }
                 if i < SHORTEST {
                     continue;
                 }
-                for (start, to) in [(at, end), (end, at)] {
+                for ((start, to), gain) in [(at, end), (end, at)].into_iter().zip(expected.gains) {
                     let gain = gain / time_s(&start, length_m);
                     consider(gain, Target::Stroke { place: start, to });
                 }
@@ -154,9 +183,9 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
     let places = references.iter().map(|point| point.coords.as_slice());
     let reduction = VarianceReduction::new(believed.posterior(), places);
     let region = Region::from(scope.ball);
-    let time_s = |target: &Target| {
+    let time_s = |target: &Target, length_m: f64| {
         let way_m = offer.from.as_ref().map_or(0.0, |from| region.travel_m(from, target));
-        offer.tap_s + way_m / offer.travel_m_s + target.slide_m() / offer.speed_m_s
+        offer.tap_s + way_m / offer.travel_m_s + length_m / offer.speed_m_s
     };
     let mut field = believed.field();
     let start_w = first_point(&scope.ball, &mut field, aim)?;
@@ -167,10 +196,11 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
         let across_w = aim.across_w(std::f64::consts::TAU * heading as f64 / HEADINGS as f64);
         let line = line_along(&mut field, (start_w, across_w), aim, step_m);
         let points: Vec<&[f64]> = line.iter().map(|p_w| p_w.coords.as_slice()).collect();
-        for (i, gain) in reduction.along(&points).into_iter().enumerate() {
+        let gains = reduction.along(&points);
+        for (i, expected) in offer.expected(&gains, step_m).enumerate() {
             if i == 0 {
                 let tap = Target::Aim(*aim);
-                found.push((gain / time_s(&tap), tap));
+                found.push((gains[0] / time_s(&tap, 0.0), tap));
             }
             if i < SHORTEST {
                 continue;
@@ -178,9 +208,9 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
             let way_w = across_w * (i as f64 * step_m);
             let there = Aim { p_w: line[i], ..*aim };
             let strokes = [(*aim, way_w), (there, -way_w)];
-            for (aim, way_w) in strokes {
+            for ((aim, way_w), gain) in strokes.into_iter().zip(expected.gains) {
                 let stroke = Target::StrokeAround { aim, way_w };
-                found.push((gain / time_s(&stroke), stroke));
+                found.push((gain / time_s(&stroke, expected.length_m), stroke));
             }
         }
     }

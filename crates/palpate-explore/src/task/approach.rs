@@ -1,7 +1,7 @@
 //! The approach of one touch: start, direction and length; and the ball around a whole object that
 //! is touched from any side.
 
-use super::target::Aim;
+use super::target::{Aim, Target};
 use crate::robot::Finger;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 use palpate_input::config::{Rules, Validate};
@@ -197,33 +197,33 @@ impl Ball {
         [near_m, far_m]
     }
 
-    /// Returns the `approach` of `aim` with a slide by `way_w`, as far as that is across it: it
-    /// begins before the ball and ends where the hull is not too low all along the way. Returns
-    /// `None` if the hull would be too low at one end.
-    pub fn slide(
+    /// Returns the approach of `target`, which for a stroke begins before the ball all along its
+    /// way, and ends where the hull is not too low at either end. Returns `None` for a place of a
+    /// zone.
+    pub fn approach_to(
         &self,
-        aim: &Aim,
-        approach: Approach,
-        way_w: &Vector3<f64>,
+        target: &Target,
         finger: &Finger,
+        standoff_m: f64,
+        roll_rad: f64,
     ) -> Option<Approach> {
+        let aim = target.aim()?;
+        let approach = self.approach(aim, finger, standoff_m, roll_rad);
+        let Target::StrokeAround { way_w, .. } = target else { return Some(approach) };
         let ahead_w = aim.direction_w.into_inner();
         let way_w = way_w - ahead_w * way_w.dot(&ahead_w);
-        let at = |share: f64| Aim { p_w: aim.p_w + way_w * share, ..*aim };
         // The ball bulges: its surface is nearest on the line that passes closest to its centre.
         let closest = way_w.dot(&(self.centre_w - aim.p_w)) / way_w.norm_squared().max(1e-18);
-        let levels_m = [0.0, closest.clamp(0.0, 1.0), 1.0]
-            .map(|share| self.reach_m(&at(share), finger, &approach.r_wa));
-        let near_m = levels_m.iter().fold(f64::INFINITY, |least, [near_m, _]| least.min(*near_m));
-        let far_m = levels_m[0][1].min(levels_m[2][1]);
-        let slide = Approach {
-            p_near_w: aim.p_w + ahead_w * near_m,
-            p_far_w: aim.p_w + ahead_w * far_m,
+        let [start_m, middle_m, end_m] = [0.0, closest.clamp(0.0, 1.0), 1.0].map(|share| {
+            let at = Aim { p_w: aim.p_w + way_w * share, ..*aim };
+            self.reach_m(&at, finger, &approach.r_wa)
+        });
+        Some(Approach {
+            p_near_w: aim.p_w + ahead_w * start_m[0].min(middle_m[0]).min(end_m[0]),
+            p_far_w: aim.p_w + ahead_w * start_m[1].min(end_m[1]),
             slide_w: Some(way_w),
             ..approach
-        };
-        let is_free = |share| self.is_free(&at(share), &slide.slid(share), finger);
-        (is_free(0.0) && is_free(1.0)).then_some(slide)
+        })
     }
 
     /// Returns the ball that a fingertip stays out of between approaches, to keep the stand-off.
@@ -253,9 +253,15 @@ impl Ball {
         Some(p_wt.z - finger.drop_m(r_wa) - self.lowest_m?)
     }
 
-    /// Whether the hull stays above the lowest z on an `approach` of [`Self::approach`], and
+    /// Whether the hull stays above the lowest z on an `approach` of [`Self::approach_to`], and
     /// reaches the aim's point.
     pub fn is_free(&self, aim: &Aim, approach: &Approach, finger: &Finger) -> bool {
+        let end = Aim { p_w: aim.p_w + approach.slide_w.unwrap_or_default(), ..*aim };
+        let reaches = |aim, approach| self.reaches(aim, approach, finger);
+        reaches(aim, approach) && (approach.slide_w.is_none() || reaches(&end, &approach.slid(1.0)))
+    }
+
+    fn reaches(&self, aim: &Aim, approach: &Approach, finger: &Finger) -> bool {
         let ahead_w = approach.direction_w();
         let keep_out = approach.obstacle.as_ref();
         let start_w = keep_out.map_or(approach.p_near_w, |out| out.entrance_w(&aim.p_w, &ahead_w));
@@ -324,8 +330,9 @@ mod tests {
             let ball = Ball { centre_w, radius_m: 0.9, lowest_m: Some(0.1) };
             let aim = Aim::against(centre_w + Vector3::from(at), &-ahead_w);
             let finger = Finger::default();
-            let tap = ball.approach(&aim, &finger, 0.01, 0.0);
-            if let Some(slide) = ball.slide(&aim, tap, &way.into(), &finger) {
+            let target = Target::StrokeAround { aim, way_w: way.into() };
+            let slide = ball.approach_to(&target, &finger, 0.01, 0.0).unwrap();
+            if ball.is_free(&aim, &slide, &finger) {
                 let slid = slide.slid(share);
                 prop_assert!(slide.slide_w.unwrap().dot(&aim.direction_w).abs() < 1e-9);
                 prop_assert!((slid.p_near_w - centre_w).norm() > 0.9 - 1e-9);

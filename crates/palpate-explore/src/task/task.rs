@@ -175,7 +175,7 @@ impl Task {
         }
         let cell = cell(&-aim.direction_w.into_inner());
         let aim = Aim::against(ball.centre_w, &middle(cell));
-        let find = || self.over(ball, &aim, None).is_some();
+        let find = || self.over(ball, &aim.into()).is_some();
         self.cells.get(cell).is_some_and(|found| *found.get_or_init(find))
     }
 
@@ -194,10 +194,7 @@ impl Task {
     /// does not match the region's kind, or cannot be reached.
     pub fn approach(&self, target: &Target) -> Option<Approach> {
         match (&self.region, target) {
-            (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim, None),
-            (Region::Ball(ball), Target::StrokeAround { aim, way_w }) => {
-                self.over(ball, aim, Some(way_w))
-            }
+            (Region::Ball(ball), _) => self.over(ball, target),
             (Region::Zone(zone), _) => {
                 let place = target.place()?;
                 let finger = self.finger.with_pitch(target.pitch_deg())?;
@@ -211,22 +208,21 @@ impl Task {
                     .map(|end| x_wz.rotation * (zone.local(end, 0.0) - zone.local(place, 0.0)));
                 Some(Approach { p_near_w, p_far_w, r_wa, r_at, obstacle: None, slide_w })
             }
-            (Region::Ball(_), _) => None,
         }
     }
 
     /// Returns the approach with the smallest roll of the finger for which its hull stays above the
     /// lowest z and the robot reaches it. Returns `None` if there is none.
-    fn over(&self, ball: &Ball, aim: &Aim, way_w: Option<&Vector3<f64>>) -> Option<Approach> {
+    fn over(&self, ball: &Ball, target: &Target) -> Option<Approach> {
         let Self { finger, touch, reach, .. } = self;
-        let rolled = ROLLS_DEG.iter().map(|roll_deg| {
-            let approach = ball.approach(aim, finger, touch.standoff_m, roll_deg.to_radians());
-            match way_w {
-                Some(way_w) => ball.slide(aim, approach, way_w, finger),
-                None => ball.is_free(aim, &approach, finger).then_some(approach),
-            }
+        let aim = target.aim()?;
+        let mut rolled = ROLLS_DEG.iter().filter_map(|roll_deg| {
+            ball.approach_to(target, finger, touch.standoff_m, roll_deg.to_radians())
         });
-        rolled.flatten().find(|approach| reach.as_ref().is_none_or(|reach| reach(approach)))
+        rolled.find(|approach| {
+            ball.is_free(aim, approach, finger)
+                && reach.as_ref().is_none_or(|reach| reach(approach))
+        })
     }
 }
 

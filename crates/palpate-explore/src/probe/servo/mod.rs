@@ -460,26 +460,28 @@ impl Probe for Servo {
         let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
         let finger = self.robot.finger.clone();
         self.swept = Some(SweptVolume { finger, p_wt: reached_w.into() });
+        let mut trail = None;
         let touch = match end {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
             Some(ApproachEnd::Contact) => match self.read(approach, &above)? {
                 Some(mut contact) => {
-                    let further = self.slide(approach, &mut contact, &above)?;
-                    contact.patch.extend(further);
+                    trail = self.slide(approach, &mut contact, &above)?;
                     Touch::Contact(contact)
                 }
                 None => Touch::Overload,
             },
         };
-        let here_w = self.x_wt().translation.vector;
-        let above = match approach.slide_w {
-            Some(_) => standoff(&self.robot, self.settings.standoff_m, &approach.through(&here_w)),
-            None => above,
+        let has_left = match &trail {
+            Some(trail) => self.leave_stroke(approach, trail, &above)?,
+            None => false,
         };
-        let back_w = approach.project_to_level(&here_w, &above.translation.vector);
-        let back = Isometry3::from_parts(back_w.into(), above.rotation);
-        self.move_straight("the retract position", back, travel_m_s, false)?;
+        if !has_left {
+            let here_w = self.x_wt().translation.vector;
+            let back_w = approach.project_to_level(&here_w, &above.translation.vector);
+            let back = Isometry3::from_parts(back_w.into(), above.rotation);
+            self.move_straight("the retract position", back, travel_m_s, false)?;
+        }
         Ok(touch)
     }
 

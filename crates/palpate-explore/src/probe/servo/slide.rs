@@ -1,9 +1,10 @@
 //! Slide along the surface: speed along its tangent, load along the approach, until the way is
 //! done or the surface ends.
 
-use super::contact_monitor::ApproachEnd;
-use super::reach::turning_point;
-use super::{PRESS_SPEED, Servo};
+use super::contact_monitor::{ApproachEnd, ContactMonitor};
+use super::reach::{standoff, turning_point};
+use super::trajectory::Path;
+use super::{PRESS_SPEED, PathEnd, Servo};
 use crate::backend::Fault;
 use crate::control::Goal;
 use crate::probe::Contact;
@@ -40,6 +41,27 @@ const STUCK_M: f64 = 4e-3;
 // heuristic: noise of electrodes is averaged over two millimetres.
 const NEW_NORMAL: f64 = 0.4;
 
+/// Multiple of an approach's speed with which the finger leaves a stroke: the surface may overhang
+/// there.
+// heuristic: at twice the speed a stiff finger stops far below a usual limit of force.
+const LEAVES: f64 = 2.0;
+
+/// Way that the finger goes back along a stroke first, m, if something blocks it.
+// heuristic: a stiff finger yields by less.
+const RELEASED_M: f64 = 2e-3;
+
+/// Way out of the object in which the load may still be that of the stroke, m.
+// heuristic: a soft finger is dented by less.
+const LOOSENS_M: f64 = 2e-3;
+
+/// Path of a finger along the surface.
+pub(super) struct Trail {
+    /// Places of the tip in `W`, a sample apart.
+    places_w: Vec<Vector3<f64>>,
+    /// Load that shows a wall ahead.
+    wall: f64,
+}
+
 /// Load that is held, in the unit of the sensor, and its rise per metre of depth along the normal.
 struct Hold {
     load: f64,
@@ -52,16 +74,16 @@ fn yields_m(load: f64, per_m: f64) -> f64 {
 }
 
 impl Servo {
-    /// Slides along the way of `approach`, if it has one, after contact at `first`. Returns the
-    /// contacts along it, up to where the surface ended, was too steep or too far, or the finger was
+    /// Slides along the way of `approach`, if it has one, after contact at `first`. Returns the path,
+    /// and adds to `contacts` those along it, up to where the surface ended, was too steep or too far, or the finger was
     /// stuck or overloaded. In a scene with strokes, `first` is corrected by what the finger yields.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
         first: &mut Contact,
         tared: &Isometry3<f64>,
-    ) -> Result<Vec<Contact>, Fault> {
-        let Some(stroke) = self.settings.stroke.clone() else { return Ok(Vec::new()) };
+    ) -> Result<Option<Trail>, Fault> {
+        let Some(stroke) = self.settings.stroke.clone() else { return Ok(None) };
         let ahead_w = approach.direction_w();
         let way_w = approach.slide_w.unwrap_or_default();
         let across_w = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9);
@@ -73,23 +95,24 @@ impl Servo {
             first.p_wc += first.normal_w * yields_m(load, per_m);
         }
         if across_w.is_none() && (self.yields_n_m.is_some() || !is_on_hull) {
-            return Ok(Vec::new());
+            return Ok(None);
         }
         let Some(hold) = self.press_for_slide((&ahead_w, facing), stroke.force_n)? else {
-            return Ok(Vec::new());
+            return Ok(None);
         };
         if is_on_hull {
             self.yields_n_m = Some(hold.per_m);
             first.p_wc += first.normal_w * yields_m(load, hold.per_m);
         }
-        let Some(across_w) = across_w else { return Ok(Vec::new()) };
+        let Some(across_w) = across_w else { return Ok(None) };
         let start = self.x_wt();
         let mut goal = start;
         let deepest_w = turning_point(&self.robot, approach).translation.vector;
         // A sensor that tells a load may tell none without contact.
         let is_felt = self.monitor.load().is_some();
         let wall = WALL * hold.load.max(self.monitor.load().unwrap_or(0.0));
-        let (mut contacts, mut sampled_m, mut off_s) = (Vec::new(), 0.0, 0.0);
+        let mut trail = Trail { places_w: vec![start.translation.vector], wall };
+        let (mut sampled_m, mut off_s, mut left_m) = (0.0, 0.0, 0.0);
         let (mut sum_w, mut count) = (Vector3::zeros(), 0.0);
         self.monitor.clear_samples();
         loop {
@@ -123,6 +146,10 @@ impl Servo {
             }
             let is_off = load.is_some_and(|load| load < LOST * hold.load);
             off_s = if is_off { off_s + passed_s } else { 0.0 };
+            if done_m >= left_m + SAMPLE_M {
+                trail.places_w.push(here.translation.vector);
+                left_m = done_m;
+            }
             sum_w += here.translation.vector;
             count += 1.0;
             let is_read = self.monitor.last_sample_s().is_none()
@@ -146,12 +173,47 @@ impl Servo {
                     let turned_w = normal_w.lerp(&contact.normal_w, NEW_NORMAL);
                     normal_w = turned_w.try_normalize(1e-6).unwrap_or(normal_w);
                 }
-                contacts.push(Contact { patch: Vec::new(), ..contact });
+                first.patch.push(Contact { patch: Vec::new(), ..contact });
             }
             self.monitor.clear_samples();
             (sampled_m, sum_w, count) = (done_m, Vector3::zeros(), 0.0);
         }
-        Ok(contacts)
+        Ok(Some(trail))
+    }
+
+    /// Leaves the surface at the end of `trail` for the stand-off there, and returns true; or, if
+    /// the finger has slid under something that is in the way, goes back along the trail to where
+    /// the stroke began at `above`, and returns false.
+    pub(super) fn leave_stroke(
+        &mut self,
+        approach: &Approach,
+        trail: &Trail,
+        above: &Isometry3<f64>,
+    ) -> Result<bool, Fault> {
+        let (speed_m_s, wall) = (self.settings.approach_m_s, trail.wall);
+        let is_blocked = |monitor: &ContactMonitor| monitor.load().is_some_and(|load| load > wall);
+        let at = |p_w: &Vector3<f64>| Isometry3::from_parts((*p_w).into(), above.rotation);
+        let mut places_w = trail.places_w.iter().rev();
+        if is_blocked(&self.monitor) {
+            for p_w in places_w.by_ref().take((RELEASED_M / SAMPLE_M).ceil() as usize) {
+                self.move_straight("the stroke's way back", at(p_w), speed_m_s, false)?;
+            }
+        }
+        let from_w = self.x_wt().translation.vector;
+        let back = standoff(&self.robot, self.settings.standoff_m, &approach.through(&from_w));
+        let ahead_w = approach.direction_w();
+        let loose_w = from_w - ahead_w.scale(LOOSENS_M);
+        self.move_straight("the retract position", at(&loose_w), speed_m_s, false)?;
+        let path = Path::straight(loose_w, back, LEAVES * speed_m_s);
+        match self.move_along(path, is_blocked)? {
+            PathEnd::Arrived => return Ok(true),
+            PathEnd::Late => return Err(self.timeout_fault("the retract position", &back)),
+            PathEnd::Stopped => {}
+        }
+        for p_w in std::iter::once(&from_w).chain(places_w) {
+            self.move_straight("the stroke's way back", at(p_w), speed_m_s, false)?;
+        }
+        Ok(false)
     }
 
     /// Presses the finger until it has the force to slide with, or a little if the sensor measures
