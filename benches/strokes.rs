@@ -37,7 +37,7 @@ struct Slide {
 fn slide(environment: &Arc<Environment>, target: &Target) -> Option<Slide> {
     let simulator = Simulator::new(Arc::clone(environment)).ok()?;
     let readings = Arc::<Mutex<Vec<Reading>>>::default();
-    let body = Tap { inner: simulator.body()?.ok()?, readings: Arc::clone(&readings) };
+    let body = Tap { inner: simulator.body().ok()??, readings: Arc::clone(&readings) };
     let mut servo = simulator.servo(Box::new(body), 0).ok()?;
     let touch = servo.touch(&environment.task().approach(target)?).ok()?;
     let Touch::Contact(contact) = touch else { return None };

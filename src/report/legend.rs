@@ -102,6 +102,11 @@ pub fn seen_entry(run: &Run) -> Option<(Swatch, &'static str)> {
     run.rows.iter().any(|row| !row.views.is_empty()).then_some(SEEN)
 }
 
+/// Returns the legend entry of strokes.
+pub fn stroke_entry() -> (Swatch, &'static str) {
+    (Swatch::Line(style::slide(PLANNED)), "stroke")
+}
+
 /// Legend entry of what cameras have seen.
 pub const SEEN: (Swatch, &str) = (Swatch::Dot, "seen by the camera");
 

@@ -313,6 +313,19 @@ impl Relief {
         }
     }
 
+    /// Draws a stroke along points, where the surface does not hide them.
+    pub fn stroke(
+        &self,
+        canvas: &mut Canvas,
+        camera: &Camera,
+        points: impl IntoIterator<Item = Vector3<f64>>,
+    ) {
+        let points: Vec<Vector3<f64>> = points.into_iter().collect();
+        for visible in points.split(|p| self.hides(camera, p)).filter(|part| part.len() > 1) {
+            canvas.line(visible.iter().map(|p| camera.at(p)), &style::slide(style::PLANNED));
+        }
+    }
+
     /// Draws a touch at a point; hollow if the surface hides it.
     pub fn mark(
         &self,

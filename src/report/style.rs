@@ -124,6 +124,11 @@ pub fn visible_touch(colour: &str) -> String {
     format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
 }
 
+/// Returns the attributes of a stroke's line.
+pub fn slide(colour: &str) -> String {
+    stroke(colour, 1.2)
+}
+
 /// Radius of a point that a camera has seen.
 pub const SEEN_PX: f64 = 1.1;
 

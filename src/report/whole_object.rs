@@ -8,7 +8,7 @@ use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::TrialRow;
+use crate::experiment::trial::row::{TouchRow, TrialRow};
 use anyhow::Context;
 use nalgebra::Point3;
 use palpate_explore::task::Task;
@@ -137,9 +137,17 @@ pub fn frame(
         sd_m: surface.offsets_m(&mesh.0),
         error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
         score: shape.map(score).unwrap_or_default(),
+        slid_w: touches.iter().filter_map(slid_w).collect(),
         seen_w: belief.seen().iter().flat_map(|it| it.elements()).map(|it| it.p_w).collect(),
         mesh,
     }))
+}
+
+/// Returns the points along a touch's stroke, if it is one.
+fn slid_w(touch: &TouchRow) -> Option<Vec<Point3<f64>>> {
+    let first = touch.contact.filter(|_| touch.target.slide_m() > 0.0)?;
+    let further = touch.patch.iter().map(|p| Point3::new(p[0], p[1], p[2]));
+    Some(std::iter::once(Point3::from(first)).chain(further).collect())
 }
 
 /// Returns the belief after `count` touches of a trial; `None` without a fit then.

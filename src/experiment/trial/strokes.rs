@@ -5,15 +5,6 @@ use palpate_explore::planner::stroke::StrokeOffer;
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Target, Task};
 
-/// Strokes that are taken for ended early before the first one, and the length that they slid, m.
-// heuristic: an object a quarter of a metre wide has one edge.
-const ENDED: f64 = 0.5;
-const SLID_M: f64 = 0.25;
-
-/// Fraction of a stroke's length beyond which it was complete.
-// heuristic: samples are a few millimetres apart on slopes.
-const COMPLETE: f64 = 0.8;
-
 /// Strokes of a trial.
 pub(super) struct Strokes<'a> {
     task: &'a Task,
@@ -21,14 +12,12 @@ pub(super) struct Strokes<'a> {
     count: u32,
     travelled_m: f64,
     slid_m: f64,
-    /// Number of strokes that ended early.
-    ended: u32,
     last: Option<Target>,
 }
 
 impl<'a> Strokes<'a> {
     pub(super) fn new(task: &'a Task) -> Self {
-        Self { task, count: 0, travelled_m: 0.0, slid_m: 0.0, ended: 0, last: None }
+        Self { task, count: 0, travelled_m: 0.0, slid_m: 0.0, last: None }
     }
 
     /// Returns what the next stroke may be, if the scene allows strokes; `looked_s` is the time
@@ -44,7 +33,6 @@ impl<'a> Strokes<'a> {
             tap_s: mean_s.filter(|mean_s| *mean_s > 0.0 && self.count > 0).unwrap_or(TOUCH_S),
             travel_m_s: touch.travel_m_s,
             from: self.last.clone(),
-            ends_per_m: (f64::from(self.ended) + ENDED) / (self.slid_m + SLID_M),
         })
     }
 
@@ -56,9 +44,7 @@ impl<'a> Strokes<'a> {
         }
         if let (Touch::Contact(contact), true) = (touch, target.slide_m() > 0.0) {
             let points = contact.points().zip(&contact.patch);
-            let slid_m = points.map(|(from, to)| (to.p_wc - from.p_wc).norm()).sum::<f64>();
-            self.slid_m += slid_m;
-            self.ended += u32::from(slid_m < COMPLETE * target.slide_m());
+            self.slid_m += points.map(|(from, to)| (to.p_wc - from.p_wc).norm()).sum::<f64>();
         }
         self.last = Some(target.clone());
     }

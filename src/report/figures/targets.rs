@@ -6,12 +6,11 @@ use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::Area;
-use crate::report::legend::{FigureLayout, Swatch, miss_entry};
+use crate::report::legend::{FigureLayout, Swatch, miss_entry, stroke_entry};
 use crate::report::replay;
 use crate::report::style::{self, FAINT_INK, INITIAL, PLANNED, dot};
 use crate::report::table::digits;
 use nalgebra::Point3;
-use palpate_explore::task::Target;
 
 pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "targets", caption, draw };
 
@@ -40,9 +39,6 @@ const WIDTH_MIN_PX: f64 = 420.0;
 /// Margin around the zone as a fraction of its side, because contacts may lie outside.
 const MARGIN: f64 = 0.12;
 
-/// Width of the line of a stroke.
-const STROKE_PX: f64 = 1.2;
-
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
     let Some(z_m) = zone.z_m else { return Ok(None) };
@@ -62,9 +58,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         (Swatch::Circle(dot(INITIAL)), "contact of an initial touch"),
         (Swatch::Circle(dot(PLANNED)), "contact of a later touch"),
     ];
-    let slides = |touch: &TouchRow| matches!(touch.target, Target::Stroke { .. });
+    let slides = |touch: &TouchRow| touch.target.slide_m() > 0.0;
     if rows.iter().flat_map(|row| &row.touches).any(slides) {
-        entries.push((Swatch::Line(style::stroke(PLANNED, STROKE_PX)), "stroke"));
+        entries.push(stroke_entry());
     }
     entries.extend(miss_entry(run));
     let most = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
@@ -90,7 +86,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                             let further = touch.patch.iter().map(|p| Point3::new(p[0], p[1], p[2]));
                             let further = further.map(|p_w| at(&zone.place(&p_w)));
                             let line = std::iter::once(at(&place)).chain(further);
-                            canvas.line(line, &style::stroke(colour, STROKE_PX));
+                            canvas.line(line, &style::slide(colour));
                         }
                         canvas.line([target, at(&place)], &style::stroke(FAINT_INK, 0.9));
                         canvas.circle(target, 2.6, &ring(colour));

@@ -6,7 +6,7 @@ use super::section::{TRUTH_TRIANGLES, deviation_axis};
 use super::{PlannerSurfaces, SurfaceFrame};
 use crate::report::axes::{Axis, MM, colour_bar};
 use crate::report::canvas::{Area, Canvas, PointPx};
-use crate::report::legend::{FigureLayout, MISS, SEEN, touch_entries};
+use crate::report::legend::{FigureLayout, MISS, SEEN, stroke_entry, touch_entries};
 use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use palpate_geometry::decimate::decimate;
@@ -53,7 +53,8 @@ pub fn figure(
     let is_missed = touches().any(|touch| touch.contact_w.is_none());
     let is_seen = drawn.iter().any(|frame| !frame.seen_w.is_empty());
     let entries = touch_entries().into_iter().chain(is_missed.then_some(MISS));
-    let entries = entries.chain(is_seen.then_some(SEEN));
+    let slides = drawn.iter().any(|frame| !frame.slid_w.is_empty());
+    let entries = entries.chain(is_seen.then_some(SEEN)).chain(slides.then(stroke_entry));
     let rows = sequences.iter().flat_map(|it| [false, true].map(|is_behind| (it, is_behind)));
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows.clone().count() as f64 * PANEL.1 + FOOT_PX];
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
@@ -164,6 +165,9 @@ fn draw_frame(
     let relief = view.relief(canvas, &frame.mesh, colour);
     canvas.grouped(ON_RELIEF, |canvas| {
         relief.dots(canvas, &view.camera, frame.seen_w.iter().map(|p_w| p_w.coords));
+        for slid_w in &frame.slid_w {
+            relief.stroke(canvas, &view.camera, slid_w.iter().map(|p_w| p_w.coords));
+        }
         for (i, touch) in sequence.touches.iter().take(count).enumerate() {
             let colour = style::touch(touch.is_initial);
             let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;

@@ -58,6 +58,8 @@ pub struct SurfaceFrame {
     pub score: String,
     /// Points that cameras have seen, in `W`.
     pub seen_w: Vec<Point3<f64>>,
+    /// Points along each stroke, in `W`.
+    pub slid_w: Vec<Vec<Point3<f64>>>,
 }
 
 impl SurfaceFrame {

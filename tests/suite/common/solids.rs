@@ -79,6 +79,7 @@ fn frame(touches: &[SolidTouch], most: usize, cell_m: f64) -> SurfaceFrame {
         error_m: mesh.0.iter().map(ring_m).collect(),
         mesh,
         seen_w: Vec::new(),
+        slid_w: Vec::new(),
         score: format!("Chamfer {:.1} mm", 10.0 * (1.0 - share)),
     }
 }

@@ -24,34 +24,22 @@ pub struct StrokeOffer {
     pub travel_m_s: f64,
     /// Last target, from whose end the finger comes.
     pub from: Option<Target>,
-    /// Rate at which strokes have ended early, 1/m: at edges, walls and steep slopes.
-    pub ends_per_m: f64,
-}
-
-/// What is expected of a stroke that may end early.
-struct Expected {
-    /// Reduction of the variance, from the first place of the line and to it.
-    gains: [f64; 2],
-    /// Length, m.
-    length_m: f64,
 }
 
 impl StrokeOffer {
-    /// Returns what is expected of the strokes over the first place of a line, the first two and so
-    /// on, `step_m` apart, where `gains` are those of strokes that do not end early.
-    ///
-    /// Those to the first place gain it last, and the others in equal parts.
-    fn expected(&self, gains: &[f64], step_m: f64) -> impl Iterator<Item = Expected> {
-        let (mut before, mut from, mut steps) = (0.0, 0.0, 0.0);
-        gains.iter().enumerate().map(move |(i, gain)| {
-            let lasts = (-self.ends_per_m * i as f64 * step_m).exp();
-            from += lasts * (gain - before);
-            before = *gain;
-            steps += if i > 0 { lasts } else { 0.0 };
-            let to = lasts * gains[0] + steps / i.max(1) as f64 * (gain - gains[0]);
-            Expected { gains: [from, to], length_m: steps * step_m }
-        })
+    /// Returns a tap or stroke with its reduction per time of a variance that it reduces by `gain`.
+    fn rated(&self, region: &Region, target: Target, gain: f64) -> (f64, Target) {
+        let way_m = self.from.as_ref().map_or(0.0, |from| region.travel_m(from, &target));
+        let moves_s = way_m / self.travel_m_s + target.slide_m() / self.speed_m_s;
+        (gain / (self.tap_s + moves_s), target)
     }
+}
+
+/// Returns targets in the order of their rates, the best first.
+fn ranked(mut targets: Vec<(f64, Target)>) -> impl Iterator<Item = Target> {
+    targets.retain(|(rate, _)| rate.is_finite());
+    targets.sort_by(|a, b| b.0.total_cmp(&a.0));
+    targets.into_iter().map(|(_, target)| target)
 }
 
 /// Number of places at which the variance is summed.
@@ -109,7 +97,7 @@ fn inside(zone: &Zone, place: [f64; 2]) -> Option<Vec<f64>> {
 /// Returns the stroke from `target`, or to it, that reduces the variance over the surface the most
 /// per time, or `target` if a tap does so more.
 ///
-/// A stroke ends early at the rate of those before it; the gains are expectations.
+/// The finger is assumed to keep contact all along.
 pub fn worthwhile(belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
     let found = match (belief, &target) {
         (Belief::HeightField(field), Target::Place(place)) => {
@@ -130,21 +118,9 @@ pub fn best(field: &HeightField, offer: &StrokeOffer, places: &[Vec<f64>]) -> Op
     }
     let references = zone.grid(PLACES.sqrt() as usize);
     let reduction = VarianceReduction::new(posterior, references.iter().map(Vec::as_slice));
-    let travel_m = |to: &[f64]| {
-        let from = offer.from.as_ref().and_then(Target::end)?;
-        Some((from[0] - to[0]).hypot(from[1] - to[1]))
-    };
-    let time_s = |start: &[f64], length_m: f64| {
-        let way_m = travel_m(start).unwrap_or(0.0);
-        offer.tap_s + way_m / offer.travel_m_s + length_m / offer.speed_m_s
-    };
+    let region = Region::from(zone.clone());
     let step_m = offer.longest_m / POINTS as f64;
-    let mut best: Option<(f64, Target)> = None;
-    let mut consider = |gain: f64, target: Target| {
-        if gain.is_finite() && best.as_ref().is_none_or(|(most, _)| gain > *most) {
-            best = Some((gain, target));
-        }
-    };
+    let mut candidates = Vec::new();
     for place in places {
         let at = [place[0], place[1]];
         for heading in 0..HEADINGS {
@@ -156,22 +132,18 @@ pub fn best(field: &HeightField, offer: &StrokeOffer, places: &[Vec<f64>]) -> Op
             let line: Vec<Vec<f64>> = (0..=POINTS).map_while(along).collect();
             let points: Vec<&[f64]> = line.iter().map(Vec::as_slice).collect();
             let gains = reduction.along(&points);
-            for (i, expected) in offer.expected(&gains, step_m).enumerate() {
-                let (end, length_m) = ([line[i][0], line[i][1]], expected.length_m);
-                if i == 0 {
-                    consider(gains[0] / time_s(&at, 0.0), Target::Place(place.clone()));
-                }
-                if i < SHORTEST {
-                    continue;
-                }
-                for ((start, to), gain) in [(at, end), (end, at)].into_iter().zip(expected.gains) {
-                    let gain = gain / time_s(&start, length_m);
-                    consider(gain, Target::Stroke { place: start, to });
-                }
+            let mut consider = |target: Target, gain: f64| {
+                candidates.push(offer.rated(&region, target, gain));
+            };
+            consider(Target::Place(place.clone()), gains[0]);
+            for (end, gain) in line.iter().zip(&gains).skip(SHORTEST) {
+                let end = [end[0], end[1]];
+                consider(Target::Stroke { place: at, to: end }, *gain);
+                consider(Target::Stroke { place: end, to: at }, *gain);
             }
         }
     }
-    best.map(|(_, target)| target)
+    ranked(candidates).next()
 }
 
 /// Returns the tap or stroke from `aim`, or to it, that reduces the variance over the surface of a
@@ -183,44 +155,32 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
     let places = references.iter().map(|point| point.coords.as_slice());
     let reduction = VarianceReduction::new(believed.posterior(), places);
     let region = Region::from(scope.ball);
-    let time_s = |target: &Target, length_m: f64| {
-        let way_m = offer.from.as_ref().map_or(0.0, |from| region.travel_m(from, target));
-        offer.tap_s + way_m / offer.travel_m_s + length_m / offer.speed_m_s
-    };
     let mut field = believed.field();
     let start_w = first_point(&scope.ball, &mut field, aim)?;
     let length_m = offer.longest_m.min(WIDEST * surface.estimated_ball().radius_m);
     let step_m = length_m / POINTS as f64;
-    let mut found: Vec<(f64, Target)> = Vec::new();
+    let mut candidates = Vec::new();
     for heading in 0..HEADINGS {
         let across_w = aim.across_w(std::f64::consts::TAU * heading as f64 / HEADINGS as f64);
         let line = line_along(&mut field, (start_w, across_w), aim, step_m);
         let points: Vec<&[f64]> = line.iter().map(|p_w| p_w.coords.as_slice()).collect();
         let gains = reduction.along(&points);
-        for (i, expected) in offer.expected(&gains, step_m).enumerate() {
-            if i == 0 {
-                let tap = Target::Aim(*aim);
-                found.push((gains[0] / time_s(&tap, 0.0), tap));
-            }
-            if i < SHORTEST {
-                continue;
-            }
+        let mut consider = |target: Target, gain: f64| {
+            candidates.push(offer.rated(&region, target, gain));
+        };
+        consider(Target::Aim(*aim), gains[0]);
+        for (i, gain) in gains.iter().enumerate().skip(SHORTEST) {
             let way_w = across_w * (i as f64 * step_m);
             let there = Aim { p_w: line[i], ..*aim };
-            let strokes = [(*aim, way_w), (there, -way_w)];
-            for ((aim, way_w), gain) in strokes.into_iter().zip(expected.gains) {
-                let stroke = Target::StrokeAround { aim, way_w };
-                found.push((gain / time_s(&stroke, expected.length_m), stroke));
-            }
+            consider(Target::StrokeAround { aim: *aim, way_w }, *gain);
+            consider(Target::StrokeAround { aim: there, way_w: -way_w }, *gain);
         }
     }
-    found.retain(|(gain, _)| gain.is_finite());
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut is_free = |target: &Target| {
         let other = target.aim().filter(|it| it.p_w != aim.p_w);
         other.is_none_or(|aim| has_room(surface, &mut field, aim)) && scope.contains(target)
     };
-    found.into_iter().take(TRIED).find(|(_, target)| is_free(target)).map(|(_, target)| target)
+    ranked(candidates).take(TRIED).find(|target| is_free(target))
 }
 
 /// Returns the first point of the estimated surface on the way of `aim` into the ball.
