@@ -69,10 +69,14 @@ impl<'a> BeliefReplay<'a> {
             let target = target.with_context(|| {
                 format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
-            belief.observe(target, &touch.touch(-zone.ahead_w().into_inner()));
-            if let Some(swept) = swept(finger, touch) {
-                belief.observe_swept(&swept);
+            let (touched, swept) =
+                (touch.touch(-zone.ahead_w().into_inner()), swept(finger, touch));
+            if touch.target.slide_m() > 0.0 {
+                belief.observe_stroke(target, (&touched, swept.as_ref()));
+                continue;
             }
+            belief.observe(target, &touched);
+            swept.iter().for_each(|swept| belief.observe_swept(swept));
         }
         belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };

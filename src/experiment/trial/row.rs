@@ -185,7 +185,7 @@ impl TouchRow {
     /// opposite to the approach.
     pub fn touch(&self, against_w: Vector3<f64>) -> Touch {
         let further = |[x, y, z, a, b, c, sd_m]: &[f64; 7]| Contact {
-            sd_m: Some(*sd_m),
+            sd_m: Some(*sd_m).filter(|sd_m| *sd_m > 0.0),
             ..Contact::new(Point3::new(*x, *y, *z), Vector3::new(*a, *b, *c))
         };
         match self.contact {

@@ -182,7 +182,7 @@ impl Servo {
     fn move_along(
         &mut self,
         mut path: Path,
-        stops: impl Fn(&ContactMonitor) -> bool,
+        mut stops: impl FnMut(&ContactMonitor) -> bool,
     ) -> Result<PathEnd, Fault> {
         let to = path.to;
         let mut deadline = Deadline::default();

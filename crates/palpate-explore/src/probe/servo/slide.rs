@@ -1,7 +1,7 @@
 //! Slide along the surface: speed along its tangent, load along the approach, until the way is
 //! done or the surface ends.
 
-use super::contact_monitor::{ApproachEnd, ContactMonitor};
+use super::contact_monitor::ApproachEnd;
 use super::reach::{standoff, turning_point};
 use super::trajectory::Path;
 use super::{PRESS_SPEED, PathEnd, Servo};
@@ -10,6 +10,7 @@ use crate::control::Goal;
 use crate::probe::Contact;
 use crate::task::Approach;
 use crate::task::stroke::{SAMPLE_M, STEEPEST};
+use crate::task::touch::TouchSettings;
 use nalgebra::{Isometry3, UnitVector3, Vector3, Vector6};
 
 /// Rate at which the load approaches its set point, 1/s.
@@ -41,10 +42,9 @@ const STUCK_M: f64 = 4e-3;
 // heuristic: noise of electrodes is averaged over two millimetres.
 const NEW_NORMAL: f64 = 0.4;
 
-/// Multiple of an approach's speed with which the finger leaves a stroke: the surface may overhang
-/// there.
-// heuristic: at twice the speed a stiff finger stops far below a usual limit of force.
-const LEAVES: f64 = 2.0;
+/// Largest tangent of the angle between a shaft and its approach at which it fills the way back.
+// heuristic: a degree.
+const STRAIGHT: f64 = 0.02;
 
 /// Way that the finger goes back along a stroke first, m, if something blocks it.
 // heuristic: a stiff finger yields by less.
@@ -183,35 +183,47 @@ impl Servo {
 
     /// Leaves the surface at the end of `trail` for the stand-off there, and returns true; or, if
     /// the finger has slid under something that is in the way, goes back along the trail to where
-    /// the stroke began at `above`, and returns false.
+    /// the stroke began at `above`, and returns false. It leaves as slowly as it approaches, but
+    /// where its own shaft is.
     pub(super) fn leave_stroke(
         &mut self,
         approach: &Approach,
         trail: &Trail,
         above: &Isometry3<f64>,
     ) -> Result<bool, Fault> {
-        let (speed_m_s, wall) = (self.settings.approach_m_s, trail.wall);
-        let is_blocked = |monitor: &ContactMonitor| monitor.load().is_some_and(|load| load > wall);
+        let TouchSettings { approach_m_s, travel_m_s, .. } = self.settings;
         let at = |p_w: &Vector3<f64>| Isometry3::from_parts((*p_w).into(), above.rotation);
         let mut places_w = trail.places_w.iter().rev();
-        if is_blocked(&self.monitor) {
+        if self.monitor.load().is_some_and(|load| load > trail.wall) {
             for p_w in places_w.by_ref().take((RELEASED_M / SAMPLE_M).ceil() as usize) {
-                self.move_straight("the stroke's way back", at(p_w), speed_m_s, false)?;
+                self.move_straight("the stroke's way back", at(p_w), approach_m_s, false)?;
             }
         }
         let from_w = self.x_wt().translation.vector;
-        let back = standoff(&self.robot, self.settings.standoff_m, &approach.through(&from_w));
-        let ahead_w = approach.direction_w();
-        let loose_w = from_w - ahead_w.scale(LOOSENS_M);
-        self.move_straight("the retract position", at(&loose_w), speed_m_s, false)?;
-        let path = Path::straight(loose_w, back, LEAVES * speed_m_s);
-        match self.move_along(path, is_blocked)? {
+        let out = standoff(&self.robot, self.settings.standoff_m, &approach.through(&from_w));
+        // What the finger's own shaft fills is free.
+        let back_w = -approach.direction_w().into_inner();
+        let shaft_a = self.robot.finger.axis_a();
+        let is_straight = shaft_a.z.abs() < STRAIGHT * shaft_a.y;
+        let filled_m = if is_straight { shaft_a.y } else { 0.0 };
+        let free_m = filled_m.max(LOOSENS_M).min((out.translation.vector - from_w).norm());
+        let free = at(&(from_w + back_w * free_m));
+        let speed_m_s = if is_straight { travel_m_s } else { approach_m_s };
+        self.move_straight("the retract position", free, speed_m_s, false)?;
+        let mut was_free = false;
+        let path = Path::straight(free.translation.vector, out, approach_m_s);
+        let end = self.move_along(path, |monitor| {
+            let touches = monitor.approach_end().is_some();
+            was_free |= !touches;
+            touches && was_free || monitor.load().is_some_and(|load| load > trail.wall)
+        })?;
+        match end {
             PathEnd::Arrived => return Ok(true),
-            PathEnd::Late => return Err(self.timeout_fault("the retract position", &back)),
+            PathEnd::Late => return Err(self.timeout_fault("the retract position", &out)),
             PathEnd::Stopped => {}
         }
         for p_w in std::iter::once(&from_w).chain(places_w) {
-            self.move_straight("the stroke's way back", at(p_w), speed_m_s, false)?;
+            self.move_straight("the stroke's way back", at(p_w), approach_m_s, false)?;
         }
         Ok(false)
     }
