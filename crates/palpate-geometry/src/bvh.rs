@@ -284,6 +284,12 @@ impl MeshBvh {
         hit
     }
 
+    /// Returns the points of axis and mesh that are nearest to each other, if they are no farther
+    /// apart than the radius.
+    pub fn nearest_to_axis(&self, capsule: &Capsule) -> Option<(Point3<f64>, Point3<f64>)> {
+        self.overlap(capsule).map(|triangle| capsule.nearest(&self.corners(triangle)))
+    }
+
     /// Returns the triangle nearest to the axis, if it is no farther than the radius.
     fn overlap(&self, capsule: &Capsule) -> Option<u32> {
         let ends = (capsule.p0_w - self.centre, capsule.p1_w - self.centre);
