@@ -95,12 +95,6 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// Clearance from the estimated surface along an approach, and the lengths of the first and of
-/// later steps along it, in fingertip radii; heuristics.
-const ROOM: f64 = 0.7;
-const FIRST: f64 = 1.5;
-const STEP: f64 = 0.7;
-
 /// Sideways tilt of an approach from the normal, as a tangent (35°); a heuristic.
 const TILT: f64 = 0.7;
 
@@ -139,7 +133,7 @@ pub fn free_aim(
         .find(|aim| {
             ball.contains(aim)
                 && is_new(belief, aim)
-                && has_room(belief, surface, aim)
+                && belief.has_room(surface, aim)
                 && belief.scope().reaches(aim)
         })
 }
@@ -149,20 +143,6 @@ fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     belief.aims().iter().all(|asked| {
         (asked.p_w - aim.p_w).norm() > near_m || asked.direction_w.dot(&aim.direction_w) < ALONG
     })
-}
-
-/// Whether the approach of `aim` outside the object is clear of the estimated surface.
-pub(super) fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> bool {
-    let (ball, radius_m) = (&belief.scope().ball, belief.scope().radius_m);
-    let back = |radii: f64| aim.p_w - aim.direction_w.scale(radii * radius_m);
-    let mut radii = FIRST;
-    while (back(radii) - ball.centre_w).norm() < ball.radius_m {
-        if surface.value(&back(radii)) < ROOM * radius_m {
-            return false;
-        }
-        radii += STEP;
-    }
-    true
 }
 
 /// Fraction of the whole ball below which the ball around the contacts counts as unexplored, and
@@ -198,5 +178,5 @@ pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option
     holes.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut from = |p_w| Aim::against(p_w, &(in_ball(whole, rng) - whole.centre_w));
     let aims = holes.iter().take(EMPTIEST).flat_map(|(_, p_w)| [*p_w; SIDES]);
-    aims.map(&mut from).find(|aim| has_room(belief, &mut surface, aim) && scope.reaches(aim))
+    aims.map(&mut from).find(|aim| belief.has_room(&mut surface, aim) && scope.reaches(aim))
 }

@@ -1,14 +1,12 @@
-//! Whether a stroke pays: the reduction of the variance over the surface by its points together, per
-//! time, against that of a tap.
+//! Whether a stroke pays: the reduction of the variance over the surface by its points together,
+//! per time, against that of a tap.
 
-use super::candidates::has_room;
 use crate::belief::{Belief, HeightField};
 use crate::task::stroke::STEEPEST;
 use crate::task::{Aim, Ball, Region, Target, Zone};
 use crate::whole_object::ImplicitSurface;
 use crate::whole_object::surface::SurfaceField;
 use nalgebra::{Point3, Vector3};
-use palpate_geometry::implicit::Field;
 use palpate_gp::reduction::VarianceReduction;
 
 /// Strokes that a scene allows, and what they cost.
@@ -178,7 +176,7 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
     }
     let mut is_free = |target: &Target| {
         let other = target.aim().filter(|it| it.p_w != aim.p_w);
-        other.is_none_or(|aim| has_room(surface, &mut field, aim)) && scope.contains(target)
+        other.is_none_or(|aim| surface.has_room(&mut field, aim)) && scope.contains(target)
     };
     ranked(candidates).take(TRIED).find(|target| is_free(target))
 }
@@ -211,14 +209,14 @@ fn line_along(
     for _ in 0..POINTS {
         p_w += (across_w + ahead_w * slope) * step_m;
         for _ in 0..NEWTON {
-            let Field { value, gradient } = field.at(&p_w);
-            let facing = -gradient.dot(&ahead_w);
-            slope = gradient.dot(&across_w) / facing;
+            let found = field.at(&p_w);
+            let facing = -found.gradient.dot(&ahead_w);
+            slope = found.gradient.dot(&across_w) / facing;
             // Also false if it faces away, or nothing is finite.
             if !(facing > 0.0 && slope.abs() <= STEEPEST) {
                 return line;
             }
-            p_w += ahead_w * (value / facing).clamp(-step_m, step_m);
+            p_w += ahead_w * (found.value / facing).clamp(-step_m, step_m);
         }
         line.push(p_w);
     }

@@ -4,7 +4,7 @@
 use super::evidence::{CameraPose, PriorMean, TouchEvidence};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
-use super::surface::Surface;
+use super::surface::{Surface, SurfaceField};
 use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
 use crate::view::{Offer, RigidError, SeenSurface, View};
@@ -60,6 +60,12 @@ const TRIED_MAX: f64 = 60.0;
 const STEP_FIRST: f64 = 0.7;
 const STEP_NEXT: f64 = 0.35;
 const STEP_LAST: f64 = 0.1;
+
+/// Clearance from the estimated surface along an approach, and the lengths of the first and of
+/// later steps along it, in fingertip radii; heuristics.
+const ROOM: f64 = 0.7;
+const FIRST: f64 = 1.5;
+const STEP: f64 = 0.7;
 
 /// Smallest distance between two points of a stroke, as a fraction of the ball's radius.
 // heuristic: a few points for each length over which a surface changes.
@@ -310,6 +316,20 @@ impl ImplicitSurface {
             scanned_at: observations.len(),
             stop: found.stop,
         })
+    }
+
+    /// Whether the approach of `aim` outside the object is clear of the estimated surface.
+    pub fn has_room(&self, field: &mut SurfaceField, aim: &Aim) -> bool {
+        let (ball, radius_m) = (&self.scope.ball, self.scope.radius_m);
+        let back = |radii: f64| aim.p_w - aim.direction_w.scale(radii * radius_m);
+        let mut radii = FIRST;
+        while (back(radii) - ball.centre_w).norm() < ball.radius_m {
+            if field.value(&back(radii)) < ROOM * radius_m {
+                return false;
+            }
+            radii += STEP;
+        }
+        true
     }
 
     /// The region and the finger.
