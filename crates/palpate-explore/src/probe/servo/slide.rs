@@ -74,9 +74,10 @@ fn yields_m(load: f64, per_m: f64) -> f64 {
 }
 
 impl Servo {
-    /// Slides along the way of `approach`, if it has one, after contact at `first`. Returns the path,
-    /// and adds to `contacts` those along it, up to where the surface ended, was too steep or too far, or the finger was
-    /// stuck or overloaded. In a scene with strokes, `first` is corrected by what the finger yields.
+    /// Slides along the way of `approach`, if it has one, after contact at `first`, and adds to its
+    /// patch the contacts along the way, up to where the surface ended, was too steep or too far, or
+    /// the finger was stuck or overloaded. In a scene with strokes, `first` is corrected by what the
+    /// finger yields. Returns the path.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
