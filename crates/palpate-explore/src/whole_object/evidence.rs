@@ -142,8 +142,8 @@ impl TouchEvidence {
     }
 
     /// Returns the observations of the field relative to `prior`. At each contact the field is 0,
-    /// with the normal as its gradient if `normals` is set; what the sensor states as the error of a
-    /// stroke's contacts is one that they have in common. At the centre of each swept ball inside
+    /// with the normal as its gradient if `normals` is set; what the sensor states as the error of
+    /// a stroke's contacts is one that they have in common. At the centre of each swept ball inside
     /// `ball` it is the distance to the nearest contact. That is the upper bound of a distance
     /// there, and the swept radius the lower bound: the standard deviation is that of a uniform
     /// distribution between them. `noise_m` is the unit of the noise.

@@ -34,6 +34,11 @@ const LASTS_S: f64 = 0.1;
 // heuristic: a stiff finger still brakes well below a usual limit of force.
 const WALL: f64 = 3.0;
 
+/// Fraction of the load of a wall above which a contact is that of two surfaces, which is not
+/// measured, and which is a wall if it lasts.
+// heuristic: twice the set load at the start.
+const HARD: f64 = 0.67;
+
 /// Distance of the tip behind its set point at which it counts as stuck, m.
 // heuristic: what a servo lags at the largest speed of a stroke.
 const STUCK_M: f64 = 4e-3;
@@ -75,9 +80,9 @@ fn yields_m(load: f64, per_m: f64) -> f64 {
 
 impl Servo {
     /// Slides along the way of `approach`, if it has one, after contact at `first`, and adds to its
-    /// patch the contacts along the way, up to where the surface ended, was too steep or too far, or
-    /// the finger was stuck or overloaded. In a scene with strokes, `first` is corrected by what the
-    /// finger yields. Returns the path.
+    /// patch the contacts along the way, up to where the surface ended, was too steep or too far,
+    /// or the finger was stuck or overloaded. In a scene with strokes, `first` is corrected by what
+    /// the finger yields. Returns the path.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
@@ -113,7 +118,7 @@ impl Servo {
         let is_felt = self.monitor.load().is_some();
         let wall = WALL * hold.load.max(self.monitor.load().unwrap_or(0.0));
         let mut trail = Trail { places_w: vec![start.translation.vector], wall };
-        let (mut sampled_m, mut off_s, mut left_m) = (0.0, 0.0, 0.0);
+        let (mut sampled_m, mut left_m, mut off_s, mut hard_s) = (0.0, 0.0, 0.0, 0.0);
         let (mut sum_w, mut count) = (Vector3::zeros(), 0.0);
         self.monitor.clear_samples();
         loop {
@@ -121,12 +126,15 @@ impl Servo {
             let done_m = (goal.translation.vector - start.translation.vector).dot(&across_w);
             let is_beyond = (goal.translation.vector - deepest_w).dot(&ahead_w) > 0.0;
             let is_over = done_m >= way_w.norm() || steep.abs() > STEEPEST || is_beyond;
-            if is_over || off_s > LASTS_S {
+            if is_over || off_s > LASTS_S || hard_s > LASTS_S {
                 break;
             }
-            let across_m_s = stroke.speed_m_s / (1.0 + steep * steep).sqrt();
             let most_m_s = STEEPEST * stroke.speed_m_s;
             let load = is_felt.then(|| self.monitor.load().unwrap_or(0.0));
+            // A surface that rises ahead presses the finger: it goes on as the load falls again.
+            let eased = load.map_or(1.0, |load| (wall - load) / (wall - hold.load).max(1e-9));
+            let across_m_s =
+                eased.clamp(0.0, 1.0) * stroke.speed_m_s / (1.0 + steep * steep).sqrt();
             let push_m_s = load.map_or(0.0, |load| {
                 (RATE_PER_S * (hold.load - load) / hold.per_m).clamp(-most_m_s, most_m_s)
             });
@@ -147,6 +155,8 @@ impl Servo {
             }
             let is_off = load.is_some_and(|load| load < LOST * hold.load);
             off_s = if is_off { off_s + passed_s } else { 0.0 };
+            let is_hard = load.is_some_and(|load| load > HARD * wall);
+            hard_s = if is_hard { hard_s + passed_s } else { 0.0 };
             if done_m >= left_m + SAMPLE_M {
                 trail.places_w.push(here.translation.vector);
                 left_m = done_m;
@@ -155,8 +165,9 @@ impl Servo {
             count += 1.0;
             let is_read = self.monitor.last_sample_s().is_none()
                 || self.monitor.collected() >= self.settings.frames;
-            if !is_read || is_off || done_m < sampled_m + SAMPLE_M {
-                if is_off {
+            let is_unclear = is_off || is_hard;
+            if !is_read || is_unclear || done_m < sampled_m + SAMPLE_M {
+                if is_unclear {
                     self.monitor.clear_samples();
                     (sum_w, count) = (Vector3::zeros(), 0.0);
                 }
