@@ -9,14 +9,13 @@ use palpate::backend::Reading;
 use palpate::explore::probe::{Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
-use palpate::robot::sensor::Sample;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::Target;
 use rand::RngExt;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use tap::Tap;
+use tap::{Tap, forces_n};
 
 /// Strokes for each object and speed, and their length.
 const STROKES: usize = 12;
@@ -26,14 +25,15 @@ const LENGTH_M: f64 = 0.05;
 const FORCE_N: f64 = 0.5;
 const LOST: f64 = 0.3;
 
-/// What was measured along one stroke.
+/// Measurements of a stroke.
 struct Slide {
+    /// Distances of its contacts from the object.
     errors_m: Vec<f64>,
     /// Forces from the first sample of the slide to its last, N.
     forces_n: Vec<f64>,
 }
 
-/// Slides along the object from `from` to `to`.
+/// Makes a stroke; returns `None` without contact.
 fn slide(environment: &Arc<Environment>, target: &Target) -> Option<Slide> {
     let simulator = Simulator::new(Arc::clone(environment)).ok()?;
     let readings = Arc::<Mutex<Vec<Reading>>>::default();
@@ -44,15 +44,7 @@ fn slide(environment: &Arc<Environment>, target: &Target) -> Option<Slide> {
     let bvh = MeshBvh::new(environment.mesh()?.clone());
     let off_m = |p_w: &Point3<f64>| (bvh.closest_point(p_w).point - p_w).norm();
     let errors_m = contact.patch.iter().map(|point| off_m(&point.p_wc)).collect();
-    let readings = readings.lock().ok()?;
-    let forces = readings.iter().map(|reading| {
-        let felt = reading.samples.iter().find_map(|sample| match sample {
-            Sample::Ideal(contact) => Some(contact.force_n),
-            _ => None,
-        });
-        felt.unwrap_or(0.0)
-    });
-    let forces_n: Vec<f64> = forces.collect();
+    let forces_n = forces_n(&readings.lock().ok()?);
     let first = forces_n.iter().position(|force_n| *force_n >= FORCE_N)?;
     let last = forces_n.iter().rposition(|force_n| *force_n >= LOST * FORCE_N)?;
     Some(Slide { errors_m, forces_n: forces_n[first..=last].to_vec() })
@@ -78,7 +70,7 @@ fn main() {
             let environment = Arc::new(Environment::build(scene).expect("its object"));
             let zone = environment.task().zone().expect("a zone").clone();
             let mut random = stream(2016, 0, object);
-            let (mut errors_m, mut shares, mut peaks) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut errors_m, mut means_n, mut peaks_n) = (Vec::new(), Vec::new(), Vec::new());
             let (mut count, mut lost, mut done) = (0, 0, 0);
             while done < STROKES {
                 let place = zone.at(&[random.random(), random.random()]);
@@ -92,8 +84,8 @@ fn main() {
                 let Some(found) = slide(&environment, &target) else { continue };
                 lost += found.forces_n.iter().filter(|force| **force < LOST * FORCE_N).count();
                 count += found.forces_n.len();
-                shares.push(found.forces_n.iter().sum::<f64>() / found.forces_n.len() as f64);
-                peaks.push(found.forces_n.iter().copied().fold(0.0, f64::max));
+                means_n.push(found.forces_n.iter().sum::<f64>() / found.forces_n.len() as f64);
+                peaks_n.push(found.forces_n.iter().copied().fold(0.0, f64::max));
                 errors_m.extend(found.errors_m);
             }
             let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
@@ -101,11 +93,11 @@ fn main() {
             println!(
                 "| {object} | {:.0} | {} | {:.0} % | {:.3} | {:.2} | {:.2} | {:.1} % |",
                 1e3 * speed_m_s,
-                peaks.len(),
-                100.0 * errors_m.len() as f64 / (peaks.len() as f64 * LENGTH_M * 1e3),
+                peaks_n.len(),
+                100.0 * errors_m.len() as f64 / (peaks_n.len() as f64 * LENGTH_M * 1e3),
                 1e3 * mean(&squares).sqrt(),
-                mean(&shares) / FORCE_N,
-                peaks.iter().copied().fold(0.0, f64::max) / FORCE_N,
+                mean(&means_n) / FORCE_N,
+                peaks_n.iter().copied().fold(0.0, f64::max) / FORCE_N,
                 100.0 * lost as f64 / count as f64,
             );
         }

@@ -65,18 +65,13 @@ impl<'a> BeliefReplay<'a> {
             belief.observe_seen(view.seen.clone());
         }
         for touch in touches {
-            let target = touch.target.place().filter(|it| it.len() == zone.dimension());
-            let target = target.with_context(|| {
+            let is_place = |it: &&[f64]| it.len() == zone.dimension();
+            touch.target.place().filter(is_place).with_context(|| {
                 format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
             let (touched, swept) =
                 (touch.touch(-zone.ahead_w().into_inner()), swept(finger, touch));
-            if touch.target.slide_m() > 0.0 {
-                belief.observe_stroke(target, (&touched, swept.as_ref()));
-                continue;
-            }
-            belief.observe(target, &touched);
-            swept.iter().for_each(|swept| belief.observe_swept(swept));
+            belief.observe_target(&touch.target, (&touched, swept.as_ref()));
         }
         belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };

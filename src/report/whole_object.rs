@@ -137,17 +137,10 @@ pub fn frame(
         sd_m: surface.offsets_m(&mesh.0),
         error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
         score: shape.map(score).unwrap_or_default(),
-        slid_w: touches.iter().filter_map(slid_w).collect(),
+        slid_w: touches.iter().filter_map(TouchRow::slid_w).collect(),
         seen_w: belief.seen().iter().flat_map(|it| it.elements()).map(|it| it.p_w).collect(),
         mesh,
     }))
-}
-
-/// Returns the points along a touch's stroke, if it is one.
-fn slid_w(touch: &TouchRow) -> Option<Vec<Point3<f64>>> {
-    let first = touch.contact.filter(|_| touch.target.slide_m() > 0.0)?;
-    let further = touch.patch.iter().map(|p| Point3::new(p[0], p[1], p[2]));
-    Some(std::iter::once(Point3::from(first)).chain(further).collect())
 }
 
 /// Returns the belief after `count` touches of a trial; `None` without a fit then.
@@ -175,13 +168,12 @@ pub fn belief(
     for touch in touches {
         // The roll of the finger does not change its path.
         let standoff_m = scene.touch.standoff_m;
-        let approach = ball
-            .approach_to(&touch.target, &scene.finger, standoff_m, 0.0)
+        let approach = ball.approach_to(&touch.target, &scene.finger, standoff_m, 0.0);
+        let (aim, approach) = (touch.target.aim().zip(approach))
             .context("the target has no direction, which a whole object needs")?;
         let swept = swept(&scene.finger, touch);
         let touched = touch.touch(-approach.direction_w().into_inner());
-        let aim = touch.target.aim();
-        aim.into_iter().for_each(|aim| belief.observe(aim, &approach, (&touched, swept.as_ref())));
+        belief.observe(aim, &approach, (&touched, swept.as_ref()));
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))

@@ -2,7 +2,7 @@
 
 use crate::common::program::folder;
 use crate::common::shipped::{contact, environment};
-use crate::common::tap::Tap;
+use crate::common::tap::{Tap, forces_n};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Reading;
 use palpate::experiment::{Experiment, Simulation};
@@ -11,7 +11,6 @@ use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner::stroke::{StrokeOffer, best};
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use palpate::explore::probe::{Contact, Probe, SweptVolume, Touch};
-use palpate::robot::sensor::Sample;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Target, Zone};
@@ -93,14 +92,7 @@ fn slide(environment: &Arc<Environment>, x: f64, to: f64) -> (Vec<Contact>, Vec<
     let target = Target::Stroke { place: [x, MIDDLE_M], to: [to, MIDDLE_M] };
     let approach = environment.task().approach(&target).unwrap();
     let touched = contact(servo.touch(&approach).unwrap());
-    let force_n = |reading: &Reading| {
-        let felt = reading.samples.iter().find_map(|sample| match sample {
-            Sample::Ideal(contact) => Some(contact.force_n),
-            _ => None,
-        });
-        felt.unwrap_or(0.0)
-    };
-    let forces_n = readings.lock().unwrap().iter().map(force_n).collect();
+    let forces_n = forces_n(&readings.lock().unwrap());
     (touched.points().cloned().collect(), forces_n)
 }
 

@@ -209,6 +209,13 @@ impl TouchRow {
         contact.patch.iter().map(numbers).collect()
     }
 
+    /// Returns the points along a stroke with contact, in `W`, m.
+    pub fn slid_w(&self) -> Option<Vec<Point3<f64>>> {
+        let first = self.contact.filter(|_| self.target.slide_m() > 0.0)?;
+        let further = self.patch.iter().map(|p| Point3::new(p[0], p[1], p[2]));
+        Some(std::iter::once(Point3::from(first)).chain(further).collect())
+    }
+
     /// Positions of the finger for [travel](TrialRow::path_m): one, or both ends of a stroke.
     fn places(&self) -> impl Iterator<Item = &[f64]> + Clone {
         let end = match &self.target {

@@ -10,7 +10,6 @@ use crate::report::legend::{FigureLayout, Swatch, miss_entry, stroke_entry};
 use crate::report::replay;
 use crate::report::style::{self, FAINT_INK, INITIAL, PLANNED, dot};
 use crate::report::table::digits;
-use nalgebra::Point3;
 
 pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "targets", caption, draw };
 
@@ -82,10 +81,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                 let target = at(&touch.target.numbers());
                 match replay::contact(zone, touch) {
                     Some((place, _)) => {
-                        if slides(touch) {
-                            let further = touch.patch.iter().map(|p| Point3::new(p[0], p[1], p[2]));
-                            let further = further.map(|p_w| at(&zone.place(&p_w)));
-                            let line = std::iter::once(at(&place)).chain(further);
+                        if let Some(slid_w) = touch.slid_w() {
+                            let line = slid_w.iter().map(|p_w| at(&zone.place(p_w)));
                             canvas.line(line, &style::slide(colour));
                         }
                         canvas.line([target, at(&place)], &style::stroke(FAINT_INK, 0.9));

@@ -1,6 +1,7 @@
 //! Readings of a body during touches.
 
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::robot::sensor::Sample;
 use std::sync::{Arc, Mutex};
 
 /// Wrapper that keeps every reading of a body.
@@ -25,4 +26,15 @@ impl Backend for Tap {
         self.readings.lock().unwrap().push(reading.clone());
         Ok(reading)
     }
+}
+
+/// Returns the force of each reading of a simulated finger without a sensor, N; 0 without contact.
+pub fn forces_n(readings: &[Reading]) -> Vec<f64> {
+    let force_n = |reading: &Reading| {
+        reading.samples.iter().find_map(|sample| match sample {
+            Sample::Ideal(contact) => Some(contact.force_n),
+            _ => None,
+        })
+    };
+    readings.iter().map(|reading| force_n(reading).unwrap_or(0.0)).collect()
 }

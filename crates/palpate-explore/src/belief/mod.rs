@@ -61,18 +61,12 @@ impl Belief {
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
-        match (self, target.place(), target.aim()) {
-            (Self::HeightField(field), Some(place), _) => {
-                if approach.slide_w.is_some() {
-                    return field.observe_stroke(place, (touch, swept));
-                }
-                field.observe(place, touch);
-                swept.into_iter().for_each(|swept| field.observe_swept(swept));
-            }
-            (Self::ImplicitSurface(surface), _, Some(aim)) => {
+        match (self, target.aim()) {
+            (Self::HeightField(field), _) => field.observe_target(target, (touch, swept)),
+            (Self::ImplicitSurface(surface), Some(aim)) => {
                 surface.observe(aim, approach, (touch, swept));
             }
-            _ => {}
+            (Self::ImplicitSurface(_), None) => {}
         }
     }
 

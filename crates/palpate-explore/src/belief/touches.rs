@@ -2,6 +2,8 @@
 
 use super::HeightField;
 use crate::probe::{Contact, SweptVolume, Touch};
+use crate::task::Target;
+use crate::task::stroke::FIRST_SOURCE;
 use nalgebra::Vector3;
 use palpate_gp::{KnownError, Observation, Slope};
 
@@ -26,24 +28,31 @@ const STROKE_STEP: f64 = 0.03;
 // heuristic: the points between hardly change a fit, whose time grows as their cube.
 const STROKE_FITTED: usize = 3;
 
-/// Number of the first stroke among the sources of errors in common, above those of views.
-const STROKES: usize = 1 << 20;
-
 impl HeightField {
-    /// Adds a stroke that began at `target` with the volume swept by then, thinned; the belief
-    /// changes at the next [`refit`](Self::refit).
-    pub fn observe_stroke(
+    /// Adds a touch or stroke at `target` and the volume that it swept; nothing for a target that is
+    /// not a place of a zone. The belief changes at the next [`refit`](Self::refit).
+    pub fn observe_target(
         &mut self,
-        target: &[f64],
+        target: &Target,
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
+        let Some(place) = target.place() else { return };
+        if target.slide_m() > 0.0 {
+            return self.observe_stroke(place, (touch, swept));
+        }
+        self.observe(place, touch);
+        swept.into_iter().for_each(|swept| self.observe_swept(swept));
+    }
+
+    /// Adds a stroke that began at `target` with the volume swept by then, thinned.
+    fn observe_stroke(&mut self, target: &[f64], (touch, swept): (&Touch, Option<&SweptVolume>)) {
         let thinned = match touch {
             Touch::Contact(contact) => {
                 Touch::Contact(contact.thinned(STROKE_STEP * self.zone.widest_m()))
             }
             other => other.clone(),
         };
-        let number = STROKES + self.targets.len();
+        let number = FIRST_SOURCE + self.targets.len();
         self.observe_points((target, &thinned), STROKE_FITTED, Some(number));
         let Some(swept) = swept else { return };
         self.observe_swept(swept);

@@ -13,6 +13,9 @@ pub const SAMPLE_M: f64 = 1e-3;
 // heuristic: tan 60°; on a steeper wall the tip rests beside the place below it.
 pub const STEEPEST: f64 = 1.73;
 
+/// Number of the first stroke among the sources of errors in common, above those of views.
+pub(crate) const FIRST_SOURCE: usize = 1 << 20;
+
 /// Table `[touch.stroke]`: a slide along the surface after contact. Without it the finger only
 /// taps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,6 +3,7 @@
 
 use super::settings::PriorShape;
 use crate::probe::{Contact, SweptVolume, Touch};
+use crate::task::stroke::FIRST_SOURCE;
 use crate::task::{Aim, Approach, Ball};
 use crate::view::SeenSurface;
 use nalgebra::{Point3, Vector3};
@@ -154,7 +155,7 @@ impl TouchEvidence {
         (noise_m, pose): (f64, CameraPose),
     ) -> Observations {
         let mut all = Observations::new(3);
-        let mut strokes = self.strokes.iter().zip(STROKES..).peekable();
+        let mut strokes = self.strokes.iter().zip(FIRST_SOURCE..).peekable();
         for (i, contact) in self.contacts.iter().enumerate() {
             let Contact { p_wc: p_w, normal_w, has_normal, sd_m, .. } = contact;
             while strokes.next_if(|([_, end], _)| *end <= i).is_some() {}
@@ -236,9 +237,6 @@ impl TouchEvidence {
         self.seen.iter_mut().for_each(|seen| seen.align(&self.contacts, inside_m));
     }
 }
-
-/// Number of the first stroke among the sources of errors in common, above those of views.
-const STROKES: usize = 1 << 20;
 
 /// Distance of free points before seen elements, as a fraction of the object's radius.
 // heuristic: near enough to be before the same part of the surface.
