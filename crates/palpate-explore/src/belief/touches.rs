@@ -29,8 +29,8 @@ const STROKE_STEP: f64 = 0.03;
 const STROKE_FITTED: usize = 3;
 
 impl HeightField {
-    /// Adds a touch or stroke at `target` and the volume that it swept; nothing for a target that is
-    /// not a place of a zone. The belief changes at the next [`refit`](Self::refit).
+    /// Adds a touch or stroke at `target` and the volume that it swept; nothing for a target that
+    /// is not a place of a zone. The belief changes at the next [`refit`](Self::refit).
     pub fn observe_target(
         &mut self,
         target: &Target,
