@@ -104,9 +104,9 @@ impl Planner for PythonPlanner {
     fn plan(&mut self, belief: &Known) -> Result<Plan, PlanError> {
         let target = self.target(belief).map_err(|reason| PlanError { reason })?;
         let (found, wanted) = (target.len(), target_numbers(belief));
-        // A place of a zone may be followed by a pitch.
-        let is_tilted = wanted == 2 && found == 3;
-        if found != wanted && !is_tilted {
+        // A place of a zone may be followed by a pitch or the end of a stroke, an aim by a way.
+        let is_longer = matches!((wanted, found), (2, 3 | 4) | (6, 9));
+        if found != wanted && !is_longer {
             let is_zone = belief.height_field().is_some();
             let of = if is_zone { "of this zone" } else { "around an object" };
             let reason =

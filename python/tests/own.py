@@ -18,6 +18,17 @@ class Middle:
         return places[np.argmax(belief.variance(places))]
 
 
+class Strokes(Middle):
+    """Slides across from the place of the largest variance: (x, z) of the start, then of the end."""
+
+    def plan(self, belief):
+        start = np.asarray(super().plan(belief))
+        end = start.copy()
+        middle = (self.zone.lower[0] + self.zone.upper[0]) / 2
+        end[0] += 0.03 if start[0] < middle else -0.03
+        return [*start, *end]
+
+
 class Raises:
     def plan(self, belief):
         raise ValueError("no idea")

@@ -1,6 +1,7 @@
 """Tests of Python planners: they run beside the built-in ones, and their failures are isolated."""
 
 import functools
+import json
 import os
 import re
 import signal
@@ -39,6 +40,19 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     assert run.rows() == toy.run(["own:Middle", "random"], trials=3, threads=1).rows()
     assert "own:Middle" in str(run)
     assert len(run.summary().query("planner == 'own:Middle'")) > 0
+
+
+def test_an_own_planner_makes_strokes():
+    slides = palpate.Experiment.load("container_strokes", touches=5, initial_touches=2)
+    run = slides.run([own.Strokes], trials=1)
+    assert run.trials()["failure"].isna().all()
+    touches = json.loads(run.rows())["touches"]
+    assert all(len(touch.get("patch", [])) == 0 for touch in touches[:2])
+    assert all("stroke" in touch["target"] for touch in touches[2:])
+    assert sum(len(touch.get("patch", [])) for touch in touches[2:]) > 20
+    taps = palpate.Experiment.load("container", touches=3, initial_touches=2)
+    failed = taps.run([own.Strokes], trials=1).trials()["failure"]
+    assert all("the scene has no [touch.stroke]" in reason for reason in failed)
 
 
 @pytest.mark.parametrize("how", [{}, {"limit_s": None}, {"isolate": True}])

@@ -7,10 +7,14 @@
 #[cfg(feature = "mujoco")]
 use crate::common::rig::{ARM, Rest};
 use crate::common::rig::{Rig, STAGE, patient};
+#[cfg(feature = "mujoco")]
+use palpate::backend::pace;
 use palpate::explore::probe::Touch;
 use palpate::ros::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
 use palpate::ros::settings::BackendSettings;
 use palpate::ros::status::ArmStatus;
+#[cfg(feature = "mujoco")]
+use palpate::task::Target;
 #[cfg(feature = "mujoco")]
 use std::sync::atomic::Ordering;
 use std::thread::sleep;
@@ -272,4 +276,53 @@ fn after_every_failure_the_tip_moves_ten_millimetres_at_most() {
         }));
     }
     assert!(far.is_empty(), "{far:#?}");
+}
+
+/// Time after a loss of commands within which a sliding finger has stopped, and the share of its
+/// speed at which it yields to the force then.
+#[cfg(feature = "mujoco")]
+const STROKE_STOP_S: f64 = 0.15;
+#[cfg(feature = "mujoco")]
+const YIELDS: f64 = 0.1;
+
+/// Commands cease in the middle of a stroke: the finger stops soon, presses no harder while it
+/// stops, and the force falls.
+#[cfg(feature = "mujoco")]
+#[test]
+#[ignore = "needs the machine for itself: make test-faults"]
+fn a_stroke_without_commands_stops_soon_and_its_force_falls() {
+    let target = Target::Stroke { place: [-0.045, 0.5], to: [0.045, 0.5] };
+    for speed in [0.02, 0.04] {
+        let mut tries = (0..MEASURED).map(|_| {
+            let stroke = format!("touch.stroke={{speed_m_s={speed},force_n=1.0}}");
+            let rig = Rig::with(ARM, &[&stroke], BackendSettings::default(), &[]);
+            let lab = rig.lab().unwrap();
+            let (touches, at_s) = std::thread::scope(|scope| {
+                let touches =
+                    scope.spawn(|| rig.touch_targets(&lab, std::slice::from_ref(&target)));
+                while rig.largest_force_n(pace::now_s() - 0.1, f64::INFINITY) < 0.5 {
+                    assert!(!touches.is_finished(), "the finger slides nowhere");
+                    sleep(Duration::from_millis(1));
+                }
+                sleep(Duration::from_millis(700));
+                let at_s = pace::now_s();
+                rig.wire.cuts_sent.store(true, Ordering::Relaxed);
+                (touches.join().unwrap(), at_s)
+            });
+            assert!(matches!(touches[..], [Err(_)]), "{touches:?}");
+            sleep(Duration::from_millis(700));
+            let stop_s = rig.slow_after_s(at_s, YIELDS * speed);
+            let before_n = rig.largest_force_n(at_s - 0.3, at_s);
+            let stopping_n = rig.largest_force_n(at_s, at_s + STROKE_STOP_S);
+            let after_n = rig.largest_force_n(at_s + 0.5, f64::INFINITY);
+            println!(
+                "| stroke at {:.0} mm/s | {:.0} ms | {before_n:.2} N before, {stopping_n:.2} N while it stops, \
+                 {after_n:.2} N after half a second |",
+                1e3 * speed,
+                1e3 * stop_s
+            );
+            stop_s <= STROKE_STOP_S && stopping_n < 1.25 * before_n && after_n < 0.6 * before_n
+        });
+        assert!(tries.any(|stops| stops), "at {speed} m/s");
+    }
 }

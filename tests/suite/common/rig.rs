@@ -2,7 +2,7 @@
 //! except for the transport.
 
 use crate::common::hub::{Hub, Memory};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use palpate::backend::pace;
 use palpate::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
 use palpate::error::InputError;
@@ -19,6 +19,7 @@ use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use palpate::sim::finger::effects::wrench::WrenchEffect;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
+use palpate::task::Target;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -29,8 +30,8 @@ pub const STAGE: &str = "scenes/container_finger.toml";
 #[cfg(feature = "mujoco")]
 pub const ARM: &str = "scenes/container_pa10.toml";
 
-/// True positions of the robot's fingertip with the time of day.
-pub type Track = Arc<Mutex<Vec<(f64, Point3<f64>)>>>;
+/// True positions of the robot's fingertip with the time of day, and the force relative to the first, N.
+pub type Track = Arc<Mutex<Vec<(f64, Point3<f64>, f64)>>>;
 
 /// A simulated robot in a thread, and its connection.
 pub struct Rig {
@@ -50,6 +51,8 @@ struct Tracked {
     body: Box<dyn Backend>,
     chain: Chain,
     track: Track,
+    /// Force before the first step: it has the weight.
+    at_start_n: Option<Vector3<f64>>,
 }
 
 impl Backend for Tracked {
@@ -65,7 +68,9 @@ impl Backend for Tracked {
         let reading = self.body.step(command)?;
         let q = self.chain.joints_from(&reading.q).unwrap();
         let tip: Point3<f64> = self.chain.forward(&q).translation.vector.into();
-        self.track.lock().unwrap().push((pace::now_s(), tip));
+        let force_n = reading.wrench.map(|wrench| wrench.force_n).unwrap_or_default();
+        let force_n = (force_n - *self.at_start_n.get_or_insert(force_n)).norm();
+        self.track.lock().unwrap().push((pace::now_s(), tip, force_n));
         Ok(reading)
     }
 
@@ -176,6 +181,7 @@ impl Rig {
             body: simulator.body().unwrap().unwrap(),
             chain: chain.clone(),
             track: Arc::clone(&track),
+            at_start_n: None,
         };
         let (end, stopped, values) = (hub.clone(), Arc::clone(&stop), Arc::clone(&events));
         let settings_of_arm = settings.clone();
@@ -205,6 +211,17 @@ impl Rig {
 
     /// Touches places at these fractions of the zone, until one fails.
     pub fn touch(&self, lab: &Arc<RosArm>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
+        let zone = self.simulator.environment().task().zone().unwrap();
+        let targets: Vec<Target> = places.iter().map(|at| zone.at(at).into()).collect();
+        self.touch_targets(lab, &targets)
+    }
+
+    /// Touches targets, until one fails.
+    pub fn touch_targets(
+        &self,
+        lab: &Arc<RosArm>,
+        targets: &[Target],
+    ) -> Vec<Result<Touch, Fault>> {
         let task = self.simulator.environment().task();
         let body = Box::new(lab.backend());
         let mut servo = match self.simulator.servo_within(body, 0, &self.settings.interlocks) {
@@ -212,9 +229,8 @@ impl Rig {
             Err(fault) => return vec![Err(fault)],
         };
         let mut touches = Vec::new();
-        let zone = task.zone().unwrap();
-        for place in places {
-            let touch = servo.touch(&task.approach(&zone.at(place).into()).unwrap());
+        for target in targets {
+            let touch = servo.touch(&task.approach(target).unwrap());
             let failed = touch.is_err();
             touches.push(touch);
             if failed {
@@ -241,7 +257,7 @@ impl Rig {
     pub fn path_m(&self, span: Duration) -> f64 {
         let since_s = pace::now_s() - span.as_secs_f64();
         let track = self.track.lock().unwrap();
-        let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();
+        let after: Vec<_> = track.iter().filter(|(at_s, ..)| *at_s >= since_s).collect();
         after.windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()).sum()
     }
 
@@ -256,15 +272,35 @@ impl Rig {
     }
 
     #[cfg(feature = "mujoco")]
+    /// Time after `since_s` from which on the tip is slower than `speed_m_s`, over `SPEED_S`.
+    pub fn slow_after_s(&self, since_s: f64, speed_m_s: f64) -> f64 {
+        const SPEED_S: f64 = 0.02;
+        let track = self.track.lock().unwrap();
+        let fast_s = track.iter().enumerate().rev().find_map(|(i, (at_s, tip, _))| {
+            let (from_s, from, _) = track[..i].iter().rfind(|from| from.0 <= at_s - SPEED_S)?;
+            ((tip - from).norm() >= speed_m_s * (at_s - from_s)).then_some(*at_s)
+        });
+        fast_s.unwrap_or(since_s) - since_s
+    }
+
+    #[cfg(feature = "mujoco")]
+    /// Largest force in the time from `since_s` to `until_s`, N.
+    pub fn largest_force_n(&self, since_s: f64, until_s: f64) -> f64 {
+        let track = self.track.lock().unwrap();
+        let within = track.iter().filter(|(at_s, ..)| (since_s..until_s).contains(at_s));
+        within.map(|(_, _, force_n)| *force_n).fold(0.0, f64::max)
+    }
+
+    #[cfg(feature = "mujoco")]
     /// Movement until the tip came to rest after `since_s`. It must be at rest now.
     pub fn rest(&self, since_s: f64) -> Rest {
         let track = self.track.lock().unwrap();
-        let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();
-        let (end_s, end) = after.last().unwrap();
+        let after: Vec<_> = track.iter().filter(|(at_s, ..)| *at_s >= since_s).collect();
+        let (end_s, end, _) = after.last().unwrap();
         let is_near = |tip: &Point3<f64>| (tip - end).norm() < STILL_M;
-        let moving = after.iter().rposition(|(_, tip)| !is_near(tip));
+        let moving = after.iter().rposition(|(_, tip, _)| !is_near(tip));
         let rest = moving.map_or(0, |last| last + 1);
-        let (rest_s, _) = after[rest];
+        let (rest_s, ..) = after[rest];
         assert!(end_s - rest_s > 0.1, "the tip still moves");
         let path_m = after[..=rest].windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()).sum();
         Rest { time_s: rest_s - since_s, path_m }
