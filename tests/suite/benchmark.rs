@@ -5,7 +5,7 @@ use palpate::experiment::runner;
 use palpate::experiment::store::{Run, RunFolder};
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::belief::Belief;
+use palpate::explore::belief::{Belief, SurfaceBelief};
 use palpate::explore::planner::{
     Plan, PlanError, Planner, PlannerFactory, PlanningSettings, sample,
 };
@@ -78,7 +78,9 @@ impl Planner for Shrunk {
         if self.share == 0.0 {
             return Err("out of order".into());
         }
-        let Belief::HeightField(field) = belief else { return Err("needs a zone".into()) };
+        let SurfaceBelief::HeightField(field) = belief.surface() else {
+            return Err("needs a zone".into());
+        };
         let zone = field.zone();
         let place = sample::uniform(zone, &mut self.random);
         let low = [zone.x_m[0], zone.z_m.unwrap()[0]];

@@ -1,7 +1,7 @@
 //! Belief and contacts as shapes for viewers.
 
 use nalgebra::Point3;
-use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
 use palpate_explore::task::Zone;
 use palpate_explore::task::zone::grid_triangles;
 use palpate_gp::posterior::Posterior;
@@ -49,8 +49,8 @@ pub(super) fn shape(belief: &Belief) -> BelievedShape {
     let size_m = if is_line { SIZE_M } else { 1.0 };
     let mut surface = Marker::new("belief", shape, size_m, SURE);
     let mut contacts = Marker::new("contacts", Shape::SphereList, SIZE_M, CONTACT);
-    match belief {
-        Belief::HeightField(field) => {
+    match belief.surface() {
+        SurfaceBelief::HeightField(field) => {
             if let Some(posterior) = field.surface() {
                 let zone = field.zone();
                 cloud = draw(zone, field, posterior, &mut surface);
@@ -61,7 +61,7 @@ pub(super) fn shape(belief: &Belief) -> BelievedShape {
                 contacts.points = seen.heights().iter().enumerate().map(point).collect();
             }
         }
-        Belief::ImplicitSurface(belief) => {
+        SurfaceBelief::ImplicitSurface(belief) => {
             if let Some(believed) = belief.surface() {
                 contacts.points = belief.contacts().map(|p_w| (*p_w).into()).collect();
                 if let Some(mesh) = believed.mesh(CELLS) {

@@ -21,7 +21,7 @@ use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
-use palpate_explore::belief::Belief;
+use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Approach, Target, Task};
@@ -258,8 +258,8 @@ fn evaluate(
     (count, row): (u32, &mut TouchRow),
 ) -> Result<(), CovarianceError> {
     let fitted = belief.refit().cloned();
-    match belief {
-        Belief::HeightField(field) => {
+    match belief.surface() {
+        SurfaceBelief::HeightField(field) => {
             if fitted.is_ok() {
                 row.metrics = truth.truth.compare(field);
             }
@@ -269,7 +269,7 @@ fn evaluate(
                 outline.reliability = None;
             }
         }
-        Belief::ImplicitSurface(surface) => {
+        SurfaceBelief::ImplicitSurface(surface) => {
             let is_compared = fitted.is_ok() && experiment.is_evaluated(count);
             if let Some(surface) = surface.surface().filter(|_| is_compared) {
                 let cells = experiment.space.cells;

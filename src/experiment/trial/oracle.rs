@@ -8,7 +8,7 @@ use crate::experiment::trial::planner_names::ORACLE;
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::probe::exact_probe;
-use palpate_explore::belief::Belief;
+use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::candidates::{Candidates, free_aim};
 use palpate_explore::planner::sample::random_aim;
 use palpate_explore::planner::search::Search;
@@ -49,9 +49,9 @@ impl GroundTruth {
     /// Error of a belief, m: the root mean square over a zone; the mean of |f| / |∇f| on the true
     /// surface of a whole object.
     fn error_m(&self, belief: &Belief) -> Option<f64> {
-        match belief {
-            Belief::HeightField(field) => self.truth.rmse_m(field.surface()?),
-            Belief::ImplicitSurface(surface) => {
+        match belief.surface() {
+            SurfaceBelief::HeightField(field) => self.truth.rmse_m(field.surface()?),
+            SurfaceBelief::ImplicitSurface(surface) => {
                 let mut field = surface.surface()?.field();
                 let spots = self.shape.as_ref()?.samples().iter().step_by(LOOKED_AT);
                 let offset_m = |spot: &SurfacePoint| {
@@ -86,8 +86,8 @@ struct Oracle {
 
 impl Planner for Oracle {
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        Ok(match belief {
-            Belief::HeightField(field) => {
+        Ok(match belief.surface() {
+            SurfaceBelief::HeightField(field) => {
                 let count = self.search.settings.oracle.candidates;
                 let places = self.search.spread_places(field.zone(), count);
                 let targets = places.into_iter().map(|place| field.target(place)).collect();
@@ -96,7 +96,7 @@ impl Planner for Oracle {
                     None => self.search.anywhere(field.zone()),
                 }
             }
-            Belief::ImplicitSurface(surface) => {
+            SurfaceBelief::ImplicitSurface(surface) => {
                 let targets = self.aims(surface).into_iter().map(Target::from).collect();
                 match self.best(belief, targets) {
                     Some(target) => Plan::at(target),

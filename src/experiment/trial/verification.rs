@@ -4,7 +4,7 @@
 use crate::experiment::experiment::Experiment;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use nalgebra::Point3;
-use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
 use palpate_explore::planner::sample::target_from_fractions;
 use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::task::{Target, Task};
@@ -88,12 +88,12 @@ fn band_m(field: &HeightField, p_w: &Point3<f64>) -> Option<[f64; 2]> {
 /// Distance of a point of `W` outside the estimated surface and the standard deviation of a touch;
 /// `None` before the first fit.
 fn signed_distance(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
-    match belief {
-        Belief::HeightField(field) => {
+    match belief.surface() {
+        SurfaceBelief::HeightField(field) => {
             let (mean_m, sd_m) = height(field, &field.zone().place(p_w))?;
             Some((field.zone().height_m(p_w) - mean_m, sd_m))
         }
-        Belief::ImplicitSurface(surface) => {
+        SurfaceBelief::ImplicitSurface(surface) => {
             let surface = surface.surface()?;
             let sd = surface.sds_m(&[*p_w]).first().copied()?;
             let noise_sd = surface.posterior().hyperparameters().noise_sd;
@@ -108,9 +108,9 @@ fn signed_distance(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
 /// is the height; around an object the distance before the aimed point, or 0 with the ball's radius
 /// as deviation if no contact is predicted.
 fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
-    match belief {
-        Belief::HeightField(field) => height(field, target.place()?),
-        Belief::ImplicitSurface(surface) => {
+    match belief.surface() {
+        SurfaceBelief::HeightField(field) => height(field, target.place()?),
+        SurfaceBelief::ImplicitSurface(surface) => {
             let (aim, ball) = (target.aim()?, &surface.scope().ball);
             let mut field = surface.surface()?.field();
             let at = |along_m: f64| aim.p_w + aim.direction_w.scale(along_m);

@@ -21,13 +21,20 @@ use palpate_input::error::InputError;
 use palpate_input::format;
 use serde::{Deserialize, Serialize};
 
-/// Belief of one trial. Both variants are large, and few exist at a time.
+/// Belief of one trial.
 ///
 /// To store a belief use [`to_json`](Self::to_json) and [`from_json`](Self::from_json), which
 /// computes the posterior again.
 #[derive(Clone, Serialize, Deserialize)]
+pub struct Belief {
+    #[serde(flatten)]
+    surface: SurfaceBelief,
+}
+
+/// Belief of a surface. Both variants are large, and few exist at a time.
+#[derive(Clone, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)]
-pub enum Belief {
+pub enum SurfaceBelief {
     /// Heights over a zone.
     HeightField(HeightField),
     /// A closed surface in a ball.
@@ -61,29 +68,29 @@ impl Belief {
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
-        match (self, target.aim()) {
-            (Self::HeightField(field), _) => field.observe_target(target, (touch, swept)),
-            (Self::ImplicitSurface(surface), Some(aim)) => {
+        match (&mut self.surface, target.aim()) {
+            (SurfaceBelief::HeightField(field), _) => field.observe_target(target, (touch, swept)),
+            (SurfaceBelief::ImplicitSurface(surface), Some(aim)) => {
                 surface.observe(aim, approach, (touch, swept));
             }
-            (Self::ImplicitSurface(_), None) => {}
+            (SurfaceBelief::ImplicitSurface(_), None) => {}
         }
     }
 
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
     /// it shows.
     pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        match self {
-            Self::HeightField(field) => field.observe_view(view),
-            Self::ImplicitSurface(surface) => surface.observe_view(view),
+        match &mut self.surface {
+            SurfaceBelief::HeightField(field) => field.observe_view(view),
+            SurfaceBelief::ImplicitSurface(surface) => surface.observe_view(view),
         }
     }
 
     /// Returns the error of the camera's pose in each view, after a fit.
     pub fn rigid_errors(&self) -> Vec<RigidError> {
-        match self {
-            Self::HeightField(field) => field.rigid_errors(),
-            Self::ImplicitSurface(surface) => surface.rigid_errors(),
+        match &self.surface {
+            SurfaceBelief::HeightField(field) => field.rigid_errors(),
+            SurfaceBelief::ImplicitSurface(surface) => surface.rigid_errors(),
         }
     }
 
@@ -92,9 +99,9 @@ impl Belief {
     /// # Errors
     /// If the covariance of the touches cannot be factored.
     pub fn refit(&mut self) -> Result<&Fit, CovarianceError> {
-        match self {
-            Self::HeightField(field) => field.refit().map(|(fit, _)| fit),
-            Self::ImplicitSurface(surface) => surface.refit().map(|(fit, _)| fit),
+        match &mut self.surface {
+            SurfaceBelief::HeightField(field) => field.refit().map(|(fit, _)| fit),
+            SurfaceBelief::ImplicitSurface(surface) => surface.refit().map(|(fit, _)| fit),
         }
     }
 
@@ -104,9 +111,9 @@ impl Belief {
     /// If the covariance of the touches cannot be factored.
     pub fn condition(&mut self) -> Result<(), CovarianceError> {
         let Some(fit) = self.fit().cloned() else { return Ok(()) };
-        match self {
-            Self::HeightField(field) => field.condition(&fit),
-            Self::ImplicitSurface(surface) => surface.condition(Some(&fit), &fit),
+        match &mut self.surface {
+            SurfaceBelief::HeightField(field) => field.condition(&fit),
+            SurfaceBelief::ImplicitSurface(surface) => surface.condition(Some(&fit), &fit),
         }
     }
 
@@ -126,9 +133,9 @@ impl Belief {
     pub fn from_json(text: &str) -> Result<Self, InputError> {
         let mut belief: Self = serde_json::from_str(text)
             .map_err(|error| InputError::new(format::json(&error)).at("belief"))?;
-        let restored = match &mut belief {
-            Self::HeightField(field) => field.restore(),
-            Self::ImplicitSurface(surface) => surface.restore(),
+        let restored = match &mut belief.surface {
+            SurfaceBelief::HeightField(field) => field.restore(),
+            SurfaceBelief::ImplicitSurface(surface) => surface.restore(),
         };
         restored.map_err(|error| InputError::new(error.to_string()).at("belief"))?;
         Ok(belief)
@@ -136,64 +143,71 @@ impl Belief {
 
     /// Returns the result of the last [`refit`](Self::refit).
     pub fn fit(&self) -> Option<&Fit> {
-        match self {
-            Self::HeightField(field) => field.fit(),
-            Self::ImplicitSurface(surface) => surface.fit(),
+        match &self.surface {
+            SurfaceBelief::HeightField(field) => field.fit(),
+            SurfaceBelief::ImplicitSurface(surface) => surface.fit(),
         }
     }
 
     /// The Gaussian process, after the first fit: heights over places of a zone, or a field over
     /// points of `W` whose zero set is the surface.
     pub fn posterior(&self) -> Option<&Posterior> {
-        match self {
-            Self::HeightField(field) => field.surface(),
-            Self::ImplicitSurface(surface) => Some(surface.surface()?.posterior()),
+        match &self.surface {
+            SurfaceBelief::HeightField(field) => field.surface(),
+            SurfaceBelief::ImplicitSurface(surface) => Some(surface.surface()?.posterior()),
         }
     }
 
     /// Largest jitter added to a covariance of this belief, relative to its diagonal.
     pub fn jitter(&self) -> f64 {
-        match self {
-            Self::HeightField(field) => field.jitter(),
-            Self::ImplicitSurface(_) => self.posterior().map_or(0.0, Posterior::jitter),
+        match &self.surface {
+            SurfaceBelief::HeightField(field) => field.jitter(),
+            SurfaceBelief::ImplicitSurface(_) => self.posterior().map_or(0.0, Posterior::jitter),
         }
     }
 
     /// All targets so far.
     pub fn targets(&self) -> Vec<Target> {
-        match self {
-            Self::HeightField(field) => field.targets().iter().cloned().map(Target::from).collect(),
-            Self::ImplicitSurface(surface) => {
+        match &self.surface {
+            SurfaceBelief::HeightField(field) => {
+                field.targets().iter().cloned().map(Target::from).collect()
+            }
+            SurfaceBelief::ImplicitSurface(surface) => {
                 surface.aims().iter().copied().map(Target::from).collect()
             }
         }
     }
 
+    /// Returns the belief of the surface.
+    pub fn surface(&self) -> &SurfaceBelief {
+        &self.surface
+    }
+
     /// Returns the belief over a zone, if it is one.
     pub fn height_field(&self) -> Option<&HeightField> {
-        match self {
-            Self::HeightField(field) => Some(field),
-            Self::ImplicitSurface(_) => None,
+        match &self.surface {
+            SurfaceBelief::HeightField(field) => Some(field),
+            SurfaceBelief::ImplicitSurface(_) => None,
         }
     }
 
     /// Returns the belief of a whole object, if it is one.
     pub fn implicit_surface(&self) -> Option<&ImplicitSurface> {
-        match self {
-            Self::HeightField(_) => None,
-            Self::ImplicitSurface(surface) => Some(surface),
+        match &self.surface {
+            SurfaceBelief::HeightField(_) => None,
+            SurfaceBelief::ImplicitSurface(surface) => Some(surface),
         }
     }
 }
 
 impl From<HeightField> for Belief {
     fn from(field: HeightField) -> Self {
-        Self::HeightField(field)
+        Self { surface: SurfaceBelief::HeightField(field) }
     }
 }
 
 impl From<ImplicitSurface> for Belief {
     fn from(surface: ImplicitSurface) -> Self {
-        Self::ImplicitSurface(surface)
+        Self { surface: SurfaceBelief::ImplicitSurface(surface) }
     }
 }

@@ -4,7 +4,7 @@
 use super::candidates::Candidates;
 use super::plan::{Plan, PlannerEntry};
 use super::search::Search;
-use crate::belief::Belief;
+use crate::belief::{Belief, SurfaceBelief};
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "active",
@@ -19,14 +19,14 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 /// Finds the maximum of the variance instead of its root: both have the same maximum, and the
 /// gradient of the variance is finite everywhere.
 fn plan(search: &mut Search, belief: &Belief) -> Plan {
-    match belief {
-        Belief::HeightField(field) => match field.planning_posterior() {
+    match belief.surface() {
+        SurfaceBelief::HeightField(field) => match field.planning_posterior() {
             None => search.anywhere(field.zone()),
             Some(known) => {
                 search.plan(field, |places, gradients| known.variances(places, gradients))
             }
         },
-        Belief::ImplicitSurface(surface) => {
+        SurfaceBelief::ImplicitSurface(surface) => {
             Candidates::plan(surface, &mut search.rng, |candidates| {
                 candidates.all.iter().map(|candidate| candidate.offset_m).collect()
             })

@@ -5,7 +5,7 @@ use super::candidates::Candidates;
 use super::plan::{Plan, PlannerEntry};
 use super::search::Search;
 use super::sobol;
-use crate::belief::{Belief, HeightField};
+use crate::belief::{Belief, HeightField, SurfaceBelief};
 use crate::whole_object::ImplicitSurface;
 use palpate_gp::reduction::VarianceReduction;
 use rand::RngExt;
@@ -20,12 +20,12 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
         // plan.
         let mut seed = None;
         Box::new(move |belief: &Belief| {
-            Ok(match belief {
-                Belief::HeightField(field) => {
+            Ok(match belief.surface() {
+                SurfaceBelief::HeightField(field) => {
                     let seed = *seed.get_or_insert_with(|| search.rng.random());
                     in_zone(&mut search, seed, field)
                 }
-                Belief::ImplicitSurface(surface) => around(&mut search, surface),
+                SurfaceBelief::ImplicitSurface(surface) => around(&mut search, surface),
             })
         })
     },

@@ -1,7 +1,7 @@
 //! Whether another look pays: the reduction of the variance over the surface per time, against that
 //! of the next touch.
 
-use crate::belief::{Belief, HeightField};
+use crate::belief::{Belief, HeightField, SurfaceBelief};
 use crate::task::Target;
 use crate::view::Offer;
 use crate::whole_object::ImplicitSurface;
@@ -24,9 +24,9 @@ pub fn worthwhile(belief: &Belief, offers: &[Offer], target: &Target) -> Option<
     if offers.is_empty() {
         return None;
     }
-    let (by_touch, by_look) = match belief {
-        Belief::HeightField(field) => in_zone(field, offers, target.place()?)?,
-        Belief::ImplicitSurface(surface) => around(surface, offers, &target.aim()?.p_w)?,
+    let (by_touch, by_look) = match belief.surface() {
+        SurfaceBelief::HeightField(field) => in_zone(field, offers, target.place()?)?,
+        SurfaceBelief::ImplicitSurface(surface) => around(surface, offers, &target.aim()?.p_w)?,
     };
     let per_touch = by_look.into_iter().zip(offers).map(|(gain, offer)| gain / offer.cost);
     let best = per_touch.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));

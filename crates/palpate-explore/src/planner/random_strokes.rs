@@ -4,7 +4,7 @@
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
 use super::sample::random_target;
 use super::stroke::StrokeOffer;
-use crate::belief::Belief;
+use crate::belief::{Belief, SurfaceBelief};
 use crate::task::Target;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +26,9 @@ impl Planner for RandomStrokes {
     }
 
     fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
-        if let (Belief::ImplicitSurface(surface), Some(aim)) = (belief, target.aim()) {
+        if let (SurfaceBelief::ImplicitSurface(surface), Some(aim)) =
+            (belief.surface(), target.aim())
+        {
             let turn = self.rng.random_range(0.0..std::f64::consts::TAU);
             let way_w = aim.across_w(turn) * offer.longest_m;
             let stroke = Target::StrokeAround { aim: *aim, way_w };

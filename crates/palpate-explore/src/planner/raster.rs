@@ -6,7 +6,7 @@
 
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
 use super::stroke::StrokeOffer;
-use crate::belief::Belief;
+use crate::belief::{Belief, SurfaceBelief};
 use crate::task::{Aim, Ball, Target, Zone};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -49,9 +49,9 @@ impl Raster {
 
     /// Length of the line.
     fn length_m(&self, belief: &Belief) -> f64 {
-        match belief {
-            Belief::HeightField(field) => field.zone().widest_m(),
-            Belief::ImplicitSurface(surface) => {
+        match belief.surface() {
+            SurfaceBelief::HeightField(field) => field.zone().widest_m(),
+            SurfaceBelief::ImplicitSurface(surface) => {
                 let out = (1.0 - self.up().powi(2)).sqrt();
                 TAU * surface.scope().ball.radius_m * out
             }
@@ -89,9 +89,11 @@ impl Planner for Raster {
             let length_m = self.length_m(belief);
             let part = self.done_m / length_m;
             self.done_m += length_m;
-            match belief {
-                Belief::HeightField(field) => return Ok(Plan::at(self.place(field.zone(), part))),
-                Belief::ImplicitSurface(surface) => {
+            match belief.surface() {
+                SurfaceBelief::HeightField(field) => {
+                    return Ok(Plan::at(self.place(field.zone(), part)));
+                }
+                SurfaceBelief::ImplicitSurface(surface) => {
                     let aim = self.aim(&surface.scope().ball, part);
                     if surface.scope().reaches(&aim) {
                         return Ok(Plan::at(aim));
@@ -108,14 +110,14 @@ impl Planner for Raster {
         let start_m = self.done_m - length_m;
         let parts = (length_m / offer.longest_m).ceil();
         self.done_m = start_m + length_m / parts;
-        match (belief, &target) {
-            (Belief::HeightField(field), Target::Place(from)) => {
+        match (belief.surface(), &target) {
+            (SurfaceBelief::HeightField(field), Target::Place(from)) => {
                 match (from.as_slice(), &*self.place(field.zone(), self.done_m / length_m)) {
                     ([x, z], [u, v]) => Target::Stroke { place: [*x, *z], to: [*u, *v] },
                     _ => target,
                 }
             }
-            (Belief::ImplicitSurface(surface), Target::Aim(aim)) => {
+            (SurfaceBelief::ImplicitSurface(surface), Target::Aim(aim)) => {
                 let east_w = Vector3::z().cross(&-aim.direction_w.into_inner());
                 let way_w = east_w.normalize() * (length_m / parts).min(offer.longest_m);
                 let stroke = Target::StrokeAround { aim: *aim, way_w };

@@ -1,6 +1,6 @@
 //! Sampling of targets without a model: points of the unit square, mapped to the zone or object.
 
-use crate::belief::Belief;
+use crate::belief::{Belief, SurfaceBelief};
 use crate::task::{Aim, Ball, Target, Zone};
 use crate::whole_object::ExplorationSetup;
 use nalgebra::{Point3, Vector3};
@@ -26,9 +26,11 @@ fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 /// fractions, one or two. For a whole object, they encode a direction, and `next` is called until
 /// one is reachable.
 pub fn target_from_fractions(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Target {
-    match belief {
-        Belief::HeightField(field) => field.zone().at(&next(field.zone().dimension())).into(),
-        Belief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).into(),
+    match belief.surface() {
+        SurfaceBelief::HeightField(field) => {
+            field.zone().at(&next(field.zone().dimension())).into()
+        }
+        SurfaceBelief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).into(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Whether a stroke pays: the reduction of the variance over the surface by its points together,
 //! per time, against that of a tap.
 
-use crate::belief::{Belief, HeightField};
+use crate::belief::{Belief, HeightField, SurfaceBelief};
 use crate::task::stroke::STEEPEST;
 use crate::task::{Aim, Ball, Region, Target, Zone};
 use crate::whole_object::ImplicitSurface;
@@ -97,11 +97,11 @@ fn inside(zone: &Zone, place: [f64; 2]) -> Option<Vec<f64>> {
 ///
 /// The finger is assumed to keep contact all along.
 pub fn worthwhile(belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
-    let found = match (belief, &target) {
-        (Belief::HeightField(field), Target::Place(place)) => {
+    let found = match (belief.surface(), &target) {
+        (SurfaceBelief::HeightField(field), Target::Place(place)) => {
             best(field, offer, std::slice::from_ref(place))
         }
-        (Belief::ImplicitSurface(surface), Target::Aim(aim)) => around(surface, offer, aim),
+        (SurfaceBelief::ImplicitSurface(surface), Target::Aim(aim)) => around(surface, offer, aim),
         _ => None,
     };
     found.unwrap_or(target)

@@ -10,7 +10,7 @@ use super::candidates::{Candidates, explore_unknown};
 use super::plan::{Plan, PlannerEntry};
 use super::sample::random_aim;
 use super::search::Search;
-use crate::belief::{Belief, HeightField};
+use crate::belief::{Belief, HeightField, SurfaceBelief};
 use crate::task::{Aim, Region, Target};
 use crate::whole_object::ImplicitSurface;
 use palpate_gp::posterior::Scratch;
@@ -22,9 +22,9 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     make: |settings, rng| {
         let mut travel = Travel { tour: Vec::new(), search: Search::new(settings, rng) };
         Box::new(move |belief: &Belief| {
-            Ok(match belief {
-                Belief::HeightField(field) => travel.in_zone(field),
-                Belief::ImplicitSurface(surface) => travel.around(surface),
+            Ok(match belief.surface() {
+                SurfaceBelief::HeightField(field) => travel.in_zone(field),
+                SurfaceBelief::ImplicitSurface(surface) => travel.around(surface),
             })
         })
     },
