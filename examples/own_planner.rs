@@ -33,6 +33,7 @@ pub static ENTRY: PlannerEntry = PlannerEntry {
     name: "farthest_of_some",
     about: "of thirty random targets, the farthest from earlier ones",
     zone_only: None,
+    needs_library: false,
     make: |_, rng| Box::new(FarthestOfSome { rng }),
 };
 

@@ -13,6 +13,7 @@ use crate::sim::Scene;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
+use palpate_explore::recognition::RecognitionSettings;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
@@ -67,6 +68,9 @@ pub struct Experiment {
     /// Belief around a whole object; in an experiment file it is the table `[gp]`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub space: SpatialGpSettings,
+    /// Hypotheses about the object of a scene with a library.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub recognition: RecognitionSettings,
     /// Search settings of the planners.
     #[serde(default)]
     pub planning: PlanningSettings,
@@ -141,6 +145,7 @@ impl Experiment {
             grid: GRID,
             gp: GpSettings::default(),
             space: SpatialGpSettings::default(),
+            recognition: RecognitionSettings::default(),
             planning: PlanningSettings::default(),
             report: ReportSettings::default(),
             backend: BackendSettings::default(),
@@ -337,6 +342,22 @@ pub fn is_name_character(c: char) -> bool {
 }
 
 impl Experiment {
+    /// Checks planners with and without a library.
+    fn check_recognition(&self, rules: &mut Rules) {
+        rules.table("recognition", &self.recognition);
+        let has_library = self.scene.library.is_some();
+        for (i, name) in self.planners.iter().enumerate() {
+            let needs = planner::by_name(name).is_some_and(|entry| entry.needs_library);
+            rules.require(&format!("planners[{i}]"), name, has_library || !needs, || {
+                "other planners, or a scene with a table [library]".into()
+            });
+            let is_oracle = name == ORACLE;
+            rules.require(&format!("planners[{i}]"), name, !has_library || !is_oracle, || {
+                "other planners: with a library each trial has another ground truth".into()
+            });
+        }
+    }
+
     /// Checks the settings that do not apply around a whole object.
     fn check_whole_object(&self, rules: &mut Rules) {
         if self.scene.whole_object.is_none() {
@@ -419,6 +440,7 @@ impl Validate for Experiment {
         rules.table("gp", &self.gp);
         rules.table("space", &self.space);
         self.check_whole_object(rules);
+        self.check_recognition(rules);
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
         rules.table("backend", &self.backend);

@@ -5,10 +5,12 @@ use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
 use crate::experiment::real_arm::RealArm;
 use crate::experiment::real_robot;
+use crate::experiment::trial::recorded_trial;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{self, GroundTruth, OracleFactory, TrialObserver};
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
+use crate::sim::library::{LoadedLibrary, OBJECT};
 use crate::sim::simulator::Simulator;
 use palpate_explore::backend::{Backend, Fault, LinkFault};
 use palpate_explore::planner::{self, PlannerFactory};
@@ -60,9 +62,51 @@ impl Simulation {
                 zone.datum_y_m.get_or_insert(0.0);
             }
         }
+        let library = experiment.scene.library.as_ref().map(|settings| {
+            tell("reading the library");
+            LoadedLibrary::read(settings).map(Arc::new)
+        });
+        if let Some(library) = library.transpose()? {
+            library.complete(&mut experiment.scene);
+            return Self::with_library(experiment, &library, 0);
+        }
         let environment = Environment::build_with_progress(experiment.scene.clone(), tell);
         let environment = environment.map_err(|error| InputError::new(error.to_string()))?;
         Self::sampled(experiment, Arc::new(environment), tell)
+    }
+
+    /// Builds the simulation of a trial with an object of a library.
+    fn with_library(
+        experiment: Experiment,
+        library: &Arc<LoadedLibrary>,
+        trial: u32,
+    ) -> Result<Self, InputError> {
+        let prior = experiment.scene.pose.clone().unwrap_or_default();
+        let mut random = seed::stream(experiment.seed, trial.into(), OBJECT);
+        let object = library.draw(&prior, trial, &mut random);
+        let scene = library.place(&experiment.scene, &object);
+        let environment = Arc::new(Environment::build(scene)?);
+        let truth = Truth::sample(&environment, experiment.grid as usize, &|_| ());
+        let (library, object) = (Some(Arc::clone(library)), Some(object));
+        let mut made = Self::made(
+            experiment,
+            GroundTruth { environment, truth, shape: None, library, object },
+        )?;
+        // Each trial has its own.
+        made.experiment.scene.object = None;
+        Ok(made)
+    }
+
+    /// Returns the simulation of one trial, where each touches another object; `None` where all
+    /// share one.
+    ///
+    /// # Errors
+    /// If the scene with the object cannot be built or simulated.
+    pub fn drawn(&self, trial: u32) -> Result<Option<Self>, InputError> {
+        let Some(library) = self.truth.library.as_ref().filter(|_| !self.is_real()) else {
+            return Ok(None);
+        };
+        Self::with_library(self.experiment.clone(), library, trial).map(Some)
     }
 
     /// Builds the simulation in an existing environment, whose scene replaces the experiment's.
@@ -98,7 +142,7 @@ impl Simulation {
         }
         let shape = TrueShape::from_environment(&environment);
         tell("compiling the model");
-        let truth = GroundTruth { environment, truth, shape };
+        let truth = GroundTruth { environment, truth, shape, library: None, object: None };
         Ok(Self { scan_notice: scanned, ..Self::made(experiment, truth)? })
     }
 
@@ -112,7 +156,8 @@ impl Simulation {
         environment: Arc<Environment>,
         truth: Truth,
     ) -> Result<Self, InputError> {
-        Self::made(experiment, GroundTruth { environment, truth, shape: None })
+        let (library, object) = (None, None);
+        Self::made(experiment, GroundTruth { environment, truth, shape: None, library, object })
     }
 
     fn made(mut experiment: Experiment, truth: GroundTruth) -> Result<Self, InputError> {
@@ -247,10 +292,7 @@ impl Simulation {
 
     /// Runs one trial of `planner` from start to end; the row contains any failure.
     pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
-        match self.probe(trial) {
-            Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(None)),
-            Err(fault) => TrialRow::not_started(trial, planner.name(), &fault),
-        }
+        recorded_trial::run(self, (trial, planner), None, &[], &mut |_| Ok(None))
     }
 
     /// Runs a trial like [`trial`](Self::trial) with any `probe`, and calls `observer` after each

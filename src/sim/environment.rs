@@ -1,6 +1,7 @@
 //! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
 use super::camera::{VisibleScene, capsules_at_home};
+use super::library::LoadedLibrary;
 use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
@@ -92,6 +93,13 @@ impl Environment {
             let function = scene.function.ok_or_else(|| missing_part("function"))?;
             return Self::with_shape(scene, ObjectShape::Function(function));
         }
+        let scene = match (&scene.library, &scene.object) {
+            (Some(settings), None) => {
+                let library = LoadedLibrary::read(settings)?;
+                library.first(scene)
+            }
+            _ => scene,
+        };
         let object = scene.object.as_ref().ok_or_else(|| missing_part("object"))?;
         tell(&format!("reading {}", object.mesh.display()));
         let (mesh, report) = import_with(

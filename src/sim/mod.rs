@@ -5,6 +5,7 @@ pub mod environment;
 pub mod finger;
 pub mod kinematic;
 pub mod known_body;
+pub mod library;
 pub mod mjcf;
 mod model_file;
 #[cfg(feature = "mujoco")]

@@ -1,11 +1,13 @@
 //! The scene: object, finger, zone, and the simulator that carries out a touch.
 
 use super::camera::CameraSettings;
+use super::library::LibrarySettings;
 use super::solver::SolverSettings;
 pub use super::unit::Unit;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::sensor;
 use nalgebra::Isometry3;
+use palpate_explore::recognition::PosePrior;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::arm::settings::FILE_ENDINGS;
 use palpate_explore::robot::finger::Finger;
@@ -41,6 +43,12 @@ pub struct Scene {
     /// Object to touch, unless `simulator = "analytic"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<ObjectSettings>,
+    /// Folder of objects of which each trial touches one, in place of `object`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub library: Option<LibrarySettings>,
+    /// Where the object of a library may be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PosePrior>,
     /// Finger; not used by `simulator = "analytic"`.
     #[serde(default)]
     pub finger: Finger,
@@ -271,8 +279,9 @@ impl Validate for Scene {
             let allowed = format!("no function: simulator = \"{body}\" touches an object");
             given(rules, "function", self.function.is_some(), &allowed);
             let allowed = format!("a table with a mesh, because simulator = \"{body}\"");
-            lacks(rules, "object", self.object.is_none(), &allowed);
+            lacks(rules, "object", self.object.is_none() && self.library.is_none(), &allowed);
         }
+        self.check_library(rules);
         let turns = self.whole_object.is_none()
             || self.arm.is_some()
             || self.simulator != SimulatorKind::Dynamic;
@@ -377,6 +386,27 @@ impl Validate for Scene {
 }
 
 impl Scene {
+    /// Checks the tables of recognition.
+    fn check_library(&self, rules: &mut Rules) {
+        if let Some(pose) = &self.pose {
+            rules.table("pose", pose);
+            let needed = || "a table [library] beside it".into();
+            rules.require("pose", "(given)", self.library.is_some(), needed);
+        }
+        let Some(library) = &self.library else { return };
+        rules.table("library", library);
+        let is_curve = self.simulator == SimulatorKind::Analytic;
+        rules.require("library", "(given)", !is_curve, || {
+            "no library: simulator = \"analytic\" touches a curve".into()
+        });
+        if let Some(zone) = &self.zone {
+            let is_given = zone.depth_m.is_some() && zone.datum_y_m.is_some();
+            rules.require("zone.depth_m", "(none)", is_given, || {
+                "depth_m and datum_y_m, because the objects of a library differ".into()
+            });
+        }
+    }
+
     /// Returns the scene with every effect at its default settings.
     pub fn with_all_effects(self) -> Self {
         Self { effects: Effects::all(), ..self }
@@ -476,6 +506,7 @@ impl Scene {
         loader.read_former_keys(prefix, &FORMER_KEYS)?;
         loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
         loader.resolve_path(&format!("{prefix}object.mesh"));
+        loader.resolve_path(&format!("{prefix}library.folder"));
         for ending in FILE_ENDINGS {
             loader.resolve_path_ending(&format!("{prefix}arm.model"), ending);
         }

@@ -203,6 +203,7 @@ static WORSE: PlannerEntry = PlannerEntry {
     name: "worse",
     about: "active, but away from the border",
     zone_only: Some("it keeps away from a border"),
+    needs_library: false,
     make: |settings, rng| {
         let own = (planner::by_name("active").unwrap().make)(settings, rng);
         Box::new(Shy { own, margin: margin() })
@@ -213,6 +214,7 @@ static RESEEDED: PlannerEntry = PlannerEntry {
     name: "reseeded",
     about: "random, with other random numbers",
     zone_only: None,
+    needs_library: false,
     make: |settings, mut rng| {
         rng.random::<u64>();
         (planner::by_name("random").unwrap().make)(settings, rng)

@@ -56,6 +56,7 @@ mod free_space;
 pub mod gp_settings;
 pub mod planner;
 pub mod probe;
+pub mod recognition;
 pub mod registration;
 pub mod robot;
 pub mod surface_evidence;

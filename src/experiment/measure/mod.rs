@@ -5,11 +5,13 @@
 //! of the page, and the names that a claim may use.
 
 pub mod metrics;
+pub mod recognition;
 pub mod shape;
 pub mod silhouette;
 
 use self::Direction::{Maximise, Minimise, Undirected};
 use self::metrics::{Metrics, coverage, nlpd, rmse};
+use self::recognition::RecognitionMetrics;
 use self::shape::ShapeMetrics;
 use self::silhouette::SilhouetteMetrics;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
@@ -73,6 +75,23 @@ pub static MEASURES: &[Measure] = &[
     measure(Undirected, "shape_coverage", "coverage within two standard deviations", SHARE)
         .from(Source::Shape(|it| it.coverage))
         .drawn(PanelAxis::UpToOne),
+    RECOGNISED,
+    measure(Minimise, "recognition_log_score", "log score of the object", PLAIN)
+        .from(Source::Recognition(RecognitionMetrics::log_score)),
+    measure(Undirected, "confidence", "probability of the most likely object", SHARE)
+        .from(Source::Recognition(|it| Some(it.confidence())))
+        .untabled(),
+    POSE_DISTANCE,
+    measure(Undirected, "pose_coverage", "poses within the stated 95 % distance", SHARE)
+        .from(Source::Recognition(|it| it.is_covered().map(share))),
+    measure(Minimise, "position_m", "error of the object's position", MM)
+        .from(Source::Recognition(|it| Some(it.error.as_ref()?.offset?[0])))
+        .aggregated(Aggregate::Median)
+        .untabled(),
+    measure(Minimise, "rotation_deg", "error of the object's rotation", DEGREES)
+        .from(Source::Recognition(|it| Some(it.error.as_ref()?.offset?[1])))
+        .aggregated(Aggregate::Median)
+        .untabled(),
     measure(Minimise, "path_m", "lateral travel", METRES)
         .from(Source::Trial(TrialRow::path_m))
         .drawn(PanelAxis::Linear),
@@ -141,6 +160,17 @@ pub const CHAMFER: Measure = measure(Minimise, "chamfer_m", "Chamfer distance", 
     .drawn(PanelAxis::Log)
     .error();
 
+/// Share of trials whose most likely hypothesis is the right one.
+pub const RECOGNISED: Measure = measure(Maximise, "recognised", "right object", SHARE)
+    .from(Source::Recognition(|it| Some(share(it.error.as_ref()?.is_right))))
+    .drawn(PanelAxis::UpToOne);
+
+/// Distance of the surfaces at the true and at the estimated pose, where the object is found.
+pub const POSE_DISTANCE: Measure = measure(Minimise, "pose_distance_m", "pose error (ADD-S)", MM)
+    .from(Source::Recognition(|it| it.error.as_ref()?.distance_m))
+    .aggregated(Aggregate::Both)
+    .drawn(PanelAxis::Log);
+
 /// Root mean square error at verification touches, which the belief predicted and was not fitted
 /// to.
 pub const VERIFICATION_RMSE: Measure =
@@ -165,6 +195,11 @@ pub const REPEATABILITY: Measure = measure(Minimise, "repeatability_m", "repeata
         rmse(verification(row, n)?.iter().filter_map(|touch| touch.difference_m))
     }))
     .aggregated(Aggregate::Both);
+
+/// 1 for true, 0 for false.
+fn share(holds: bool) -> f64 {
+    f64::from(u8::from(holds))
+}
 
 fn length_scale(touch: &TouchRow, axis: usize) -> Option<f64> {
     touch.fit.as_ref()?.hyperparameters.length_scales.get(axis).copied()
@@ -197,8 +232,14 @@ fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
 
 /// Measures with columns in files about `rows`.
 pub fn measures_with_columns(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
-    let has_shape = rows.iter().flat_map(|row| &row.touches).any(|touch| touch.shape.is_some());
-    MEASURES.iter().filter(move |measure| has_shape || !measure.is_for_whole_objects())
+    let has = |part: &dyn Fn(&TouchRow) -> bool| rows.iter().flat_map(|row| &row.touches).any(part);
+    let has_shape = has(&|touch| touch.shape.is_some());
+    let has_hypotheses = has(&|touch| touch.recognition.is_some());
+    MEASURES.iter().filter(move |measure| match measure.source {
+        Source::Shape(_) => has_shape,
+        Source::Recognition(_) => has_hypotheses,
+        _ => true,
+    })
 }
 
 /// Finds the measure by its name in files.
@@ -240,6 +281,9 @@ pub enum Source {
     /// Agreement of the closed surfaces after a touch. Files of runs over a zone have no column for
     /// such a measure.
     Shape(fn(&ShapeMetrics) -> Option<f64>),
+    /// Hypotheses about the object after a touch. Files of runs without a library have no column for
+    /// such a measure.
+    Recognition(fn(&RecognitionMetrics) -> Option<f64>),
     /// Row of one touch.
     Touch(fn(&TouchRow) -> Option<f64>),
     /// A trial and a number of touches.
@@ -330,6 +374,8 @@ const PERCENT: MeasureUnit =
 pub const METRES: MeasureUnit =
     MeasureUnit { suffix: "_m", symbol: "m", range: [0.0, FAR_M], ..PLAIN };
 const MM: MeasureUnit = MeasureUnit { symbol: "mm", per_si: 1e3, ..METRES };
+const DEGREES: MeasureUnit =
+    MeasureUnit { suffix: "_deg", symbol: "°", decimals: 1, range: [0.0, 180.000_001], ..PLAIN };
 const SECONDS: MeasureUnit =
     MeasureUnit { suffix: "_s", symbol: "s", decimals: 1, range: [-LARGE, LARGE], ..PLAIN };
 
@@ -371,6 +417,7 @@ impl Measure {
             Source::Metrics(of) => of(touch.metrics.as_ref()?),
             Source::Outline(of) => of(touch.silhouette.as_ref()?),
             Source::Shape(of) => of(touch.shape.as_ref()?),
+            Source::Recognition(of) => of(touch.recognition.as_ref()?),
             Source::Touch(of) => of(touch),
             Source::Trial(_) => None,
         }

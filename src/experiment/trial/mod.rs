@@ -19,15 +19,18 @@ use self::row::{TouchRow, TrialRow};
 use self::strokes::Strokes;
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
 use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::recognition::ObjectHypotheses;
 use palpate_explore::task::{Approach, Target, Task};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 use std::cell::OnceCell;
+use std::sync::Arc;
 
 /// A finished touch.
 pub struct FinishedTouch<'a> {
@@ -114,7 +117,14 @@ fn run_touches(
 ) -> Result<(), String> {
     let (scene, task) = (truth.environment.scene(), truth.environment.task());
     let finger = (&scene.finger, scene.effects.skin.is_some());
-    let mut belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
+    let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
+    let hypotheses = truth.library.as_ref().map(|library| {
+        let prior = scene.pose.clone().unwrap_or_default();
+        let (settings, shared) = (experiment.recognition.clone(), Arc::clone(&library.known));
+        ObjectHypotheses::new(shared, prior, settings, (task, finger.1), &mut stream("hypotheses"))
+    });
+    let mut belief =
+        Belief::new(task, finger, &experiment.gp, &experiment.space).with_hypotheses(hypotheses);
     let (is_around, name) = (belief.implicit_surface().is_some(), factory.name());
     if let Some(why) = factory.zone_only().filter(|_| is_around) {
         return Err(format!("planner `{name}` does not support whole objects: {why}"));
@@ -122,7 +132,6 @@ fn run_touches(
     // Initial touches: random places in a zone, evenly spread directions around an object.
     let start = planner::by_name(if is_around { "sobol" } else { "random" });
     let start = start.ok_or("no planner for the initial touches")?;
-    let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
     // Rows contain contact normals and tips if the belief uses them.
@@ -193,6 +202,7 @@ fn run_touches(
             metrics: None,
             silhouette: None,
             shape: None,
+            recognition: None,
         };
         let fitted = match count >= experiment.initial_touches {
             true => evaluate(experiment, truth, &mut belief, (count, &mut touch_row)),
@@ -257,6 +267,9 @@ fn evaluate(
     belief: &mut Belief,
     (count, row): (u32, &mut TouchRow),
 ) -> Result<(), CovarianceError> {
+    row.recognition = belief
+        .hypotheses()
+        .map(|hypotheses| RecognitionMetrics::of(hypotheses, truth.object.as_ref()));
     let fitted = belief.refit().cloned();
     match belief.surface() {
         SurfaceBelief::HeightField(field) => {

@@ -7,6 +7,7 @@ use crate::experiment::statistics::mean;
 use crate::experiment::trial::planner_names::ORACLE;
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
+use crate::sim::library::{LoadedLibrary, TrueObject};
 use crate::sim::probe::exact_probe;
 use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::candidates::{Candidates, free_aim};
@@ -29,6 +30,10 @@ pub(in crate::experiment) struct GroundTruth {
     pub(in crate::experiment) truth: Truth,
     /// True surface of a whole object; `None` for a zone.
     pub(in crate::experiment) shape: Option<TrueShape>,
+    /// Objects of the hypotheses.
+    pub(in crate::experiment) library: Option<Arc<LoadedLibrary>>,
+    /// Object of a library that was drawn for the trial.
+    pub(in crate::experiment) object: Option<TrueObject>,
 }
 
 /// Step between the points of the true surface at which the oracle computes the error.

@@ -52,6 +52,13 @@ pub fn run(
     observer: &mut TrialObserver,
 ) -> TrialRow {
     let job = (trial, planner);
+    let drawn = match simulation.drawn(trial) {
+        Ok(drawn) => drawn,
+        Err(error) => {
+            return TrialRow::without_touches(trial, planner.name(), Some(error.to_string()));
+        }
+    };
+    let simulation = drawn.as_ref().unwrap_or(simulation);
     let row = match path {
         Some(path) => record(simulation, job, path, earlier_touches, observer),
         None => simulation.probe(trial).map(|mut probe| {

@@ -1,6 +1,7 @@
 //! Row of a trial: one line of `trials.jsonl`.
 
 use crate::experiment::measure::metrics::Metrics;
+use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use nalgebra::{Point3, Vector3};
@@ -108,6 +109,9 @@ pub struct TouchRow {
     /// Errors of the estimated closed surface; omitted for a zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<ShapeMetrics>,
+    /// Hypotheses about the object; omitted without a library.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recognition: Option<RecognitionMetrics>,
 }
 
 /// A held-out touch, made after all `touches` of a trial.

@@ -140,6 +140,8 @@ pub fn scene(period_s: f64) -> Scene {
         sensor: Default::default(),
         arm: None,
         camera: None,
+        library: None,
+        pose: None,
         effects,
         touch: TouchSettings { period_s: Some(period_s), ..TouchSettings::default() },
         solver: Default::default(),

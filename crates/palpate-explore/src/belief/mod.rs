@@ -11,6 +11,7 @@ pub use quantiles::BAND;
 use super::gp_settings::GpSettings;
 use super::probe::{SweptVolume, Touch};
 use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
+use crate::recognition::ObjectHypotheses;
 use crate::robot::Finger;
 use crate::task::{Approach, Region, Target, Task};
 use crate::view::{RigidError, SeenSurface, View};
@@ -24,11 +25,14 @@ use serde::{Deserialize, Serialize};
 /// Belief of one trial.
 ///
 /// To store a belief use [`to_json`](Self::to_json) and [`from_json`](Self::from_json), which
-/// computes the posterior again.
+/// computes the posterior again; hypotheses are not stored.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Belief {
     #[serde(flatten)]
     surface: SurfaceBelief,
+    /// Hypotheses about the object, where the scene has a library.
+    #[serde(skip)]
+    hypotheses: Option<ObjectHypotheses>,
 }
 
 /// Belief of a surface. Both variants are large, and few exist at a time.
@@ -68,6 +72,9 @@ impl Belief {
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
     ) {
+        if let Some(hypotheses) = &mut self.hypotheses {
+            hypotheses.observe(approach, (touch, swept));
+        }
         match (&mut self.surface, target.aim()) {
             (SurfaceBelief::HeightField(field), _) => field.observe_target(target, (touch, swept)),
             (SurfaceBelief::ImplicitSurface(surface), Some(aim)) => {
@@ -178,6 +185,16 @@ impl Belief {
         }
     }
 
+    /// Adds hypotheses about the object in the region.
+    pub fn with_hypotheses(self, hypotheses: Option<ObjectHypotheses>) -> Self {
+        Self { hypotheses, ..self }
+    }
+
+    /// Returns the hypotheses about the object, where the scene has a library.
+    pub fn hypotheses(&self) -> Option<&ObjectHypotheses> {
+        self.hypotheses.as_ref()
+    }
+
     /// Returns the belief of the surface.
     pub fn surface(&self) -> &SurfaceBelief {
         &self.surface
@@ -202,12 +219,12 @@ impl Belief {
 
 impl From<HeightField> for Belief {
     fn from(field: HeightField) -> Self {
-        Self { surface: SurfaceBelief::HeightField(field) }
+        Self { surface: SurfaceBelief::HeightField(field), hypotheses: None }
     }
 }
 
 impl From<ImplicitSurface> for Belief {
     fn from(surface: ImplicitSurface) -> Self {
-        Self { surface: SurfaceBelief::ImplicitSurface(surface) }
+        Self { surface: SurfaceBelief::ImplicitSurface(surface), hypotheses: None }
     }
 }

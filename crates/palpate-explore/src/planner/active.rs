@@ -10,6 +10,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "active",
     about: "largest posterior standard deviation, by DIRECT then BFGS (Yi et al. 2016)",
     zone_only: None,
+    needs_library: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         Box::new(move |belief: &Belief| Ok(plan(&mut search, belief)))

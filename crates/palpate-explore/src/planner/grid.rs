@@ -14,6 +14,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "grid",
     about: "a lattice from coarse to fine, no model",
     zone_only: None,
+    needs_library: false,
     make: |_, _| {
         let mut next_level = 0;
         // Remaining nodes of this level, the next one last, as fractions in 0..1.

@@ -14,6 +14,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "integrated_variance",
     about: "largest reduction of the variance over the whole surface (Cohn 1996)",
     zone_only: None,
+    needs_library: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         // Seed of the places at which the variance over a zone is computed; drawn with the first

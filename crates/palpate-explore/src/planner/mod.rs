@@ -5,9 +5,12 @@
 mod active;
 pub mod candidates;
 mod grid;
+mod information;
 mod integrated_variance;
 pub mod look;
+mod object_information;
 mod plan;
+mod pose_information;
 mod random;
 mod random_strokes;
 mod raster;
@@ -52,6 +55,9 @@ planners! {
     ucb: "ucb",
     random_strokes: "random_strokes",
     raster: "raster",
+    information: "information",
+    object_information: "object_information",
+    pose_information: "pose_information",
 }
 
 /// Whether `name` names an external planner, `MODULE:NAME` or `MODULE:NAME(ARGUMENTS)`. An

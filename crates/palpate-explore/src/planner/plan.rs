@@ -122,6 +122,8 @@ pub struct PlannerEntry {
     pub about: &'static str,
     /// Reason why it supports zones only and no whole objects, if so.
     pub zone_only: Option<&'static str>,
+    /// Whether it plans by hypotheses about the object, which need a library.
+    pub needs_library: bool,
     /// Creates a planner; the generator is its only source of randomness.
     pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
 }

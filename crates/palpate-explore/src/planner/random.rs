@@ -8,6 +8,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "random",
     about: "uniformly random targets (baseline of Yi et al. 2016)",
     zone_only: None,
+    needs_library: false,
     make: |_, mut rng| {
         Box::new(move |belief: &Belief| Ok(Plan::at(random_target(belief, &mut rng))))
     },

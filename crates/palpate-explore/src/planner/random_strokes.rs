@@ -13,6 +13,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "random_strokes",
     about: "strokes from random touches along random ways, as long as allowed; without strokes, `random`",
     zone_only: None,
+    needs_library: false,
     make: |_, rng| Box::new(RandomStrokes { rng }),
 };
 

@@ -15,6 +15,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "raster",
     about: "parallel strokes along the longer side, or in rings, lines from coarse to fine; without strokes, their starts",
     zone_only: None,
+    needs_library: false,
     make: |_, _| Box::new(Raster { line: 0, done_m: 0.0 }),
 };
 

@@ -23,6 +23,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "silhouette",
     about: "integrated_variance over the probable surface, times the probability of contact",
     zone_only: Some("the silhouette is defined along a single approach direction"),
+    needs_library: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         // Seed of the places at which the variance is computed.

@@ -14,6 +14,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "slope",
     about: "standard deviation weighted by the slope of the posterior mean",
     zone_only: Some("it uses the slope of a height field"),
+    needs_library: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         zone_planner(move |belief| plan(&mut search, belief))

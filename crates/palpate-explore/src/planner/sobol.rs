@@ -10,6 +10,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "sobol",
     about: "a scrambled Sobol sequence: evenly spread, no model (stronger baseline)",
     zone_only: None,
+    needs_library: false,
     make: |_, mut rng| {
         let (seed, mut index) = (rng.random(), 0);
         Box::new(move |belief: &Belief| {

@@ -19,6 +19,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "travel",
     about: "the largest standard deviations of the next touches, in the order of a short tour",
     zone_only: None,
+    needs_library: false,
     make: |settings, rng| {
         let mut travel = Travel { tour: Vec::new(), search: Search::new(settings, rng) };
         Box::new(move |belief: &Belief| {

@@ -8,6 +8,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "ucb",
     about: "upper confidence bound (UCB): seeks the highest point",
     zone_only: Some("it seeks the highest point of a height field"),
+    needs_library: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         zone_planner(move |belief| {

@@ -1,0 +1,12 @@
+//! Planner `object_information`; see [`information`](super::information).
+
+use super::information::{Goal, planner};
+use super::plan::PlannerEntry;
+
+pub(super) const ENTRY: PlannerEntry = PlannerEntry {
+    name: "object_information",
+    about: "most expected information about the object, with a library",
+    zone_only: None,
+    needs_library: true,
+    make: |settings, rng| planner(Goal::Object, settings, rng),
+};

@@ -1,0 +1,288 @@
+//! What touches tell about an object at a pose: residuals of contacts and of free space.
+//!
+//! Each number is a likelihood ratio: the density of what was measured if the object is at the
+//! pose, over its density if the shape is unknown. For a contact at the distance r from the surface
+//! and the angle θ between both normals, with the deviations σ and σₙ and the share ε of outliers,
+//!
+//! L = (1 − ε) s / (½ √(2π) σ) exp(−r²/2σ² − g²/2σ²) exp(−θ²/2σₙ²) / σₙ² + ε,
+//!
+//! where s is the range over which an unknown surface is uniform, half of unknown approaches miss,
+//! and its normals are uniform over a hemisphere. g is the depth by which the hull would have met
+//! the object before. For a miss L = 2 (1 − ε) exp(−g²/2σ²) + ε. A temperature τ adds to both
+//! deviations, so that at a large one all poses are equal.
+
+use super::library::LibraryObject;
+use crate::probe::{Contact, SweptVolume, Touch};
+use crate::task::Approach;
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitVector3, Vector3, Vector6};
+use palpate_geometry::primitives::normal;
+use palpate_geometry::sweep::Capsule;
+
+/// Noise of the contacts of an object at its true pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NoiseModel {
+    /// Deviation of a contact along the normal, m, on top of its sensor's.
+    pub contact_sd_m: f64,
+    /// Deviation of a normal about each of two axes, rad.
+    pub normal_sd_rad: f64,
+    /// Share of contacts that are anywhere.
+    pub outliers: f64,
+}
+
+/// Lever at which a turn counts as much as a distance, m, for the temperature.
+// heuristic: half the size of an object for a hand.
+const LEVER_M: f64 = 0.03;
+
+/// Probability of a miss on an approach to an unknown shape.
+// heuristic: undecided.
+const UNKNOWN_MISS: f64 = 0.5;
+
+/// Number of further points of a touch that count as independent: their errors are correlated.
+// heuristic: a patch has a height, two slopes, and some curvature.
+const INDEPENDENT: f64 = 6.0;
+
+/// Largest number of further points of a touch.
+const POINTS: usize = 24;
+
+/// Length below which a direction is rounding, m.
+const ROUNDING_M: f64 = 1e-9;
+
+/// One point of a surface that a touch shows.
+struct MeasuredPoint {
+    p_w: Point3<f64>,
+    normal_w: Option<Vector3<f64>>,
+    /// Deviation that its sensor states, m.
+    sd_m: f64,
+    /// Factor on all deviations.
+    inflation: f64,
+    /// Range over which it would be uniform on an unknown surface, m.
+    range_m: f64,
+}
+
+/// What one touch tells.
+pub(super) struct TouchEvidence {
+    /// Hull at the start of its way.
+    hull: Capsule,
+    ahead_w: UnitVector3<f64>,
+    /// Length of the way that was found free, m.
+    free_m: f64,
+    /// Depth by which the hull yields at contact, m.
+    slack_m: f64,
+    /// Points of contact; none for a miss.
+    points: Vec<MeasuredPoint>,
+}
+
+/// Residuals of a touch for an object at a pose.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TouchFit {
+    /// Depth by which the hull would have met the object before it did, m, along the normal.
+    depth: Residual,
+    points: Vec<PointFit>,
+}
+
+/// A distance, m, with its derivative by the pose.
+#[derive(Clone, Debug, Default)]
+struct Residual {
+    value_m: f64,
+    slope: Vector6<f64>,
+}
+
+#[derive(Clone, Debug)]
+struct PointFit {
+    distance: Residual,
+    /// Rotation vector from the object's normal to the measured one, and the object's normal.
+    turn: Option<(Vector3<f64>, Vector3<f64>)>,
+}
+
+/// Sum of log-likelihood ratios with its derivatives by the pose.
+pub(super) struct LogLikelihood {
+    pub value: f64,
+    pub gradient: Vector6<f64>,
+    /// Gauss–Newton approximation of minus the second derivative.
+    pub information: Matrix6<f64>,
+}
+
+impl LogLikelihood {
+    /// Creates the sum over nothing.
+    pub fn zero() -> Self {
+        Self { value: 0.0, gradient: Vector6::zeros(), information: Matrix6::zeros() }
+    }
+
+    /// Adds a mixture ratio with the exponent's derivatives.
+    fn add(&mut self, inlier: f64, outlier: f64, terms: &Terms) {
+        let ratio = inlier + outlier;
+        let share = inlier / ratio;
+        self.value += ratio.ln();
+        self.gradient -= terms.gradient * share;
+        self.information += terms.information * share;
+    }
+}
+
+/// Half of a sum of squares with its derivatives.
+#[derive(Default)]
+struct Terms {
+    half_squares: f64,
+    gradient: Vector6<f64>,
+    information: Matrix6<f64>,
+}
+
+impl Terms {
+    fn add(&mut self, residual: &Residual, sd_m: f64) {
+        let weight = sd_m.powi(-2);
+        self.half_squares += 0.5 * residual.value_m.powi(2) * weight;
+        self.gradient += residual.slope * (residual.value_m * weight);
+        self.information += residual.slope * residual.slope.transpose() * weight;
+    }
+
+    fn add_turn(&mut self, turn: &Vector3<f64>, normal_w: &Vector3<f64>, sd_rad: f64) {
+        let weight = sd_rad.powi(-2);
+        let across = Matrix3::identity() - normal_w * normal_w.transpose();
+        self.half_squares += 0.5 * turn.norm_squared() * weight;
+        let mut gradient = self.gradient.fixed_rows_mut::<3>(3);
+        gradient -= across * turn * weight;
+        let mut information = self.information.fixed_view_mut::<3, 3>(3, 3);
+        information += across * weight;
+    }
+}
+
+impl TouchEvidence {
+    /// Returns what a touch along `approach` tells, with a hull that yields by `slack_m`; `None`
+    /// after an overload, and without a hull.
+    pub fn new(
+        approach: &Approach,
+        (touch, swept): (&Touch, Option<&SweptVolume>),
+        slack_m: f64,
+    ) -> Option<Self> {
+        let swept = swept?;
+        let ahead_w = approach.direction_w();
+        let finger = &swept.finger;
+        // The hull starts outside of the region, and the tip ends where it was at contact.
+        let whole_m = (approach.p_far_w - approach.p_near_w).dot(&ahead_w);
+        let end_w = match touch {
+            Touch::Overload => return None,
+            Touch::Contact(_) | Touch::Miss => swept.p_wt,
+        };
+        let before_m = finger.radius_m + finger.length_m;
+        let at_m = (approach.p_near_w - end_w).dot(&ahead_w) - before_m;
+        let start_w = end_w + ahead_w.scale(at_m);
+        let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
+        let hull = Capsule { p0_w: start_w, p1_w: start_w + axis_w, radius_m: finger.radius_m };
+        let contact = match touch {
+            Touch::Contact(contact) => Some(contact),
+            Touch::Miss | Touch::Overload => None,
+        };
+        let points = contact.map(|contact| points(contact, whole_m)).unwrap_or_default();
+        Some(Self { hull, ahead_w, free_m: -at_m, slack_m, points })
+    }
+
+    /// Returns the residuals for `object` at the pose `x_wo`.
+    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> TouchFit {
+        let origin_w = Point3::from(x_wo.translation.vector);
+        // A distance changes with the motion of the object's point p along n by n·(v + ω × p).
+        let slope = |n: &Vector3<f64>, p_w: &Point3<f64>| {
+            let lever = (p_w - origin_w).cross(n);
+            Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z)
+        };
+        let ahead_o = x_wo.inverse_transform_unit_vector(&self.ahead_w);
+        let hull = Capsule {
+            p0_w: x_wo.inverse_transform_point(&self.hull.p0_w),
+            p1_w: x_wo.inverse_transform_point(&self.hull.p1_w),
+            ..self.hull
+        };
+        let hit = object.bvh.sweep(&hull, &ahead_o, self.free_m + self.hull.radius_m);
+        let met = hit.map(|hit| (hit.travel_m, x_wo * hit.normal, x_wo * hit.point));
+        let points: Vec<PointFit> = (self.points.iter())
+            .map(|point| {
+                let closest = object.bvh.closest_point(&x_wo.inverse_transform_point(&point.p_w));
+                let q_w = x_wo * closest.point;
+                let face_w = x_wo * normal(&object.bvh.mesh().corners(closest.triangle as usize));
+                let away = point.p_w - q_w;
+                let side = if away.dot(&face_w) < 0.0 { -1.0 } else { 1.0 };
+                // Close to the surface the direction is rounding; the face has it.
+                let n = match closest.distance_m > ROUNDING_M {
+                    true => away * (side / closest.distance_m),
+                    false => face_w,
+                };
+                let value_m = side * closest.distance_m;
+                let distance = Residual { value_m, slope: -slope(&n, &q_w) };
+                // On an edge, the hull's normal lies between those of the faces.
+                let is_same = |p_w: &Point3<f64>| (p_w - q_w).norm() < 0.5 * self.hull.radius_m;
+                let normal_w = match &met {
+                    Some((_, normal_w, p_w)) if is_same(p_w) => *normal_w,
+                    _ => face_w,
+                };
+                let turn = point.normal_w.map(|to_w| (turn_between(&normal_w, &to_w), normal_w));
+                PointFit { distance, turn }
+            })
+            .collect();
+        let depth = met.filter(|met| met.0 < self.free_m).map(|(travel_m, n, p_w)| {
+            let facing = (-n.dot(&self.ahead_w)).max(0.0);
+            let depth_m = (self.free_m - travel_m) * facing;
+            // A contact that is inside of the object has told that once already.
+            let inside = points.first().map(|point| &point.distance).filter(|it| it.value_m < 0.0);
+            let (told_m, told) =
+                inside.map_or((0.0, Vector6::zeros()), |it| (-it.value_m, it.slope));
+            let value_m = depth_m - told_m - self.slack_m;
+            (value_m > 0.0).then(|| Residual { value_m, slope: slope(&n, &p_w) + told })
+        });
+        TouchFit { depth: depth.flatten().unwrap_or_default(), points }
+    }
+
+    /// Adds the log-likelihood ratio of residuals at the temperature `tau_m`.
+    pub fn add(&self, fit: &TouchFit, noise: &NoiseModel, tau_m: f64, to: &mut LogLikelihood) {
+        let sd_m = noise.contact_sd_m.hypot(tau_m);
+        if self.points.is_empty() {
+            let mut terms = Terms::default();
+            terms.add(&fit.depth, sd_m);
+            let inlier = (1.0 - noise.outliers) * (-terms.half_squares).exp() / UNKNOWN_MISS;
+            return to.add(inlier, noise.outliers, &terms);
+        }
+        for (i, (point, fitted)) in self.points.iter().zip(&fit.points).enumerate() {
+            let mut terms = Terms::default();
+            let sd_m = sd_m.hypot(point.sd_m) * point.inflation;
+            terms.add(&fitted.distance, sd_m);
+            let mut density = point.range_m / (sd_m * (2.0 * std::f64::consts::PI).sqrt());
+            if i == 0 {
+                terms.add(&fit.depth, sd_m);
+                density /= 1.0 - UNKNOWN_MISS;
+            }
+            if let Some((turn, normal_w)) = &fitted.turn {
+                let sd_rad = noise.normal_sd_rad.hypot(tau_m / LEVER_M) * point.inflation;
+                terms.add_turn(turn, normal_w, sd_rad);
+                density /= sd_rad * sd_rad;
+            }
+            let inlier = (1.0 - noise.outliers) * density * (-terms.half_squares).exp();
+            to.add(inlier, noise.outliers, &terms);
+        }
+    }
+}
+
+/// Returns the rotation vector from one unit vector to another, rad.
+fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
+    let axis = from.cross(to);
+    let (sine, cosine) = (axis.norm(), from.dot(to));
+    if sine > ROUNDING_M { axis * (sine.atan2(cosine) / sine) } else { Vector3::zeros() }
+}
+
+/// Returns the points of a contact, thinned.
+fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
+    let further = contact.patch.len();
+    let step = further.div_ceil(POINTS).max(1);
+    let count = further.div_ceil(step) as f64;
+    let inflation = (count / INDEPENDENT).max(1.0).sqrt();
+    let point = |point: &Contact, inflation: f64, range_m: f64| MeasuredPoint {
+        p_w: point.p_wc,
+        normal_w: point.has_normal.then_some(point.normal_w),
+        sd_m: point.sd_m.unwrap_or(0.0),
+        inflation,
+        range_m,
+    };
+    let first = point(contact, 1.0, whole_m);
+    // Between the faces of an edge a patch has normals of neither, so that only places count.
+    let others = contact.patch.iter().step_by(step).map(|further| {
+        // An unknown surface may rise or fall by as much as the point is away.
+        let range_m = 2.0 * (further.p_wc - contact.p_wc).norm().max(1e-4);
+        MeasuredPoint { normal_w: None, ..point(further, inflation, range_m) }
+    });
+    std::iter::once(first).chain(others).collect()
+}

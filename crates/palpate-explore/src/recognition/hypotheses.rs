@@ -1,0 +1,321 @@
+//! Hypotheses about object and pose, and *none of these*.
+
+use super::evidence::{NoiseModel, TouchEvidence};
+use super::library::{Library, LibraryObject};
+use super::particles::{Model, Particles, log_sum_exp, systematic};
+use super::pose_prior::PosePrior;
+use crate::probe::{SweptVolume, Touch};
+use crate::task::{Approach, Target, Task};
+use nalgebra::{Isometry3, Point3, Vector3};
+use palpate_geometry::sweep::Capsule;
+use palpate_input::config::{Rules, Validate};
+use rand::{Rng, RngExt};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Settings of the hypotheses: noise, and the hypothesis *none of these*.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecognitionSettings {
+    /// Prior probability that the object is none of the library.
+    pub none_probability: f64,
+    /// Standard deviation of a contact along the normal, m, on top of its sensor's: of the finger's
+    /// pose and of the mesh.
+    pub contact_sd_m: f64,
+    /// Standard deviation of a contact's normal about each of two axes, deg.
+    pub normal_sd_deg: f64,
+    /// Share of contacts that are anywhere, e.g. on something else.
+    pub outliers: f64,
+    /// Number of poses per object.
+    pub particles: u32,
+}
+
+impl Default for RecognitionSettings {
+    /// Returns the defaults.
+    fn default() -> Self {
+        // heuristics: a stylus on a calibrated arm, a mesh of a CAD model, and one contact in a
+        // thousand on something else.
+        Self {
+            none_probability: 0.05,
+            contact_sd_m: 5e-4,
+            normal_sd_deg: 10.0,
+            outliers: 1e-3,
+            particles: 256,
+        }
+    }
+}
+
+impl Validate for RecognitionSettings {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("none_probability", self.none_probability, 0.0..=0.999);
+        rules.number("contact_sd_m", self.contact_sd_m, 1e-6..=0.1);
+        rules.number("normal_sd_deg", self.normal_sd_deg, 0.1..=180.0);
+        rules.number("outliers", self.outliers, 1e-12..=0.5);
+        rules.number("particles", self.particles.into(), 8.0..=1e5);
+    }
+}
+
+/// Noise of a shape near to one of the library: the object *none of these* is often of their kind.
+// heuristic: a tenth of an object for a hand, and normals that hardly agree.
+const NEAR_SHAPE: NoiseModel =
+    NoiseModel { contact_sd_m: 6e-3, normal_sd_rad: 0.6, outliers: 0.05 };
+
+/// Part of the poses that the hypothesis of a near shape has.
+const NEAR_PART: u32 = 4;
+
+/// Logarithm of the probability, relative to the best object, below which an object is left out of
+/// further touches.
+// heuristic: three contacts that fit exactly would not make up for it.
+const HOPELESS: f64 = -30.0;
+
+/// Depth by which the tip of a soft finger passes the surface at contact, m.
+// heuristic: the press depth of a BioTac and its margin.
+const SOFT_SLACK_M: f64 = 2e-3;
+
+/// A possible object at a possible pose.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    /// Number of the object in the library.
+    pub object: usize,
+    /// Pose of the object's frame in `W`.
+    pub x_wo: Isometry3<f64>,
+}
+
+/// Estimate of the most likely object's pose.
+#[derive(Clone, Debug)]
+pub struct PoseEstimate {
+    /// Number of the object in the library.
+    pub object: usize,
+    /// Pose of the object's frame in `W` with the smallest expected distance of surfaces.
+    pub x_wo: Isometry3<f64>,
+    /// Distance of the surfaces, m, that the pose exceeds with a probability of 5 %.
+    pub distance_95_m: f64,
+}
+
+/// Number of poses among which an estimate is found, and the step between the points of its
+/// distances; heuristics.
+const ESTIMATED: usize = 24;
+const POINT_STEP: usize = 8;
+
+/// Posterior over objects and poses.
+#[derive(Clone)]
+pub struct ObjectHypotheses {
+    library: Arc<Library>,
+    prior: Arc<PosePrior>,
+    settings: RecognitionSettings,
+    task: Task,
+    slack_m: f64,
+    touches: Vec<Arc<TouchEvidence>>,
+    objects: Vec<ObjectPosterior>,
+    near: Vec<ObjectPosterior>,
+}
+
+/// Poses of an object with their own random numbers, so that objects are updated side by side.
+#[derive(Clone)]
+struct ObjectPosterior {
+    particles: Particles,
+    random: ChaCha8Rng,
+    /// Whether it still takes part.
+    is_possible: bool,
+}
+
+impl ObjectHypotheses {
+    /// Creates the prior: all objects are equally likely. The flag marks a soft finger.
+    pub fn new(
+        library: Arc<Library>,
+        prior: PosePrior,
+        settings: RecognitionSettings,
+        (task, is_soft): (&Task, bool),
+        random: &mut ChaCha8Rng,
+    ) -> Self {
+        let slack_m = if is_soft { SOFT_SLACK_M } else { 0.0 };
+        let mut made = Self {
+            library,
+            prior: Arc::new(prior),
+            settings,
+            task: task.clone(),
+            slack_m,
+            touches: Vec::new(),
+            objects: Vec::new(),
+            near: Vec::new(),
+        };
+        let mut bank = |count: u32, noise: NoiseModel| -> Vec<ObjectPosterior> {
+            let numbers = 0..made.library.objects().len();
+            let posterior = numbers.map(|number| {
+                let mut random: ChaCha8Rng = rand::SeedableRng::from_rng(&mut *random);
+                let particles =
+                    Particles::new(&made.model(number, &[], noise), count as usize, &mut random);
+                ObjectPosterior { particles, random, is_possible: true }
+            });
+            posterior.collect()
+        };
+        let objects = bank(made.settings.particles, made.noise());
+        let near = bank((made.settings.particles / NEAR_PART).max(8), NEAR_SHAPE);
+        (made.objects, made.near) = (objects, near);
+        made
+    }
+
+    fn noise(&self) -> NoiseModel {
+        NoiseModel {
+            contact_sd_m: self.settings.contact_sd_m,
+            normal_sd_rad: self.settings.normal_sd_deg.to_radians(),
+            outliers: self.settings.outliers,
+        }
+    }
+
+    fn model<'a>(
+        &'a self,
+        number: usize,
+        touches: &'a [Arc<TouchEvidence>],
+        noise: NoiseModel,
+    ) -> Model<'a> {
+        Model { object: &self.library.objects()[number], prior: &self.prior, touches, noise }
+    }
+
+    /// The objects.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// The task of the touches.
+    pub fn task(&self) -> &Task {
+        &self.task
+    }
+
+    /// Takes in a touch; nothing after an overload.
+    pub(crate) fn observe(&mut self, approach: &Approach, touched: (&Touch, Option<&SweptVolume>)) {
+        let Some(evidence) = TouchEvidence::new(approach, touched, self.slack_m) else { return };
+        self.touches.push(Arc::new(evidence));
+        let (noise, touches) = (self.noise(), self.touches.clone());
+        for (of_objects, noise) in [(true, noise), (false, NEAR_SHAPE)] {
+            let bank = if of_objects { &mut self.objects } else { &mut self.near };
+            let mut bank = std::mem::take(bank);
+            bank.par_iter_mut().enumerate().filter(|(_, it)| it.is_possible).for_each(
+                |(number, posterior)| {
+                    let ObjectPosterior { particles, random, .. } = posterior;
+                    particles.update(&self.model(number, &touches, noise), random);
+                },
+            );
+            *(if of_objects { &mut self.objects } else { &mut self.near }) = bank;
+        }
+        let evidences = self.objects.iter().map(|it| it.particles.log_evidence);
+        let best = evidences.fold(f64::NEG_INFINITY, f64::max);
+        for posterior in &mut self.objects {
+            posterior.is_possible &= posterior.particles.log_evidence > best + HOPELESS;
+        }
+    }
+
+    /// Probability of each object, then that of none of these.
+    pub fn probabilities(&self) -> Vec<f64> {
+        let count = self.objects.len() as f64;
+        let none = self.settings.none_probability;
+        let each = |bank: &[ObjectPosterior]| -> Vec<f64> {
+            bank.iter().map(|it| it.particles.log_evidence).collect()
+        };
+        let mut logs = each(&self.objects);
+        logs.iter_mut().for_each(|log| *log += ((1.0 - none) / count).ln());
+        // Half of the other shapes are near to one of the library.
+        let near = log_sum_exp(&each(&self.near)) - count.ln();
+        logs.push(none.ln() + log_sum_exp(&[0.0, near]) - 2f64.ln());
+        let sum = log_sum_exp(&logs);
+        logs.into_iter().map(|log| (log - sum).exp()).collect()
+    }
+
+    /// Whether none of the objects is more likely than not.
+    pub fn is_unknown(&self) -> bool {
+        self.probabilities().last().is_some_and(|none| *none > 0.5)
+    }
+
+    /// Draws `count` hypotheses by their probability, evenly over the posterior.
+    pub fn draw(&self, count: usize, random: &mut impl Rng) -> Vec<Hypothesis> {
+        let probabilities = self.probabilities();
+        let weighted = self.objects.iter().zip(probabilities).enumerate().flat_map(
+            |(object, (posterior, probability))| {
+                let weighted = posterior.particles.weighted();
+                weighted.map(move |(x_wo, weight)| (object, x_wo, weight * probability))
+            },
+        );
+        let weighted: Vec<_> = weighted.collect();
+        let sum: f64 = weighted.iter().map(|it| it.2).sum();
+        let weights = weighted.iter().map(|it| it.2 / sum);
+        let drawn = systematic(weights, count, random.random());
+        drawn
+            .into_iter()
+            .map(|i| Hypothesis { object: weighted[i].0, x_wo: *weighted[i].1 })
+            .collect()
+    }
+
+    /// Returns the pose of the most likely object.
+    pub fn estimate(&self) -> PoseEstimate {
+        let likely = self
+            .objects
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1.particles.log_evidence.total_cmp(&b.1.particles.log_evidence));
+        let (number, posterior) = likely.unwrap_or((0, &self.objects[0]));
+        let object = &self.library.objects()[number];
+        let weighted: Vec<_> = posterior.particles.weighted().collect();
+        let drawn = systematic(weighted.iter().map(|it| it.1), ESTIMATED, 0.5);
+        let poses: Vec<&Isometry3<f64>> = drawn.into_iter().map(|i| weighted[i].0).collect();
+        let distances_m = |from: &Isometry3<f64>| -> Vec<f64> {
+            let to = poses.iter();
+            to.map(|to| object.sampled_distance_m(to, from, POINT_STEP)).collect()
+        };
+        let mean_m = |from: &Isometry3<f64>| distances_m(from).iter().sum::<f64>();
+        let scored = poses.iter().map(|pose| (mean_m(pose), **pose));
+        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
+        let x_wo = best.map_or_else(Isometry3::identity, |(_, pose)| pose);
+        // Over all particles, because the quantile is in the tail.
+        let step = (weighted.len() / 128).max(1);
+        let mut away: Vec<(f64, f64)> = (weighted.iter().step_by(step))
+            .map(|(pose, weight)| (object.sampled_distance_m(pose, &x_wo, POINT_STEP), *weight))
+            .collect();
+        away.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let whole: f64 = away.iter().map(|it| it.1).sum();
+        let mut passed = 0.0;
+        let within = away.iter().find(|(_, weight)| {
+            passed += weight;
+            passed >= 0.95 * whole
+        });
+        let distance_95_m = within.map_or(0.0, |it| it.0);
+        PoseEstimate { object: number, x_wo, distance_95_m }
+    }
+
+    /// Returns a point of a hypothesis's surface, in `W`, with the number of the point among its
+    /// samples.
+    pub fn surface_point_w(&self, hypothesis: &Hypothesis, number: usize) -> Point3<f64> {
+        let samples = &self.library.objects()[hypothesis.object].samples;
+        hypothesis.x_wo * samples[number % samples.len()]
+    }
+
+    /// Predicts the contact of a touch for a hypothesis: the tip's way from the approach's nearest
+    /// point, m, and the contact's normal in `W`. Returns `None` for a miss.
+    pub fn predict(
+        &self,
+        hypothesis: &Hypothesis,
+        approach: &Approach,
+    ) -> Option<(f64, Vector3<f64>)> {
+        let finger = self.task.finger();
+        let object: &LibraryObject = &self.library.objects()[hypothesis.object];
+        let ahead_w = approach.direction_w();
+        let before_m = finger.radius_m + finger.length_m;
+        let start_w = approach.p_near_w - ahead_w.scale(before_m);
+        let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
+        let x_wo = &hypothesis.x_wo;
+        let p0_w = x_wo.inverse_transform_point(&start_w);
+        let p1_w = p0_w + x_wo.inverse_transform_vector(&axis_w);
+        let hull = Capsule { p0_w, p1_w, radius_m: finger.radius_m };
+        let ahead_o = x_wo.inverse_transform_unit_vector(&ahead_w);
+        let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + finger.radius_m;
+        let hit = object.bvh.sweep(&hull, &ahead_o, way_m)?;
+        Some((hit.travel_m - before_m, x_wo * hit.normal))
+    }
+
+    /// Returns the approach to a target, if the finger reaches it.
+    pub fn approach(&self, target: &Target) -> Option<Approach> {
+        self.task.approach(target).filter(|_| self.task.region().contains(target))
+    }
+}

@@ -1,0 +1,104 @@
+//! Library: the objects that may be in the region, each with its mesh.
+
+use nalgebra::{Isometry3, Point3};
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::low_discrepancy::over_surface;
+use palpate_geometry::mesh::Mesh;
+use palpate_input::error::InputError;
+use std::sync::Arc;
+
+/// Number of points of a surface that pose errors and plans are computed from.
+// heuristic: about 5 mm apart on an object of the size of a mug.
+const SAMPLES: usize = 256;
+
+/// An object whose shape is known.
+pub struct LibraryObject {
+    /// Name: that of the mesh file without its ending.
+    pub name: String,
+    /// Mesh in the frame `O`, whose origin is the middle of the mesh's box.
+    pub bvh: MeshBvh,
+    /// Origin of `O` in the frame of the mesh file, m.
+    pub middle_m: Point3<f64>,
+    /// Height of the origin of `O` above the lowest point of the mesh, m.
+    pub stand_m: f64,
+    /// Points evenly spread over the surface, in `O`.
+    pub samples: Vec<Point3<f64>>,
+}
+
+impl LibraryObject {
+    /// Creates an object from its mesh in the frame of its file, m.
+    pub fn new(name: impl Into<String>, mesh: &Mesh) -> Self {
+        let (low, high) = mesh.bounds();
+        let middle_m = nalgebra::center(&low, &high);
+        let bvh = MeshBvh::new(mesh.transformed(&Isometry3::from(-middle_m.coords)));
+        let samples = over_surface(bvh.mesh(), SAMPLES).into_iter().map(|at| at.point).collect();
+        Self { name: name.into(), bvh, middle_m, stand_m: (high.z - low.z) / 2.0, samples }
+    }
+
+    /// Pose of the frame of the mesh file in `O`.
+    pub fn x_om(&self) -> Isometry3<f64> {
+        Isometry3::from(-self.middle_m.coords)
+    }
+
+    /// Largest distance of the mesh from the origin of `O`, m.
+    pub fn radius_m(&self) -> f64 {
+        let vertices = self.bvh.mesh().vertices().iter();
+        vertices.map(|vertex| vertex.coords.norm()).fold(0.0, f64::max)
+    }
+
+    /// Returns the mean distance between the surface at the pose `x_wo` and at the pose `other`, m:
+    /// the mean over points of the one to the nearest point of the other. Poses that a symmetry of
+    /// the object makes equal are at distance zero (ADD-S, Hinterstoisser et al. 2012, with the
+    /// surface in place of the points of the model).
+    pub fn surface_distance_m(&self, x_wo: &Isometry3<f64>, other: &Isometry3<f64>) -> f64 {
+        self.sampled_distance_m(x_wo, other, 1)
+    }
+
+    /// Returns the distance of [`Self::surface_distance_m`] over one of `step` points.
+    pub(super) fn sampled_distance_m(
+        &self,
+        x_wo: &Isometry3<f64>,
+        other: &Isometry3<f64>,
+        step: usize,
+    ) -> f64 {
+        let between = other.inv_mul(x_wo);
+        let points = self.samples.iter().step_by(step);
+        let count = points.len().max(1) as f64;
+        points.map(|p_o| self.bvh.closest_point(&(between * p_o)).distance_m).sum::<f64>() / count
+    }
+}
+
+/// Objects that may be in the region.
+pub struct Library {
+    objects: Vec<Arc<LibraryObject>>,
+}
+
+impl Library {
+    /// Creates a library.
+    ///
+    /// # Errors
+    /// If it is empty, or two objects have the same name.
+    pub fn new(objects: Vec<Arc<LibraryObject>>) -> Result<Self, InputError> {
+        if objects.is_empty() {
+            return Err(InputError::new("the library has no objects"));
+        }
+        let named = |i: usize| objects[..i].iter().any(|other| other.name == objects[i].name);
+        match (0..objects.len()).find(|&i| named(i)) {
+            Some(i) => {
+                let name = &objects[i].name;
+                Err(InputError::new(format!("the library has two objects \"{name}\"")))
+            }
+            None => Ok(Self { objects }),
+        }
+    }
+
+    /// Returns the objects.
+    pub fn objects(&self) -> &[Arc<LibraryObject>] {
+        &self.objects
+    }
+
+    /// Returns the number of the object with this name.
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.objects.iter().position(|object| object.name == name)
+    }
+}

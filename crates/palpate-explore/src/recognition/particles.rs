@@ -1,0 +1,264 @@
+//! Sequential Monte Carlo over the poses of one object (Del Moral et al. 2006): each touch enters at
+//! a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
+//! Calderhead 2011) on all touches so far.
+
+use super::evidence::{LogLikelihood, NoiseModel, TouchEvidence, TouchFit};
+use super::library::LibraryObject;
+use super::pose_prior::{PosePrior, moved};
+use nalgebra::{Cholesky, Const, Isometry3, Matrix6, Vector6};
+use rand::{Rng, RngExt};
+use std::sync::Arc;
+
+/// Effective share of particles that a step of the temperature keeps.
+// heuristic: usual for tempering.
+const ESS: f64 = 0.5;
+
+/// Moves of each particle after a resampling.
+// heuristic: two, each with an acceptance of about a half, renew three quarters.
+const MOVES: usize = 2;
+
+/// Largest and smallest temperature, m: the size of a region and below any contact's deviation.
+const TAU_M: [f64; 2] = [1.0, 1e-5];
+
+/// Length of a Langevin step in units of the posterior's deviation.
+// heuristic: near the optimal acceptance of 0.57 in six dimensions.
+const STEP: f64 = 1.0;
+
+/// A pose with its residuals.
+#[derive(Clone)]
+struct Particle {
+    x_wo: Isometry3<f64>,
+    fits: Vec<TouchFit>,
+}
+
+/// Posterior of one object's pose, and the evidence for the object.
+#[derive(Clone)]
+pub(super) struct Particles {
+    particles: Vec<Particle>,
+    /// Logarithms of the weights, normalised.
+    log_weights: Vec<f64>,
+    /// Logarithm of the likelihood ratio of all touches, over the prior of the pose.
+    pub log_evidence: f64,
+}
+
+/// What the particles of an object share.
+pub(super) struct Model<'a> {
+    pub object: &'a LibraryObject,
+    pub prior: &'a PosePrior,
+    pub touches: &'a [Arc<TouchEvidence>],
+    pub noise: NoiseModel,
+}
+
+impl Particles {
+    /// Draws `count` poses from the prior, evenly spread.
+    pub fn new(model: &Model, count: usize, random: &mut impl Rng) -> Self {
+        let seed = random.next_u32();
+        let pose = |i: usize| {
+            let number = |axis| f64::from(sobol_burley::sample(i as u32, axis, seed));
+            model.prior.at(model.object, std::array::from_fn(|axis| number(axis as u32)))
+        };
+        let particles = (0..count).map(|i| Particle { x_wo: pose(i), fits: Vec::new() }).collect();
+        Self { particles, log_weights: vec![-(count as f64).ln(); count], log_evidence: 0.0 }
+    }
+
+    /// Returns the poses and their weights.
+    pub fn weighted(&self) -> impl Iterator<Item = (&Isometry3<f64>, f64)> {
+        let weights = self.log_weights.iter().map(|log| log.exp());
+        self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
+    }
+
+    /// Takes in the last of the model's touches.
+    pub fn update(&mut self, model: &Model, random: &mut impl Rng) {
+        let Some(last) = model.touches.last() else { return };
+        for particle in &mut self.particles {
+            particle.fits.push(last.fit(model.object, &particle.x_wo));
+        }
+        let mut tau_m = f64::INFINITY;
+        while tau_m > 0.0 {
+            let before = self.logs(model, tau_m);
+            let gains = |tau_m: f64| -> Vec<f64> {
+                let after = self.logs(model, tau_m);
+                after.iter().zip(&before).map(|(after, before)| after - before).collect()
+            };
+            let (next_m, gained) = self.next_temperature(tau_m, &gains);
+            self.reweight(&gained);
+            tau_m = next_m;
+            if self.effective_share() < ESS * 1.5 || tau_m > 0.0 {
+                self.resample(random);
+                for _ in 0..MOVES {
+                    self.advance(model, tau_m, random);
+                }
+            }
+        }
+    }
+
+    /// Log-likelihood ratio of the last touch for each particle at a temperature; 0 at an infinite
+    /// one.
+    fn logs(&self, model: &Model, tau_m: f64) -> Vec<f64> {
+        let last = model.touches.last().filter(|_| tau_m.is_finite());
+        let log = |particle: &Particle| {
+            let mut sum = LogLikelihood::zero();
+            if let (Some(touch), Some(fit)) = (last, particle.fits.last()) {
+                touch.add(fit, &model.noise, tau_m, &mut sum);
+            }
+            sum.value
+        };
+        self.particles.iter().map(log).collect()
+    }
+
+    /// Returns the smallest temperature that keeps enough particles, and what they gain by it.
+    fn next_temperature(&self, from_m: f64, gains: &impl Fn(f64) -> Vec<f64>) -> (f64, Vec<f64>) {
+        let keeps = |gained: &[f64]| self.share_after(gained) >= ESS;
+        let cold = gains(0.0);
+        if keeps(&cold) {
+            return (0.0, cold);
+        }
+        let [most_m, least_m] = TAU_M;
+        let (mut high, mut low) = (from_m.min(most_m).ln(), least_m.ln());
+        for _ in 0..10 {
+            let middle = 0.5 * (high + low);
+            match keeps(&gains(middle.exp())) {
+                true => high = middle,
+                false => low = middle,
+            }
+        }
+        // At the smallest temperature the rest is one step.
+        match high - least_m.ln() < 0.1 {
+            true => (0.0, cold),
+            false => (high.exp(), gains(high.exp())),
+        }
+    }
+
+    /// Effective share of particles after a gain of their log-weights.
+    fn share_after(&self, gained: &[f64]) -> f64 {
+        let logs = self.log_weights.iter().zip(gained).map(|(weight, gain)| weight + gain);
+        let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+        let (sum, squares) = logs.fold((0.0, 0.0), |(sum, squares), log| {
+            let weight = (log - most).exp();
+            (sum + weight, squares + weight * weight)
+        });
+        sum * sum / squares / self.particles.len() as f64
+    }
+
+    fn effective_share(&self) -> f64 {
+        self.share_after(&vec![0.0; self.particles.len()])
+    }
+
+    fn reweight(&mut self, gained: &[f64]) {
+        self.log_weights.iter_mut().zip(gained).for_each(|(weight, gain)| *weight += gain);
+        let sum = log_sum_exp(&self.log_weights);
+        self.log_weights.iter_mut().for_each(|weight| *weight -= sum);
+        self.log_evidence += sum;
+    }
+
+    /// Draws particles by their weights, systematically.
+    fn resample(&mut self, random: &mut impl Rng) {
+        let count = self.particles.len();
+        let drawn = systematic(self.weighted().map(|(_, weight)| weight), count, random.random());
+        self.particles = drawn.into_iter().map(|i| self.particles[i].clone()).collect();
+        self.log_weights.fill(-(count as f64).ln());
+    }
+
+    /// Moves every particle by one step with the posterior at the temperature as its invariant.
+    fn advance(&mut self, model: &Model, tau_m: f64, random: &mut impl Rng) {
+        let free = model.prior.free();
+        for particle in &mut self.particles {
+            let normals = Vector6::from_fn(|i, _| if free[i] { normal(random) } else { 0.0 });
+            let accepts: f64 = random.random();
+            let here = Langevin::new(model, &particle.fits, tau_m);
+            let step = here.step(&normals);
+            let x_wo = moved(&particle.x_wo, &step);
+            if !model.prior.contains(model.object, &x_wo) {
+                continue;
+            }
+            let fits: Vec<TouchFit> =
+                model.touches.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
+            let there = Langevin::new(model, &fits, tau_m);
+            let log =
+                there.value - here.value + there.log_density(&-step) - here.log_density(&step);
+            if accepts.ln() < log {
+                *particle = Particle { x_wo, fits };
+            }
+        }
+    }
+}
+
+/// Proposal of a Langevin step from a pose.
+struct Langevin {
+    value: f64,
+    drift: Vector6<f64>,
+    information: Cholesky<f64, Const<6>>,
+}
+
+impl Langevin {
+    fn new(model: &Model, fits: &[TouchFit], tau_m: f64) -> Self {
+        let mut sum = LogLikelihood::zero();
+        for (i, (touch, fit)) in model.touches.iter().zip(fits).enumerate() {
+            let tau_m = if i + 1 == model.touches.len() { tau_m } else { 0.0 };
+            touch.add(fit, &model.noise, tau_m, &mut sum);
+        }
+        let free = model.prior.free();
+        let is_free = |i: usize, j: usize| if free[i] && free[j] { 1.0 } else { 0.0 };
+        let mask = Matrix6::from_fn(is_free);
+        let information = sum.information.component_mul(&mask) + model.prior.precision();
+        let gradient = sum.gradient.component_mul(&mask.diagonal());
+        // The precision of the prior is positive, so that only overflow fails.
+        let information =
+            Cholesky::new(information).unwrap_or_else(|| Cholesky::pack_dirty(Matrix6::identity()));
+        let drift = information.solve(&gradient) * (0.5 * STEP * STEP);
+        Self { value: sum.value, drift, information }
+    }
+
+    /// Returns the step for standard normal numbers.
+    fn step(&self, normals: &Vector6<f64>) -> Vector6<f64> {
+        let mut across = *normals;
+        // Lᵀ x = z gives the covariance (L Lᵀ)⁻¹.
+        self.information.l_dirty().tr_solve_lower_triangular_mut(&mut across);
+        self.drift + across * STEP
+    }
+
+    /// Logarithm of the density of a step, up to a constant.
+    fn log_density(&self, step: &Vector6<f64>) -> f64 {
+        let lower = self.information.l();
+        let off = (lower.transpose() * (step - self.drift)) / STEP;
+        let log_determinant: f64 = lower.diagonal().iter().map(|x| x.ln()).sum();
+        log_determinant - 0.5 * off.norm_squared()
+    }
+}
+
+/// Returns the numbers of `count` items drawn with these weights at equal steps from the offset
+/// `start`, from 0 to 1.
+pub(super) fn systematic(
+    weights: impl Iterator<Item = f64>,
+    count: usize,
+    start: f64,
+) -> Vec<usize> {
+    let mut drawn = Vec::with_capacity(count);
+    let mut passed = 0.0;
+    let mut last = 0;
+    for (i, weight) in weights.enumerate() {
+        passed += weight * count as f64;
+        while drawn.len() < count && drawn.len() as f64 + start < passed {
+            drawn.push(i);
+        }
+        last = i;
+    }
+    // Rounding of the sum.
+    drawn.resize(count, last);
+    drawn
+}
+
+/// Returns the logarithm of a sum of exponentials; −∞ for an empty one.
+pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match most.is_finite() {
+        true => most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln(),
+        false => most,
+    }
+}
+
+/// Returns a standard normal number (Box & Muller 1958).
+fn normal(random: &mut impl Rng) -> f64 {
+    let [u, v]: [f64; 2] = random.random();
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}

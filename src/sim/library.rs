@@ -1,0 +1,166 @@
+//! Table `[library]`: the objects of a folder, of which each trial touches one at a drawn pose.
+
+use super::scene::{ObjectSettings, Scene, Unit};
+use nalgebra::{Isometry3, Vector3};
+use palpate_explore::recognition::{Library, LibraryObject, PosePrior};
+use palpate_geometry::import::{import, is_mesh_file};
+use palpate_gp::math::pose::parts;
+use palpate_gp::math::seed;
+use palpate_input::config::{Rules, Validate, is_default};
+use palpate_input::error::InputError;
+use rand::{Rng, RngExt};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Table `[library]`: meshes of a folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LibrarySettings {
+    /// Folder with mesh files, relative to the scene file. Their z axis points up.
+    pub folder: PathBuf,
+    /// Unit of the mesh files.
+    #[serde(default)]
+    pub unit: Unit,
+    /// Names of the objects, without the endings of their files; default: all of the folder.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub objects: Vec<String>,
+    /// Names of objects that trials touch too, and that no hypothesis has: none of these.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub unknown: Vec<String>,
+}
+
+impl Validate for LibrarySettings {
+    fn check(&self, rules: &mut Rules) {
+        let is_named = !self.folder.as_os_str().is_empty();
+        rules.require("folder", "\"\"", is_named, || "the name of a folder with meshes".into());
+    }
+}
+
+/// Purpose of the random numbers that draw an object.
+pub const OBJECT: &str = "object";
+
+/// Margin of the default ball around all objects at all poses.
+// heuristic: approaches begin beside the objects.
+const ROOMIER: f64 = 1.05;
+
+/// Objects of a library, with their files.
+pub struct LoadedLibrary {
+    /// Objects of the hypotheses.
+    pub known: Arc<Library>,
+    /// Objects of the trials: those of the hypotheses, then the unknown ones.
+    all: Vec<(PathBuf, Arc<LibraryObject>)>,
+    unit: Unit,
+}
+
+/// Object of a trial, as drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueObject {
+    /// Name.
+    pub name: String,
+    /// Number in the library; `None` for an unknown object.
+    pub number: Option<usize>,
+    /// Pose of its frame `O` in `W`.
+    pub x_wo: Isometry3<f64>,
+}
+
+impl LoadedLibrary {
+    /// Reads the meshes of a library.
+    ///
+    /// # Errors
+    /// If the folder cannot be read, lacks an object or has no mesh, or a mesh cannot be read.
+    pub fn read(settings: &LibrarySettings) -> Result<Self, InputError> {
+        let LibrarySettings { folder, unit, objects, unknown } = settings;
+        let failed = |words: String| InputError::new(words).at("library.folder");
+        let entries = std::fs::read_dir(folder)
+            .map_err(|error| failed(format!("{}: {error}", folder.display())))?;
+        let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+        let mut files: Vec<(String, PathBuf)> = (paths.filter(|path| is_mesh_file(path)))
+            .map(|path| (path.file_stem().unwrap_or_default().to_string_lossy().into(), path))
+            .collect();
+        files.sort();
+        if files.is_empty() {
+            let formats = "at least one .obj, .gltf, .glb, .stl or .ply file";
+            return Err(failed(format!("{} has no mesh; allowed is {formats}", folder.display())));
+        }
+        let names = || files.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+        for (key, listed) in [("objects", objects), ("unknown", unknown)] {
+            let lacks = |name: &&String| !files.iter().any(|(known, _)| known == *name);
+            if let Some(name) = listed.iter().find(lacks) {
+                let words = format!("\"{name}\" is no mesh of the folder; allowed are {}", names());
+                return Err(InputError::new(words).at(format!("library.{key}")));
+            }
+        }
+        let is_known = |name: &String| {
+            !unknown.contains(name) && (objects.is_empty() || objects.contains(name))
+        };
+        let read = |(name, path): &(String, PathBuf)| {
+            let (mesh, _) = import(path, unit.metres_per_unit())?;
+            Ok((path.clone(), Arc::new(LibraryObject::new(name, &mesh))))
+        };
+        let chosen = |is_chosen: &dyn Fn(&String) -> bool| {
+            files.iter().filter(|(name, _)| is_chosen(name)).map(read).collect()
+        };
+        let mut all: Vec<(PathBuf, Arc<LibraryObject>)> = chosen(&is_known)?;
+        let known = all.iter().map(|(_, object)| Arc::clone(object)).collect();
+        let known = Library::new(known).map_err(|error| error.at("library"))?;
+        let others: Result<Vec<_>, InputError> = chosen(&|name| unknown.contains(name));
+        all.extend(others?);
+        Ok(Self { known: Arc::new(known), all, unit: *unit })
+    }
+
+    /// Fills in the ball of a scene around all objects at all poses.
+    pub fn complete(&self, scene: &mut Scene) {
+        let prior = scene.pose.clone().unwrap_or_default();
+        let Some(around) = &mut scene.whole_object else { return };
+        let stands_m = self.all.iter().map(|(_, object)| prior.middle(object).z);
+        let [low_m, high_m] = stands_m
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
+                [f64::min(low, z), f64::max(high, z)]
+            });
+        let [x, y, _] = prior.position_m;
+        let centre_m = *around.centre_m.get_or_insert([x, y, 0.5 * (low_m + high_m)]);
+        let widest_m = Vector3::from(prior.half_width_m).norm();
+        let farthest_m = self.all.iter().map(|(_, object)| {
+            (prior.middle(object).coords - Vector3::from(centre_m)).norm() + object.radius_m()
+        });
+        let radius_m = ROOMIER * (farthest_m.fold(0.0, f64::max) + widest_m);
+        around.radius_m.get_or_insert(radius_m);
+    }
+
+    /// Returns a scene with an object of the library, for what needs no trial.
+    pub fn first(&self, mut scene: Scene) -> Scene {
+        self.complete(&mut scene);
+        let prior = scene.pose.clone().unwrap_or_default();
+        self.place(&scene, &self.draw(&prior, 0, &mut seed::stream(0, 0, OBJECT)))
+    }
+
+    /// Draws the object of a trial and its pose: objects in turn, poses from the prior.
+    pub fn draw(&self, prior: &PosePrior, trial: u32, random: &mut impl Rng) -> TrueObject {
+        let number = trial as usize % self.all.len();
+        let object = &self.all[number].1;
+        let x_wo = prior.at(object, random.random());
+        let name = object.name.clone();
+        TrueObject { number: self.known.position(&name), name, x_wo }
+    }
+
+    /// Returns a scene with an object drawn for it.
+    pub fn place(&self, scene: &Scene, drawn: &TrueObject) -> Scene {
+        let found = self.all.iter().find(|(_, object)| object.name == drawn.name);
+        let object = found.map(|(mesh, object)| {
+            let (position_m, rotation_deg) = parts(&(drawn.x_wo * object.x_om()));
+            ObjectSettings {
+                mesh: mesh.clone(),
+                allow_external_buffers: false,
+                unit: self.unit,
+                scale: 1.0,
+                position_m,
+                rotation_deg,
+                fill_holes: true,
+                truth: None,
+            }
+        });
+        Scene { object, ..scene.clone() }
+    }
+}
