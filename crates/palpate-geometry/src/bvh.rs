@@ -251,6 +251,9 @@ impl MeshBvh {
         if let Some(triangle) = self.overlap(capsule) {
             return Some(self.contact(capsule, direction, 0.0, triangle));
         }
+        // A capsule that moves along its axis meets first what its leading end meets.
+        let (whole, leading) = (capsule, capsule.leading(direction));
+        let capsule = leading.as_ref().unwrap_or(capsule);
         let slab = Slab::new(&(capsule.p0_w - self.centre), direction);
         let body = Box3::swept(capsule);
         let sweep = Sweep::new(capsule, *direction);
@@ -272,7 +275,7 @@ impl MeshBvh {
                 }
                 match sweep.travel_m(&corners).filter(|&travel_m| travel_m < limit_m) {
                     Some(travel_m) => {
-                        let contact = self.contact(capsule, direction, travel_m, triangle);
+                        let contact = self.contact(whole, direction, travel_m, triangle);
                         wall.set(Wall::new(capsule, &self.centre, direction, &contact.normal));
                         hit = Some(contact);
                         travel_m

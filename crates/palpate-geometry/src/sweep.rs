@@ -11,6 +11,9 @@ const TOUCH_M: f64 = 1e-11;
 /// Squared sine below which a motion is parallel to an edge and meets only the corners at its ends.
 const PARALLEL: f64 = 1e-24;
 
+/// Relative distance from a line at which an axis is parallel to it.
+const ROUNDING: f64 = 1e-12;
+
 /// All points within `radius_m` of a segment. Equal ends give a sphere, a zero radius a segment or
 /// a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +30,15 @@ impl Capsule {
     /// Creates a sphere.
     pub fn sphere(centre_w: Point3<f64>, radius_m: f64) -> Self {
         Self { p0_w: centre_w, p1_w: centre_w, radius_m }
+    }
+
+    /// Returns the sphere at the leading end of a capsule whose axis is parallel to `direction`.
+    pub fn leading(&self, direction: &UnitVector3<f64>) -> Option<Self> {
+        let axis = self.p1_w - self.p0_w;
+        let along_m = axis.dot(direction);
+        let is_parallel = (axis - direction.scale(along_m)).norm() <= ROUNDING * axis.norm();
+        let end_w = if along_m > 0.0 { self.p1_w } else { self.p0_w };
+        is_parallel.then(|| Self::sphere(end_w, self.radius_m))
     }
 
     /// Returns the nearest points of the axis and a triangle, in this order.
