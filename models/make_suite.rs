@@ -5,9 +5,11 @@
 //! heuristic, so that the objects differ: full faces and silhouettes over a third of their zone,
 //! holes, thin parts, steps, undercuts, reliefs, several pieces, tilted, small and large ones.
 
+mod fields;
 mod meshing;
 
 use anyhow::{Context, Result};
+use fields::{EDGE_M, ball, cuboid, disc, ellipsoid, half_space, rod, together, without};
 use meshing::{glb, nets};
 use nalgebra::{Point3, Vector3, point, vector};
 use palpate::geometry::implicit::{Field, ImplicitSolid};
@@ -18,8 +20,6 @@ use std::path::Path;
 const CELLS: f64 = 36.0;
 /// Cell of an object with narrow parts, metres.
 const FINE_M: f64 = 0.0025;
-/// Radius of rounded edges, metres.
-const EDGE_M: f64 = 0.003;
 /// Base colour.
 const CLAY: (&str, [f64; 3]) = ("clay", [0.75, 0.55, 0.4]);
 
@@ -178,50 +178,6 @@ impl ImplicitSolid for Shape {
         let half_m = Vector3::from(self.half_m).add_scalar(EDGE_M);
         [Point3::from(-half_m), Point3::from(half_m)]
     }
-}
-
-fn ball(p: Point3<f64>, at: Point3<f64>, radius_m: f64) -> Field {
-    ellipsoid(p, at, [radius_m; 3])
-}
-
-fn ellipsoid(p: Point3<f64>, at: Point3<f64>, radii_m: [f64; 3]) -> Field {
-    Field::ellipsoid(p - at, radii_m.into())
-}
-
-fn rod(p: Point3<f64>, a: Point3<f64>, b: Point3<f64>, radius_m: f64) -> Field {
-    Field::round_cone(p, (a, radius_m), (b, radius_m))
-}
-
-fn half_space(p: Point3<f64>, at: Point3<f64>, outward: Vector3<f64>) -> Field {
-    Field::plane(p, at, outward.normalize())
-}
-
-/// Returns a box with rounded edges.
-fn cuboid(p: Point3<f64>, at: Point3<f64>, half_m: [f64; 3]) -> Field {
-    let sides = [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().zip(half_m);
-    let planes = sides.flat_map(|(axis, half_m)| {
-        [axis, -axis].map(|outward| Field::plane(p, at + outward * half_m, outward))
-    });
-    planes.reduce(|a, b| a.intersection(b, EDGE_M)).unwrap_or(Field::plane(p, at, Vector3::y()))
-}
-
-/// Returns a disc that faces +y.
-fn disc(p: Point3<f64>, at: Point3<f64>, radius_m: f64, half_depth_m: f64) -> Field {
-    let side = Field::ellipsoid(p - at, vector![radius_m, f64::INFINITY, radius_m]);
-    let [front, back] = [Vector3::y(), -Vector3::y()]
-        .map(|outward| Field::plane(p, at + outward * half_depth_m, outward));
-    side.intersection(front, EDGE_M).intersection(back, EDGE_M)
-}
-
-/// Returns the union of `all`.
-fn together(all: impl IntoIterator<Item = Field>, blend_m: f64) -> Field {
-    let far = Field { value: f64::MAX, gradient: Vector3::zeros() };
-    all.into_iter().fold(far, |sum, each| sum.union(each, blend_m))
-}
-
-/// Returns `a` without `b`.
-fn without(a: Field, b: Field) -> Field {
-    a.intersection(Field { value: -b.value, gradient: -b.gradient }, EDGE_M)
 }
 
 /// Eight directions around, the first up, of unit length up to rounding.

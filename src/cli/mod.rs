@@ -15,6 +15,7 @@ mod doctor;
 mod export;
 mod find;
 mod host;
+mod identify;
 mod known_body;
 mod list;
 mod look;
@@ -67,6 +68,7 @@ Examples:
   palpate show my-part.obj --unit mm        check a mesh before exploring it
   palpate show scenes/bird_pa10.toml --watch    a trial in a window
   palpate serve experiments/container_pa10.toml   a simulated robot in place of the real one, over ROS 2
+  palpate identify models/lookalikes scenes/lookalikes.toml
   palpate export runs/bird --planner active --out bird.ply
   palpate export scenes/bird.toml           touch the whole zone, write a point cloud
   palpate run experiments/suite/six.toml    compare planners on several objects
@@ -87,6 +89,8 @@ enum Command {
     Report(report::Args),
     /// Describe a mesh, scene, experiment or run folder; watch a trial in a window.
     Show(show::Args),
+    /// Identify an object of a library, and its pose, by touch.
+    Identify(identify::Args),
     /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts as a point
     /// cloud.
     Export(export::Args),
@@ -124,7 +128,7 @@ enum Command {
 
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
-    ("Explore", &["new", "run", "report", "show", "export"]),
+    ("Explore", &["new", "run", "identify", "report", "show", "export"]),
     ("Evaluate", &["compare", "sensors", "benchmark", "check", "accuracy", "calibrate-band"]),
     ("Robot", &["serve", "look", "register", "replay", "calibrate"]),
     ("More", &[]),
@@ -193,6 +197,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Run(args) => run::run(&args, talk, host),
         Command::Report(args) => report::run(&args, host),
         Command::Show(args) => show::run(&args, talk),
+        Command::Identify(args) => identify::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
         Command::Compare(args) => compare::run(&args),
         Command::Sensors(args) => sensors::run(&args, talk),

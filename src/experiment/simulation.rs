@@ -55,6 +55,14 @@ impl Simulation {
         mut experiment: Experiment,
         tell: &dyn Fn(&str),
     ) -> Result<Self, InputError> {
+        let library = experiment.scene.library.as_ref().map(|settings| {
+            tell("reading the library");
+            LoadedLibrary::read(settings).map(Arc::new)
+        });
+        let library = library.transpose()?;
+        if let Some(library) = &library {
+            library.complete(&mut experiment.scene);
+        }
         real_robot::check(&experiment, false)?;
         if experiment.backend.kind != BackendKind::Simulated {
             // A simulation takes this from the mesh.
@@ -62,17 +70,14 @@ impl Simulation {
                 zone.datum_y_m.get_or_insert(0.0);
             }
         }
-        let library = experiment.scene.library.as_ref().map(|settings| {
-            tell("reading the library");
-            LoadedLibrary::read(settings).map(Arc::new)
-        });
-        if let Some(library) = library.transpose()? {
-            library.complete(&mut experiment.scene);
-            return Self::with_library(experiment, &library, 0);
+        let is_simulated = experiment.backend.kind == BackendKind::Simulated;
+        let is_drawn = is_simulated && experiment.scene.object.is_none();
+        if let Some(library) = library.as_ref().filter(|_| is_drawn) {
+            return Self::with_library(experiment, library, 0);
         }
         let environment = Environment::build_with_progress(experiment.scene.clone(), tell);
         let environment = environment.map_err(|error| InputError::new(error.to_string()))?;
-        Self::sampled(experiment, Arc::new(environment), tell)
+        Self::sampled(experiment, Arc::new(environment), library, tell)
     }
 
     /// Builds the simulation of a trial with an object of a library.
@@ -103,7 +108,8 @@ impl Simulation {
     /// # Errors
     /// If the scene with the object cannot be built or simulated.
     pub fn drawn(&self, trial: u32) -> Result<Option<Self>, InputError> {
-        let Some(library) = self.truth.library.as_ref().filter(|_| !self.is_real()) else {
+        let is_drawn = self.truth.object.is_some();
+        let Some(library) = self.truth.library.as_ref().filter(|_| is_drawn) else {
             return Ok(None);
         };
         Self::with_library(self.experiment.clone(), library, trial).map(Some)
@@ -117,7 +123,7 @@ impl Simulation {
         experiment: Experiment,
         environment: Arc<Environment>,
     ) -> Result<Self, InputError> {
-        Self::sampled(experiment, environment, &|_| ())
+        Self::sampled(experiment, environment, None, &|_| ())
     }
 
     /// Builds the simulation in an environment and samples the ground truth that the experiment
@@ -125,6 +131,7 @@ impl Simulation {
     fn sampled(
         experiment: Experiment,
         environment: Arc<Environment>,
+        library: Option<Arc<LoadedLibrary>>,
         tell: &dyn Fn(&str),
     ) -> Result<Self, InputError> {
         let per_side = experiment.grid as usize;
@@ -142,7 +149,7 @@ impl Simulation {
         }
         let shape = TrueShape::from_environment(&environment);
         tell("compiling the model");
-        let truth = GroundTruth { environment, truth, shape, library: None, object: None };
+        let truth = GroundTruth { environment, truth, shape, library, object: None };
         Ok(Self { scan_notice: scanned, ..Self::made(experiment, truth)? })
     }
 

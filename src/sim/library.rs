@@ -29,6 +29,9 @@ pub struct LibrarySettings {
     /// Names of objects that trials touch too, and that no hypothesis has: none of these.
     #[serde(default, skip_serializing_if = "is_default")]
     pub unknown: Vec<String>,
+    /// Whether the part of a name before `-` is a class, and hypotheses are about classes.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub has_classes: bool,
 }
 
 impl Validate for LibrarySettings {
@@ -61,6 +64,8 @@ pub struct TrueObject {
     pub name: String,
     /// Number in the library; `None` for an unknown object.
     pub number: Option<usize>,
+    /// Class of the object.
+    pub class: String,
     /// Pose of its frame `O` in `W`.
     pub x_wo: Isometry3<f64>,
 }
@@ -71,7 +76,7 @@ impl LoadedLibrary {
     /// # Errors
     /// If the folder cannot be read, lacks an object or has no mesh, or a mesh cannot be read.
     pub fn read(settings: &LibrarySettings) -> Result<Self, InputError> {
-        let LibrarySettings { folder, unit, objects, unknown } = settings;
+        let LibrarySettings { folder, unit, objects, unknown, has_classes } = settings;
         let failed = |words: String| InputError::new(words).at("library.folder");
         let entries = std::fs::read_dir(folder)
             .map_err(|error| failed(format!("{}: {error}", folder.display())))?;
@@ -97,7 +102,8 @@ impl LoadedLibrary {
         };
         let read = |(name, path): &(String, PathBuf)| {
             let (mesh, _) = import(path, unit.metres_per_unit())?;
-            Ok((path.clone(), Arc::new(LibraryObject::new(name, &mesh))))
+            let class = name.split('-').next().filter(|_| *has_classes).unwrap_or(name);
+            Ok((path.clone(), Arc::new(LibraryObject::new(name, &mesh).of_class(class))))
         };
         let chosen = |is_chosen: &dyn Fn(&String) -> bool| {
             files.iter().filter(|(name, _)| is_chosen(name)).map(read).collect()
@@ -141,8 +147,8 @@ impl LoadedLibrary {
         let number = trial as usize % self.all.len();
         let object = &self.all[number].1;
         let x_wo = prior.at(object, random.random());
-        let name = object.name.clone();
-        TrueObject { number: self.known.position(&name), name, x_wo }
+        let (name, class) = (object.name.clone(), object.class.clone());
+        TrueObject { number: self.known.position(&name), name, class, x_wo }
     }
 
     /// Returns a scene with an object drawn for it.

@@ -12,6 +12,7 @@ use super::topics::{Endpoint, Service, Topic};
 use super::transport::{Connect, Packet, cannot_open};
 use super::ur::{TrajectoryStream, stoppable_share};
 use super::view::{MarkerArray, TFMessage};
+use nalgebra::Isometry3;
 use palpate_explore::backend::interlock::check_start;
 use palpate_explore::backend::pace::{self, RealTimePacer};
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
@@ -79,7 +80,7 @@ impl RosArm {
         let (chain, latched, engaged_by) = (chain.clone(), Mutex::default(), Mutex::default());
         let shown = Mutex::default();
         let lab = Arc::new(Self { chain, link, mailbox, latched, engaged_by, shown, _net_ft });
-        lab.show_frames();
+        lab.show_frames(None);
         lab.wait_for_topics()?;
         lab.check_publishers()?;
         Ok(lab)
@@ -139,9 +140,17 @@ impl RosArm {
         self.show(shown.clone());
     }
 
-    /// Publishes the pose of `W` in the frame of the robot's base.
-    fn show_frames(&self) {
+    /// Publishes the pose of a recognised object's mesh in `W` as the frame `object`.
+    pub fn show_object(&self, x_wm: &Isometry3<f64>) {
+        self.show_frames(Some(x_wm));
+    }
+
+    /// Publishes the pose of `W` in the frame of the robot's base, and of an object in `W`.
+    fn show_frames(&self, x_wm: Option<&Isometry3<f64>>) {
         let mut frames = TFMessage::of_base(self.settings().base_frame(), &self.chain.base);
+        if let Some(x_wm) = x_wm {
+            frames = frames.with("object", "W", x_wm);
+        }
         frames.set_stamp(Time::from_s(pace::now_s()));
         self.show(frames);
     }

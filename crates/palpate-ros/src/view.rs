@@ -149,16 +149,19 @@ impl TFMessage {
     /// Returns the pose of `W` in the frame `base_frame` of the robot's base, whose pose in `W` is
     /// `x_wb`.
     pub fn of_base(base_frame: &str, x_wb: &Isometry3<f64>) -> Self {
-        let x_bw = x_wb.inverse();
-        let turn = x_bw.rotation;
+        Self { transforms: Vec::new() }.with("W", base_frame, &x_wb.inverse())
+    }
+
+    /// Adds the pose of the frame `child` in the frame `parent`.
+    pub fn with(mut self, child: &str, parent: &str, pose: &Isometry3<f64>) -> Self {
+        let turn = pose.rotation;
         let transform = Transform {
-            translation: x_bw.translation.vector.into(),
+            translation: pose.translation.vector.into(),
             rotation: Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w },
         };
-        let header = Header::new(0.0, base_frame);
-        Self {
-            transforms: vec![TransformStamped { header, child_frame_id: "W".into(), transform }],
-        }
+        let (header, child_frame_id) = (Header::new(0.0, parent), child.into());
+        self.transforms.push(TransformStamped { header, child_frame_id, transform });
+        self
     }
 
     /// Sets the time of all poses.

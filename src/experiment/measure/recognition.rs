@@ -21,9 +21,9 @@ const FLOOR: f64 = 1e-6;
 /// Hypotheses after a touch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecognitionMetrics {
-    /// Most likely object, or `none`.
+    /// Most likely object or class of objects, or `none`.
     pub object: String,
-    /// Probabilities of at least 0.001, by object; that of none of these as `none`.
+    /// Probabilities of at least 0.001, by object or class; that of none of these as `none`.
     pub probabilities: BTreeMap<String, f64>,
     /// Estimated pose of the most likely object of the library.
     pub pose: PoseRow,
@@ -68,16 +68,17 @@ impl RecognitionMetrics {
     /// Compares hypotheses with the object of the trial, where it is known.
     pub fn of(hypotheses: &ObjectHypotheses, truth: Option<&TrueObject>) -> Self {
         let objects = hypotheses.library().objects();
-        let name =
-            |i: usize| objects.get(i).map_or_else(|| NONE.to_owned(), |object| object.name.clone());
-        let probabilities = hypotheses.probabilities();
+        let classes = hypotheses.library().classes();
+        let name = |i: usize| classes.get(i).map_or_else(|| NONE.to_owned(), String::clone);
+        let probabilities = hypotheses.class_probabilities();
         let best = probabilities.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-        let best = best.map_or(objects.len(), |(i, _)| i);
+        let best = best.map_or(classes.len(), |(i, _)| i);
         let estimate = hypotheses.estimate();
         let object = &objects[estimate.object];
         let (position_m, rotation_deg) = parts(&(estimate.x_wo * object.x_om()));
         let error = truth.map(|truth| {
-            let right = truth.number.unwrap_or(objects.len());
+            let right = classes.iter().position(|class| *class == truth.class);
+            let right = right.unwrap_or(classes.len());
             let is_found = truth.number == Some(estimate.object);
             let between = truth.x_wo.inv_mul(&estimate.x_wo);
             RecognitionError {

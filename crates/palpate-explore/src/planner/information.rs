@@ -4,7 +4,7 @@
 //! Each candidate is touched in thought at every one of some hypotheses h drawn from the posterior,
 //! with the outcome o_h: a miss, or a contact with a depth and a normal. With the density p(o|h) of
 //! an outcome, the information about object and pose is the mean of ln p(o_h|h) − ln p(o_h), that
-//! about the object the mean of ln p(o_h|object of h) − ln p(o_h), and that about the pose their
+//! about the object's class the mean of ln p(o_h|class of h) − ln p(o_h), and that about the pose their
 //! difference (Lindley 1956).
 
 use super::active;
@@ -127,14 +127,14 @@ impl InformationPlanner {
         let approach = hypotheses.approach(target)?;
         let outcomes: Vec<Option<(f64, Vector3<f64>)>> =
             drawn.iter().map(|hypothesis| hypotheses.predict(hypothesis, &approach)).collect();
-        let count = drawn.len() as f64;
+        let (count, library) = (drawn.len() as f64, hypotheses.library());
         let mut sum = 0.0;
         for (of, outcome) in drawn.iter().zip(&outcomes) {
             let (mut all, mut same, mut objects) = (0.0, 0.0, 0.0);
             for (other, predicted) in drawn.iter().zip(&outcomes) {
                 let density = likeness(outcome, predicted);
                 all += density;
-                if other.object == of.object {
+                if library.class_of(other.object) == library.class_of(of.object) {
                     (same, objects) = (same + density, objects + 1.0);
                 }
             }

@@ -71,6 +71,12 @@ const NEAR_PART: u32 = 4;
 // heuristic: three contacts that fit exactly would not make up for it.
 const HOPELESS: f64 = -30.0;
 
+/// Counts of touches after which posteriors may be found anew, and the log-odds of the best object
+/// against none of these below which they are.
+// heuristic: often at first, when touches are few and poses many.
+const RESTARTS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
+const DOUBT: f64 = 8.0;
+
 /// Depth by which the tip of a soft finger passes the surface at contact, m.
 // heuristic: the press depth of a BioTac and its margin.
 const SOFT_SLACK_M: f64 = 2e-3;
@@ -189,6 +195,14 @@ impl ObjectHypotheses {
     pub(crate) fn observe(&mut self, approach: &Approach, touched: (&Touch, Option<&SweptVolume>)) {
         let Some(evidence) = TouchEvidence::new(approach, touched, self.slack_m) else { return };
         self.touches.push(Arc::new(evidence));
+        self.update_all();
+        if RESTARTS.contains(&self.touches.len()) && self.is_doubtful() {
+            self.restart();
+        }
+    }
+
+    /// Takes in new touches for all objects that are possible.
+    fn update_all(&mut self) {
         let (noise, touches) = (self.noise(), self.touches.clone());
         for (of_objects, noise) in [(true, noise), (false, NEAR_SHAPE)] {
             let bank = if of_objects { &mut self.objects } else { &mut self.near };
@@ -201,11 +215,46 @@ impl ObjectHypotheses {
             );
             *(if of_objects { &mut self.objects } else { &mut self.near }) = bank;
         }
+        self.leave_out();
+    }
+
+    /// Leaves out hopeless objects.
+    fn leave_out(&mut self) {
         let evidences = self.objects.iter().map(|it| it.particles.log_evidence);
         let best = evidences.fold(f64::NEG_INFINITY, f64::max);
         for posterior in &mut self.objects {
             posterior.is_possible &= posterior.particles.log_evidence > best + HOPELESS;
         }
+    }
+
+    /// Whether the best object explains the touches hardly better than none of these does.
+    fn is_doubtful(&self) -> bool {
+        let probabilities = self.probabilities();
+        let Some((none, objects)) = probabilities.split_last() else { return false };
+        let best = objects.iter().copied().fold(0.0, f64::max);
+        none.ln() > best.ln() - DOUBT
+    }
+
+    /// Finds the posteriors of all objects anew from the prior, because few particles may have
+    /// missed a pose that explains all touches.
+    fn restart(&mut self) {
+        let fresh = |mut posterior: ObjectPosterior, number: usize| {
+            let model = self.model(number, &self.touches, self.noise());
+            let count = self.settings.particles as usize;
+            let mut found = Particles::new(&model, count, &mut posterior.random);
+            found.update(&model, &mut posterior.random);
+            // A mean of estimates, because each is unbiased.
+            let logs = [found.log_evidence, posterior.particles.log_evidence];
+            if found.log_evidence > posterior.particles.log_evidence {
+                posterior.particles = found;
+                posterior.is_possible = true;
+            }
+            posterior.particles.log_evidence = log_sum_exp(&logs) - 2f64.ln();
+            posterior
+        };
+        let each = self.objects.clone().into_par_iter().enumerate();
+        self.objects = each.map(|(number, posterior)| fresh(posterior, number)).collect();
+        self.leave_out();
     }
 
     /// Probability of each object, then that of none of these.
@@ -222,6 +271,17 @@ impl ObjectHypotheses {
         logs.push(none.ln() + log_sum_exp(&[0.0, near]) - 2f64.ln());
         let sum = log_sum_exp(&logs);
         logs.into_iter().map(|log| (log - sum).exp()).collect()
+    }
+
+    /// Probability of each class of objects, then that of none of these.
+    pub fn class_probabilities(&self) -> Vec<f64> {
+        let mut classes = vec![0.0; self.library.classes().len() + 1];
+        for (object, probability) in self.probabilities().into_iter().enumerate() {
+            let is_object = object < self.objects.len();
+            let none = self.library.classes().len();
+            classes[if is_object { self.library.class_of(object) } else { none }] += probability;
+        }
+        classes
     }
 
     /// Whether none of the objects is more likely than not.

@@ -15,6 +15,8 @@ const SAMPLES: usize = 256;
 pub struct LibraryObject {
     /// Name: that of the mesh file without its ending.
     pub name: String,
+    /// Class that hypotheses are about: its own name, unless several objects share one.
+    pub class: String,
     /// Mesh in the frame `O`, whose origin is the middle of the mesh's box.
     pub bvh: MeshBvh,
     /// Origin of `O` in the frame of the mesh file, m.
@@ -32,7 +34,13 @@ impl LibraryObject {
         let middle_m = nalgebra::center(&low, &high);
         let bvh = MeshBvh::new(mesh.transformed(&Isometry3::from(-middle_m.coords)));
         let samples = over_surface(bvh.mesh(), SAMPLES).into_iter().map(|at| at.point).collect();
-        Self { name: name.into(), bvh, middle_m, stand_m: (high.z - low.z) / 2.0, samples }
+        let (name, stand_m) = (name.into(), (high.z - low.z) / 2.0);
+        Self { class: name.clone(), name, bvh, middle_m, stand_m, samples }
+    }
+
+    /// Sets the class.
+    pub fn of_class(self, class: impl Into<String>) -> Self {
+        Self { class: class.into(), ..self }
     }
 
     /// Pose of the frame of the mesh file in `O`.
@@ -71,6 +79,9 @@ impl LibraryObject {
 /// Objects that may be in the region.
 pub struct Library {
     objects: Vec<Arc<LibraryObject>>,
+    /// Names of the classes, and the number of each object's.
+    classes: Vec<String>,
+    class_of: Vec<usize>,
 }
 
 impl Library {
@@ -88,13 +99,34 @@ impl Library {
                 let name = &objects[i].name;
                 Err(InputError::new(format!("the library has two objects \"{name}\"")))
             }
-            None => Ok(Self { objects }),
+            None => {
+                let mut classes: Vec<String> = Vec::new();
+                let mut number = |object: &Arc<LibraryObject>| {
+                    let known = classes.iter().position(|class| *class == object.class);
+                    known.unwrap_or_else(|| {
+                        classes.push(object.class.clone());
+                        classes.len() - 1
+                    })
+                };
+                let class_of = objects.iter().map(&mut number).collect();
+                Ok(Self { objects, classes, class_of })
+            }
         }
     }
 
     /// Returns the objects.
     pub fn objects(&self) -> &[Arc<LibraryObject>] {
         &self.objects
+    }
+
+    /// Returns the names of the classes.
+    pub fn classes(&self) -> &[String] {
+        &self.classes
+    }
+
+    /// Returns the number of an object's class.
+    pub fn class_of(&self, object: usize) -> usize {
+        self.class_of[object]
     }
 
     /// Returns the number of the object with this name.

@@ -67,17 +67,18 @@ impl Particles {
         self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
     }
 
-    /// Takes in the last of the model's touches.
+    /// Takes in those of the model's touches that are new.
     pub fn update(&mut self, model: &Model, random: &mut impl Rng) {
-        let Some(last) = model.touches.last() else { return };
+        let known = self.particles.first().map_or(0, |particle| particle.fits.len());
         for particle in &mut self.particles {
-            particle.fits.push(last.fit(model.object, &particle.x_wo));
+            let new = model.touches[known..].iter();
+            particle.fits.extend(new.map(|touch| touch.fit(model.object, &particle.x_wo)));
         }
         let mut tau_m = f64::INFINITY;
         while tau_m > 0.0 {
-            let before = self.logs(model, tau_m);
+            let before = self.logs((model, known), tau_m);
             let gains = |tau_m: f64| -> Vec<f64> {
-                let after = self.logs(model, tau_m);
+                let after = self.logs((model, known), tau_m);
                 after.iter().zip(&before).map(|(after, before)| after - before).collect()
             };
             let (next_m, gained) = self.next_temperature(tau_m, &gains);
@@ -86,20 +87,20 @@ impl Particles {
             if self.effective_share() < ESS * 1.5 || tau_m > 0.0 {
                 self.resample(random);
                 for _ in 0..MOVES {
-                    self.advance(model, tau_m, random);
+                    self.advance((model, known), tau_m, random);
                 }
             }
         }
     }
 
-    /// Log-likelihood ratio of the last touch for each particle at a temperature; 0 at an infinite
-    /// one.
-    fn logs(&self, model: &Model, tau_m: f64) -> Vec<f64> {
-        let last = model.touches.last().filter(|_| tau_m.is_finite());
+    /// Log-likelihood ratio of the touches from number `known` on for each particle at a
+    /// temperature; 0 at an infinite one.
+    fn logs(&self, (model, known): (&Model, usize), tau_m: f64) -> Vec<f64> {
         let log = |particle: &Particle| {
             let mut sum = LogLikelihood::zero();
-            if let (Some(touch), Some(fit)) = (last, particle.fits.last()) {
-                touch.add(fit, &model.noise, tau_m, &mut sum);
+            if tau_m.is_finite() {
+                let new = model.touches.iter().zip(&particle.fits).skip(known);
+                new.for_each(|(touch, fit)| touch.add(fit, &model.noise, tau_m, &mut sum));
             }
             sum.value
         };
@@ -160,12 +161,12 @@ impl Particles {
     }
 
     /// Moves every particle by one step with the posterior at the temperature as its invariant.
-    fn advance(&mut self, model: &Model, tau_m: f64, random: &mut impl Rng) {
+    fn advance(&mut self, (model, known): (&Model, usize), tau_m: f64, random: &mut impl Rng) {
         let free = model.prior.free();
         for particle in &mut self.particles {
             let normals = Vector6::from_fn(|i, _| if free[i] { normal(random) } else { 0.0 });
             let accepts: f64 = random.random();
-            let here = Langevin::new(model, &particle.fits, tau_m);
+            let here = Langevin::new((model, known), &particle.fits, tau_m);
             let step = here.step(&normals);
             let x_wo = moved(&particle.x_wo, &step);
             if !model.prior.contains(model.object, &x_wo) {
@@ -173,7 +174,7 @@ impl Particles {
             }
             let fits: Vec<TouchFit> =
                 model.touches.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
-            let there = Langevin::new(model, &fits, tau_m);
+            let there = Langevin::new((model, known), &fits, tau_m);
             let log =
                 there.value - here.value + there.log_density(&-step) - here.log_density(&step);
             if accepts.ln() < log {
@@ -191,10 +192,10 @@ struct Langevin {
 }
 
 impl Langevin {
-    fn new(model: &Model, fits: &[TouchFit], tau_m: f64) -> Self {
+    fn new((model, known): (&Model, usize), fits: &[TouchFit], tau_m: f64) -> Self {
         let mut sum = LogLikelihood::zero();
         for (i, (touch, fit)) in model.touches.iter().zip(fits).enumerate() {
-            let tau_m = if i + 1 == model.touches.len() { tau_m } else { 0.0 };
+            let tau_m = if i < known { 0.0 } else { tau_m };
             touch.add(fit, &model.noise, tau_m, &mut sum);
         }
         let free = model.prior.free();
