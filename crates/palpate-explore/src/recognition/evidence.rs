@@ -286,3 +286,103 @@ fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
     });
     std::iter::once(first).chain(others).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recognition::pose_prior::moved;
+    use crate::robot::Finger;
+    use crate::task::{Aim, Ball};
+    use palpate_geometry::mesh::Mesh;
+    use palpate_geometry::solids::sphere_mesh;
+    use proptest::prelude::*;
+
+    fn ellipsoid() -> LibraryObject {
+        let (vertices, triangles) = sphere_mesh(Point3::origin(), 1.0, 24);
+        let stretched: Vec<_> =
+            vertices.iter().map(|p| Point3::new(0.05 * p.x, 0.03 * p.y, 0.04 * p.z)).collect();
+        LibraryObject::new("ellipsoid", &Mesh::new(&stretched, &triangles).unwrap().0)
+    }
+
+    const NOISE: NoiseModel = NoiseModel { contact_sd_m: 1e-3, normal_sd_rad: 0.3, outliers: 1e-3 };
+
+    /// A touch at `p_w` from a direction, with the tip where it rests if `is_contact`.
+    fn touch(p_w: [f64; 3], from: [f64; 3], is_contact: bool) -> TouchEvidence {
+        let ball = Ball { centre_w: Point3::origin(), radius_m: 0.1, lowest_m: None };
+        let finger = Finger { pitch_deg: 0.0, ..Finger::default() };
+        let aim = Aim::against(p_w.into(), &from.into());
+        let approach = ball.approach(&aim, &finger, 0.01, 0.0);
+        let normal_w = -approach.direction_w().into_inner();
+        let p_wt = aim.p_w + normal_w * finger.radius_m;
+        let touch = match is_contact {
+            // The normal of a hull on the facets of a mesh has no derivative.
+            true => {
+                Touch::Contact(Contact { has_normal: false, ..Contact::new(aim.p_w, normal_w) })
+            }
+            false => Touch::Miss,
+        };
+        let swept = SweptVolume { finger, p_wt };
+        TouchEvidence::new(&approach, (&touch, Some(&swept)), 0.0).unwrap()
+    }
+
+    proptest! {
+        /// The gradient is the derivative of the value where the object's face stays the same, and
+        /// the information is positive.
+        #[test]
+        fn the_gradient_is_the_derivative(
+            from in prop::array::uniform3(-1f64..1.0),
+            share in 0.7f64..1.3,
+            offset in prop::array::uniform3(-0.003f64..0.003),
+            axis in 0usize..6,
+            tau_m in 1e-3f64..0.02,
+        ) {
+            let outward = Vector3::from(from);
+            prop_assume!(outward.norm() > 0.3);
+            let object = ellipsoid();
+            let radii = Vector3::new(0.05, 0.03, 0.04);
+            let at = outward.normalize().component_mul(&radii) * share;
+            let evidence = touch(at.into(), from, true);
+            let x_wo = Isometry3::from(Vector3::from(offset));
+            let log = |by_m: f64| {
+                let mut sum = LogLikelihood::zero();
+                let mut by = Vector6::zeros();
+                by[axis] = by_m;
+                let fit = evidence.fit(&object, &moved(&x_wo, &by));
+                evidence.add(&fit, &NOISE, tau_m, &mut sum);
+                sum
+            };
+            let step_m = 1e-6;
+            let [back, here, ahead] = [-step_m, 0.0, step_m].map(log);
+            let slopes = [here.value - back.value, ahead.value - here.value].map(|x| x / step_m);
+            // At the border of two triangles it has a kink.
+            let scale = here.information[(axis, axis)].sqrt() + 1.0;
+            prop_assume!((slopes[1] - slopes[0]).abs() < 0.02 * scale);
+            let error = here.gradient[axis] - 0.5 * (slopes[0] + slopes[1]);
+            prop_assert!(error.abs() < 0.03 * scale, "{error} of {} at {scale}", here.gradient[axis]);
+            prop_assert!(here.information.symmetric_eigenvalues().min() > -1e-6 * scale * scale);
+        }
+
+        /// Wherever a touch ends, ratios are finite, and at a large temperature all poses are equal.
+        #[test]
+        fn ratios_are_finite_anywhere(
+            p_w in prop::array::uniform3(-0.1f64..0.1),
+            from in prop::array::uniform3(-1f64..1.0),
+            offset in prop::array::uniform3(-0.05f64..0.05),
+            is_contact: bool,
+        ) {
+            prop_assume!(Vector3::from(from).norm() > 0.01);
+            let (object, evidence) = (ellipsoid(), touch(p_w, from, is_contact));
+            let x_wo = Isometry3::from(Vector3::from(offset));
+            let fits = [x_wo, Isometry3::identity()].map(|x_wo| evidence.fit(&object, &x_wo));
+            for tau_m in [0.0, 1e-3, 1e3] {
+                let values = fits.each_ref().map(|fit| {
+                    let mut sum = LogLikelihood::zero();
+                    evidence.add(fit, &NOISE, tau_m, &mut sum);
+                    sum.value
+                });
+                prop_assert!(values.iter().all(|value| value.is_finite()), "{values:?}");
+                prop_assert!(tau_m < 1.0 || (values[0] - values[1]).abs() < 1e-3, "{values:?}");
+            }
+        }
+    }
+}

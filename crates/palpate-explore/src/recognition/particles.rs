@@ -263,3 +263,101 @@ fn normal(random: &mut impl Rng) -> f64 {
     let [u, v]: [f64; 2] = random.random();
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Contact, SweptVolume, Touch};
+    use crate::recognition::pose_prior::Turn;
+    use crate::robot::Finger;
+    use crate::task::{Aim, Ball};
+    use nalgebra::{Point3, Vector3};
+    use palpate_geometry::mesh::Mesh;
+    use palpate_geometry::solids::box_mesh;
+    use palpate_gp::math::seed;
+
+    /// Touches of a box whose front and right side are 2 mm and 3 mm off.
+    fn touches() -> Vec<Arc<TouchEvidence>> {
+        let ball = Ball { centre_w: Point3::origin(), radius_m: 0.15, lowest_m: None };
+        let finger = Finger { pitch_deg: 0.0, ..Finger::default() };
+        [([0.01, 0.032, 0.0], Vector3::y()), ([0.053, 0.0, 0.01], Vector3::x())]
+            .into_iter()
+            .map(|(p_w, normal_w)| {
+                let aim = Aim::against(p_w.into(), &normal_w);
+                let approach = ball.approach(&aim, &finger, 0.01, 0.0);
+                let touch = Touch::Contact(Contact::new(aim.p_w, normal_w));
+                let p_wt = aim.p_w + normal_w * finger.radius_m;
+                let swept = SweptVolume { finger: finger.clone(), p_wt };
+                Arc::new(TouchEvidence::new(&approach, (&touch, Some(&swept)), 0.0).unwrap())
+            })
+            .collect()
+    }
+
+    /// The evidence of particles is the integral of the likelihood over the prior, and their mean is
+    /// that of the posterior: a sum over a grid is the slow twin.
+    #[test]
+    fn particles_are_an_integral_over_the_prior() {
+        let (vertices, triangles) = box_mesh([-0.05, -0.03, -0.04], [0.05, 0.03, 0.04]);
+        let object = LibraryObject::new("box", &Mesh::new(&vertices, &triangles).unwrap().0);
+        let half_width_m = [0.02, 0.02, 0.0];
+        let prior = PosePrior { position_m: [0.0, 0.0, -0.04], half_width_m, turn: Turn::None };
+        let noise = NoiseModel { contact_sd_m: 1e-3, normal_sd_rad: 0.2, outliers: 1e-3 };
+        let touches = touches();
+        let per_side = 400;
+        let (mut logs, mut means) = (Vec::new(), [0.0; 2]);
+        for i in 0..per_side * per_side {
+            let at = [i % per_side, i / per_side].map(|n| (n as f64 + 0.5) / per_side as f64);
+            let x_wo = prior.at(&object, [at[0], at[1], 0.5, 0.0, 0.0, 0.0]);
+            let mut sum = LogLikelihood::zero();
+            for touch in &touches {
+                touch.add(&touch.fit(&object, &x_wo), &noise, 0.0, &mut sum);
+            }
+            logs.push((sum.value, x_wo.translation.vector));
+        }
+        let values: Vec<f64> = logs.iter().map(|(value, _)| *value).collect();
+        let total = log_sum_exp(&values);
+        for (value, at) in &logs {
+            let weight = (value - total).exp();
+            means = [means[0] + weight * at.x, means[1] + weight * at.y];
+        }
+        let expected = total - (logs.len() as f64).ln();
+        let model = |count: usize| Model {
+            object: &object,
+            prior: &prior,
+            touches: &touches[..count],
+            noise,
+        };
+        let mut evidences = Vec::new();
+        for number in 0..8 {
+            let mut random = seed::stream(1, number, "particles");
+            let mut particles = Particles::new(&model(0), 256, &mut random);
+            // One after another, or both at once as in a restart.
+            if number % 2 == 0 {
+                particles.update(&model(1), &mut random);
+            }
+            particles.update(&model(2), &mut random);
+            evidences.push(particles.log_evidence);
+            let mean = particles.weighted().fold(Vector3::zeros(), |sum, (x_wo, weight)| {
+                sum + x_wo.translation.vector * weight
+            });
+            assert!((mean.x - means[0]).abs() < 4e-4, "{mean} {means:?}");
+            assert!((mean.y - means[1]).abs() < 4e-4, "{mean} {means:?}");
+        }
+        let mean = evidences.iter().sum::<f64>() / evidences.len() as f64;
+        assert!((mean - expected).abs() < 0.2, "{evidences:?}, expected {expected}");
+        assert!(evidences.iter().all(|it| (it - expected).abs() < 0.8), "{evidences:?}");
+        assert!((means[0] - 0.003).abs() < 1e-3 && (means[1] - 0.002).abs() < 1e-3, "{means:?}");
+    }
+
+    #[test]
+    fn systematic_draws_follow_the_weights() {
+        let weights = [0.1, 0.0, 0.6, 0.3];
+        for start in [0.0, 0.3, 0.999] {
+            let drawn = systematic(weights.iter().copied(), 1000, start);
+            let count = |of: usize| drawn.iter().filter(|i| **i == of).count() as f64;
+            for (i, weight) in weights.iter().enumerate() {
+                assert!((count(i) - 1000.0 * weight).abs() <= 1.0, "{i}: {}", count(i));
+            }
+        }
+    }
+}
