@@ -47,6 +47,7 @@ use std::path::Path;
 /// Figures in the order of the page; one line adds a figure.
 pub const FIGURES: &[ReportFigure] = &[
     figures::convergence::FIGURE,
+    figures::hypotheses::FIGURE,
     figures::curves::FIGURE,
     figures::SURFACES,
     figures::SOLIDS,

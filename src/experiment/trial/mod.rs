@@ -21,6 +21,7 @@ use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
+use crate::sim::finger::effects::gel::GelEffect;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
@@ -121,7 +122,9 @@ fn run_touches(
     let hypotheses = truth.library.as_ref().map(|library| {
         let prior = scene.pose.clone().unwrap_or_default();
         let (settings, shared) = (experiment.recognition.clone(), Arc::clone(&library.known));
-        ObjectHypotheses::new(shared, prior, settings, (task, finger.1), &mut stream("hypotheses"))
+        let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
+        let task = (task, finger.1, pad);
+        ObjectHypotheses::new(shared, prior, settings, task, &mut stream("hypotheses"))
     });
     let mut belief =
         Belief::new(task, finger, &experiment.gp, &experiment.space).with_hypotheses(hypotheses);

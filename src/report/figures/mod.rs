@@ -3,6 +3,7 @@
 pub(super) mod acquisition;
 pub(super) mod convergence;
 pub(super) mod curves;
+pub(super) mod hypotheses;
 pub(super) mod surfaces;
 pub(super) mod targets;
 

@@ -13,6 +13,7 @@
 
 use super::library::LibraryObject;
 use crate::probe::{Contact, SweptVolume, Touch};
+use crate::robot::sensor::GelPad;
 use crate::task::Approach;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitVector3, Vector3, Vector6};
 use palpate_geometry::primitives::normal;
@@ -70,6 +71,8 @@ pub(super) struct TouchEvidence {
     slack_m: f64,
     /// Points of contact; none for a miss.
     points: Vec<MeasuredPoint>,
+    /// Points of a pad's face at the end of the way.
+    face_w: Vec<Point3<f64>>,
 }
 
 /// Residuals of a touch for an object at a pose.
@@ -146,12 +149,12 @@ impl Terms {
 }
 
 impl TouchEvidence {
-    /// Returns what a touch along `approach` tells, with a hull that yields by `slack_m`; `None`
-    /// after an overload, and without a hull.
+    /// Returns what a touch along `approach` tells, with a hull that yields by `slack_m` and may have
+    /// a pad; `None` after an overload, and without a hull.
     pub fn new(
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
-        slack_m: f64,
+        (slack_m, pad): (f64, Option<&GelPad>),
     ) -> Option<Self> {
         let swept = swept?;
         let ahead_w = approach.direction_w();
@@ -172,7 +175,9 @@ impl TouchEvidence {
             Touch::Miss | Touch::Overload => None,
         };
         let points = contact.map(|contact| points(contact, whole_m)).unwrap_or_default();
-        Some(Self { hull, ahead_w, free_m: -at_m, slack_m, points })
+        let x_wt = Isometry3::from_parts(end_w.coords.into(), approach.r_wt());
+        let face_w = pad.map(|pad| face_w(pad, &(x_wt * GelPad::x_tp(finger)))).unwrap_or_default();
+        Some(Self { hull, ahead_w, free_m: -at_m, slack_m, points, face_w })
     }
 
     /// Returns the residuals for `object` at the pose `x_wo`.
@@ -215,9 +220,19 @@ impl TouchEvidence {
                 PointFit { distance, turn }
             })
             .collect();
-        let depth = met.filter(|met| met.0 < self.free_m).map(|(travel_m, n, p_w)| {
+        let of_hull = met.filter(|met| met.0 < self.free_m).map(|(travel_m, n, p_w)| {
             let facing = (-n.dot(&self.ahead_w)).max(0.0);
-            let depth_m = (self.free_m - travel_m) * facing;
+            ((self.free_m - travel_m) * facing, n, p_w)
+        });
+        let of_face = self.face_w.iter().filter_map(|p_w| {
+            let closest = object.bvh.closest_point(&x_wo.inverse_transform_point(p_w));
+            let q_w = x_wo * closest.point;
+            let face_w = x_wo * normal(&object.bvh.mesh().corners(closest.triangle as usize));
+            let is_inside = (p_w - q_w).dot(&face_w) < 0.0;
+            is_inside.then_some((closest.distance_m, face_w, q_w))
+        });
+        let deepest = of_hull.into_iter().chain(of_face).max_by(|a, b| a.0.total_cmp(&b.0));
+        let depth = deepest.map(|(depth_m, n, p_w)| {
             // A contact that is inside of the object has told that once already.
             let inside = points.first().map(|point| &point.distance).filter(|it| it.value_m < 0.0);
             let (told_m, told) =
@@ -262,6 +277,20 @@ fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
     let axis = from.cross(to);
     let (sine, cosine) = (axis.norm(), from.dot(to));
     if sine > ROUNDING_M { axis * (sine.atan2(cosine) / sine) } else { Vector3::zeros() }
+}
+
+/// Number of points along each side of a pad's face.
+// heuristic: a few millimetres apart on a usual pad.
+const FACE: usize = 4;
+
+/// Returns points spread over the face of a pad at the pose `x_wp`.
+fn face_w(pad: &GelPad, x_wp: &Isometry3<f64>) -> Vec<Point3<f64>> {
+    let point = |i: usize| {
+        let pixels = [FACE; 2];
+        let [x, y] = pad.pixel_m(pixels, i);
+        x_wp * Point3::new(x, y, pad.surface_m([x, y]))
+    };
+    (0..FACE * FACE).map(point).collect()
 }
 
 /// Returns the points of a contact, thinned.
@@ -322,7 +351,7 @@ mod tests {
             false => Touch::Miss,
         };
         let swept = SweptVolume { finger, p_wt };
-        TouchEvidence::new(&approach, (&touch, Some(&swept)), 0.0).unwrap()
+        TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None)).unwrap()
     }
 
     proptest! {

@@ -5,6 +5,7 @@ use super::library::{Library, LibraryObject};
 use super::particles::{Model, Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
 use crate::probe::{SweptVolume, Touch};
+use crate::robot::sensor::GelPad;
 use crate::task::{Approach, Target, Task};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_geometry::sweep::Capsule;
@@ -81,6 +82,10 @@ const DOUBT: f64 = 8.0;
 // heuristic: the press depth of a BioTac and its margin.
 const SOFT_SLACK_M: f64 = 2e-3;
 
+/// Depth by which a pad passes the surface at contact beyond its press depth, m.
+// heuristic: an arm stops it within this.
+const PAD_SLACK_M: f64 = 3e-4;
+
 /// A possible object at a possible pose.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
@@ -114,6 +119,7 @@ pub struct ObjectHypotheses {
     settings: RecognitionSettings,
     task: Task,
     slack_m: f64,
+    pad: Option<GelPad>,
     touches: Vec<Arc<TouchEvidence>>,
     objects: Vec<ObjectPosterior>,
     near: Vec<ObjectPosterior>,
@@ -129,21 +135,27 @@ struct ObjectPosterior {
 }
 
 impl ObjectHypotheses {
-    /// Creates the prior: all objects are equally likely. The flag marks a soft finger.
+    /// Creates the prior: all objects are equally likely. The flag marks a soft finger, which may
+    /// have a pad.
     pub fn new(
         library: Arc<Library>,
         prior: PosePrior,
         settings: RecognitionSettings,
-        (task, is_soft): (&Task, bool),
+        (task, is_soft, pad): (&Task, bool, Option<GelPad>),
         random: &mut ChaCha8Rng,
     ) -> Self {
-        let slack_m = if is_soft { SOFT_SLACK_M } else { 0.0 };
+        let slack_m = match &pad {
+            Some(_) => task.touch().press_m + PAD_SLACK_M,
+            None if is_soft => SOFT_SLACK_M,
+            None => 0.0,
+        };
         let mut made = Self {
             library,
             prior: Arc::new(prior),
             settings,
             task: task.clone(),
             slack_m,
+            pad,
             touches: Vec::new(),
             objects: Vec::new(),
             near: Vec::new(),
@@ -193,7 +205,11 @@ impl ObjectHypotheses {
 
     /// Takes in a touch; nothing after an overload.
     pub(crate) fn observe(&mut self, approach: &Approach, touched: (&Touch, Option<&SweptVolume>)) {
-        let Some(evidence) = TouchEvidence::new(approach, touched, self.slack_m) else { return };
+        let Some(evidence) =
+            TouchEvidence::new(approach, touched, (self.slack_m, self.pad.as_ref()))
+        else {
+            return;
+        };
         self.touches.push(Arc::new(evidence));
         self.update_all();
         if RESTARTS.contains(&self.touches.len()) && self.is_doubtful() {

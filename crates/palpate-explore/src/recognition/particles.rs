@@ -288,7 +288,9 @@ mod tests {
                 let touch = Touch::Contact(Contact::new(aim.p_w, normal_w));
                 let p_wt = aim.p_w + normal_w * finger.radius_m;
                 let swept = SweptVolume { finger: finger.clone(), p_wt };
-                Arc::new(TouchEvidence::new(&approach, (&touch, Some(&swept)), 0.0).unwrap())
+                Arc::new(
+                    TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None)).unwrap(),
+                )
             })
             .collect()
     }

@@ -14,6 +14,8 @@ effect! {
         spread: bool = true,
         /// Pixels of a depth image along the pad's width and height.
         pixels: [usize; 2] = [80, 60],
+        /// Largest number of points that a contact's patch has.
+        patch_points: usize = 4,
     }
     constants {
         /// Width and height of the pad.
@@ -38,6 +40,7 @@ effect! {
 fn check_settings(effect: &GelEffect, rules: &mut Rules) {
     let is_allowed = effect.pixels.iter().all(|count| (8..=1024).contains(count));
     let pixels = format!("{:?}", effect.pixels);
+    rules.number("patch_points", effect.patch_points as f64, 1.0..=100.0);
     rules.require("pixels", pixels, is_allowed, || "two numbers from 8 to 1024".into());
 }
 
@@ -55,6 +58,7 @@ impl GelEffect {
             scale: self.scale,
             scale_sd: self.scale_sd,
             depth_max_m: DEEP * self.thickness_m,
+            patch_points: self.patch_points,
         }
     }
 }

@@ -24,13 +24,16 @@ pub struct GelPad {
     pub scale_sd: f64,
     /// Indentation beyond which the pad is overloaded.
     pub depth_max_m: f64,
+    /// Largest number of points of a patch.
+    pub patch_points: usize,
 }
 
 impl Default for GelPad {
     /// Returns a flat pad without size and noise.
     fn default() -> Self {
         let [dome_m, noise_m, scale_sd, depth_max_m] = [0.0; 4];
-        Self { size_m: [0.0; 2], dome_m, noise_m, scale: 1.0, scale_sd, depth_max_m }
+        let (size_m, patch_points) = ([0.0; 2], PATCH_POINTS);
+        Self { size_m, dome_m, noise_m, scale: 1.0, scale_sd, depth_max_m, patch_points }
     }
 }
 
@@ -89,8 +92,9 @@ const LEAST: usize = 8;
 // heuristic: more than half of the contact is beside the pad.
 const RIM: f64 = 0.8;
 
-/// Largest number of points of a patch.
-const POINTS: usize = 4;
+/// Default number of points of a patch.
+// heuristic: more tell a belief of the surface little.
+const PATCH_POINTS: usize = 4;
 
 /// Shortest distance between points of a patch, m.
 // heuristic: nearer points tell a belief nothing new; a tenth of a usual pad.
@@ -318,7 +322,7 @@ impl DepthPatch {
         let mean = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
         let mut away_m: Vec<f64> = places.iter().map(|place| -(place - mean).norm()).collect();
         let mut chosen: Vec<usize> = Vec::new();
-        while chosen.len() < POINTS {
+        while chosen.len() < self.pad.patch_points {
             let next = (0..places.len()).max_by(|a, b| away_m[*a].total_cmp(&away_m[*b]));
             let is_first = chosen.is_empty();
             let Some(next) = next.filter(|next| is_first || away_m[*next] >= APART_M) else {
