@@ -6,6 +6,7 @@ pub mod finger;
 pub mod kinematic;
 pub mod known_body;
 pub mod library;
+pub mod library_settings;
 pub mod mjcf;
 mod model_file;
 #[cfg(feature = "mujoco")]

@@ -1,7 +1,7 @@
 //! The scene: object, finger, zone, and the simulator that carries out a touch.
 
 use super::camera::CameraSettings;
-use super::library::LibrarySettings;
+use super::library_settings::LibrarySettings;
 use super::solver::SolverSettings;
 pub use super::unit::Unit;
 use crate::sim::finger::Effects;

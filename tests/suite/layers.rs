@@ -263,7 +263,7 @@ fn planners_see_the_belief_and_nothing_else() {
         if !module_path.starts_with("palpate_explore/planner") {
             continue;
         }
-        let beliefs = ["planner", "belief", "whole_object", "task", "view"];
+        let beliefs = ["planner", "belief", "whole_object", "recognition", "task", "view"];
         let beliefs = beliefs.map(|module| format!("palpate_explore/{module}"));
         let below = ["palpate_gp", "palpate_input"].map(String::from);
         let allowed = beliefs.iter().chain(&below);

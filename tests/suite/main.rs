@@ -79,6 +79,7 @@ mod presence;
 mod probes;
 mod prose;
 mod reach;
+mod recognition;
 mod recording;
 mod reference;
 mod registration;

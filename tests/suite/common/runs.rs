@@ -117,6 +117,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
     TouchRow {
         silhouette: None,
         shape: None,
+        recognition: None,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
         tip: height_m(&target).is_none().then(|| tip_behind(zone, &target)),
         target: target.into(),

@@ -1,0 +1,204 @@
+//! Tests of recognition: which object of a library is touched, and where it is.
+
+use crate::common::program::{fails, palpate, run_to_end, succeeds};
+use palpate::experiment::Simulation;
+use palpate::experiment::experiment::Experiment;
+use palpate::experiment::measure::recognition::{NONE, RecognitionMetrics};
+use palpate::experiment::trial::row::TrialRow;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+fn simulation(experiment: &str, sets: &[&str]) -> Simulation {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments").join(experiment);
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    Simulation::new(Experiment::load(&path, &sets).unwrap()).unwrap()
+}
+
+fn trial(simulation: &Simulation, planner: &str, number: u32) -> TrialRow {
+    let row = simulation.trial(simulation.planner(planner).unwrap(), number);
+    assert_eq!(row.failure, None, "{planner}, trial {number}");
+    row
+}
+
+fn last(row: &TrialRow) -> &RecognitionMetrics {
+    row.touches.last().unwrap().recognition.as_ref().unwrap()
+}
+
+/// Three boxes that differ by 3 mm, and few poses, so that tests are fast.
+const BOXES: [&str; 3] = [
+    "scene.library.objects=[\"box\",\"box-wider\",\"box-higher\"]",
+    "recognition.particles=128",
+    "touches=8",
+];
+
+/// Objects that differ by 3 mm are recognised and found, with probabilities that sum to one.
+#[test]
+fn objects_that_differ_by_millimetres_are_recognised() {
+    let simulation = simulation("lookalikes.toml", &BOXES);
+    for number in 0..3 {
+        let row = trial(&simulation, "object_information", number);
+        for touch in &row.touches {
+            let found = touch.recognition.as_ref().unwrap();
+            let sum: f64 = found.probabilities.values().sum();
+            assert!((sum - 1.0).abs() < 5e-3, "{found:?}");
+        }
+        let error = last(&row).error.as_ref().unwrap();
+        assert!(error.is_right && error.probability > 0.9, "{:?}", last(&row));
+        assert!(error.distance_m.unwrap() < 1e-3, "{error:?}");
+    }
+}
+
+/// An object that no hypothesis has is found to be none of these.
+#[test]
+fn an_unknown_object_is_none_of_these() {
+    let sets = [&BOXES[..], &["scene.library.unknown=[\"bottle\"]", "trials=4"]].concat();
+    let simulation = simulation("lookalikes.toml", &sets);
+    let row = trial(&simulation, "object_information", 3);
+    let found = last(&row);
+    assert_eq!(found.error.as_ref().unwrap().object, "bottle");
+    assert_eq!(found.object, NONE, "{found:?}");
+}
+
+/// Every planner works beside a library, and a row does not depend on threads.
+#[test]
+fn rows_do_not_depend_on_threads_nor_on_the_kind_of_planner() {
+    let sets = [&BOXES[..2], &["touches=4", "planners=[\"sobol\"]"]].concat();
+    let simulation = simulation("lookalikes.toml", &sets);
+    let rows = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let names = ["information", "pose_information", "active", "random"];
+            names.map(|name| serde_json::to_string(&trial(&simulation, name, 1)).unwrap())
+        })
+    };
+    assert_eq!(rows(1), rows(3));
+}
+
+/// The rows of a relief over a zone name the digit.
+#[test]
+fn digits_over_a_zone_are_read() {
+    let sets = [
+        "scene.library.objects=[\"0-plain\",\"1-plain\",\"1-wide\"]",
+        "scene.simulator=\"swept\"",
+        "scene.sensor={}",
+        "scene.effects={}",
+        "scene.finger={radius_m=0.002,length_m=0.05,pitch_deg=0}",
+        "recognition.particles=128",
+        "touches=12",
+        "trials=2",
+    ];
+    let simulation = simulation("digits.toml", &sets);
+    for (number, class) in [(0, "0"), (1, "1")] {
+        let row = trial(&simulation, "object_information", number);
+        assert_eq!(last(&row).object, class, "{:?}", last(&row));
+    }
+}
+
+/// Any rotation: the pose of a known object is found from touches around it.
+#[test]
+fn a_pose_in_space_is_found() {
+    let sets = [
+        "scene.library.objects=[\"mug-high\"]",
+        "scene.pose.turn=\"free\"",
+        "scene.pose.half_width_m=[0.01,0.01,0.01]",
+        "scene.whole_object={}",
+        "recognition.particles=1024",
+        "recognition.none_probability=0",
+        "touches=10",
+        "trials=2",
+    ];
+    let simulation = simulation("lookalikes.toml", &sets);
+    for number in 0..2 {
+        let row = trial(&simulation, "pose_information", number);
+        let error = last(&row).error.as_ref().unwrap();
+        assert!(error.distance_m.unwrap() < 2e-3, "{error:?}");
+    }
+}
+
+fn shipped(path: &str) -> String {
+    format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn identify_says_what_is_there_and_where() {
+    let folder = TempDir::new().unwrap();
+    let [library, scene] = ["models/lookalikes", "scenes/lookalikes.toml"].map(shipped);
+    let few = ["--set", "library.objects=[\"box\",\"bottle\"]"];
+    let identify = ["identify", &library, &scene];
+    let says = succeeds(folder.path(), &[&identify[..], &few].concat());
+    for part in ["touch  1: ", "after", "position_m = [", "right: the object is bottle"] {
+        assert!(says.contains(part), "{part} in {says}");
+    }
+    // One touch does not tell.
+    let undecided = palpate(
+        folder.path(),
+        &[&identify[..], &few, &["--touches", "1", "--sure", "0.999"]].concat(),
+    );
+    assert_eq!(undecided.status.code(), Some(3));
+    // Its own object is what is there.
+    let own = ["--set", "object={mesh=\"box.glb\",position_m=[0,-0.65,0.44]}"];
+    let mesh = folder.path().join("box.glb");
+    fs::copy(shipped("models/lookalikes/box.glb"), mesh).unwrap();
+    let says = succeeds(folder.path(), &[&identify[..], &few, &own].concat());
+    assert!(says.contains("\nbox ("), "{says}");
+    assert!(!says.contains("right:"), "{says}");
+}
+
+#[test]
+fn wrong_libraries_are_refused_with_the_reason() {
+    let folder = TempDir::new().unwrap();
+    let [library, scene] = ["models/lookalikes", "scenes/lookalikes.toml"].map(shipped);
+    let empty = folder.path().to_str().unwrap().to_owned();
+    for (arguments, words) in [
+        (vec!["identify", "nowhere", &scene], "nowhere: not a folder"),
+        (vec!["identify", &empty, &scene], "has no mesh; allowed is at least one .obj"),
+        (vec!["identify", &library, &scene, "--planner", "x"], "--planner x: no such planner"),
+        (vec!["identify", &library, &scene, "--sure", "1"], "allowed is 0.5 to below 1"),
+        (
+            vec!["identify", &library, &scene, "--set", "library.objects=[\"cup\"]"],
+            "library.objects: \"cup\" is no mesh of the folder; allowed are bottle",
+        ),
+        (
+            vec!["identify", &library, &scene, "--set", "pose.half_width_m=[-1,0,0]"],
+            "pose.half_width_m",
+        ),
+        (
+            vec!["run", "toy", "--set", "planners=[\"information\"]"],
+            "allowed is other planners, or a scene with a table [library]",
+        ),
+        (
+            vec!["run", "lookalikes", "--set", "planners=[\"oracle\"]"],
+            "with a library each trial has another ground truth",
+        ),
+        (vec!["run", "digits", "--set", "scene.zone.depth_m=0"], "scene.zone.depth_m"),
+    ] {
+        fails(folder.path(), &arguments, &[words]);
+    }
+}
+
+/// A run draws its hypotheses, and its tables have accuracy and pose errors.
+#[test]
+fn a_run_shows_how_hypotheses_fade() {
+    let folder = TempDir::new().unwrap();
+    let mut command = crate::common::program::command(
+        folder.path(),
+        &["run", "lookalikes", "--set", "trials=2", "--set", "touches=3", "--out", "it"],
+    );
+    for set in [BOXES[0], BOXES[1], "planners=[\"sobol\"]"] {
+        command.args(["--set", set]);
+    }
+    let output = run_to_end(&mut command, "run lookalikes");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let figure = fs::read_to_string(folder.path().join("it/figures/hypotheses.svg")).unwrap();
+    assert!(figure.contains("box-wider") && figure.contains("most likely object"), "{figure}");
+    let summary = fs::read_to_string(folder.path().join("it/summary.csv")).unwrap();
+    let header = summary.lines().next().unwrap();
+    for column in ["recognised_mean", "recognition_log_score_mean", "pose_distance_median_m"] {
+        assert!(header.contains(column), "{column} in {header}");
+    }
+    // Other runs have no such columns.
+    succeeds(folder.path(), &["run", "toy", "--set", "trials=1", "--no-report", "--out", "toy"]);
+    let summary = fs::read_to_string(folder.path().join("toy/summary.csv")).unwrap();
+    assert!(!summary.contains("recognised"), "{summary}");
+}
