@@ -3,9 +3,9 @@
 //!
 //! Each candidate is touched in thought at every one of some hypotheses h drawn from the posterior,
 //! with the outcome o_h: a miss, or a contact with a depth and a normal. With the density p(o|h) of
-//! an outcome, the information about object and pose is the mean of ln p(o_h|h) − ln p(o_h), that
-//! about the object's class the mean of ln p(o_h|class of h) − ln p(o_h), and that about the pose their
-//! difference (Lindley 1956).
+//! an outcome, the information about object and pose is the mean of ln p(o_h|h) − ln p(o_h)
+//! (Lindley 1956). That about the object's class is the mean of ln p(o_h|class of h) − ln p(o_h);
+//! that about the pose is their difference.
 
 use super::active;
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
