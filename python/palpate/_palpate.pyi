@@ -115,6 +115,15 @@ class Belief:
     """
 
     @property
+    def hypotheses(self) -> dict[str, float] | None:
+        """Probability of each object or class of a library, and of none of these as "none"; None without a library."""
+
+    @property
+    def object_pose(self) -> tuple[str, list[float], list[float]] | None:
+        """Most likely object of a library with the estimated position (m) and rotation (deg, about the fixed axes x,
+        then y, then z) of its mesh; None without a library."""
+
+    @property
     def zone(self) -> Zone:
         """Explored zone."""
     def mean(self, points: npt.ArrayLike) -> _Array:
@@ -378,6 +387,24 @@ class ParallelExplorations:
     def belief(self, index: int) -> Belief: ...
     def reset(self, seeds: Sequence[int]) -> dict[str, Any]: ...
     def step(self, actions: npt.NDArray[np.float32]) -> dict[str, Any]: ...
+
+@final
+class RecognitionEpisode:
+    def __new__(cls, path: str, sets: Sequence[str], touches: int) -> RecognitionEpisode: ...
+    @property
+    def classes(self) -> list[str]: ...
+    @property
+    def sizes(self) -> tuple[int, int]: ...
+    def reset(self, seed: int) -> None: ...
+    def touch(self, action: Sequence[float]) -> None: ...
+    @property
+    def observation(self) -> tuple[list[float], int, bool, str | None]: ...
+    @property
+    def probabilities(self) -> list[float]: ...
+    @property
+    def truth(self) -> tuple[str, int, list[float], list[float]]: ...
+    @property
+    def half_width_m(self) -> list[float]: ...
 
 @final
 class Experiment:

@@ -38,6 +38,9 @@ Info: "chamfer_m", "f_1", "iou" and "failure".
 Reward: "error", the decrease of the log error (RMSE over a zone; Chamfer distance around an object, where a missing
 surface counts as the ball's radius); "information", the decrease of the mean log standard deviation on the grid;
 "none", 0, which with `grid=0` fits no belief.
+
+`Palpate/Recognise-v0` and `Palpate/Locate-v0` ask which object of a library it is, and where; see `RecogniseEnv` and
+`LocateEnv`.
 """
 
 from __future__ import annotations
@@ -55,10 +58,11 @@ from gymnasium.vector.utils import batch_space
 
 from . import _palpate
 from ._home import HOME, find_file
+from ._recognition import LocateEnv, RecogniseEnv
 from ._render import Renderer
 from ._settings import assignments
 
-__all__ = ["TouchEnv", "TouchVectorEnv"]
+__all__ = ["LocateEnv", "RecogniseEnv", "TouchEnv", "TouchVectorEnv"]
 
 _Observation = dict[str, Any]
 
@@ -273,3 +277,5 @@ gymnasium.register(
     entry_point="palpate.gym:TouchEnv",
     vector_entry_point="palpate.gym:TouchVectorEnv",
 )
+gymnasium.register("Palpate/Recognise-v0", entry_point="palpate.gym:RecogniseEnv")
+gymnasium.register("Palpate/Locate-v0", entry_point="palpate.gym:LocateEnv")

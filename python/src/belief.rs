@@ -6,10 +6,11 @@ use crate::known::{Known, target_numbers};
 use crate::mesh::triangles_of;
 use crate::pickle::{self, Reduced, Version};
 use crate::places::{Places, rows, seen_at};
+use crate::recognition;
 use crate::zone::Zone;
 use nalgebra::Point3;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
-use palpate::explore::belief::HeightField;
+use palpate::explore::belief::{HeightField, SurfaceBelief};
 use palpate::explore::whole_object::ImplicitSurface;
 use palpate::format::counted;
 use palpate::gp::Posterior;
@@ -17,6 +18,7 @@ use palpate::task::Target;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::collections::BTreeMap;
 
 /// Belief after some touches: a Gaussian process of the surface's height over a zone, or of an
 /// implicit surface around an object (a field that is zero on the surface and negative inside).
@@ -35,18 +37,18 @@ type Field<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
 
 impl Belief {
     fn over_zone(&self, name: &str) -> PyResult<&HeightField> {
-        match &self.0 {
-            Known::HeightField(belief) => Ok(belief),
-            Known::ImplicitSurface(_) => {
+        match self.0.surface() {
+            SurfaceBelief::HeightField(belief) => Ok(belief),
+            SurfaceBelief::ImplicitSurface(_) => {
                 Err(errors::not_around(name, "mesh(cells), field(points), ball"))
             }
         }
     }
 
     fn around(&self, name: &str) -> PyResult<&ImplicitSurface> {
-        match &self.0 {
-            Known::ImplicitSurface(belief) => Ok(belief),
-            Known::HeightField(_) => {
+        match self.0.surface() {
+            SurfaceBelief::ImplicitSurface(belief) => Ok(belief),
+            SurfaceBelief::HeightField(_) => {
                 Err(errors::not_over_zone(name, "mean(points), variance(points), zone"))
             }
         }
@@ -91,6 +93,20 @@ impl Belief {
     #[getter]
     fn zone(&self) -> PyResult<Zone> {
         Ok(Zone(self.over_zone("zone")?.zone().clone()))
+    }
+
+    /// Probability of each object or class of a library, and of none of these as "none"; `None`
+    /// without a library.
+    #[getter]
+    fn hypotheses(&self) -> Option<BTreeMap<String, f64>> {
+        self.0.hypotheses().map(recognition::probabilities)
+    }
+
+    /// Most likely object of a library with the estimated position (m) and rotation (deg, about the
+    /// fixed axes x, then y, then z) of its mesh; `None` without a library.
+    #[getter]
+    fn object_pose(&self) -> Option<(String, [f64; 3], [f64; 3])> {
+        self.0.hypotheses().map(recognition::pose)
     }
 
     /// Mean height above the datum, metres.

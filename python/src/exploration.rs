@@ -3,11 +3,14 @@
 use crate::errors;
 use crate::fork;
 use crate::known::{self, AIM, BeliefErrors, GroundTruth, Known};
+use crate::recognition;
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
+use palpate::explore::belief::SurfaceBelief;
 use palpate::explore::planner::sample::random_aim;
 use palpate::explore::planner::uniform;
 use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::recognition::Library;
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
@@ -36,6 +39,8 @@ pub(crate) struct ExplorationScene {
     truth: GroundTruth,
     /// Points on which the belief is observed.
     grid: Vec<Vec<f64>>,
+    /// Objects of the hypotheses.
+    library: Option<Arc<Library>>,
 }
 
 impl ExplorationScene {
@@ -60,11 +65,26 @@ impl ExplorationScene {
             };
             let simulator = Simulator::new(environment).map_err(errors::scene)?;
             simulator.check_reach().map_err(errors::scene)?;
-            Ok(Arc::new(Self { simulator, truth, grid }))
+            Ok(Arc::new(Self { simulator, truth, grid, library: None }))
         })?
     }
 
-    fn task(&self) -> &Task {
+    /// Creates the scene of an episode of recognition, without a ground truth of the surface.
+    pub(crate) fn of_library(simulator: Simulator, library: Arc<Library>) -> Arc<Self> {
+        let (truth, grid) = (GroundTruth::Around(None), Vec::new());
+        Arc::new(Self { simulator, truth, grid, library: Some(library) })
+    }
+
+    /// Returns a belief without touches.
+    fn empty_belief(&self, random: &mut ChaCha8Rng) -> Known {
+        let environment = self.simulator.environment();
+        let known = known::empty_belief(environment);
+        let library = self.library.as_ref();
+        let hypotheses = library.map(|library| recognition::prior(environment, library, random));
+        known.with_hypotheses(hypotheses)
+    }
+
+    pub(crate) fn task(&self) -> &Task {
         self.simulator.environment().task()
     }
 
@@ -225,7 +245,7 @@ impl Episode {
             how,
             world: Arc::clone(world),
             probe: world.simulator.probe(0)?,
-            known: known::empty_belief(world.simulator.environment()),
+            known: world.empty_belief(&mut seed::stream(0, 0, "exploration")),
             random: seed::stream(0, 0, "exploration"),
             score: 0.0,
             count: 0,
@@ -238,6 +258,11 @@ impl Episode {
         })
     }
 
+    /// Scene of the episode.
+    pub(crate) fn world(&self) -> &ExplorationScene {
+        &self.world
+    }
+
     /// Seeds all random numbers that follow.
     pub(crate) fn seed(&mut self, seed: u64) {
         self.random = seed::stream(seed, 0, "exploration");
@@ -248,7 +273,7 @@ impl Episode {
         let world = &worlds[self.random.random_range(0..worlds.len())];
         let probe = world.simulator.probe(self.random.random());
         self.world = Arc::clone(world);
-        self.known = known::empty_belief(world.simulator.environment());
+        self.known = world.empty_belief(&mut self.random);
         self.observations = vec![0.0; self.how.touches * world.row()];
         self.believed = vec![0.0; 2 * world.grid.len()];
         (self.count, self.is_over, self.failure) = (0, false, None);
@@ -273,9 +298,9 @@ impl Episode {
     }
 
     fn anywhere(&mut self) -> Target {
-        match &self.known {
-            Known::HeightField(belief) => uniform(belief.zone(), &mut self.random).into(),
-            Known::ImplicitSurface(belief) => {
+        match self.known.surface() {
+            SurfaceBelief::HeightField(belief) => uniform(belief.zone(), &mut self.random).into(),
+            SurfaceBelief::ImplicitSurface(belief) => {
                 let mut random = seed::stream(self.random.random(), 0, "side");
                 random_aim(belief.scope(), &mut random).into()
             }
@@ -288,8 +313,10 @@ impl Episode {
         let mut met = None;
         if let Some(approach) = task.approach(target) {
             let touch = self.probe.touch(&approach)?;
-            if self.how.believes || self.how.reward != Reward::None {
-                let swept = self.probe.swept_volume().filter(|_| self.world.is_around());
+            let recognises = self.world.library.is_some();
+            if self.how.believes || self.how.reward != Reward::None || recognises {
+                let is_used = self.world.is_around() || recognises;
+                let swept = self.probe.swept_volume().filter(|_| is_used);
                 self.known.observe(target, &approach, (&touch, swept.as_ref()));
             }
             met = match touch {
@@ -351,13 +378,13 @@ impl Episode {
 
 /// Means and variances of the height or the field on the grid.
 fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    match known {
-        Known::HeightField(belief) => {
+    match known.surface() {
+        SurfaceBelief::HeightField(belief) => {
             let values = belief.surface().map(|it| it.predict(grid.iter().map(Vec::as_slice)));
             let values = values.into_iter().flatten();
             values.map(|values| (values.mean, values.variance)).collect()
         }
-        Known::ImplicitSurface(belief) => {
+        SurfaceBelief::ImplicitSurface(belief) => {
             let Some(surface) = belief.surface() else { return Vec::new() };
             let points_w: Vec<Point3<f64>> = grid.iter().map(|at| Point3::from_slice(at)).collect();
             let mut field = surface.field();

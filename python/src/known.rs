@@ -8,6 +8,7 @@ use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::sim::Environment;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
+use palpate::explore::belief::SurfaceBelief;
 
 /// Returns an empty belief for `environment` with default settings.
 pub(crate) fn empty_belief(environment: &Environment) -> Known {
@@ -52,11 +53,11 @@ impl GroundTruth {
     /// Errors of `known`; a closed surface is meshed with `cells` along its longest side. `None`
     /// before the first fit, or without ground truth.
     pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<BeliefErrors> {
-        match (self, known) {
-            (Self::Zone(truth), Known::HeightField(belief)) => {
+        match (self, known.surface()) {
+            (Self::Zone(truth), SurfaceBelief::HeightField(belief)) => {
                 truth.compare(belief).map(BeliefErrors::Zone)
             }
-            (Self::Around(shape), Known::ImplicitSurface(belief)) => {
+            (Self::Around(shape), SurfaceBelief::ImplicitSurface(belief)) => {
                 Some(BeliefErrors::Around(shape.as_ref()?.evaluate(belief.surface()?, cells)))
             }
             _ => None,

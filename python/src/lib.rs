@@ -21,6 +21,7 @@ mod pickle;
 mod places;
 mod planner;
 mod program;
+mod recognition;
 mod run;
 mod scene;
 mod zone;
@@ -41,6 +42,7 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<executor::RowCollector>()?;
     module.add_class::<explorer::Exploration>()?;
     module.add_class::<gaussian_process::Fitted>()?;
+    module.add_class::<recognition::RecognitionEpisode>()?;
     module.add_class::<run::Run>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<scene::Touch>()?;

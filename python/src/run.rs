@@ -117,7 +117,7 @@ impl Run {
             whole_object::belief(experiment, row, touch).map_err(errors::other)?.map(Known::from)
         } else {
             let replay = BeliefReplay::of(experiment, row, touch).map_err(errors::other)?;
-            replay.map(|replay| Known::HeightField(replay.belief))
+            replay.map(|replay| Known::from(replay.belief))
         };
         let none = || {
             let (made, first) = (row.touches.len(), experiment.initial_touches);

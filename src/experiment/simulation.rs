@@ -10,12 +10,13 @@ use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{self, GroundTruth, OracleFactory, TrialObserver};
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
-use crate::sim::library::{LoadedLibrary, OBJECT};
+use crate::sim::library::{LoadedLibrary, OBJECT, TrueObject};
 use crate::sim::simulator::Simulator;
 use palpate_explore::backend::{Backend, Fault, LinkFault};
 use palpate_explore::planner::{self, PlannerFactory};
 use palpate_explore::probe::Probe;
 use palpate_explore::probe::servo::Servo;
+use palpate_explore::recognition::Library;
 use palpate_explore::task::Task;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
@@ -100,6 +101,16 @@ impl Simulation {
         // Each trial has its own.
         made.experiment.scene.object = None;
         Ok(made)
+    }
+
+    /// Returns the objects of hypotheses.
+    pub fn library(&self) -> Option<&Arc<Library>> {
+        self.truth.library.as_ref().map(|library| &library.known)
+    }
+
+    /// Returns the object of the trial that this simulation was [drawn](Self::drawn) for.
+    pub fn object(&self) -> Option<&TrueObject> {
+        self.truth.object.as_ref()
     }
 
     /// Returns the simulation of one trial, where each touches another object; `None` where all

@@ -39,6 +39,8 @@ pub struct TrueObject {
     pub class: String,
     /// Pose of its frame `O` in `W`.
     pub x_wo: Isometry3<f64>,
+    /// Offset from the middle of the prior, m.
+    pub offset_m: [f64; 3],
 }
 
 impl LoadedLibrary {
@@ -119,7 +121,9 @@ impl LoadedLibrary {
         let object = &self.all[number].1;
         let x_wo = prior.at(object, random.random());
         let (name, class) = (object.name.clone(), object.class.clone());
-        TrueObject { number: self.known.position(&name), name, class, x_wo }
+        let offset_m = x_wo.translation.vector - prior.middle(object).coords;
+        let (number, offset_m) = (self.known.position(&name), offset_m.into());
+        TrueObject { number, name, class, x_wo, offset_m }
     }
 
     /// Returns a scene with an object drawn for it.

@@ -1,0 +1,175 @@
+//! Recognition for Python: hypotheses of a belief, and the core of the Gymnasium environments.
+
+use crate::errors;
+use crate::exploration::{Episode, EpisodeOptions, ExplorationScene, Reward};
+use crate::fork;
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::recognition::{Library, ObjectHypotheses, RecognitionSettings};
+use palpate::math::pose::parts;
+use palpate::math::seed;
+use palpate::sim::finger::effects::gel::GelEffect;
+use palpate::sim::library::TrueObject;
+use palpate::sim::{Environment, Scene};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Name of the hypothesis that the object is none of the library.
+const NONE: &str = "none";
+
+/// Returns the hypotheses before the first touch, with default settings.
+pub(crate) fn prior(
+    environment: &Environment,
+    library: &Arc<Library>,
+    random: &mut ChaCha8Rng,
+) -> ObjectHypotheses {
+    let scene = environment.scene();
+    let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
+    let finger = (environment.task(), scene.effects.skin.is_some(), pad);
+    let settings = RecognitionSettings::default();
+    let prior = scene.pose.clone().unwrap_or_default();
+    ObjectHypotheses::new(Arc::clone(library), prior, settings, finger, random)
+}
+
+/// Probability of each class, and of none of these.
+pub(crate) fn probabilities(hypotheses: &ObjectHypotheses) -> BTreeMap<String, f64> {
+    let names = hypotheses.library().classes().iter().cloned().chain([NONE.to_owned()]);
+    names.zip(hypotheses.class_probabilities()).collect()
+}
+
+/// Most likely object, position and rotation of its mesh.
+pub(crate) fn pose(hypotheses: &ObjectHypotheses) -> (String, [f64; 3], [f64; 3]) {
+    let estimate = hypotheses.estimate();
+    let object = &hypotheses.library().objects()[estimate.object];
+    let (position_m, rotation_deg) = parts(&(estimate.x_wo * object.x_om()));
+    (object.name.clone(), position_m, rotation_deg)
+}
+
+/// Episode of touches of an object drawn from a library.
+#[pyclass(frozen, module = "palpate._palpate")]
+pub(crate) struct RecognitionEpisode {
+    simulation: Simulation,
+    how: EpisodeOptions,
+    state: Mutex<State>,
+}
+
+struct State {
+    episode: Episode,
+    object: TrueObject,
+}
+
+#[pymethods]
+impl RecognitionEpisode {
+    /// A scene's file with its `--set` assignments, and the touches of an episode.
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf, sets: Vec<String>, touches: u32) -> PyResult<Self> {
+        let scene = Scene::load(&path, &sets).map_err(errors::config)?;
+        if scene.library.is_none() || scene.object.is_some() {
+            let words = "scene: allowed is one with a table [library] and without [object]";
+            return Err(PyValueError::new_err(words));
+        }
+        if touches < 1 {
+            return Err(PyValueError::new_err("touches = 0: allowed are 1 or more"));
+        }
+        let experiment = Experiment::with_defaults(&scene, &["random"], 1, touches);
+        let simulation = fork::detach(py, || Simulation::new(experiment).map_err(errors::scene))??;
+        let (reward, touches) = (Reward::None, touches as usize);
+        let how = EpisodeOptions { touches, initial: 0, reward, believes: false };
+        let state = Mutex::new(begin(&simulation, how, 0)?);
+        Ok(Self { simulation, how, state })
+    }
+
+    /// Names of the classes.
+    #[getter]
+    fn classes(&self) -> Vec<String> {
+        self.simulation.library().map(|library| library.classes().to_vec()).unwrap_or_default()
+    }
+
+    /// Numbers of values of an action and of a touch's row.
+    #[getter]
+    fn sizes(&self) -> (usize, usize) {
+        let state = self.lock();
+        (state.episode.world().action(), state.episode.world().row())
+    }
+
+    /// Draws an object and a pose.
+    fn reset(&self, py: Python<'_>, seed: u64) -> PyResult<()> {
+        let begun = fork::detach(py, || begin(&self.simulation, self.how, seed))??;
+        *self.lock() = begun;
+        Ok(())
+    }
+
+    /// Makes a touch at an action; nothing after the last one.
+    fn touch(&self, py: Python<'_>, action: Vec<f32>) -> PyResult<()> {
+        let needed = self.sizes().0;
+        if action.len() != needed {
+            let words = format!("an action has {} numbers; allowed are {needed}", action.len());
+            return Err(PyValueError::new_err(words));
+        }
+        py.detach(|| {
+            let episode = &mut self.lock().episode;
+            if !episode.is_over {
+                episode.touch(&action);
+            }
+        });
+        Ok(())
+    }
+
+    /// Rows of the touches, one after another, their number, whether the episode has ended, and the
+    /// reason of an early end.
+    #[getter]
+    fn observation(&self) -> (Vec<f32>, usize, bool, Option<String>) {
+        let Episode { observations, count, is_over, failure, .. } = &self.lock().episode;
+        (observations.clone(), *count, *is_over, failure.clone())
+    }
+
+    /// Probability of each class, then of none of these.
+    #[getter]
+    fn probabilities(&self) -> Vec<f64> {
+        let state = self.lock();
+        state
+            .episode
+            .known
+            .hypotheses()
+            .map(ObjectHypotheses::class_probabilities)
+            .unwrap_or_default()
+    }
+
+    /// Name of the true object, the number of its class (−1 if no hypothesis has it), and position
+    /// (m) and rotation (deg) of the middle of its box from where it would stand without an offset.
+    #[getter]
+    fn truth(&self) -> (String, i64, [f64; 3], [f64; 3]) {
+        let TrueObject { name, class, offset_m, x_wo, .. } = &self.lock().object;
+        let number = self.classes().iter().position(|known| known == class);
+        let (_, rotation_deg) = parts(x_wo);
+        (name.clone(), number.map_or(-1, |number| number as i64), *offset_m, rotation_deg)
+    }
+
+    /// Half of the sides of the box of possible offsets, m.
+    #[getter]
+    fn half_width_m(&self) -> [f64; 3] {
+        self.simulation.experiment().scene.pose.clone().unwrap_or_default().half_width_m
+    }
+}
+
+impl RecognitionEpisode {
+    fn lock(&self) -> std::sync::MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn begin(simulation: &Simulation, how: EpisodeOptions, seed: u64) -> PyResult<State> {
+    let trial = seed::stream(seed, 0, "episode").random();
+    let drawn = simulation.drawn(trial).map_err(errors::scene)?;
+    let found = drawn.as_ref().and_then(|drawn| Some((drawn, drawn.object()?, drawn.library()?)));
+    let (drawn, object, library) = found.ok_or_else(|| errors::other("no object is drawn"))?;
+    let world = ExplorationScene::of_library(drawn.simulator().clone(), Arc::clone(library));
+    let mut episode = Episode::new(&world, how).map_err(errors::scene)?;
+    episode.seed(seed);
+    episode.begin(std::slice::from_ref(&world));
+    Ok(State { episode, object: object.clone() })
+}
