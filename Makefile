@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth bench-peers growth-around wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -223,6 +223,10 @@ growth: setup
 # Cost over the number of touches around a whole object; draws docs/growth-around.svg.
 growth-around: setup
 	cargo bench --locked --bench around
+
+# Cost over the number of hypotheses; draws docs/growth-hypotheses.svg.
+growth-hypotheses: setup
+	cargo bench --locked --bench hypotheses
 
 # Compares Palpate with scikit-learn and egobox, in a separate environment.
 bench-peers: setup $(DEPS)/peers/bin/python

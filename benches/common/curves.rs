@@ -1,4 +1,4 @@
-//! Curves over the number of touches: timed, printed with their exponents, and drawn with the
+//! Curves over a number, usually of touches: timed, printed with their exponents, and drawn with the
 //! expected laws.
 
 use palpate::report::axes::{Axis, Panel};
@@ -44,8 +44,8 @@ fn exponent(curve: &Curve) -> f64 {
     }
 }
 
-/// Draws panels below each other.
-fn drawn(panels: &[(&str, &[Curve])]) -> Option<String> {
+/// Draws panels below each other over the number `of`.
+fn drawn(of: &str, panels: &[(&str, &[Curve])]) -> Option<String> {
     let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
     // All panels use the same colours, and the first has them all.
     let entries = panels[0].1.iter().map(|curve| (Swatch::Line(stroke(curve)), curve.name));
@@ -61,7 +61,7 @@ fn drawn(panels: &[(&str, &[Curve])]) -> Option<String> {
         let x = Axis::log(points().map(|(n, _)| *n))?;
         let y = Axis::log(points().map(|(_, value)| *value))?;
         let panel = Panel { area, x, y };
-        panel.titled_frame(&mut canvas, "", "touches n", unit);
+        panel.titled_frame(&mut canvas, "", of, unit);
         for curve in *curves {
             panel.curve(&mut canvas, &curve.values, &stroke(curve));
             if let Some((last, value)) = curve.values.last() {
@@ -89,9 +89,14 @@ pub fn print(unit: &str, curves: &[Curve]) {
     }
 }
 
-/// Draws up to two panels as `docs/NAME.svg` and `.png`.
+/// Draws up to two panels over the number of touches as `docs/NAME.svg` and `.png`.
 pub fn draw(name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
-    if let Some(svg) = drawn(panels) {
+    draw_over("touches n", name, panels)
+}
+
+/// Draws up to two panels over the number `of` as `docs/NAME.svg` and `.png`.
+pub fn draw_over(of: &str, name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
+    if let Some(svg) = drawn(of, panels) {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
         std::fs::write(docs.join(name).with_extension("png"), png(&svg)?)?;
         std::fs::write(docs.join(name).with_extension("svg"), svg)?;

@@ -33,6 +33,7 @@ class ExperimentSettings(TypedDict, total=False):
     further_views: int
     grid: int
     gp: _File | _Table
+    recognition: _Table
     planning: _Table
     report: _Table
     backend: _File | _Table

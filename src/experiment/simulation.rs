@@ -5,7 +5,6 @@ use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
 use crate::experiment::real_arm::RealArm;
 use crate::experiment::real_robot;
-use crate::experiment::trial::recorded_trial;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{self, GroundTruth, OracleFactory, TrialObserver};
 use crate::experiment::truth::Truth;
@@ -74,25 +73,30 @@ impl Simulation {
         let is_simulated = experiment.backend.kind == BackendKind::Simulated;
         let is_drawn = is_simulated && experiment.scene.object.is_none();
         if let Some(library) = library.as_ref().filter(|_| is_drawn) {
-            return Self::with_library(experiment, library, 0);
+            return Self::with_library(experiment, library, None);
         }
         let environment = Environment::build_with_progress(experiment.scene.clone(), tell);
         let environment = environment.map_err(|error| InputError::new(error.to_string()))?;
         Self::sampled(experiment, Arc::new(environment), library, tell)
     }
 
-    /// Builds the simulation of a trial with an object of a library.
+    /// Builds the simulation of a trial with an object of a library; without a trial, of its first
+    /// one, and no ground truth is that of all trials.
     fn with_library(
         experiment: Experiment,
         library: &Arc<LoadedLibrary>,
-        trial: u32,
+        trial: Option<u32>,
     ) -> Result<Self, InputError> {
+        let number = trial.unwrap_or(0);
         let prior = experiment.scene.pose.clone().unwrap_or_default();
-        let mut random = seed::stream(experiment.seed, trial.into(), OBJECT);
-        let object = library.draw(&prior, trial, &mut random);
+        let mut random = seed::stream(experiment.seed, number.into(), OBJECT);
+        let object = library.draw(&prior, number, &mut random);
         let scene = library.place(&experiment.scene, &object);
         let environment = Arc::new(Environment::build(scene)?);
-        let truth = Truth::sample(&environment, experiment.grid as usize, &|_| ());
+        let truth = match trial {
+            Some(_) => Truth::sample(&environment, experiment.grid as usize, &|_| ()),
+            None => Truth::default(),
+        };
         let (library, object) = (Some(Arc::clone(library)), Some(object));
         let mut made = Self::made(
             experiment,
@@ -123,7 +127,7 @@ impl Simulation {
         let Some(library) = self.truth.library.as_ref().filter(|_| is_drawn) else {
             return Ok(None);
         };
-        Self::with_library(self.experiment.clone(), library, trial).map(Some)
+        Self::with_library(self.experiment.clone(), library, Some(trial)).map(Some)
     }
 
     /// Builds the simulation in an existing environment, whose scene replaces the experiment's.
@@ -226,7 +230,9 @@ impl Simulation {
     /// Warnings about likely configuration mistakes.
     pub fn notices(&self) -> Vec<String> {
         let mut notices: Vec<String> = self.simulator.notices();
-        notices.extend(notice::truth_notices(self.task().zone(), self.truth()));
+        if self.truth.object.is_none() {
+            notices.extend(notice::truth_notices(self.task().zone(), self.truth()));
+        }
         notices.extend(self.scan_notice.clone());
         notices.extend(self.shape().and_then(notice::shape_notice));
         notices
@@ -310,7 +316,17 @@ impl Simulation {
 
     /// Runs one trial of `planner` from start to end; the row contains any failure.
     pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
-        recorded_trial::run(self, (trial, planner), None, &[], &mut |_| Ok(None))
+        let drawn = match self.drawn(trial) {
+            Ok(drawn) => drawn,
+            Err(error) => {
+                return TrialRow::without_touches(trial, planner.name(), Some(error.to_string()));
+            }
+        };
+        let own = drawn.as_ref().unwrap_or(self);
+        match own.probe(trial) {
+            Ok(mut probe) => own.trial_with(&mut *probe, planner, trial, &mut |_| Ok(None)),
+            Err(fault) => TrialRow::not_started(trial, planner.name(), &fault),
+        }
     }
 
     /// Runs a trial like [`trial`](Self::trial) with any `probe`, and calls `observer` after each

@@ -26,7 +26,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     make: |settings, rng| planner(Goal::Both, settings, rng),
 };
 
-/// What a touch should tell.
+/// Subject of the information that a touch should give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Goal {
     /// Object and pose.

@@ -1,4 +1,4 @@
-//! What touches tell about an object at a pose: residuals of contacts and of free space.
+//! Evidence of touches for an object at a pose: residuals of contacts and of free space.
 //!
 //! Each number is a likelihood ratio: the density of what was measured if the object is at the
 //! pose, over its density if the shape is unknown. For a contact at the distance r from the surface
@@ -60,7 +60,7 @@ struct MeasuredPoint {
     range_m: f64,
 }
 
-/// What one touch tells.
+/// Evidence of one touch.
 pub(super) struct TouchEvidence {
     /// Hull at the start of its way.
     hull: Capsule,
@@ -149,8 +149,8 @@ impl Terms {
 }
 
 impl TouchEvidence {
-    /// Returns what a touch along `approach` tells, with a hull that yields by `slack_m` and may have
-    /// a pad; `None` after an overload, and without a hull.
+    /// Returns the evidence of a touch along `approach`, with a hull that yields by `slack_m` and may
+    /// have a pad; `None` after an overload, and without a hull.
     pub fn new(
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
@@ -233,7 +233,7 @@ impl TouchEvidence {
         });
         let deepest = of_hull.into_iter().chain(of_face).max_by(|a, b| a.0.total_cmp(&b.0));
         let depth = deepest.map(|(depth_m, n, p_w)| {
-            // A contact that is inside of the object has told that once already.
+            // A contact that is inside of the object is that depth already.
             let inside = points.first().map(|point| &point.distance).filter(|it| it.value_m < 0.0);
             let (told_m, told) =
                 inside.map_or((0.0, Vector6::zeros()), |it| (-it.value_m, it.slope));

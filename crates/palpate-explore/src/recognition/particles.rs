@@ -41,7 +41,7 @@ pub(super) struct Particles {
     pub log_evidence: f64,
 }
 
-/// What the particles of an object share.
+/// Object, prior and data that particles share.
 pub(super) struct Model<'a> {
     pub object: &'a LibraryObject,
     pub prior: &'a PosePrior,
