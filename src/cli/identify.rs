@@ -48,7 +48,7 @@ pub(super) struct Args {
     /// Clear latched faults on the robot before moving (operator only).
     #[arg(long)]
     clear_fault: bool,
-    /// Change one setting of the scene, or of the experiment: a dotted key and a TOML value; may be repeated.
+    /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }

@@ -149,8 +149,8 @@ impl Terms {
 }
 
 impl TouchEvidence {
-    /// Returns the evidence of a touch along `approach`, with a hull that yields by `slack_m` and may
-    /// have a pad; `None` after an overload, and without a hull.
+    /// Returns the evidence of a touch along `approach`, with a hull that yields by `slack_m` and
+    /// may have a pad; `None` after an overload, and without a hull.
     pub fn new(
         approach: &Approach,
         (touch, swept): (&Touch, Option<&SweptVolume>),
@@ -391,7 +391,8 @@ mod tests {
             prop_assert!(here.information.symmetric_eigenvalues().min() > -1e-6 * scale * scale);
         }
 
-        /// Wherever a touch ends, ratios are finite, and at a large temperature all poses are equal.
+        /// Wherever a touch ends, ratios are finite, and at a large temperature all poses are
+        /// equal.
         #[test]
         fn ratios_are_finite_anywhere(
             p_w in prop::array::uniform3(-0.1f64..0.1),

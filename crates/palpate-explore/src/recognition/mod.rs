@@ -1,8 +1,8 @@
 //! Recognition: which object of a library is in the region, and at which pose.
 //!
 //! [`ObjectHypotheses`] hold an object × pose posterior beside the belief of the surface. The
-//! hypothesis *none of these* competes with the objects: a shape near to one of the library's, or an
-//! unknown one.
+//! hypothesis *none of these* competes with the objects: a shape near to one of the library's, or
+//! an unknown one.
 
 mod evidence;
 mod hypotheses;

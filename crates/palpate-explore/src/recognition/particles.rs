@@ -1,5 +1,5 @@
-//! Sequential Monte Carlo over the poses of one object (Del Moral et al. 2006): each touch enters at
-//! a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
+//! Sequential Monte Carlo over the poses of one object (Del Moral et al. 2006): each touch enters
+//! at a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
 //! Calderhead 2011) on all touches so far.
 
 use super::evidence::{LogLikelihood, NoiseModel, TouchEvidence, TouchFit};
@@ -295,8 +295,8 @@ mod tests {
             .collect()
     }
 
-    /// The evidence of particles is the integral of the likelihood over the prior, and their mean is
-    /// that of the posterior: a sum over a grid is the slow twin.
+    /// The evidence of particles is the integral of the likelihood over the prior, and their mean
+    /// is that of the posterior: a sum over a grid is the slow twin.
     #[test]
     fn particles_are_an_integral_over_the_prior() {
         let (vertices, triangles) = box_mesh([-0.05, -0.03, -0.04], [0.05, 0.03, 0.04]);
