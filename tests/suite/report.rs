@@ -1,6 +1,9 @@
 //! Tests of figures and pages of synthetic runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
+use palpate::experiment::measure::recognition::{
+    NONE, PoseRow, RecognitionError, RecognitionMetrics,
+};
 use palpate::experiment::measure::shape::ShapeMetrics;
 use palpate::experiment::measure::silhouette::SilhouetteMetrics;
 use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
@@ -238,6 +241,22 @@ fn a_zone_has_no_measures_of_whole_objects() {
 }
 
 /// Every measure of the table appears in columns, comparison, panel, column of the page, and claim.
+fn recognition() -> RecognitionMetrics {
+    let (position_m, rotation_deg) = ([0.0; 3], [0.0; 3]);
+    RecognitionMetrics {
+        object: "box".into(),
+        probabilities: [("box".to_owned(), 0.9), (NONE.to_owned(), 0.1)].into(),
+        pose: PoseRow { position_m, rotation_deg, distance_95_m: 1e-3 },
+        error: Some(RecognitionError {
+            object: "box".into(),
+            is_right: true,
+            probability: 0.9,
+            distance_m: Some(5e-4),
+            offset: Some([1e-3, 2.0]),
+        }),
+    }
+}
+
 #[test]
 fn a_measure_is_told_wherever_measures_are() {
     let mut run = run(SURFACE);
@@ -251,6 +270,7 @@ fn a_measure_is_told_wherever_measures_are() {
         });
         touch.metrics.iter_mut().for_each(|metrics| metrics.unreachable_rmse_m = Some(0.1));
         touch.shape = Some(SHAPE);
+        touch.recognition = Some(recognition());
     }
     run.experiment.report.claims = vec![Claim {
         source: "here".into(),

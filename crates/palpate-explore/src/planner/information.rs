@@ -12,9 +12,8 @@ use super::plan::{Plan, PlanError, Planner, PlannerEntry};
 use super::sample::random_target;
 use super::settings::PlanningSettings;
 use crate::belief::Belief;
-use crate::recognition::{Hypothesis, ObjectHypotheses};
+use crate::recognition::{Hypothesis, ObjectHypotheses, Prediction};
 use crate::task::{Aim, Target};
-use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -49,6 +48,10 @@ const RANDOM_SHARE: f64 = 0.25;
 // heuristic: several times a contact's, because few hypotheses stand for many.
 const DEPTH_SD_M: f64 = 1.5e-3;
 const NORMAL_SD: f64 = 0.4;
+
+/// Share of hypotheses in which the shaft may touch in place of the tip.
+// heuristic: seldom, because no sensor is there and the finger goes on.
+const SHAFT_SHARE: f64 = 0.02;
 
 /// Density of an outcome that no hypothesis predicts, relative to that of the predicted one.
 // heuristic: bounds what one touch can tell to seven nats.
@@ -125,8 +128,12 @@ impl InformationPlanner {
         target: &Target,
     ) -> Option<f64> {
         let approach = hypotheses.approach(target)?;
-        let outcomes: Vec<Option<(f64, Vector3<f64>)>> =
+        let outcomes: Vec<Option<Prediction>> =
             drawn.iter().map(|hypothesis| hypotheses.predict(hypothesis, &approach)).collect();
+        let on_shaft = outcomes.iter().flatten().filter(|outcome| !outcome.is_on_tip).count();
+        if on_shaft as f64 > SHAFT_SHARE * outcomes.len() as f64 {
+            return None;
+        }
         let (count, library) = (drawn.len() as f64, hypotheses.library());
         let mut sum = 0.0;
         for (of, outcome) in drawn.iter().zip(&outcomes) {
@@ -150,11 +157,11 @@ impl InformationPlanner {
 }
 
 /// Density of an outcome where another is predicted, relative to its largest value.
-fn likeness(outcome: &Option<(f64, Vector3<f64>)>, predicted: &Option<(f64, Vector3<f64>)>) -> f64 {
+fn likeness(outcome: &Option<Prediction>, predicted: &Option<Prediction>) -> f64 {
     let alike = match (outcome, predicted) {
-        (Some((at_m, normal_w)), Some((other_m, other_w))) => {
-            let depth = (at_m - other_m) / DEPTH_SD_M;
-            let turn = (normal_w - other_w).norm() / NORMAL_SD;
+        (Some(here), Some(there)) => {
+            let depth = (here.way_m - there.way_m) / DEPTH_SD_M;
+            let turn = (here.normal_w - there.normal_w).norm() / NORMAL_SD;
             (-0.25 * (depth * depth + turn * turn)).exp()
         }
         (None, None) => 1.0,

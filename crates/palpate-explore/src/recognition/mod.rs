@@ -10,6 +10,6 @@ mod library;
 mod particles;
 mod pose_prior;
 
-pub use hypotheses::{Hypothesis, ObjectHypotheses, PoseEstimate, RecognitionSettings};
+pub use hypotheses::{Hypothesis, ObjectHypotheses, PoseEstimate, Prediction, RecognitionSettings};
 pub use library::{Library, LibraryObject};
 pub use pose_prior::{PosePrior, Turn};
