@@ -84,11 +84,11 @@ pub static MEASURES: &[Measure] = &[
     POSE_DISTANCE,
     measure(Undirected, "pose_coverage", "poses within the stated 95 % distance", SHARE)
         .from(Source::Recognition(|it| it.is_covered().map(share))),
-    measure(Minimise, "position_m", "error of the object's position", MM)
+    measure(Minimise, "position_m", "object position error", MM)
         .from(Source::Recognition(|it| Some(it.error.as_ref()?.offset?[0])))
         .aggregated(Aggregate::Median)
         .untabled(),
-    measure(Minimise, "rotation_deg", "error of the object's rotation", DEGREES)
+    measure(Minimise, "rotation_deg", "object rotation error", DEGREES)
         .from(Source::Recognition(|it| Some(it.error.as_ref()?.offset?[1])))
         .aggregated(Aggregate::Median)
         .untabled(),
@@ -281,8 +281,8 @@ pub enum Source {
     /// Agreement of the closed surfaces after a touch. Files of runs over a zone have no column for
     /// such a measure.
     Shape(fn(&ShapeMetrics) -> Option<f64>),
-    /// Hypotheses about the object after a touch. Files of runs without a library have no column for
-    /// such a measure.
+    /// Hypotheses about the object after a touch. Files of runs without a library have no column
+    /// for such a measure.
     Recognition(fn(&RecognitionMetrics) -> Option<f64>),
     /// Row of one touch.
     Touch(fn(&TouchRow) -> Option<f64>),

@@ -83,10 +83,11 @@ const NEAR_PART: u32 = 4;
 // heuristic: three contacts that fit exactly would not make up for it.
 const HOPELESS: f64 = -30.0;
 
-/// Counts of touches after which posteriors may be found anew, and the log-odds of the best object
-/// against none of these below which they are.
+/// Counts of touches after which posteriors may be found anew, and the probability of the best
+/// object, and its log-odds against none of these, below which they are.
 // heuristic: often at first, when touches are few and poses many.
 const RESTARTS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
+const UNDECIDED: f64 = 0.9;
 const DOUBT: f64 = 8.0;
 
 /// Depth by which the tip of a soft finger passes the surface at contact, m.
@@ -265,12 +266,13 @@ impl ObjectHypotheses {
         }
     }
 
-    /// Whether the best object explains the touches hardly better than none of these does.
+    /// Whether no object is likely, or the best one explains the touches hardly better than none of
+    /// these does.
     fn is_doubtful(&self) -> bool {
         let probabilities = self.probabilities();
         let Some((none, objects)) = probabilities.split_last() else { return false };
         let best = objects.iter().copied().fold(0.0, f64::max);
-        none.ln() > best.ln() - DOUBT
+        best < UNDECIDED || none.ln() > best.ln() - DOUBT
     }
 
     /// Finds the posteriors of all objects anew from the prior, because few particles may have
