@@ -60,6 +60,8 @@ mod lab_camera;
 #[cfg(feature = "mujoco")]
 mod lab_faults;
 #[cfg(feature = "mujoco")]
+mod lab_recognition;
+#[cfg(feature = "mujoco")]
 mod lab_strokes;
 #[cfg(feature = "mujoco")]
 mod lab_ur;
