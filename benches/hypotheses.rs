@@ -33,7 +33,11 @@ fn main() -> anyhow::Result<()> {
     let colours = ["#0072b2", "#56b4e9", "#009e73", "#d55e00"];
     let names = ["first touch", "third touch", "sixth touch", "choice of a touch"];
     let mut curves: Vec<Curve> = (names.iter().zip(colours))
-        .map(|(name, colour)| Curve { name, colour, expected: 1.0, values: Vec::new() })
+        // A choice draws a fixed number of hypotheses.
+        .map(|(name, colour)| {
+            let expected = if *name == names[3] { 0.0 } else { 1.0 };
+            Curve { name, colour, expected, values: Vec::new() }
+        })
         .collect();
     for particles in PARTICLES {
         // The median over some objects.
