@@ -24,6 +24,7 @@ __all__ = [
     "Exploration",
     "Fitted",
     "RowCollector",
+    "RecognitionEpisode",
     "Run",
     "Scene",
     "Touch",

@@ -45,6 +45,8 @@ class SceneSettings(TypedDict, total=False):
 
     simulator: str
     object: _Table
+    library: _Table
+    pose: _Table
     function: str
     zone: _Table
     whole_object: _Table
