@@ -94,6 +94,10 @@ const DOUBT: f64 = 8.0;
 // heuristic: the press depth of a BioTac and its margin.
 const SOFT_SLACK_M: f64 = 2e-3;
 
+/// Offset of a soft finger's contacts that more touches do not remove, m.
+// heuristic: the largest one of the estimated surfaces of tuning objects, 0.1 to 0.8 mm.
+const SOFT_OFFSET_M: f64 = 8e-4;
+
 /// Depth by which a pad passes the surface at contact beyond its press depth, m.
 // heuristic: an arm stops it within this.
 const PAD_SLACK_M: f64 = 3e-4;
@@ -143,6 +147,8 @@ pub struct ObjectHypotheses {
     noise: NoiseModel,
     task: Task,
     slack_m: f64,
+    /// Error that all contacts have in common.
+    offset_m: f64,
     pad: Option<GelPad>,
     touches: Vec<Arc<TouchEvidence>>,
     objects: Vec<ObjectPosterior>,
@@ -186,6 +192,7 @@ impl ObjectHypotheses {
             noise,
             task: task.clone(),
             slack_m,
+            offset_m: if is_soft { SOFT_OFFSET_M } else { 0.0 },
             pad,
             touches: Vec::new(),
             objects: Vec::new(),
@@ -380,7 +387,7 @@ impl ObjectHypotheses {
             passed += weight;
             passed >= 0.95 * whole
         });
-        let distance_95_m = within.map_or(0.0, |it| it.0);
+        let distance_95_m = within.map_or(0.0, |it| it.0).hypot(self.offset_m);
         PoseEstimate { object: number, x_wo, distance_95_m }
     }
 
