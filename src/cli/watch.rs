@@ -57,6 +57,7 @@ pub(super) fn watch(
     let experiment = experiment(path, sets, args)?;
     let planner = planner(args, &experiment)?;
     let simulation = prepare_simulation(experiment, talk)?;
+    let simulation = simulation.drawn(args.trial)?.unwrap_or(simulation);
     let Some(body) = simulation.simulator().body()? else {
         let (path, body) = (path.display(), simulation.experiment().scene.simulator.name());
         bail!(

@@ -177,6 +177,28 @@ fn wrong_libraries_are_refused_with_the_reason() {
     }
 }
 
+/// A recorded trial is replayed with the object that was drawn for it.
+#[test]
+fn a_recording_of_a_drawn_object_is_replayed() {
+    let folder = TempDir::new().unwrap();
+    let sets = [
+        BOXES[0],
+        BOXES[1],
+        "planners=[\"sobol\"]",
+        "scene.simulator=\"kinematic\"",
+        "touches=2",
+        "trials=2",
+    ];
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
+    let run = ["run", "lookalikes", "--record", "--no-report", "--out", "it"];
+    succeeds(folder.path(), &run.into_iter().chain(sets).collect::<Vec<_>>());
+    for number in ["0000", "0001"] {
+        let recording = format!("it/recordings/sobol-{number}.mcap");
+        let says = succeeds(folder.path(), &["replay", &recording]);
+        assert!(says.contains("2 touches identical"), "{says}");
+    }
+}
+
 /// A run draws its hypotheses, and its tables have accuracy and pose errors.
 #[test]
 fn a_run_shows_how_hypotheses_fade() {

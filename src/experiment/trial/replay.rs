@@ -86,6 +86,8 @@ pub fn experiment(
 /// recording's start.
 pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<ReplayResult, Fault> {
     let about = &recorded.about;
+    let drawn = simulation.drawn(about.trial)?;
+    let simulation = drawn.as_ref().unwrap_or(simulation);
     let planner = simulation.planner(&about.planner).ok_or_else(|| {
         let name = &about.planner;
         InputError::new(format!("planner \"{name}\" is not available in this version"))
