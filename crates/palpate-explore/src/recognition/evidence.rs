@@ -11,13 +11,16 @@
 //! the object before. For a miss L = 2 (1 − ε) exp(−g²/2σ²) + ε. A temperature τ adds to both
 //! deviations, so that at a large one all poses are equal.
 
-use super::library::LibraryObject;
+use super::library::{LibraryObject, Nearest};
 use crate::probe::{Contact, SweptVolume, Touch};
+use crate::robot::Finger;
 use crate::robot::sensor::GelPad;
-use crate::task::Approach;
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitVector3, Vector3, Vector6};
-use palpate_geometry::primitives::normal;
+use crate::task::{Approach, any_orthogonal};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, UnitVector3, Vector3, Vector6,
+};
 use palpate_geometry::sweep::Capsule;
+use std::f64::consts::PI;
 
 /// Noise of the contacts of an object at its true pose.
 #[derive(Clone, Copy, Debug)]
@@ -165,11 +168,8 @@ impl TouchEvidence {
             Touch::Overload => return None,
             Touch::Contact(_) | Touch::Miss => swept.p_wt,
         };
-        let before_m = finger.radius_m + finger.length_m;
-        let at_m = (approach.p_near_w - end_w).dot(&ahead_w) - before_m;
-        let start_w = end_w + ahead_w.scale(at_m);
-        let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
-        let hull = Capsule { p0_w: start_w, p1_w: start_w + axis_w, radius_m: finger.radius_m };
+        let at_m = (approach.p_near_w - end_w).dot(&ahead_w) - before_m(finger);
+        let hull = hull(finger, approach, end_w + ahead_w.scale(at_m));
         let contact = match touch {
             Touch::Contact(contact) => Some(contact),
             Touch::Miss | Touch::Overload => None,
@@ -188,57 +188,49 @@ impl TouchEvidence {
             let lever = (p_w - origin_w).cross(n);
             Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z)
         };
-        let ahead_o = x_wo.inverse_transform_unit_vector(&self.ahead_w);
-        let hull = Capsule {
-            p0_w: x_wo.inverse_transform_point(&self.hull.p0_w),
-            p1_w: x_wo.inverse_transform_point(&self.hull.p1_w),
-            ..self.hull
-        };
-        let hit = object.bvh.sweep(&hull, &ahead_o, self.free_m + self.hull.radius_m);
-        let met = hit.map(|hit| (hit.travel_m, x_wo * hit.normal, x_wo * hit.point));
+        let reach_m = self.free_m + self.hull.radius_m;
+        let met = object.sweep(x_wo, (&self.hull, &self.ahead_w), reach_m);
         let points: Vec<PointFit> = (self.points.iter())
             .map(|point| {
-                let closest = object.bvh.closest_point(&x_wo.inverse_transform_point(&point.p_w));
-                let q_w = x_wo * closest.point;
-                let face_w = x_wo * normal(&object.bvh.mesh().corners(closest.triangle as usize));
-                let away = point.p_w - q_w;
-                let side = if away.dot(&face_w) < 0.0 { -1.0 } else { 1.0 };
+                let Nearest { q_w, face_w, distance_m } = object.nearest(x_wo, &point.p_w);
                 // Close to the surface the direction is rounding; the face has it.
-                let n = match closest.distance_m > ROUNDING_M {
-                    true => away * (side / closest.distance_m),
+                let n = match distance_m.abs() > ROUNDING_M {
+                    true => (point.p_w - q_w) / distance_m,
                     false => face_w,
                 };
-                let value_m = side * closest.distance_m;
-                let distance = Residual { value_m, slope: -slope(&n, &q_w) };
+                let distance = Residual { value_m: distance_m, slope: -slope(&n, &q_w) };
                 // On an edge, the hull's normal lies between those of the faces.
                 let is_same = |p_w: &Point3<f64>| (p_w - q_w).norm() < 0.5 * self.hull.radius_m;
                 let normal_w = match &met {
-                    Some((_, normal_w, p_w)) if is_same(p_w) => *normal_w,
+                    Some(hit) if is_same(&hit.point) => hit.normal,
                     _ => face_w,
                 };
                 let turn = point.normal_w.map(|to_w| (turn_between(&normal_w, &to_w), normal_w));
                 PointFit { distance, turn }
             })
             .collect();
-        let of_hull = met.filter(|met| met.0 < self.free_m).map(|(travel_m, n, p_w)| {
-            let facing = (-n.dot(&self.ahead_w)).max(0.0);
-            ((self.free_m - travel_m) * facing, n, p_w)
+        let of_hull = met.filter(|hit| hit.travel_m < self.free_m).map(|hit| {
+            // The turn of the normal is left out of the slope: it only counts deep inside.
+            let facing = (-hit.normal.dot(&self.ahead_w)).max(0.0);
+            let value_m = (self.free_m - hit.travel_m) * facing;
+            Residual { value_m, slope: slope(&hit.normal, &hit.point) }
         });
         let of_face = self.face_w.iter().filter_map(|p_w| {
-            let closest = object.bvh.closest_point(&x_wo.inverse_transform_point(p_w));
-            let q_w = x_wo * closest.point;
-            let face_w = x_wo * normal(&object.bvh.mesh().corners(closest.triangle as usize));
-            let is_inside = (p_w - q_w).dot(&face_w) < 0.0;
-            is_inside.then_some((closest.distance_m, face_w, q_w))
+            let Nearest { q_w, face_w, distance_m } = object.nearest(x_wo, p_w);
+            let inside = || Residual { value_m: -distance_m, slope: slope(&face_w, &q_w) };
+            (distance_m < 0.0).then(inside)
         });
-        let deepest = of_hull.into_iter().chain(of_face).max_by(|a, b| a.0.total_cmp(&b.0));
-        let depth = deepest.map(|(depth_m, n, p_w)| {
+        let deepest =
+            of_hull.into_iter().chain(of_face).max_by(|a, b| a.value_m.total_cmp(&b.value_m));
+        let depth = deepest.map(|mut depth| {
             // A contact that is inside of the object is that depth already.
             let inside = points.first().map(|point| &point.distance).filter(|it| it.value_m < 0.0);
-            let (told_m, told) =
-                inside.map_or((0.0, Vector6::zeros()), |it| (-it.value_m, it.slope));
-            let value_m = depth_m - told_m - self.slack_m;
-            (value_m > 0.0).then(|| Residual { value_m, slope: slope(&n, &p_w) + told })
+            if let Some(inside) = inside {
+                depth.value_m += inside.value_m;
+                depth.slope += inside.slope;
+            }
+            depth.value_m -= self.slack_m;
+            (depth.value_m > 0.0).then_some(depth)
         });
         TouchFit { depth: depth.flatten().unwrap_or_default(), points }
     }
@@ -256,7 +248,7 @@ impl TouchEvidence {
             let mut terms = Terms::default();
             let sd_m = sd_m.hypot(point.sd_m) * point.inflation;
             terms.add(&fitted.distance, sd_m);
-            let mut density = point.range_m / (sd_m * (2.0 * std::f64::consts::PI).sqrt());
+            let mut density = point.range_m / (sd_m * (2.0 * PI).sqrt());
             if i == 0 {
                 terms.add(&fit.depth, sd_m);
                 density /= 1.0 - UNKNOWN_MISS;
@@ -272,11 +264,24 @@ impl TouchEvidence {
     }
 }
 
+/// Distance before the nearest point of an approach at which a hull is outside of the region.
+pub(super) fn before_m(finger: &Finger) -> f64 {
+    finger.radius_m + finger.length_m
+}
+
+/// Returns the hull of a finger on an approach with its tip at `p_wt`.
+pub(super) fn hull(finger: &Finger, approach: &Approach, p_wt: Point3<f64>) -> Capsule {
+    let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
+    Capsule { p0_w: p_wt, p1_w: p_wt + axis_w, radius_m: finger.radius_m }
+}
+
 /// Returns the rotation vector from one unit vector to another, rad.
 fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
-    let axis = from.cross(to);
-    let (sine, cosine) = (axis.norm(), from.dot(to));
-    if sine > ROUNDING_M { axis * (sine.atan2(cosine) / sine) } else { Vector3::zeros() }
+    match UnitQuaternion::rotation_between(from, to) {
+        Some(turn) => turn.scaled_axis(),
+        // Opposite vectors: about any axis across.
+        None => any_orthogonal(&UnitVector3::new_normalize(*from)) * PI,
+    }
 }
 
 /// Number of points along each side of a pad's face.
@@ -320,7 +325,6 @@ fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
 mod tests {
     use super::*;
     use crate::recognition::pose_prior::moved;
-    use crate::robot::Finger;
     use crate::task::{Aim, Ball};
     use palpate_geometry::mesh::Mesh;
     use palpate_geometry::solids::sphere_mesh;
@@ -354,9 +358,19 @@ mod tests {
         TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None)).unwrap()
     }
 
+    /// The angle between normals is that of the rotation, for opposite ones too.
+    #[test]
+    fn opposite_normals_are_half_a_turn_apart() {
+        let (x, y) = (Vector3::x(), Vector3::y());
+        for (to, expected_rad) in [(x, 0.0), (y, PI / 2.0), (-x, PI)] {
+            assert!((turn_between(&x, &to).norm() - expected_rad).abs() < 1e-9, "{to}");
+        }
+    }
+
     proptest! {
         /// The gradient is the derivative of the value where the object's face stays the same, and
-        /// the information is positive.
+        /// the information is positive. Inside of the object the gradient is approximate, because it
+        /// leaves out the turn of the normal.
         #[test]
         fn the_gradient_is_the_derivative(
             from in prop::array::uniform3(-1f64..1.0),
@@ -387,7 +401,7 @@ mod tests {
             let scale = here.information[(axis, axis)].sqrt() + 1.0;
             prop_assume!((slopes[1] - slopes[0]).abs() < 0.02 * scale);
             let error = here.gradient[axis] - 0.5 * (slopes[0] + slopes[1]);
-            prop_assert!(error.abs() < 0.03 * scale, "{error} of {} at {scale}", here.gradient[axis]);
+            prop_assert!(share < 1.1 || error.abs() < 0.015 * scale, "{error} of {} at {scale}", here.gradient[axis]);
             prop_assert!(here.information.symmetric_eigenvalues().min() > -1e-6 * scale * scale);
         }
 

@@ -1,6 +1,6 @@
 //! Hypotheses about object and pose, and *none of these*.
 
-use super::evidence::{NoiseModel, TouchEvidence};
+use super::evidence::{NoiseModel, TouchEvidence, before_m, hull};
 use super::library::{Library, LibraryObject};
 use super::particles::{Model, Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
@@ -8,7 +8,6 @@ use crate::probe::{SweptVolume, Touch};
 use crate::robot::sensor::GelPad;
 use crate::task::{Approach, Target, Task};
 use nalgebra::{Isometry3, Point3, Vector3};
-use palpate_geometry::sweep::Capsule;
 use palpate_input::config::{Rules, Validate};
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
@@ -249,17 +248,13 @@ impl ObjectHypotheses {
 
     /// Takes in new touches for all objects that are possible.
     fn update_all(&mut self) {
-        let (noise, touches) = (self.noise, self.touches.clone());
-        for (of_objects, noise) in [(true, noise), (false, NEAR_SHAPE)] {
-            let bank = if of_objects { &mut self.objects } else { &mut self.near };
-            let mut bank = std::mem::take(bank);
-            bank.par_iter_mut().enumerate().filter(|(_, it)| it.is_possible).for_each(
-                |(number, posterior)| {
-                    let ObjectPosterior { particles, random, .. } = posterior;
-                    particles.update(&self.model(number, &touches, noise), random);
-                },
-            );
-            *(if of_objects { &mut self.objects } else { &mut self.near }) = bank;
+        let Self { library, prior, touches, noise, objects, near, .. } = self;
+        for (bank, noise) in [(objects, *noise), (near, NEAR_SHAPE)] {
+            let each = bank.par_iter_mut().zip(library.objects());
+            each.filter(|(posterior, _)| posterior.is_possible).for_each(|(posterior, object)| {
+                let model = Model { object, prior, touches, noise };
+                posterior.particles.update(&model, &mut posterior.random);
+            });
         }
         self.leave_out();
     }
@@ -322,12 +317,13 @@ impl ObjectHypotheses {
 
     /// Probability of each class of objects, then that of none of these.
     pub fn class_probabilities(&self) -> Vec<f64> {
-        let mut classes = vec![0.0; self.library.classes().len() + 1];
-        for (object, probability) in self.probabilities().into_iter().enumerate() {
-            let is_object = object < self.objects.len();
-            let none = self.library.classes().len();
-            classes[if is_object { self.library.class_of(object) } else { none }] += probability;
+        let mut classes = vec![0.0; self.library.classes().len()];
+        let mut probabilities = self.probabilities();
+        let none = probabilities.pop();
+        for (object, probability) in probabilities.into_iter().enumerate() {
+            classes[self.library.class_of(object)] += probability;
         }
+        classes.extend(none);
         classes
     }
 
@@ -367,18 +363,15 @@ impl ObjectHypotheses {
         let weighted: Vec<_> = posterior.particles.weighted().collect();
         let drawn = systematic(weighted.iter().map(|it| it.1), ESTIMATED, 0.5);
         let poses: Vec<&Isometry3<f64>> = drawn.into_iter().map(|i| weighted[i].0).collect();
-        let distances_m = |from: &Isometry3<f64>| -> Vec<f64> {
-            let to = poses.iter();
-            to.map(|to| object.sampled_distance_m(to, from, POINT_STEP)).collect()
-        };
-        let mean_m = |from: &Isometry3<f64>| distances_m(from).iter().sum::<f64>();
-        let scored = poses.iter().map(|pose| (mean_m(pose), **pose));
+        let distance_m = |from, to| object.sampled_distance_m(to, from, POINT_STEP);
+        let sum_m = |from| poses.iter().map(|to| distance_m(from, to)).sum::<f64>();
+        let scored = poses.iter().map(|pose| (sum_m(*pose), **pose));
         let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
         let x_wo = best.map_or_else(Isometry3::identity, |(_, pose)| pose);
         // Over all particles, because the quantile is in the tail.
         let step = (weighted.len() / 128).max(1);
         let mut away: Vec<(f64, f64)> = (weighted.iter().step_by(step))
-            .map(|(pose, weight)| (object.sampled_distance_m(pose, &x_wo, POINT_STEP), *weight))
+            .map(|(pose, weight)| (distance_m(&x_wo, *pose), *weight))
             .collect();
         away.sort_by(|a, b| a.0.total_cmp(&b.0));
         let whole: f64 = away.iter().map(|it| it.1).sum();
@@ -402,22 +395,16 @@ impl ObjectHypotheses {
     pub fn predict(&self, hypothesis: &Hypothesis, approach: &Approach) -> Option<Prediction> {
         let finger = self.task.finger();
         let object: &LibraryObject = &self.library.objects()[hypothesis.object];
-        let ahead_w = approach.direction_w();
-        let before_m = finger.radius_m + finger.length_m;
+        let (ahead_w, before_m) = (approach.direction_w(), before_m(finger));
         let start_w = approach.p_near_w - ahead_w.scale(before_m);
-        let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
-        let x_wo = &hypothesis.x_wo;
-        let p0_w = x_wo.inverse_transform_point(&start_w);
-        let p1_w = p0_w + x_wo.inverse_transform_vector(&axis_w);
-        let hull = Capsule { p0_w, p1_w, radius_m: finger.radius_m };
-        let ahead_o = x_wo.inverse_transform_unit_vector(&ahead_w);
+        let hull = hull(finger, approach, start_w);
         let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + finger.radius_m;
-        let hit = object.bvh.sweep(&hull, &ahead_o, way_m)?;
-        let p_ot = hull.p0_w + ahead_o.scale(hit.travel_m);
-        let behind_m = (hit.point - p_ot).dot(&(hull.p1_w - hull.p0_w)) / finger.length_m;
+        let hit = object.sweep(&hypothesis.x_wo, (&hull, &ahead_w), way_m)?;
+        let p_wt = start_w + ahead_w.scale(hit.travel_m);
+        let behind_m = (hit.point - p_wt).dot(&(hull.p1_w - hull.p0_w)) / finger.length_m;
         Some(Prediction {
             way_m: hit.travel_m - before_m,
-            normal_w: x_wo * hit.normal,
+            normal_w: hit.normal,
             is_on_tip: finger.length_m == 0.0 || behind_m <= finger.radius_m,
         })
     }

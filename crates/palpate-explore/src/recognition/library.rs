@@ -1,9 +1,11 @@
 //! Library: the objects that may be in the region, each with its mesh.
 
-use nalgebra::{Isometry3, Point3};
-use palpate_geometry::bvh::MeshBvh;
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use palpate_geometry::bvh::{MeshBvh, SweepHit};
 use palpate_geometry::low_discrepancy::over_surface;
 use palpate_geometry::mesh::Mesh;
+use palpate_geometry::primitives::normal;
+use palpate_geometry::sweep::Capsule;
 use palpate_input::error::InputError;
 use std::sync::Arc;
 
@@ -54,6 +56,34 @@ impl LibraryObject {
         vertices.map(|vertex| vertex.coords.norm()).fold(0.0, f64::max)
     }
 
+    /// Returns the first contact, in `W`, of a capsule in `W` that travels along `ahead_w`, with
+    /// the object at the pose `x_wo`.
+    pub(super) fn sweep(
+        &self,
+        x_wo: &Isometry3<f64>,
+        (hull_w, ahead_w): (&Capsule, &UnitVector3<f64>),
+        way_m: f64,
+    ) -> Option<SweepHit> {
+        let hull = Capsule {
+            p0_w: x_wo.inverse_transform_point(&hull_w.p0_w),
+            p1_w: x_wo.inverse_transform_point(&hull_w.p1_w),
+            ..*hull_w
+        };
+        let ahead_o = x_wo.inverse_transform_unit_vector(ahead_w);
+        let hit = self.bvh.sweep(&hull, &ahead_o, way_m)?;
+        Some(SweepHit { point: x_wo * hit.point, normal: x_wo * hit.normal, ..hit })
+    }
+
+    /// Returns the point of the surface nearest to `p_w`, in `W`, the normal of its face, and the
+    /// distance of `p_w` from it, m, negative behind the face.
+    pub(super) fn nearest(&self, x_wo: &Isometry3<f64>, p_w: &Point3<f64>) -> Nearest {
+        let closest = self.bvh.closest_point(&x_wo.inverse_transform_point(p_w));
+        let q_w = x_wo * closest.point;
+        let face_w = x_wo * normal(&self.bvh.mesh().corners(closest.triangle as usize));
+        let side = if (p_w - q_w).dot(&face_w) < 0.0 { -1.0 } else { 1.0 };
+        Nearest { q_w, face_w, distance_m: side * closest.distance_m }
+    }
+
     /// Returns the mean distance between the surface at the pose `x_wo` and at the pose `other`, m:
     /// the mean over points of the one to the nearest point of the other. Poses that a symmetry of
     /// the object makes equal are at distance zero (ADD-S, Hinterstoisser et al. 2012, with the
@@ -74,6 +104,13 @@ impl LibraryObject {
         let count = points.len().max(1) as f64;
         points.map(|p_o| self.bvh.closest_point(&(between * p_o)).distance_m).sum::<f64>() / count
     }
+}
+
+/// Point of an object's surface nearest to another.
+pub(super) struct Nearest {
+    pub q_w: Point3<f64>,
+    pub face_w: Vector3<f64>,
+    pub distance_m: f64,
 }
 
 /// Objects that may be in the region.
