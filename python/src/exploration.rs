@@ -3,9 +3,9 @@
 use crate::errors;
 use crate::fork;
 use crate::known::{self, AIM, BeliefErrors, GroundTruth, Known};
-use crate::recognition;
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
+use palpate::experiment::trial;
 use palpate::explore::belief::SurfaceBelief;
 use palpate::explore::planner::sample::random_aim;
 use palpate::explore::planner::uniform;
@@ -80,7 +80,9 @@ impl ExplorationScene {
         let environment = self.simulator.environment();
         let known = known::empty_belief(environment);
         let library = self.library.as_ref();
-        let hypotheses = library.map(|library| recognition::prior(environment, library, random));
+        let hypotheses = library.map(|library| {
+            trial::hypotheses(environment, Arc::clone(library), Default::default(), random)
+        });
         known.with_hypotheses(hypotheses)
     }
 

@@ -3,37 +3,19 @@
 use crate::errors;
 use crate::exploration::{Episode, EpisodeOptions, ExplorationScene, Reward};
 use crate::fork;
+use palpate::experiment::measure::recognition::NONE;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::recognition::{Library, ObjectHypotheses, RecognitionSettings};
+use palpate::explore::recognition::ObjectHypotheses;
 use palpate::math::pose::parts;
 use palpate::math::seed;
-use palpate::sim::finger::effects::gel::GelEffect;
+use palpate::sim::Scene;
 use palpate::sim::library::TrueObject;
-use palpate::sim::{Environment, Scene};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Name of the hypothesis that the object is none of the library.
-const NONE: &str = "none";
-
-/// Returns the hypotheses before the first touch, with default settings.
-pub(crate) fn prior(
-    environment: &Environment,
-    library: &Arc<Library>,
-    random: &mut ChaCha8Rng,
-) -> ObjectHypotheses {
-    let scene = environment.scene();
-    let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
-    let finger = (environment.task(), scene.effects.skin.is_some(), pad);
-    let settings = RecognitionSettings::default();
-    let prior = scene.pose.clone().unwrap_or_default();
-    ObjectHypotheses::new(Arc::clone(library), prior, settings, finger, random)
-}
 
 /// Probability of each class, and of none of these.
 pub(crate) fn probabilities(hypotheses: &ObjectHypotheses) -> BTreeMap<String, f64> {

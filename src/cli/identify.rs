@@ -191,7 +191,7 @@ fn conclusion(count: u32, found: &RecognitionMetrics, is_sure: bool) -> String {
         1e3 * pose.distance_95_m
     );
     if let Some(error) = &found.error {
-        let is_right = if error.is_right { "right" } else { "wrong" };
+        let is_right = if error.hypothesis == found.object { "right" } else { "wrong" };
         text += &format!("\n{is_right}: the object is {}", error.object);
         if let Some(distance_m) = error.distance_m {
             text += &format!(", its surface {:.2} mm off", 1e3 * distance_m);

@@ -316,17 +316,13 @@ impl Simulation {
 
     /// Runs one trial of `planner` from start to end; the row contains any failure.
     pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
-        let drawn = match self.drawn(trial) {
-            Ok(drawn) => drawn,
-            Err(error) => {
-                return TrialRow::without_touches(trial, planner.name(), Some(error.to_string()));
-            }
+        let run = || {
+            let drawn = self.drawn(trial)?;
+            let own = drawn.as_ref().unwrap_or(self);
+            let mut probe = own.probe(trial)?;
+            Ok(own.trial_with(&mut *probe, planner, trial, &mut |_| Ok(None)))
         };
-        let own = drawn.as_ref().unwrap_or(self);
-        match own.probe(trial) {
-            Ok(mut probe) => own.trial_with(&mut *probe, planner, trial, &mut |_| Ok(None)),
-            Err(fault) => TrialRow::not_started(trial, planner.name(), &fault),
-        }
+        run().unwrap_or_else(|fault: Fault| TrialRow::not_started(trial, planner.name(), &fault))
     }
 
     /// Runs a trial like [`trial`](Self::trial) with any `probe`, and calls `observer` after each

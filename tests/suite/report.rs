@@ -249,7 +249,7 @@ fn recognition() -> RecognitionMetrics {
         pose: PoseRow { position_m, rotation_deg, distance_95_m: 1e-3 },
         error: Some(RecognitionError {
             object: "box".into(),
-            is_right: true,
+            hypothesis: "box".into(),
             probability: 0.9,
             distance_m: Some(5e-4),
             offset: Some([1e-3, 2.0]),

@@ -162,7 +162,7 @@ pub const CHAMFER: Measure = measure(Minimise, "chamfer_m", "Chamfer distance", 
 
 /// Share of trials whose most likely hypothesis is the right one.
 pub const RECOGNISED: Measure = measure(Maximise, "recognised", "right object", SHARE)
-    .from(Source::Recognition(|it| Some(share(it.error.as_ref()?.is_right))))
+    .from(Source::Recognition(|it| it.is_right().map(share)))
     .drawn(PanelAxis::UpToOne);
 
 /// Distance of the surfaces at the true and at the estimated pose, where the object is found.

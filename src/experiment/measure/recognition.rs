@@ -49,8 +49,8 @@ pub struct PoseRow {
 pub struct RecognitionError {
     /// Name of the true object.
     pub object: String,
-    /// Whether the most likely hypothesis is right; for an unknown object, none of these is.
-    pub is_right: bool,
+    /// Right hypothesis: its name or class; `none` for an unknown object.
+    pub hypothesis: String,
     /// Probability of the right hypothesis.
     pub probability: f64,
     /// Mean distance between the surface at the true and at the estimated pose, m (ADD-S), if the
@@ -83,7 +83,7 @@ impl RecognitionMetrics {
             let between = truth.x_wo.inv_mul(&estimate.x_wo);
             RecognitionError {
                 object: truth.name.clone(),
-                is_right: best == right,
+                hypothesis: name(right),
                 probability: probabilities.get(right).copied().unwrap_or(0.0),
                 distance_m: is_found
                     .then(|| object.surface_distance_m(&truth.x_wo, &estimate.x_wo)),
@@ -105,6 +105,11 @@ impl RecognitionMetrics {
     /// Probability of the most likely hypothesis.
     pub fn confidence(&self) -> f64 {
         self.probabilities.get(&self.object).copied().unwrap_or(0.0)
+    }
+
+    /// Whether the most likely hypothesis is the right one.
+    pub fn is_right(&self) -> Option<bool> {
+        self.error.as_ref().map(|error| error.hypothesis == self.object)
     }
 
     /// Negative logarithm of the right hypothesis's probability, nats.

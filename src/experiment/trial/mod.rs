@@ -21,15 +21,17 @@ use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
+use crate::sim::Environment;
 use crate::sim::finger::effects::gel::GelEffect;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
 use palpate_explore::probe::{Probe, Touch};
-use palpate_explore::recognition::ObjectHypotheses;
+use palpate_explore::recognition::{Library, ObjectHypotheses, RecognitionSettings};
 use palpate_explore::task::{Approach, Target, Task};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
+use rand_chacha::ChaCha8Rng;
 use std::cell::OnceCell;
 use std::sync::Arc;
 
@@ -120,11 +122,9 @@ fn run_touches(
     let finger = (&scene.finger, scene.effects.skin.is_some());
     let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
     let hypotheses = truth.library.as_ref().map(|library| {
-        let prior = scene.pose.clone().unwrap_or_default();
-        let (settings, shared) = (experiment.recognition.clone(), Arc::clone(&library.known));
-        let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
-        let task = (task, finger.1, pad);
-        ObjectHypotheses::new(shared, prior, settings, task, &mut stream("hypotheses"))
+        let settings = experiment.recognition.clone();
+        let random = &mut stream("hypotheses");
+        hypotheses(&truth.environment, Arc::clone(&library.known), settings, random)
     });
     let mut belief =
         Belief::new(task, finger, &experiment.gp, &experiment.space).with_hypotheses(hypotheses);
@@ -227,6 +227,20 @@ fn run_touches(
         view.error = Some(error);
     }
     verify(experiment, task, &belief, probe, row)
+}
+
+/// Returns the hypotheses about the object of an environment before the first touch.
+pub fn hypotheses(
+    environment: &Environment,
+    library: Arc<Library>,
+    settings: RecognitionSettings,
+    random: &mut ChaCha8Rng,
+) -> ObjectHypotheses {
+    let scene = environment.scene();
+    let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
+    let finger = (environment.task(), scene.effects.skin.is_some(), pad);
+    let prior = scene.pose.clone().unwrap_or_default();
+    ObjectHypotheses::new(library, prior, settings, finger, random)
 }
 
 /// Relative rounding of a stroke's length.

@@ -51,22 +51,17 @@ pub fn run(
     earlier_touches: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> TrialRow {
-    let job = (trial, planner);
-    let drawn = match simulation.drawn(trial) {
-        Ok(drawn) => drawn,
-        Err(error) => {
-            return TrialRow::without_touches(trial, planner.name(), Some(error.to_string()));
-        }
-    };
-    let simulation = drawn.as_ref().unwrap_or(simulation);
-    let row = match path {
-        Some(path) => record(simulation, job, path, earlier_touches, observer),
-        None => simulation.probe(trial).map(|mut probe| {
+    let mut run = || {
+        let drawn = simulation.drawn(trial)?;
+        let simulation = drawn.as_ref().unwrap_or(simulation);
+        let Some(path) = path else {
+            let mut probe = simulation.probe(trial)?;
             let mut probe = ResumedProbe::new(earlier_touches.to_vec(), simulation, &mut *probe);
-            simulation.trial_with(&mut probe, planner, trial, observer)
-        }),
+            return Ok(simulation.trial_with(&mut probe, planner, trial, observer));
+        };
+        record(simulation, (trial, planner), path, earlier_touches, observer)
     };
-    row.unwrap_or_else(|fault| TrialRow::not_started(trial, planner.name(), &fault))
+    run().unwrap_or_else(|fault: Fault| TrialRow::not_started(trial, planner.name(), &fault))
 }
 
 /// Records a trial of `planner` to `path`, continuing after the touches `made`.

@@ -94,11 +94,10 @@ fn likely(trace: &[&RecognitionMetrics]) -> Vec<String> {
 
 fn draw_trace(canvas: &mut Canvas, area: Area, trace: &[&RecognitionMetrics], names: &[String]) {
     let width = area.width / trace.len() as f64;
-    let truth = trace.iter().find_map(|found| found.error.as_ref()).map(|error| &error.object);
+    let truth = trace.iter().find_map(|found| Some(&found.error.as_ref()?.hypothesis));
     for (row, name) in names.iter().enumerate() {
         let top = area.top + row as f64 * ROW_PX;
-        let is_true = truth.is_some_and(|truth| truth == name || is_of_class(truth, name));
-        let colour = if is_true { TRUTH } else { INK };
+        let colour = if truth == Some(name) { TRUTH } else { INK };
         for (touch, found) in trace.iter().enumerate() {
             let share = found.probabilities.get(name).copied().unwrap_or(0.0);
             let left = area.left + touch as f64 * width;
@@ -118,11 +117,6 @@ fn draw_trace(canvas: &mut Canvas, area: Area, trace: &[&RecognitionMetrics], na
     canvas.text(at, "touches", TEXT_PX, Anchor::Middle);
 }
 
-/// Whether the object `name` is of the class, the part of its name before `-`.
-fn is_of_class(name: &str, class: &str) -> bool {
-    name.split('-').next() == Some(class)
-}
-
 fn title(name: &str) -> &str {
     if name == NONE { "none of these" } else { name }
 }
@@ -132,10 +126,9 @@ fn draw_matrix<'a>(canvas: &mut Canvas, area: Area, rows: impl Iterator<Item = &
     let mut counts: BTreeMap<String, BTreeMap<(String, bool), f64>> = BTreeMap::new();
     for found in rows.filter_map(|row| row.touches.last()?.recognition.as_ref()) {
         let Some(error) = &found.error else { continue };
-        // A class stands in place of its objects, if it is right.
-        let truth = if error.is_right { &found.object } else { &error.object };
-        let truth = if truth == NONE { &error.object } else { truth };
-        let found = (found.object.clone(), error.is_right);
+        let is_unknown = error.hypothesis == NONE;
+        let truth = if is_unknown { &error.object } else { &error.hypothesis };
+        let found = (found.object.clone(), found.object == error.hypothesis);
         *counts.entry(truth.clone()).or_default().entry(found).or_default() += 1.0;
     }
     let mut names: Vec<String> = counts.keys().cloned().collect();
