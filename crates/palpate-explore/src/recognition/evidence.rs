@@ -369,8 +369,8 @@ mod tests {
 
     proptest! {
         /// The gradient is the derivative of the value where the object's face stays the same, and
-        /// the information is positive. Inside of the object the gradient is approximate, because it
-        /// leaves out the turn of the normal.
+        /// the information is positive. Inside of the object the gradient is approximate, because
+        /// it leaves out the turn of the normal.
         #[test]
         fn the_gradient_is_the_derivative(
             from in prop::array::uniform3(-1f64..1.0),
