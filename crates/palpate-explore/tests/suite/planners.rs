@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
-use palpate_explore::planner::{Fallback, PLANNERS, Plan, PlanningSettings};
+use palpate_explore::planner::{Fallback, PLANNERS, Plan, PlannerEntry, PlanningSettings};
 use palpate_explore::probe::{Contact, Touch};
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -46,6 +46,11 @@ impl InZone {
     }
 }
 
+/// Returns the planners that need no library, for beliefs without hypotheses.
+fn planners_of_surfaces() -> impl Iterator<Item = &'static PlannerEntry> {
+    PLANNERS.iter().filter(|entry| !entry.needs_library)
+}
+
 fn make(name: &str) -> InZone {
     let entry = planner::by_name(name).unwrap();
     InZone((entry.make)(&PlanningSettings::default(), seed::stream(1, 0, name)))
@@ -82,7 +87,7 @@ fn active_finds_the_largest_explorable_variance() {
 #[test]
 fn every_planner_stays_in_the_zone_and_repeats_itself() {
     for zone in [&LINE, &SQUARE] {
-        for entry in PLANNERS {
+        for entry in planners_of_surfaces() {
             let belief = belief(zone, 3, 12, 2);
             let mut planners = [make(entry.name), make(entry.name)];
             for _ in 0..20 {
@@ -93,6 +98,15 @@ fn every_planner_stays_in_the_zone_and_repeats_itself() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_planner_that_needs_a_library_says_so_without_one() {
+    let belief = Belief::from(belief(&SQUARE, 3, 4, 2));
+    for entry in PLANNERS.iter().filter(|entry| entry.needs_library) {
+        let error = make(entry.name).0.plan(&belief).unwrap_err();
+        assert!(error.reason.contains("library"), "{}: {}", entry.name, error.reason);
     }
 }
 
@@ -114,7 +128,7 @@ fn a_belief_that_is_sure_everywhere_is_a_stall() {
 
 #[test]
 fn a_belief_without_any_contact_still_plans() {
-    for entry in PLANNERS {
+    for entry in planners_of_surfaces() {
         let mut belief = HeightField::new(SQUARE, GpSettings::default());
         let mut planner = make(entry.name);
         let mut targets: Vec<Vec<f64>> = vec![SQUARE.at(&[0.4, 0.7])];
