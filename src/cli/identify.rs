@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
         if stop.load(Ordering::Relaxed) { Err(stopped) } else { Ok(None) }
     };
-    let row = recorded_trial::run(&simulation, (trial, planner), None, &[], &mut observer);
+    let row = recorded_trial::run(&simulation, (trial, planner), (None, None), &[], &mut observer);
     if stop.load(Ordering::Relaxed) {
         return Ok(Outcome::Interrupted);
     }
@@ -117,7 +117,7 @@ fn experiment(args: &Args) -> anyhow::Result<Experiment> {
         true => {
             sets.push(format!("planners=[{planner:?}]"));
             sets.push(format!("trials={}", trial + 1));
-            sets.push("initial_touches=1".into());
+            sets.push("initial_touches=0".into());
             sets.push(format!("touches={touches}"));
             Experiment::load(&path, &sets)?
         }
@@ -126,7 +126,7 @@ fn experiment(args: &Args) -> anyhow::Result<Experiment> {
             Experiment::with_defaults(&scene, &[planner], trial + 1, *touches)
         }
     };
-    experiment.initial_touches = 1;
+    experiment.initial_touches = 0;
     check_planner(&experiment, &path)?;
     Ok(experiment)
 }

@@ -420,8 +420,9 @@ impl Validate for Experiment {
         rules.require("touches", self.touches, is_fitted, || {
             format!("1 to {EXACT_TOUCHES_MAX}, or up to {TOUCHES_MAX} with gp.inducing_touches")
         });
-        // With a view, a planner can choose the first touch.
-        let least = if self.views > 0 { 0.0 } else { 1.0 };
+        // With a view or a library, a planner can choose the first touch.
+        let is_informed = self.views > 0 || self.scene.library.is_some();
+        let least = if is_informed { 0.0 } else { 1.0 };
         rules.number("initial_touches", self.initial_touches.into(), least..=self.touches.into());
         rules.number("views", self.views.into(), 0.0..=VIEWS_MAX);
         rules.number("further_views", self.further_views.into(), 0.0..=VIEWS_MAX);

@@ -11,6 +11,7 @@ use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::library::{LoadedLibrary, OBJECT, TrueObject};
 use crate::sim::simulator::Simulator;
+use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
 use palpate_explore::backend::{Backend, Fault, LinkFault};
 use palpate_explore::planner::{self, PlannerFactory};
 use palpate_explore::probe::Probe;
@@ -95,7 +96,7 @@ impl Simulation {
         let environment = Arc::new(Environment::build(scene)?);
         let truth = match trial {
             Some(_) => Truth::sample(&environment, experiment.grid as usize, &|_| ()),
-            None => Truth::default(),
+            None => Truth::unknown(environment.task().zone(), experiment.grid as usize),
         };
         let (library, object) = (Some(Arc::clone(library)), Some(object));
         let mut made = Self::made(
@@ -281,17 +282,21 @@ impl Simulation {
         self.arm.as_ref()
     }
 
-    /// Returns the backend of a trial: the connected arm or the simulated robot; `None` if touches
-    /// are computed without motion.
+    /// Returns the backend of a trial, which a view may show: the connected arm or the simulated
+    /// robot; `None` if touches are computed without motion.
     ///
     /// # Errors
     /// If no arm is connected, or memory for the simulator's state is missing.
-    pub fn backend(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
-        match &self.arm {
-            Some(arm) => Ok(Some(arm.backend())),
-            None if self.is_real() => Err(Fault::lacks("a connection to the arm")),
-            None => self.simulator.body(),
-        }
+    pub fn backend(&self, view: Option<&LiveView>) -> Result<Option<Box<dyn Backend>>, Fault> {
+        let body = match &self.arm {
+            Some(arm) => Some(arm.backend()),
+            None if self.is_real() => return Err(Fault::lacks("a connection to the arm")),
+            None => self.simulator.body()?,
+        };
+        Ok(match (body, view) {
+            (Some(body), Some(view)) => Some(Box::new(ViewedBackend::new(body, view.clone()))),
+            (body, _) => body,
+        })
     }
 
     /// Returns the servo that moves `body` through touches, within the experiment's interlocks.
@@ -307,8 +312,17 @@ impl Simulation {
     /// # Errors
     /// If the robot cannot be moved to its start, or no arm is connected.
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
+        self.viewed_probe(trial, None)
+    }
+
+    /// Returns the probe as [`probe`](Self::probe) does, with a body that `view` shows.
+    pub(in crate::experiment) fn viewed_probe(
+        &self,
+        trial: u32,
+        view: Option<&LiveView>,
+    ) -> Result<Box<dyn Probe>, Fault> {
         let seed = self.body_seed(trial);
-        match self.backend()? {
+        match self.backend(view)? {
             Some(body) => Ok(Box::new(self.servo(body, seed)?)),
             None => self.simulator.probe(seed),
         }

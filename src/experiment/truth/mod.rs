@@ -94,6 +94,14 @@ impl Truth {
         Self { is_complete, ..Self::new(zone, places, heights_m, is_reachable) }
     }
 
+    /// Ground truth where no surface is known: the test points of a zone, if there is one.
+    pub fn unknown(zone: Option<&Zone>, per_side: usize) -> Self {
+        let Some(zone) = zone else { return Self::default() };
+        let places = zone.grid(per_side);
+        let count = places.len();
+        Self::new(zone, places, vec![None; count], vec![false; count])
+    }
+
     /// Ground truth of a whole object with the surface `mesh`, simplified if it is large; it has no
     /// test points.
     pub fn whole_object(mesh: Option<&Mesh>) -> Self {

@@ -87,10 +87,14 @@ impl Belief {
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
     /// it shows.
     pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        match &mut self.surface {
+        let seen = match &mut self.surface {
             SurfaceBelief::HeightField(field) => field.observe_view(view),
             SurfaceBelief::ImplicitSurface(surface) => surface.observe_view(view),
+        };
+        if let Some(hypotheses) = &mut self.hypotheses {
+            hypotheses.observe_view(seen);
         }
+        seen
     }
 
     /// Returns the error of the camera's pose in each view, after a fit.

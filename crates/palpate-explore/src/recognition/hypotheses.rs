@@ -1,12 +1,13 @@
 //! Hypotheses about object and pose, and *none of these*.
 
-use super::evidence::{NoiseModel, TouchEvidence, before_m, hull};
+use super::evidence::{Evidence, NoiseModel, TouchEvidence, ViewEvidence, before_m, hull};
 use super::library::{Library, LibraryObject};
 use super::particles::{Model, Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
 use crate::probe::{SweptVolume, Touch};
 use crate::robot::sensor::GelPad;
 use crate::task::{Approach, Target, Task};
+use crate::view::SeenSurface;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_input::config::{Rules, Validate};
 use rand::{Rng, RngExt};
@@ -149,7 +150,7 @@ pub struct ObjectHypotheses {
     /// Error that all contacts have in common.
     offset_m: f64,
     pad: Option<GelPad>,
-    touches: Vec<Arc<TouchEvidence>>,
+    evidence: Vec<Arc<Evidence>>,
     objects: Vec<ObjectPosterior>,
     near: Vec<ObjectPosterior>,
 }
@@ -193,7 +194,7 @@ impl ObjectHypotheses {
             slack_m,
             offset_m: if is_soft { SOFT_OFFSET_M } else { 0.0 },
             pad,
-            touches: Vec::new(),
+            evidence: Vec::new(),
             objects: Vec::new(),
             near: Vec::new(),
         };
@@ -216,10 +217,10 @@ impl ObjectHypotheses {
     fn model<'a>(
         &'a self,
         number: usize,
-        touches: &'a [Arc<TouchEvidence>],
+        evidence: &'a [Arc<Evidence>],
         noise: NoiseModel,
     ) -> Model<'a> {
-        Model { object: &self.library.objects()[number], prior: &self.prior, touches, noise }
+        Model { object: &self.library.objects()[number], prior: &self.prior, evidence, noise }
     }
 
     /// The objects.
@@ -234,25 +235,31 @@ impl ObjectHypotheses {
 
     /// Takes in a touch; nothing after an overload.
     pub(crate) fn observe(&mut self, approach: &Approach, touched: (&Touch, Option<&SweptVolume>)) {
-        let Some(evidence) =
-            TouchEvidence::new(approach, touched, (self.slack_m, self.pad.as_ref()))
-        else {
-            return;
-        };
-        self.touches.push(Arc::new(evidence));
+        let evidence = TouchEvidence::new(approach, touched, (self.slack_m, self.pad.as_ref()));
+        self.take_in(evidence.map(Evidence::Touch));
+    }
+
+    /// Takes in a view; nothing if it shows nothing.
+    pub(crate) fn observe_view(&mut self, seen: &SeenSurface) {
+        self.take_in(ViewEvidence::new(seen).map(Evidence::View));
+    }
+
+    fn take_in(&mut self, evidence: Option<Evidence>) {
+        let Some(evidence) = evidence else { return };
+        self.evidence.push(Arc::new(evidence));
         self.update_all();
-        if RESTARTS.contains(&self.touches.len()) && self.is_doubtful() {
+        if RESTARTS.contains(&self.evidence.len()) && self.is_doubtful() {
             self.restart();
         }
     }
 
     /// Takes in new touches for all objects that are possible.
     fn update_all(&mut self) {
-        let Self { library, prior, touches, noise, objects, near, .. } = self;
+        let Self { library, prior, evidence, noise, objects, near, .. } = self;
         for (bank, noise) in [(objects, *noise), (near, NEAR_SHAPE)] {
             let each = bank.par_iter_mut().zip(library.objects());
             each.filter(|(posterior, _)| posterior.is_possible).for_each(|(posterior, object)| {
-                let model = Model { object, prior, touches, noise };
+                let model = Model { object, prior, evidence, noise };
                 posterior.particles.update(&model, &mut posterior.random);
             });
         }
@@ -281,7 +288,7 @@ impl ObjectHypotheses {
     /// missed a pose that explains all touches.
     fn restart(&mut self) {
         let fresh = |mut posterior: ObjectPosterior, number: usize| {
-            let model = self.model(number, &self.touches, self.noise);
+            let model = self.model(number, &self.evidence, self.noise);
             let count = self.settings.particles as usize;
             let mut found = Particles::new(&model, count, &mut posterior.random);
             found.update(&model, &mut posterior.random);

@@ -1,17 +1,22 @@
 //! Sequential Monte Carlo over the poses of one object (Del Moral et al. 2006): each touch enters
 //! at a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
-//! Calderhead 2011) on all touches so far.
+//! Calderhead 2011) on all evidence so far.
 
-use super::evidence::{LogLikelihood, NoiseModel, TouchEvidence, TouchFit};
+use super::evidence::{Evidence, EvidenceFit, LogLikelihood, NoiseModel};
 use super::library::LibraryObject;
 use super::pose_prior::{PosePrior, moved};
 use nalgebra::{Cholesky, Const, Isometry3, Matrix6, Vector6};
 use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
 use std::sync::Arc;
 
-/// Effective share of particles that a step of the temperature keeps.
+/// Effective number of particles that a step of the temperature keeps, over their wanted number.
 // heuristic: usual for tempering.
 const ESS: f64 = 0.5;
+
+/// Poses drawn at first, over the wanted number: the first evidence finds the good ones among them.
+// heuristic: a pose is looked for in half the steps along each of three directions.
+const DRAWN_FIRST: usize = 8;
 
 /// Moves of each particle after a resampling.
 // heuristic: two, each with an acceptance of about a half, renew three quarters.
@@ -28,7 +33,7 @@ const STEP: f64 = 1.0;
 #[derive(Clone)]
 struct Particle {
     x_wo: Isometry3<f64>,
-    fits: Vec<TouchFit>,
+    fits: Vec<EvidenceFit>,
 }
 
 /// Posterior of one object's pose, and the evidence for the object.
@@ -37,7 +42,9 @@ pub(super) struct Particles {
     particles: Vec<Particle>,
     /// Logarithms of the weights, normalised.
     log_weights: Vec<f64>,
-    /// Logarithm of the likelihood ratio of all touches, over the prior of the pose.
+    /// Number that remains after a resampling.
+    wanted: usize,
+    /// Logarithm of the likelihood ratio of all evidence, over the prior of the pose.
     pub log_evidence: f64,
 }
 
@@ -45,20 +52,22 @@ pub(super) struct Particles {
 pub(super) struct Model<'a> {
     pub object: &'a LibraryObject,
     pub prior: &'a PosePrior,
-    pub touches: &'a [Arc<TouchEvidence>],
+    pub evidence: &'a [Arc<Evidence>],
     pub noise: NoiseModel,
 }
 
 impl Particles {
-    /// Draws `count` poses from the prior, evenly spread.
-    pub fn new(model: &Model, count: usize, random: &mut impl Rng) -> Self {
+    /// Draws poses from the prior, evenly spread, of which `wanted` remain.
+    pub fn new(model: &Model, wanted: usize, random: &mut impl Rng) -> Self {
+        let count = wanted * DRAWN_FIRST;
         let seed = random.next_u32();
         let pose = |i: usize| {
             let number = |axis| f64::from(sobol_burley::sample(i as u32, axis, seed));
             model.prior.at(model.object, std::array::from_fn(|axis| number(axis as u32)))
         };
         let particles = (0..count).map(|i| Particle { x_wo: pose(i), fits: Vec::new() }).collect();
-        Self { particles, log_weights: vec![-(count as f64).ln(); count], log_evidence: 0.0 }
+        let log_weights = vec![-(count as f64).ln(); count];
+        Self { particles, log_weights, wanted, log_evidence: 0.0 }
     }
 
     /// Returns the poses and their weights.
@@ -67,11 +76,11 @@ impl Particles {
         self.particles.iter().map(|particle| &particle.x_wo).zip(weights)
     }
 
-    /// Takes in those of the model's touches that are new.
+    /// Takes in those of the model's evidence that is new.
     pub fn update(&mut self, model: &Model, random: &mut impl Rng) {
         let known = self.particles.first().map_or(0, |particle| particle.fits.len());
         for particle in &mut self.particles {
-            let new = model.touches[known..].iter();
+            let new = model.evidence[known..].iter();
             particle.fits.extend(new.map(|touch| touch.fit(model.object, &particle.x_wo)));
         }
         let mut tau_m = f64::INFINITY;
@@ -93,13 +102,13 @@ impl Particles {
         }
     }
 
-    /// Log-likelihood ratio of the touches from number `known` on for each particle at a
+    /// Log-likelihood ratio of the evidence from number `known` on for each particle at a
     /// temperature; 0 at an infinite one.
     fn logs(&self, (model, known): (&Model, usize), tau_m: f64) -> Vec<f64> {
         let log = |particle: &Particle| {
             let mut sum = LogLikelihood::zero();
             if tau_m.is_finite() {
-                let new = model.touches.iter().zip(&particle.fits).skip(known);
+                let new = model.evidence.iter().zip(&particle.fits).skip(known);
                 new.for_each(|(touch, fit)| touch.add(fit, &model.noise, tau_m, &mut sum));
             }
             sum.value
@@ -130,7 +139,7 @@ impl Particles {
         }
     }
 
-    /// Effective share of particles after a gain of their log-weights.
+    /// Effective number of particles after a gain of their log-weights, over the wanted number.
     fn share_after(&self, gained: &[f64]) -> f64 {
         let logs = self.log_weights.iter().zip(gained).map(|(weight, gain)| weight + gain);
         let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
@@ -138,7 +147,7 @@ impl Particles {
             let weight = (log - most).exp();
             (sum + weight, squares + weight * weight)
         });
-        sum * sum / squares / self.particles.len() as f64
+        sum * sum / squares / self.wanted as f64
     }
 
     fn effective_share(&self) -> f64 {
@@ -154,17 +163,18 @@ impl Particles {
 
     /// Draws particles by their weights, systematically.
     fn resample(&mut self, random: &mut impl Rng) {
-        let count = self.particles.len();
+        let count = self.wanted;
         let drawn = systematic(self.weighted().map(|(_, weight)| weight), count, random.random());
         self.particles = drawn.into_iter().map(|i| self.particles[i].clone()).collect();
-        self.log_weights.fill(-(count as f64).ln());
+        self.log_weights = vec![-(count as f64).ln(); count];
     }
 
     /// Moves every particle by one step with the posterior at the temperature as its invariant.
     fn advance(&mut self, (model, known): (&Model, usize), tau_m: f64, random: &mut impl Rng) {
         let free = model.prior.free();
         for particle in &mut self.particles {
-            let normals = Vector6::from_fn(|i, _| if free[i] { normal(random) } else { 0.0 });
+            let normals =
+                Vector6::from_fn(|i, _| if free[i] { StandardNormal.sample(random) } else { 0.0 });
             let accepts: f64 = random.random();
             let here = Langevin::new((model, known), &particle.fits, tau_m);
             let step = here.step(&normals);
@@ -172,8 +182,8 @@ impl Particles {
             if !model.prior.contains(model.object, &x_wo) {
                 continue;
             }
-            let fits: Vec<TouchFit> =
-                model.touches.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
+            let fits: Vec<EvidenceFit> =
+                model.evidence.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
             let there = Langevin::new((model, known), &fits, tau_m);
             let log =
                 there.value - here.value + there.log_density(&-step) - here.log_density(&step);
@@ -192,9 +202,9 @@ struct Langevin {
 }
 
 impl Langevin {
-    fn new((model, known): (&Model, usize), fits: &[TouchFit], tau_m: f64) -> Self {
+    fn new((model, known): (&Model, usize), fits: &[EvidenceFit], tau_m: f64) -> Self {
         let mut sum = LogLikelihood::zero();
-        for (i, (touch, fit)) in model.touches.iter().zip(fits).enumerate() {
+        for (i, (touch, fit)) in model.evidence.iter().zip(fits).enumerate() {
             let tau_m = if i < known { 0.0 } else { tau_m };
             touch.add(fit, &model.noise, tau_m, &mut sum);
         }
@@ -258,16 +268,11 @@ pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
     }
 }
 
-/// Returns a standard normal number (Box & Muller 1958).
-fn normal(random: &mut impl Rng) -> f64 {
-    let [u, v]: [f64; 2] = random.random();
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::probe::{Contact, SweptVolume, Touch};
+    use crate::recognition::evidence::TouchEvidence;
     use crate::recognition::pose_prior::Turn;
     use crate::robot::Finger;
     use crate::task::{Aim, Ball};
@@ -277,7 +282,7 @@ mod tests {
     use palpate_gp::math::seed;
 
     /// Touches of a box whose front and right side are 2 mm and 3 mm off.
-    fn touches() -> Vec<Arc<TouchEvidence>> {
+    fn touches() -> Vec<Arc<Evidence>> {
         let ball = Ball { centre_w: Point3::origin(), radius_m: 0.15, lowest_m: None };
         let finger = Finger { pitch_deg: 0.0, ..Finger::default() };
         [([0.01, 0.032, 0.0], Vector3::y()), ([0.053, 0.0, 0.01], Vector3::x())]
@@ -288,9 +293,8 @@ mod tests {
                 let touch = Touch::Contact(Contact::new(aim.p_w, normal_w));
                 let p_wt = aim.p_w + normal_w * finger.radius_m;
                 let swept = SweptVolume { finger: finger.clone(), p_wt };
-                Arc::new(
-                    TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None)).unwrap(),
-                )
+                let evidence = TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None));
+                Arc::new(Evidence::Touch(evidence.unwrap()))
             })
             .collect()
     }
@@ -326,7 +330,7 @@ mod tests {
         let model = |count: usize| Model {
             object: &object,
             prior: &prior,
-            touches: &touches[..count],
+            evidence: &touches[..count],
             noise,
         };
         let mut evidences = Vec::new();

@@ -181,6 +181,17 @@ impl SeenSurface {
         self.all().enumerate().filter(|(i, _)| self.is_kept(*i)).map(|(_, element)| element)
     }
 
+    /// Returns at most `count` of the elements with the errors of their distance along the normal,
+    /// m, instead of those of a field.
+    pub fn distances(&self, count: usize) -> impl Iterator<Item = CorrectedElement> {
+        let step = self.len().div_ceil(count.max(1)).max(1);
+        let (x_wc, scale) = (self.corrected(), self.scale());
+        self.elements.iter().step_by(step).map(move |element| {
+            let normal_w = (x_wc.rotation * element.normal_c).into_inner();
+            self.corrected_element((&x_wc, scale), element, &normal_w)
+        })
+    }
+
     /// Whether an element is on the object.
     pub(super) fn is_kept(&self, element: usize) -> bool {
         !self.rejected.get(element).is_some_and(|is_rejected| *is_rejected)
@@ -190,13 +201,23 @@ impl SeenSurface {
     pub(super) fn all(&self) -> impl Iterator<Item = CorrectedElement> {
         let (x_wc, scale) = (self.corrected(), self.scale());
         self.elements.iter().zip(&self.gradients_w).map(move |(element, gradient_w)| {
-            let p_w = x_wc * Point3::from(element.p_c.coords / scale);
-            let normal_w = x_wc.rotation * element.normal_c;
-            let away = p_w.coords - x_wc.translation.vector;
-            let loadings = self.factor.tr_mul(&self.loadings((&p_w, &away), gradient_w)).into();
-            let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
-            CorrectedElement { p_w, normal_w, sd, loadings }
+            self.corrected_element((&x_wc, scale), element, gradient_w)
         })
+    }
+
+    /// Returns an element, corrected by the camera's pose and scale, in a field with this gradient.
+    fn corrected_element(
+        &self,
+        (x_wc, scale): (&Isometry3<f64>, f64),
+        element: &SurfaceElement,
+        gradient_w: &Vector3<f64>,
+    ) -> CorrectedElement {
+        let p_w = x_wc * Point3::from(element.p_c.coords / scale);
+        let normal_w = x_wc.rotation * element.normal_c;
+        let away = p_w.coords - x_wc.translation.vector;
+        let loadings = self.factor.tr_mul(&self.loadings((&p_w, &away), gradient_w)).into();
+        let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
+        CorrectedElement { p_w, normal_w, sd, loadings }
     }
 
     /// Takes the `gradient` of the belief's field at each corrected element in `W`, if there is

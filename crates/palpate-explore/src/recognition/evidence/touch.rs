@@ -1,4 +1,4 @@
-//! Evidence of touches for an object at a pose: residuals of contacts and of free space.
+//! Evidence of a touch for an object at a pose: residuals of contacts and of free space.
 //!
 //! Each number is a likelihood ratio: the density of what was measured if the object is at the
 //! pose, over its density if the shape is unknown. For a contact at the distance r from the surface
@@ -11,27 +11,15 @@
 //! the object before. For a miss L = 2 (1 − ε) exp(−g²/2σ²) + ε. A temperature τ adds to both
 //! deviations, so that at a large one all poses are equal.
 
-use super::library::{LibraryObject, Nearest};
+use super::likelihood::{LogLikelihood, NoiseModel, Residual, Terms, inflation};
 use crate::probe::{Contact, SweptVolume, Touch};
+use crate::recognition::library::{LibraryObject, Nearest};
 use crate::robot::Finger;
 use crate::robot::sensor::GelPad;
 use crate::task::{Approach, any_orthogonal};
-use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, UnitVector3, Vector3, Vector6,
-};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use palpate_geometry::sweep::Capsule;
 use std::f64::consts::PI;
-
-/// Noise of the contacts of an object at its true pose.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NoiseModel {
-    /// Deviation of a contact along the normal, m, on top of its sensor's.
-    pub contact_sd_m: f64,
-    /// Deviation of a normal about each of two axes, rad.
-    pub normal_sd_rad: f64,
-    /// Share of contacts that are anywhere.
-    pub outliers: f64,
-}
 
 /// Lever at which a turn counts as much as a distance, m, for the temperature.
 // heuristic: half the size of an object for a hand.
@@ -41,15 +29,8 @@ const LEVER_M: f64 = 0.03;
 // heuristic: undecided.
 const UNKNOWN_MISS: f64 = 0.5;
 
-/// Number of further points of a touch that count as independent: their errors are correlated.
-// heuristic: a patch has a height, two slopes, and some curvature.
-const INDEPENDENT: f64 = 6.0;
-
 /// Largest number of further points of a touch.
 const POINTS: usize = 24;
-
-/// Length below which a direction is rounding, m.
-const ROUNDING_M: f64 = 1e-9;
 
 /// One point of a surface that a touch shows.
 struct MeasuredPoint {
@@ -64,7 +45,7 @@ struct MeasuredPoint {
 }
 
 /// Evidence of one touch.
-pub(super) struct TouchEvidence {
+pub struct TouchEvidence {
     /// Hull at the start of its way.
     hull: Capsule,
     ahead_w: UnitVector3<f64>,
@@ -80,17 +61,10 @@ pub(super) struct TouchEvidence {
 
 /// Residuals of a touch for an object at a pose.
 #[derive(Clone, Debug, Default)]
-pub(super) struct TouchFit {
+pub struct TouchFit {
     /// Depth by which the hull would have met the object before it did, m, along the normal.
     depth: Residual,
     points: Vec<PointFit>,
-}
-
-/// A distance, m, with its derivative by the pose.
-#[derive(Clone, Debug, Default)]
-struct Residual {
-    value_m: f64,
-    slope: Vector6<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -98,57 +72,6 @@ struct PointFit {
     distance: Residual,
     /// Rotation vector from the object's normal to the measured one, and the object's normal.
     turn: Option<(Vector3<f64>, Vector3<f64>)>,
-}
-
-/// Sum of log-likelihood ratios with its derivatives by the pose.
-pub(super) struct LogLikelihood {
-    pub value: f64,
-    pub gradient: Vector6<f64>,
-    /// Gauss–Newton approximation of minus the second derivative.
-    pub information: Matrix6<f64>,
-}
-
-impl LogLikelihood {
-    /// Creates the sum over nothing.
-    pub fn zero() -> Self {
-        Self { value: 0.0, gradient: Vector6::zeros(), information: Matrix6::zeros() }
-    }
-
-    /// Adds a mixture ratio with the exponent's derivatives.
-    fn add(&mut self, inlier: f64, outlier: f64, terms: &Terms) {
-        let ratio = inlier + outlier;
-        let share = inlier / ratio;
-        self.value += ratio.ln();
-        self.gradient -= terms.gradient * share;
-        self.information += terms.information * share;
-    }
-}
-
-/// Half of a sum of squares with its derivatives.
-#[derive(Default)]
-struct Terms {
-    half_squares: f64,
-    gradient: Vector6<f64>,
-    information: Matrix6<f64>,
-}
-
-impl Terms {
-    fn add(&mut self, residual: &Residual, sd_m: f64) {
-        let weight = sd_m.powi(-2);
-        self.half_squares += 0.5 * residual.value_m.powi(2) * weight;
-        self.gradient += residual.slope * (residual.value_m * weight);
-        self.information += residual.slope * residual.slope.transpose() * weight;
-    }
-
-    fn add_turn(&mut self, turn: &Vector3<f64>, normal_w: &Vector3<f64>, sd_rad: f64) {
-        let weight = sd_rad.powi(-2);
-        let across = Matrix3::identity() - normal_w * normal_w.transpose();
-        self.half_squares += 0.5 * turn.norm_squared() * weight;
-        let mut gradient = self.gradient.fixed_rows_mut::<3>(3);
-        gradient -= across * turn * weight;
-        let mut information = self.information.fixed_view_mut::<3, 3>(3, 3);
-        information += across * weight;
-    }
 }
 
 impl TouchEvidence {
@@ -182,23 +105,12 @@ impl TouchEvidence {
 
     /// Returns the residuals for `object` at the pose `x_wo`.
     pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> TouchFit {
-        let origin_w = Point3::from(x_wo.translation.vector);
-        // A distance changes with the motion of the object's point p along n by n·(v + ω × p).
-        let slope = |n: &Vector3<f64>, p_w: &Point3<f64>| {
-            let lever = (p_w - origin_w).cross(n);
-            Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z)
-        };
         let reach_m = self.free_m + self.hull.radius_m;
         let met = object.sweep(x_wo, (&self.hull, &self.ahead_w), reach_m);
         let points: Vec<PointFit> = (self.points.iter())
             .map(|point| {
-                let Nearest { q_w, face_w, distance_m } = object.nearest(x_wo, &point.p_w);
-                // Close to the surface the direction is rounding; the face has it.
-                let n = match distance_m.abs() > ROUNDING_M {
-                    true => (point.p_w - q_w) / distance_m,
-                    false => face_w,
-                };
-                let distance = Residual { value_m: distance_m, slope: -slope(&n, &q_w) };
+                let (distance, Nearest { q_w, face_w, .. }) =
+                    Residual::of_point(object, x_wo, &point.p_w);
                 // On an edge, the hull's normal lies between those of the faces.
                 let is_same = |p_w: &Point3<f64>| (p_w - q_w).norm() < 0.5 * self.hull.radius_m;
                 let normal_w = match &met {
@@ -213,11 +125,11 @@ impl TouchEvidence {
             // The turn of the normal is left out of the slope: it only counts deep inside.
             let facing = (-hit.normal.dot(&self.ahead_w)).max(0.0);
             let value_m = (self.free_m - hit.travel_m) * facing;
-            Residual { value_m, slope: slope(&hit.normal, &hit.point) }
+            Residual::along(value_m, &hit.normal, (&hit.point, x_wo))
         });
         let of_face = self.face_w.iter().filter_map(|p_w| {
             let Nearest { q_w, face_w, distance_m } = object.nearest(x_wo, p_w);
-            let inside = || Residual { value_m: -distance_m, slope: slope(&face_w, &q_w) };
+            let inside = || Residual::along(-distance_m, &face_w, (&q_w, x_wo));
             (distance_m < 0.0).then(inside)
         });
         let deepest =
@@ -265,12 +177,12 @@ impl TouchEvidence {
 }
 
 /// Distance before the nearest point of an approach at which a hull is outside of the region.
-pub(super) fn before_m(finger: &Finger) -> f64 {
+pub fn before_m(finger: &Finger) -> f64 {
     finger.radius_m + finger.length_m
 }
 
 /// Returns the hull of a finger on an approach with its tip at `p_wt`.
-pub(super) fn hull(finger: &Finger, approach: &Approach, p_wt: Point3<f64>) -> Capsule {
+pub fn hull(finger: &Finger, approach: &Approach, p_wt: Point3<f64>) -> Capsule {
     let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
     Capsule { p0_w: p_wt, p1_w: p_wt + axis_w, radius_m: finger.radius_m }
 }
@@ -302,8 +214,8 @@ fn face_w(pad: &GelPad, x_wp: &Isometry3<f64>) -> Vec<Point3<f64>> {
 fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
     let further = contact.patch.len();
     let step = further.div_ceil(POINTS).max(1);
-    let count = further.div_ceil(step) as f64;
-    let inflation = (count / INDEPENDENT).max(1.0).sqrt();
+    let count = further.div_ceil(step);
+    let inflation = inflation(count);
     let point = |point: &Contact, inflation: f64, range_m: f64| MeasuredPoint {
         p_w: point.p_wc,
         normal_w: point.has_normal.then_some(point.normal_w),
@@ -326,6 +238,7 @@ mod tests {
     use super::*;
     use crate::recognition::pose_prior::moved;
     use crate::task::{Aim, Ball};
+    use nalgebra::Vector6;
     use palpate_geometry::mesh::Mesh;
     use palpate_geometry::solids::sphere_mesh;
     use proptest::prelude::*;

@@ -1,0 +1,248 @@
+//! Evidence of a camera's view for an object at a pose.
+//!
+//! The distance of a seen point from the surface is rᵢ = lᵢ·c + εᵢ, with the errors c ~ N(0, I) of
+//! the camera that all points have in common, and the noise εᵢ of the pixel and of the mesh. The
+//! likelihood ratio
+//!
+//! L = ∫ N(c; 0, I) Πᵢ [(1 − ε) sᵢ N(rᵢ − lᵢ·c; 0, σᵢ²) + ε] dc
+//!
+//! with the range sᵢ over which a point of an unknown surface is uniform, is approximated at its
+//! largest integrand (Laplace).
+
+use super::likelihood::{LogLikelihood, NoiseModel, Residual, inflation};
+use crate::recognition::library::LibraryObject;
+use crate::view::{CorrectedElement, ERRORS, SeenSurface};
+use nalgebra::{Cholesky, Isometry3, Point3, SMatrix, SVector, Vector3};
+use std::f64::consts::TAU;
+
+/// Largest number of points of a view.
+// heuristic: as many as a touch may have.
+const POINTS: usize = 24;
+
+/// Share of a camera's points that are anywhere, e.g. between an object and its background.
+// heuristic: a few per cent of the pixels of depth cameras.
+const OUTLIERS: f64 = 0.05;
+
+/// Steps towards the largest integrand: expectation–maximisation, which never goes down.
+// heuristic: the shares of outliers then change by less than a per cent.
+const STEPS: usize = 4;
+
+type Errors = SVector<f64, ERRORS>;
+
+/// A point that a camera has seen.
+struct SeenPoint {
+    p_w: Point3<f64>,
+    /// Deviation of its own along the normal, m.
+    sd_m: f64,
+    /// Distance per deviation of each of the camera's errors, m.
+    loadings_m: Errors,
+    /// Range over which it would be uniform on an unknown surface, m.
+    range_m: f64,
+}
+
+/// Evidence of one view.
+pub struct ViewEvidence {
+    points: Vec<SeenPoint>,
+}
+
+impl ViewEvidence {
+    /// Returns the evidence of a view; `None` if it shows nothing.
+    pub fn new(seen: &SeenSurface) -> Option<Self> {
+        let elements: Vec<CorrectedElement> = seen.distances(POINTS).collect();
+        let count = elements.len() as f64;
+        let middle_w =
+            elements.iter().map(|element| element.p_w.coords / count).sum::<Vector3<f64>>();
+        let middle_w = Point3::from(middle_w);
+        let point = |element: CorrectedElement| SeenPoint {
+            // An unknown surface may rise or fall by as much as the point is away.
+            range_m: 2.0 * (element.p_w - middle_w).norm().max(1e-3),
+            p_w: element.p_w,
+            sd_m: element.sd,
+            loadings_m: element.loadings.into(),
+        };
+        let points: Vec<SeenPoint> = elements.into_iter().map(point).collect();
+        (!points.is_empty()).then_some(Self { points })
+    }
+
+    /// Returns the distances of its points from `object` at the pose `x_wo`.
+    pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> Vec<Residual> {
+        self.points.iter().map(|point| Residual::of_point(object, x_wo, &point.p_w).0).collect()
+    }
+
+    /// Adds the log-likelihood ratio of distances at the temperature `tau_m`.
+    pub fn add(&self, fit: &[Residual], noise: &NoiseModel, tau_m: f64, to: &mut LogLikelihood) {
+        let noise_m = noise.contact_sd_m.hypot(tau_m);
+        let inflation = inflation(self.points.len());
+        let sds_m: Vec<f64> =
+            self.points.iter().map(|point| noise_m.hypot(point.sd_m) * inflation).collect();
+        let mut errors = Errors::zeros();
+        for _ in 0..STEPS {
+            let sum = self.at(&errors, fit, &sds_m);
+            errors += sum.factor().solve(&sum.gradient);
+        }
+        let sum = self.at(&errors, fit, &sds_m);
+        let factor = sum.factor();
+        // ln √|H| is the sum of the logarithms of the factor's diagonal.
+        let log_volume: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+        to.value += sum.value - 0.5 * errors.norm_squared() - log_volume;
+        let mut across = SMatrix::<f64, ERRORS, 6>::zeros();
+        for (i, residual) in fit.iter().enumerate() {
+            let Share { weight, left_m, .. } = self.share(i, &errors, residual, sds_m[i]);
+            to.gradient -= residual.slope * (left_m * weight);
+            to.information += residual.slope * residual.slope.transpose() * weight;
+            across += self.points[i].loadings_m * residual.slope.transpose() * weight;
+        }
+        to.information -= across.tr_mul(&factor.solve(&across));
+    }
+
+    /// Returns the sum over the points at errors of the camera.
+    fn at(&self, errors: &Errors, fit: &[Residual], sds_m: &[f64]) -> Sum {
+        let (mut value, mut gradient, mut precision) = (0.0, -errors, SMatrix::identity());
+        for (i, residual) in fit.iter().enumerate() {
+            let loadings_m = &self.points[i].loadings_m;
+            let Share { log_ratio, weight, left_m } = self.share(i, errors, residual, sds_m[i]);
+            value += log_ratio;
+            gradient += loadings_m * (left_m * weight);
+            precision += loadings_m * loadings_m.transpose() * weight;
+        }
+        Sum { value, gradient, precision }
+    }
+
+    /// Returns the share of point `i` at errors of the camera.
+    fn share(&self, i: usize, errors: &Errors, residual: &Residual, sd_m: f64) -> Share {
+        let SeenPoint { loadings_m, range_m, .. } = &self.points[i];
+        let left_m = residual.value_m - loadings_m.dot(errors);
+        let density = range_m / (sd_m * TAU.sqrt()) * (-0.5 * (left_m / sd_m).powi(2)).exp();
+        let inlier = (1.0 - OUTLIERS) * density;
+        let ratio = inlier + OUTLIERS;
+        Share { log_ratio: ratio.ln(), weight: inlier / ratio / (sd_m * sd_m), left_m }
+    }
+}
+
+/// Sum over the points of a view.
+struct Sum {
+    value: f64,
+    /// Derivative of the logarithm of the integrand by the errors.
+    gradient: Errors,
+    /// Approximation of minus its second derivative.
+    precision: SMatrix<f64, ERRORS, ERRORS>,
+}
+
+impl Sum {
+    fn factor(&self) -> Cholesky<f64, nalgebra::Const<ERRORS>> {
+        // It is at least the identity, so that only overflow fails.
+        Cholesky::new(self.precision).unwrap_or_else(|| Cholesky::pack_dirty(SMatrix::identity()))
+    }
+}
+
+/// Share of one point.
+struct Share {
+    log_ratio: f64,
+    /// Weight of its square, m⁻².
+    weight: f64,
+    /// Distance that the camera's errors leave, m.
+    left_m: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recognition::pose_prior::moved;
+    use nalgebra::Vector6;
+    use palpate_geometry::mesh::Mesh;
+    use palpate_geometry::solids::box_mesh;
+    use proptest::prelude::*;
+
+    const NOISE: NoiseModel = NoiseModel { contact_sd_m: 1e-3, normal_sd_rad: 0.3, outliers: 1e-3 };
+
+    fn cube() -> LibraryObject {
+        let (vertices, triangles) = box_mesh([-0.04; 3], [0.04; 3]);
+        LibraryObject::new("cube", &Mesh::new(&vertices, &triangles).unwrap().0)
+    }
+
+    /// Points above the top of the cube, seen by a camera that may be up to `shift_m` (one
+    /// deviation) too high.
+    fn view(heights_m: &[f64], shift_m: f64) -> ViewEvidence {
+        let mut loadings_m = Errors::zeros();
+        loadings_m[2] = shift_m;
+        let point = |(i, height_m): (usize, &f64)| SeenPoint {
+            p_w: Point3::new(0.006 * i as f64 - 0.02, 0.001 * i as f64, 0.04 + height_m),
+            sd_m: 5e-4,
+            loadings_m,
+            range_m: 0.03,
+        };
+        ViewEvidence { points: heights_m.iter().enumerate().map(point).collect() }
+    }
+
+    fn ratio(view: &ViewEvidence, x_wo: &Isometry3<f64>) -> LogLikelihood {
+        let mut sum = LogLikelihood::zero();
+        view.add(&view.fit(&cube(), x_wo), &NOISE, 0.0, &mut sum);
+        sum
+    }
+
+    proptest! {
+        /// The ratio is the integral over the camera's error: a sum over a grid is the slow twin.
+        /// A point that is off by a centimetre counts as an outlier of both.
+        #[test]
+        fn the_ratio_is_an_integral_over_the_error(
+            heights_m in prop::collection::vec(-1e-3f64..1e-3, 3..7),
+            common_m in -4e-3f64..4e-3,
+            shift_m in 1e-4f64..4e-3,
+            has_outlier: bool,
+        ) {
+            let mut heights_m: Vec<f64> = heights_m.iter().map(|own_m| own_m + common_m).collect();
+            if has_outlier {
+                heights_m[0] += 0.01;
+            }
+            let view = view(&heights_m, shift_m);
+            let fit = view.fit(&cube(), &Isometry3::identity());
+            let sds_m = vec![1e-3f64.hypot(5e-4) * inflation(heights_m.len()); heights_m.len()];
+            let step = 0.01;
+            let integrand = |i: i32| {
+                let mut errors = Errors::zeros();
+                errors[2] = step * f64::from(i);
+                let prior = (-0.5 * errors[2].powi(2)).exp() / TAU.sqrt();
+                step * prior * view.at(&errors, &fit, &sds_m).value.exp()
+            };
+            let whole: f64 = (-800..=800).map(integrand).sum();
+            let found = ratio(&view, &Isometry3::identity()).value;
+            prop_assert!((found - whole.ln()).abs() < 0.5, "{found} of {}", whole.ln());
+        }
+
+        /// The gradient is the derivative of the value, and the information is positive.
+        #[test]
+        fn the_gradient_is_the_derivative(
+            heights_m in prop::collection::vec(-1e-3f64..1e-3, 8),
+            rise_m in -2e-3f64..2e-3,
+            axis in 2usize..5,
+        ) {
+            let view = view(&heights_m, 2e-3);
+            let x_wo = Isometry3::from(Vector3::new(0.0, 0.0, rise_m));
+            let at = |by_m: f64| {
+                let mut by = Vector6::zeros();
+                by[axis] = by_m;
+                ratio(&view, &moved(&x_wo, &by))
+            };
+            let step = 1e-6;
+            let slope = (at(step).value - at(-step).value) / (2.0 * step);
+            let sum = at(0.0);
+            let scale = sum.information[(axis, axis)].sqrt() + 1.0;
+            prop_assert!((sum.gradient[axis] - slope).abs() < 0.1 * scale, "{} {slope}", sum.gradient[axis]);
+            prop_assert!(sum.information.symmetric_eigenvalues().min() > -1e-6 * scale * scale);
+        }
+    }
+
+    /// What a camera's error explains says less: with an exact camera a raised surface is unlikely.
+    #[test]
+    fn an_error_that_points_have_in_common_explains_a_shift() {
+        let raised = [3e-3; 8];
+        let logs = [1e-5, 3e-3].map(|shift_m| {
+            let at = |rise_m: f64| {
+                ratio(&view(&raised, shift_m), &Vector3::new(0.0, 0.0, rise_m).into())
+            };
+            at(3e-3).value - at(0.0).value
+        });
+        assert!(logs[0] > 10.0, "{logs:?}");
+        assert!((0.0..1.0).contains(&logs[1]), "{logs:?}");
+    }
+}
