@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -94,7 +94,7 @@ install-clusters:
 TOUCHES := 20
 UR_TOUCHES := 24
 UR_ENDS := 20
-OVER_TOPICS := lab:: lab_camera:: lab_recognition:: lab_strokes:: lab_faults:: lab_ur::
+OVER_TOPICS := lab:: lab_camera:: lab_live:: lab_recognition:: lab_strokes:: lab_faults:: lab_ur::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 NO_NAMESPACE := no permission for a network namespace (unshare --map-root-user --net)
 LAB_TESTS = cargo test --locked -p palpate --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
@@ -147,6 +147,18 @@ AXE := $(DEPS)/axe/axe_playwright_python/axe.min.js
 page-test: setup
 	@$(MAKE) --no-print-directory $(AXE) || echo "accessibility is not tested: the package of tests/axe.txt cannot be fetched"
 	PALPATE_PAGE_TEST=1 PALPATE_AXE=$(abspath $(AXE)) cargo test --locked -p palpate --test suite -- page accessibility
+
+# Tests the live page in a browser: needs Chromium (Debian: chromium).
+LIVE := $(DEPS)/live/bin/python
+
+test-live: setup $(LIVE) $(AXE)
+	cargo build --locked --features $(FEATURES)
+	$(LIVE) tests/live/page.py target/debug/palpate models/bird.glb --axe $(AXE) --pictures target/test-live
+
+$(LIVE): tests/live/requirements.txt
+	python3 -m venv $(DEPS)/live
+	$(DEPS)/live/bin/python -m pip install --quiet --only-binary=:all: -r tests/live/requirements.txt
+	touch $@
 
 # The package is fetched for the script in it.
 $(AXE): tests/axe.txt

@@ -9,6 +9,7 @@
 //! | module | content |
 //! |---|---|
 //! | [`cli`] | commands |
+//! | [`live`] | page in a browser to watch and to steer trials |
 //! | [`report`] | tables, figures and the page, drawn from rows and studies |
 //! | [`study`] | accuracy, regression checks of planners, comparisons of runs |
 //! | [`experiment`] | experiment, trial, runner, store, measures, statistics, ground truth |
@@ -38,6 +39,7 @@
 
 pub mod cli;
 pub mod experiment;
+pub mod live;
 pub mod report;
 pub mod sim;
 pub mod study;

@@ -18,6 +18,7 @@ mod host;
 mod identify;
 mod known_body;
 mod list;
+mod live;
 mod look;
 mod new;
 mod output;
@@ -89,6 +90,8 @@ enum Command {
     Report(report::Args),
     /// Describe a mesh, scene, experiment or run folder; watch a trial in a window.
     Show(show::Args),
+    /// Watch and steer an experiment in the browser; explore a mesh that you drop there.
+    Live(live::Args),
     /// Identify an object of a library, and its pose, by touch.
     Identify(identify::Args),
     /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts as a point
@@ -128,7 +131,7 @@ enum Command {
 
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
-    ("Explore", &["new", "run", "identify", "report", "show", "export"]),
+    ("Explore", &["new", "run", "live", "identify", "report", "show", "export"]),
     ("Evaluate", &["compare", "sensors", "benchmark", "check", "accuracy", "calibrate-band"]),
     ("Robot", &["serve", "look", "register", "replay", "calibrate"]),
     ("More", &[]),
@@ -197,6 +200,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Run(args) => run::run(&args, talk, host),
         Command::Report(args) => report::run(&args, host),
         Command::Show(args) => show::run(&args, talk),
+        Command::Live(args) => live::run(&args, talk, host),
         Command::Identify(args) => identify::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
         Command::Compare(args) => compare::run(&args),

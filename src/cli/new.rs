@@ -13,6 +13,7 @@ use crate::sim::Scene;
 use crate::sim::placement::{self, ObjectAxes, ObjectSide, UpAxis, ZoneProposal};
 use crate::sim::scene::Unit;
 use anyhow::{Context, bail, ensure};
+use clap::{Args as _, FromArgMatches};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::holes::Hole;
@@ -165,7 +166,50 @@ const NORMALS_SETTING: &str =
 /// RMS distance of contacts located by electrodes from the surface (docs/finger.md).
 const NOISE_SETTING: &str = "noise_sd_min_m = 0.0003     # noise of contacts located by electrodes; extra noise is fitted\n";
 
+impl Args {
+    /// Returns the arguments for a mesh whose ambiguities are decided by their evidence.
+    ///
+    /// # Errors
+    /// If an option's value is not allowed.
+    pub(super) fn of_words(words: &[String]) -> anyhow::Result<Self> {
+        let command = Self::augment_args(clap::Command::new("new").no_binary_name(true));
+        let found = command.try_get_matches_from(words);
+        let parsed = found.and_then(|mut found| Self::from_arg_matches_mut(&mut found));
+        parsed.map_err(|error| {
+            let words = error.render().to_string();
+            let first = words.lines().take_while(|line| !line.is_empty()).collect::<Vec<_>>();
+            anyhow::anyhow!("{}", first.join(" ").trim_start_matches("error: "))
+        })
+    }
+}
+
+/// Files that were written for a mesh.
+pub(super) struct Written {
+    /// Choices with their evidence.
+    pub words: String,
+    /// Paths of the files.
+    pub files: Vec<String>,
+    /// Path of the experiment.
+    pub experiment: PathBuf,
+    /// Path of the picture, which may be missing.
+    pub picture: PathBuf,
+    takes: &'static str,
+}
+
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+    let Written { words, files, experiment, picture, takes } = write(args, talk)?;
+    print(&format!(
+        "{words}\nwrote {}\n\nnext\n  look at {}: is the object upright, and has it the right size?\n  \
+         palpate run {}    {takes}",
+        files.join(", "),
+        picture.display(),
+        experiment.display(),
+    ))?;
+    Ok(Outcome::Done)
+}
+
+/// Writes experiment, scene and picture of a mesh.
+pub(super) fn write(args: &Args, talk: Verbosity) -> anyhow::Result<Written> {
     check_is_mesh(&args.mesh)?;
     let name = file_name(&args.mesh)?;
     let [experiment, scene] = ["", "-scene"].map(|what| args.beside(format!("{name}{what}.toml")));
@@ -192,16 +236,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         write_whole(&pictures[1], &svg)?;
         written.extend(pictures.iter().map(|path| path.display().to_string()));
     }
-    print(&format!(
-        "{}\nwrote {}\n\nnext\n  look at {}: is the object upright, and has it the right size?\n  \
-         palpate run {}    {}",
-        placed.words(args),
-        written.join(", "),
-        pictures[0].display(),
-        experiment.display(),
-        finger.takes
-    ))?;
-    Ok(Outcome::Done)
+    let [picture, _] = pictures;
+    let (words, takes) = (placed.words(args), finger.takes);
+    Ok(Written { words, files: written, experiment, picture, takes })
 }
 
 /// Refuses a scene or an experiment, with the command that takes it.

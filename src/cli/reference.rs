@@ -49,7 +49,9 @@ pub(super) fn text(program: &Command) -> String {
 /// Help of every command as Markdown.
 fn commands(program: &Command) -> String {
     let mut text = String::new();
-    for command in program.get_subcommands() {
+    // The list of `palpate --help` says all about a command without arguments.
+    let has_arguments = |command: &&Command| command.get_arguments().next().is_some();
+    for command in program.get_subcommands().filter(has_arguments) {
         let name = command.get_name();
         let mut command = command.clone().bin_name(format!("palpate {name}")).term_width(100);
         for common in ["set", "threads", "force"] {

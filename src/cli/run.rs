@@ -13,7 +13,7 @@ use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{Journal, RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
-use crate::experiment::trial::NextTouch;
+use crate::experiment::trial::TrialEvent;
 use crate::experiment::trial::row::TrialId;
 use crate::report;
 use crate::study::compare::{SuiteComparison, compare};
@@ -351,14 +351,16 @@ pub(super) fn run_missing(
             let is_asked = args.is_asked(&path, talk);
             let new = || Stepper::new(&simulation, std::io::stdin().lock());
             let mut stepper = is_asked.then(new).transpose()?;
-            let mut confirm = |next: &NextTouch| match &mut stepper {
-                Some(stepper) => bar.suspend(|| stepper.ask(next)).inspect_err(|_| {
-                    // The operator's stop is one between two touches, like Ctrl-C.
-                    stop.store(true, Ordering::Relaxed);
-                }),
-                None => Ok(None),
+            let mut ask = |event: &TrialEvent| match (event, &mut stepper) {
+                (TrialEvent::Next(next), Some(stepper)) => {
+                    bar.suspend(|| stepper.ask(next)).inspect_err(|_| {
+                        // The operator's stop is one between two touches, like Ctrl-C.
+                        stop.store(true, Ordering::Relaxed);
+                    })
+                }
+                (TrialEvent::Next(_) | TrialEvent::Finished(_), _) => Ok(None),
             };
-            runner::run_real(&simulation, rows, stop, recorded, &tick, &mut confirm)?
+            runner::run_real(&simulation, rows, stop, (recorded, None), &tick, &mut ask)?
         }
         false => {
             let rows = (&mut folder, jobs);

@@ -66,7 +66,8 @@ pub(super) fn watch(
         );
     };
     let window = Window::open(simulation.environment(), &format!("Palpate: {}", path.display()))?;
-    let (body, sight) = ViewedBackend::new(body, args.speed);
+    let sight = LiveView::new(args.speed);
+    let body = ViewedBackend::new(body, sight.clone());
     let servo = simulation.servo(Box::new(body), simulation.body_seed(args.trial))?;
     let mut probe = ReportingProbe { servo, sight: sight.clone(), count: 0 };
     let number = args.trial;

@@ -3,13 +3,13 @@
 use crate::experiment::real_arm::RealArm;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
+use crate::experiment::trial::planner_names::HUMAN;
 use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
 use crate::experiment::trial::row::{TrialId, TrialRow};
-use crate::experiment::trial::{NextTouch, TrialEvent, view};
-use palpate_explore::backend::Fault;
-use palpate_explore::backend::pace;
+use crate::experiment::trial::{self, TrialEvent, TrialObserver};
+use palpate_explore::backend::live_view::LiveView;
+use palpate_explore::backend::{Fault, pace};
 use palpate_explore::planner::{Fallback, PlannerFactory};
-use palpate_explore::task::Target;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
 use rayon::iter::{
@@ -44,8 +44,13 @@ pub fn missing_jobs<'a>(
     let known = |(trial, name): (u32, &str)| {
         let planner = simulation.planner(name);
         let problem = format!("planner `{name}` is not available in this program");
-        let mend = "run it with the palpate of the Python package, or from Rust with \
-                         Simulation::with_planners";
+        let mend = match name {
+            HUMAN => "a person plans in: palpate live EXPERIMENT",
+            _ => {
+                "run it with the palpate of the Python package, or from Rust with \
+                  Simulation::with_planners"
+            }
+        };
         Ok((trial, planner.ok_or_else(|| InputError::new(problem).remedy(mend))?))
     };
     simulation.experiment().missing_trials(done).into_iter().map(known).collect()
@@ -112,7 +117,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_caught(simulation, (trial, planner), recorded, progress);
+            let row = run_counted(simulation, (trial, planner), recorded, progress);
             if row.failure.is_some() && stop.load(Ordering::Relaxed) {
                 // The interruption may have caused the failure; the trial is run again.
                 return Ok(());
@@ -142,7 +147,7 @@ pub fn run_in_memory(
 ) -> Result<Vec<TrialRow>, InputError> {
     let run = |(trial, planner): Job| {
         let row = (!stop.load(Ordering::Relaxed))
-            .then(|| run_caught(simulation, (trial, planner), None, progress))?;
+            .then(|| run_counted(simulation, (trial, planner), None, progress))?;
         progress(Progress::Trial(&row));
         Some(row)
     };
@@ -161,9 +166,24 @@ pub(super) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, InputErro
     })
 }
 
-/// Runs one trial. A panic of a planner or probe becomes the trial's failure, so that it does not
-/// lose the other trials.
-fn run_caught(
+/// Runs one trial as [`recorded_trial::run`] does. A panic of a planner or probe becomes the
+/// trial's failure, so that it does not lose the other trials.
+pub fn run_caught(
+    simulation: &Simulation,
+    (trial, planner): Job,
+    shown: (Option<&Path>, Option<&LiveView>),
+    observer: &mut TrialObserver,
+) -> TrialRow {
+    let run = || recorded_trial::run(simulation, (trial, planner), shown, &[], observer);
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        TrialRow::without_touches(trial, planner.name(), Some(format!("panicked: {words}")))
+    })
+}
+
+/// Runs one trial, and reports each touch.
+fn run_counted(
     simulation: &Simulation,
     (trial, planner): Job,
     recorded: Option<&Path>,
@@ -176,20 +196,15 @@ fn run_caught(
         }
         Ok(None)
     };
-    let run =
-        || recorded_trial::run(simulation, (trial, planner), path.as_deref(), &[], &mut count);
-    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
-        let words = panic.downcast_ref::<String>().map(String::as_str);
-        let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-        TrialRow::without_touches(trial, planner.name(), Some(format!("panicked: {words}")))
-    })
+    run_caught(simulation, (trial, planner), (path.as_deref(), None), &mut count)
 }
 
 /// Runs the trials of a real arm that `done` lacks, in sequence, until one fails or `stop` becomes
 /// true between two touches. Every touch is stored in the journal of `folder`, from which an
 /// interrupted trial continues.
 ///
-/// `confirm` is called before each new touch, and may return another target or a fault.
+/// `observer` is called before each new touch, when it may return another target or a fault, and
+/// after each touch. A view shows the arm.
 ///
 /// Returns the number of finished trials and, if it stopped early, the trial, the reason and the
 /// stored touches.
@@ -200,9 +215,9 @@ pub fn run_real(
     simulation: &Simulation,
     (folder, done): (&mut RunFolder, &[TrialId]),
     stop: &AtomicBool,
-    recorded: Option<&Path>,
+    (recorded, view): (Option<&Path>, Option<&LiveView>),
     progress: &(dyn Fn(Progress) + Sync),
-    confirm: &mut dyn FnMut(&NextTouch) -> Result<Option<Target>, Fault>,
+    observer: &mut TrialObserver,
 ) -> Result<(usize, Option<String>), RunError> {
     let mut journal = Journal::open(folder.path())?;
     let mut finished = 0;
@@ -221,7 +236,7 @@ pub fn run_real(
             // Touches made before an interruption are not shown again, except the last.
             let is_shown = event.count() as usize >= made.len();
             if let Some(arm) = simulation.arm().and_then(RealArm::ros).filter(|_| is_shown) {
-                view::show(arm, simulation, event);
+                trial::view::show(arm, simulation, event);
             }
             let touched = match event {
                 TrialEvent::Next(next) => {
@@ -232,7 +247,7 @@ pub fn run_real(
                             Ok(chosen.then(|| made.target.clone()))
                         }
                         None => {
-                            let answer = confirm(next);
+                            let answer = observer(event);
                             is_asked |= matches!(answer, Err(Fault::Stopped { .. }));
                             answer
                         }
@@ -242,6 +257,7 @@ pub fn run_real(
             };
             let time_s = touched.row.time_s.unwrap_or_default();
             progress(Progress::Touch);
+            let observed = observer(event);
             if let Some(made) = made.get(touched.count as usize - 1) {
                 let (touch, target) = (touched.count, made.target.numbers());
                 return match made.target == touched.row.target {
@@ -258,11 +274,11 @@ pub fn run_real(
                 return Err(Fault::RecordingFailed { time_s, message });
             }
             is_asked |= stop.load(Ordering::Relaxed);
-            if is_asked { Err(Fault::Stopped { time_s }) } else { Ok(None) }
+            if is_asked { Err(Fault::Stopped { time_s }) } else { observed }
         };
         let path = recorded.map(|run| next_part(&recording_path(run, planner, trial)));
         let job = (trial, planner);
-        let row = recorded_trial::run(simulation, job, path.as_deref(), &made, &mut keep);
+        let row = recorded_trial::run(simulation, job, (path.as_deref(), view), &made, &mut keep);
         if let Some(error) = unstored {
             return Err(error);
         }

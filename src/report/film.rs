@@ -188,7 +188,7 @@ fn reliefs(run: &Run, (row, zone): (&TrialRow, &Zone), counts: &[u32]) -> Drawin
 
 fn solids(run: &Run, row: &TrialRow, counts: &[u32]) -> Drawings {
     let truth = whole_object::truth(run);
-    let sequences = whole_object::sequences(run, &[&row.planner], counts, None)?;
+    let sequences = whole_object::sequences(run, &[&row.planner], &|_| counts.to_vec(), None)?;
     let Some(sequence) = sequences.first() else { return Ok(None) };
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
     let panels = 2 + usize::from(mesh.is_some());

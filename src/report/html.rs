@@ -8,6 +8,12 @@ use std::fmt::Display;
 
 /// Returns a page of a kind, titled `name`; `question` may be empty.
 pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String {
+    page_with(kind, name, question, body, "")
+}
+
+/// Returns a page of a kind, titled `name`, with further elements of its head; `question` may be
+/// empty.
+pub fn page_with(kind: &str, name: &str, question: &str, body: &str, head: &str) -> String {
     let name = escape(name);
     let question = match question.trim() {
         "" => String::new(),
@@ -16,7 +22,7 @@ pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{name} – Palpate</title>\n<style>{STYLE}{}</style>\n</head>\n<body>\n<main>\n\
+         <title>{name} – Palpate</title>\n<style>{STYLE}{}</style>\n{head}</head>\n<body>\n<main>\n\
          <p class=\"kind\">{kind}</p>\n<h1>{name}</h1>\n{question}{body}</main>\n</body>\n</html>\n",
         figures_on_dark(),
     )

@@ -15,7 +15,7 @@ pub mod film;
 pub mod findings;
 mod glossary;
 pub mod heat_map;
-mod html;
+pub mod html;
 pub mod legend;
 pub mod orientation;
 pub mod page;

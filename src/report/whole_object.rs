@@ -1,6 +1,7 @@
 //! Replay of beliefs of whole objects: recorded touches and hyperparameters, conditioned again and
 //! converted to surfaces.
 
+use super::explorer::Counts;
 use super::figures::ReportFigure;
 use super::replay::{self, swept};
 use super::solid::{self, PlannerSurfaces, SolidTouch, SurfaceFrame, counts};
@@ -38,7 +39,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     let truth = truth(run);
     let planners = experiment.drawn_planners();
     let counts = counts(experiment.first_fit(), experiment.touches, planners.len(), TRIANGLES);
-    let sequences = sequences(run, &planners, &counts, truth.as_ref())?;
+    let sequences = sequences(run, &planners, &|_| counts.clone(), truth.as_ref())?;
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
     solid::section(&sequences, mesh, experiment.report.trial)
 }
@@ -60,20 +61,21 @@ pub const FIGURE: ReportFigure = ReportFigure {
             return Ok(None);
         }
         let (counts, truth) = (experiment.drawn_touch_counts(), truth(run));
-        let sequences = sequences(run, &experiment.drawn_planners(), &counts, truth.as_ref())?;
+        let names = experiment.drawn_planners();
+        let sequences = sequences(run, &names, &|_| counts.clone(), truth.as_ref())?;
         Ok(solid::figure(&sequences, truth.as_ref().map(|bvh| &**bvh.mesh()), &counts))
     },
 };
 
-/// Replays the beliefs of `planners` in the drawn trial, after `counts` touches; `truth` gives the
-/// errors.
+/// Replays the beliefs of `planners` in the drawn trial, after the `counts` of touches of each;
+/// `truth` gives the errors.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
-pub(super) fn sequences(
+pub fn sequences(
     run: &Run,
     planners: &[&str],
-    counts: &[u32],
+    counts: &Counts,
     truth: Option<&MeshBvh>,
 ) -> anyhow::Result<Vec<PlannerSurfaces>> {
     let initial_touches = run.experiment.initial_touches as usize;
@@ -98,7 +100,7 @@ pub(super) fn sequences(
             frame.with_context(|| format!("{} cannot be drawn", place(count as usize)))
         };
         let frames: Vec<Option<SurfaceFrame>> =
-            counts.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
+            counts(&row.planner).par_iter().map(frame).collect::<anyhow::Result<_>>()?;
         sequence.frames = frames.into_iter().flatten().collect();
         Ok(sequence)
     };

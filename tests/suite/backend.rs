@@ -3,7 +3,7 @@
 use crate::common::shipped;
 use palpate::backend::delay::DelayedBackend;
 use palpate::backend::interlock::{InterlockSettings, InterlockedBackend, SafetyContext};
-use palpate::backend::live_view::ViewedBackend;
+use palpate::backend::live_view::{LiveView, ViewedBackend};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::robot::{Finger, Robot};
@@ -32,7 +32,7 @@ const WRAPS: [(&str, Wrap); 5] = [
     ("interlocked", |body, chain| Box::new(interlocked(body, chain))),
     ("recorded", |body, _| recorded(body)),
     ("delayed", |body, _| Box::new(DelayedBackend::new(body, 0.03))),
-    ("watched", |body, _| Box::new(ViewedBackend::new(body, 100.0).0)),
+    ("watched", |body, _| Box::new(ViewedBackend::new(body, LiveView::new(100.0)))),
 ];
 
 fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
@@ -272,7 +272,8 @@ fn a_delayed_body_does_later_what_the_bare_one_does() {
 fn a_watched_body_is_the_same_body_at_the_pace_of_the_clock() {
     let simulator = Simulator::new(environment(&[EFFECTS_DRY])).unwrap();
     let mut bare = simulator.body().unwrap().unwrap();
-    let (mut watched, sight) = ViewedBackend::new(simulator.body().unwrap().unwrap(), 4.0);
+    let sight = LiveView::new(4.0);
+    let mut watched = ViewedBackend::new(simulator.body().unwrap().unwrap(), sight.clone());
     let begun = std::time::Instant::now();
     let readings = run(&mut watched, 3, 20);
     // On a busy machine it is only later.

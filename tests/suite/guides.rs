@@ -11,7 +11,7 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// Starts of command lines that run elsewhere, and where.
-const ELSEWHERE: [(&str, &str); 18] = [
+const ELSEWHERE: [(&str, &str); 19] = [
     ("git clone", "continuous integration, in a clean checkout"),
     ("make ", "targets of the Makefile, tested below"),
     ("cargo ", "continuous integration; examples in `make test`"),
@@ -27,6 +27,7 @@ const ELSEWHERE: [(&str, &str); 18] = [
     ("export ROS_LOCALHOST_ONLY", "tests/ros2/namespace.sh"),
     ("palpate accuracy", "accuracy:: and relevance::, on small scenes"),
     ("palpate serve", "lab::the_loop, over ROS 2"),
+    ("palpate live", "live::, and make test-live in a browser"),
     ("palpate run real_arm", "lab::the_loop, over ROS 2"),
     ("palpate run real_ur5e", "lab_ur::, over ROS 2"),
     ("palpate register real_arm", "needs a robot, or the simulated one in real time"),

@@ -13,7 +13,7 @@ const LAYERS: [(&str, &[&[&str]]); 6] = [
     ("palpate_geometry", &[]),
     ("palpate_explore", &[&["robot"], &["task", "backend"]]),
     ("palpate_ros", &[]),
-    ("palpate", &[&["sim"], &["experiment"], &["study"], &["report"], &["cli"]]),
+    ("palpate", &[&["sim"], &["experiment"], &["study"], &["report"], &["live"], &["cli"]]),
 ];
 
 /// Path of a module: its package, then the modules below.

@@ -60,12 +60,15 @@ mod lab_camera;
 #[cfg(feature = "mujoco")]
 mod lab_faults;
 #[cfg(feature = "mujoco")]
+mod lab_live;
+#[cfg(feature = "mujoco")]
 mod lab_recognition;
 #[cfg(feature = "mujoco")]
 mod lab_strokes;
 #[cfg(feature = "mujoco")]
 mod lab_ur;
 mod layers;
+mod live;
 mod memory;
 mod meshes;
 mod messages;

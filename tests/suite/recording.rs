@@ -543,7 +543,8 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
     let active = planner::by_name("active").unwrap();
     let path = recording_path(folder, active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let row = recorded_trial::run(&simulation, (0, active), Some(&path), &[], &mut |_| Ok(None));
+    let row =
+        recorded_trial::run(&simulation, (0, active), (Some(&path), None), &[], &mut |_| Ok(None));
     let bare = simulation.trial(active, 0);
     assert_eq!(row.failure, None);
     assert_eq!(serde_json::to_string(&row).unwrap(), serde_json::to_string(&bare).unwrap());
@@ -681,7 +682,7 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
             }
         };
         let job: (u32, &dyn PlannerFactory) = (0, active);
-        let row = recorded_trial::run(&simulation, job, Some(&part), &made, &mut interrupt);
+        let row = recorded_trial::run(&simulation, job, (Some(&part), None), &made, &mut interrupt);
         assert_eq!(row.touches, kept);
         assert_eq!(row.touches.len(), after as usize);
     }

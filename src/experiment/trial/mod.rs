@@ -15,7 +15,7 @@ pub(super) use oracle::{GroundTruth, OracleFactory};
 
 use self::belief_shape::{BelievedShape, shape};
 use self::looks::Looks;
-use self::row::{TouchRow, TrialRow};
+use self::row::{TouchRow, TrialRow, ViewRow};
 use self::strokes::Strokes;
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
@@ -43,6 +43,8 @@ pub struct FinishedTouch<'a> {
     pub touch: &'a Touch,
     /// The touch's part of the trial's row.
     pub row: &'a TouchRow,
+    /// Views so far.
+    pub views: &'a [ViewRow],
     /// Belief that includes the touch.
     pub belief: &'a Belief,
     /// The belief's shape, once a viewer or a recording has asked for it.
@@ -215,6 +217,7 @@ fn run_touches(
             count,
             touch: &touch,
             row: &touch_row,
+            views: &row.views,
             belief: &belief,
             shape: OnceCell::new(),
         };

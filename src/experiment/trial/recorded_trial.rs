@@ -6,6 +6,7 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::experiment::trial::{TrialEvent, TrialObserver, view};
 use nalgebra::Point3;
 use palpate_explore::backend::Fault;
+use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::planner::PlannerFactory;
 use palpate_explore::probe::{Probe, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
@@ -43,11 +44,12 @@ fn part(path: &Path, number: usize) -> PathBuf {
 
 /// Runs a trial that continues after the touches `made`, and calls `observer` after every touch.
 /// With a `path` it records to that file and replaces an existing one. The recording starts with
-/// `made`, so that it can be replayed alone. A touch that cannot be recorded fails the trial.
+/// `made`, so that it can be replayed alone. A touch that cannot be recorded fails the trial. A
+/// view shows a body that moves, and sets its pace.
 pub fn run(
     simulation: &Simulation,
     (trial, planner): (u32, &dyn PlannerFactory),
-    path: Option<&Path>,
+    (path, view): (Option<&Path>, Option<&LiveView>),
     earlier_touches: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> TrialRow {
@@ -55,11 +57,11 @@ pub fn run(
         let drawn = simulation.drawn(trial)?;
         let simulation = drawn.as_ref().unwrap_or(simulation);
         let Some(path) = path else {
-            let mut probe = simulation.probe(trial)?;
+            let mut probe = simulation.viewed_probe(trial, view)?;
             let mut probe = ResumedProbe::new(earlier_touches.to_vec(), simulation, &mut *probe);
             return Ok(simulation.trial_with(&mut probe, planner, trial, observer));
         };
-        record(simulation, (trial, planner), path, earlier_touches, observer)
+        record(simulation, (trial, planner), (path, view), earlier_touches, observer)
     };
     run().unwrap_or_else(|fault: Fault| TrialRow::not_started(trial, planner.name(), &fault))
 }
@@ -68,11 +70,11 @@ pub fn run(
 fn record(
     simulation: &Simulation,
     (trial, planner): (u32, &dyn PlannerFactory),
-    path: &Path,
+    (path, view): (&Path, Option<&LiveView>),
     made: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> Result<TrialRow, Fault> {
-    let body = simulation.backend()?.ok_or_else(|| Fault::lacks("a body that moves"))?;
+    let body = simulation.backend(view)?.ok_or_else(|| Fault::lacks("a body that moves"))?;
     let seed = simulation.body_seed(trial);
     let about = RecordingMetadata {
         version: env!("CARGO_PKG_VERSION").into(),

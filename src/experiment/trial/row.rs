@@ -155,11 +155,7 @@ impl TrialRow {
     }
 
     /// Creates a trial without touches, with the `failure` that ended it, if given.
-    pub(in crate::experiment) fn without_touches(
-        trial: u32,
-        planner: &str,
-        failure: Option<String>,
-    ) -> Self {
+    pub fn without_touches(trial: u32, planner: &str, failure: Option<String>) -> Self {
         let (views, touches, verification) = Default::default();
         Self { trial, planner: planner.into(), failure, views, touches, verification }
     }

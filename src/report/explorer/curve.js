@@ -3,7 +3,7 @@
 
 function curveView(canvas) {
   const [LEFT, RIGHT, TOP, GAP, BOTTOM] = [62, 16, 14, 34, 46];
-  const { x: xs, unit } = data;
+  let xs, unit;
 
   // Draws a frame with ticks; returns the function that maps a value into it.
   function panel(context, left, top, width, height, [x0, x1], [y0, y1], words) {
@@ -89,7 +89,8 @@ function curveView(canvas) {
     });
   }
 
-  return (state) => {
+  const draw = (state) => {
+    ({ x: xs, unit } = data);
     const { context, width, height } = pen(canvas);
     const frame = frameOf(state);
     const ink = onPaper(data.planners[state.planner].colours);
@@ -103,6 +104,7 @@ function curveView(canvas) {
       if (state.truth) curve(context, at, data.truth, `rgb(${data.colours.truth})`, 2.5);
       curve(context, at, frame.mean, paint("ink"), 1.8);
       drawTouches(context, at, frame, state.planner);
+      if (state.next) drawNext(context, at(state.next[0], data.space[0] + 0.08 * (data.space[1] - data.space[0])));
     });
     const below = TOP + tall + GAP;
     const most = 1.05 * data.deviation_range[1];
@@ -111,5 +113,10 @@ function curveView(canvas) {
     context.fillStyle = paint("ink");
     context.textAlign = "center";
     context.fillText(`x (${unit})`, LEFT + inner / 2, height - 8);
+    draw.pick = (x) => {
+      const share = (x - LEFT) / inner;
+      return share < 0 || share > 1 ? null : [sides[0] + share * (sides[1] - sides[0])];
+    };
   };
+  return draw;
 }

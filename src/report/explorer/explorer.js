@@ -2,60 +2,12 @@
 "use strict";
 
 const explorer = document.getElementById("explorer");
-const data = JSON.parse(document.getElementById("explorer-data").textContent);
+let data = JSON.parse(document.getElementById("explorer-data").textContent);
 const state = { planner: 0, frame: 0, colour: null, truth: false };
-
-const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-const codes = (text) => new Uint16Array(bytes(text).buffer);
-
-// Decodes numbers of sixteen bits between two ends; the highest code is null.
-function numbers(text, [low, high]) {
-  return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low + (high - low) * code / 65534));
-}
-
-// Decodes numbers between the ends of the logarithm of their range.
-function deviations(text) {
-  const [low, high] = data.deviation_range;
-  return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low * Math.pow(high / low, code / 65534)));
-}
-
-// Page colours for light or dark paper; the data has a pair of each of its colours.
-const dark = window.matchMedia("(prefers-color-scheme: dark)");
-const paint = (name) => getComputedStyle(explorer).getPropertyValue(`--${name}`).trim();
-const onPaper = (pair) => pair[dark.matches ? 1 : 0];
-dark.addEventListener("change", () => draw());
-
-// Returns about `aim` round numbers between two ends.
-function roundNumbers(low, high, aim) {
-  const rough = (high - low) / aim;
-  const power = Math.pow(10, Math.floor(Math.log10(rough)));
-  const step = [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= rough);
-  const numbers = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) numbers.push(i * step);
-  return numbers;
-}
-
-// Formats a number as a label, with the minus sign of the printed figures.
-function label(number) {
-  return String(Number(number.toPrecision(6))).replace("-", "−");
-}
-
-// Sizes a canvas to its place on the page, in screen pixels; returns its context, scaled to page
-// pixels.
-function pen(canvas) {
-  const ratio = window.devicePixelRatio || 1;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  canvas.width = Math.round(width * ratio);
-  canvas.height = Math.round(height * ratio);
-  const context = canvas.getContext("2d");
-  context.scale(ratio, ratio);
-  context.font = "12px system-ui, 'Segoe UI', Helvetica, Arial, sans-serif";
-  context.lineJoin = context.lineCap = "round";
-  return { context, width, height, ratio };
-}
 
 const canvas = explorer.querySelector("canvas");
 const slider = explorer.querySelector("input[type=range]");
+prepare();
 const view = viewOf(canvas);
 
 let isDue = false;

@@ -11,7 +11,11 @@ function frameOf(state) {
   return frame;
 }
 
-function viewOf(canvas) {
+// Decodes what is not of a frame.
+function prepare() {
   data.truth = numbers(data.truth, data.height_range);
+}
+
+function viewOf(canvas) {
   return data.z ? reliefView(canvas) : curveView(canvas);
 }

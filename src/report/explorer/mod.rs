@@ -75,6 +75,9 @@ impl InteractiveView<'_> {
     }
 }
 
+/// Function that gives the touch counts of a planner whose beliefs are shown.
+pub type Counts<'a> = dyn Fn(&str) -> Vec<u32> + Sync + 'a;
+
 /// Returns the touch counts with a frame: as many as fit, including the first and the last, if the
 /// frames of one count take `bytes`.
 pub fn counts(first: u32, last: u32, bytes: usize) -> Vec<u32> {
@@ -84,7 +87,7 @@ pub fn counts(first: u32, last: u32, bytes: usize) -> Vec<u32> {
 }
 
 /// Returns radio buttons with the first one checked.
-fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T, T)>) -> String {
+pub fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T, T)>) -> String {
     let buttons: String = (options.enumerate())
         .map(|(i, (value, words))| {
             let checked = if i == 0 { " checked" } else { "" };

@@ -1,5 +1,55 @@
-// Shared parts of the views of surfaces: colour scales, marks of touches, turning by hand.
+// Shared parts of the views of surfaces: numbers from text, labels, colour scales, marks of touches,
+// turning by hand. A script that uses them has the element `explorer`, the `data` and `draw`.
 "use strict";
+
+const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+const codes = (text) => new Uint16Array(bytes(text).buffer);
+
+// Decodes numbers of sixteen bits between two ends; the highest code is null.
+function numbers(text, [low, high]) {
+  return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low + (high - low) * code / 65534));
+}
+
+// Decodes numbers between the ends of the logarithm of their range.
+function deviations(text) {
+  const [low, high] = data.deviation_range;
+  return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low * Math.pow(high / low, code / 65534)));
+}
+
+// Page colours for light or dark paper; the data has a pair of each of its colours.
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
+const paint = (name) => getComputedStyle(explorer).getPropertyValue(`--${name}`).trim();
+const onPaper = (pair) => pair[dark.matches ? 1 : 0];
+dark.addEventListener("change", () => draw());
+
+// Returns about `aim` round numbers between two ends.
+function roundNumbers(low, high, aim) {
+  const rough = (high - low) / aim;
+  const power = Math.pow(10, Math.floor(Math.log10(rough)));
+  const step = [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= rough);
+  const numbers = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) numbers.push(i * step);
+  return numbers;
+}
+
+// Formats a number as a label, with the minus sign of the printed figures.
+function label(number) {
+  return String(Number(number.toPrecision(6))).replace("-", "−");
+}
+
+// Sizes a canvas to its place on the page, in screen pixels; returns its context, scaled to page
+// pixels.
+function pen(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  const context = canvas.getContext("2d");
+  context.scale(ratio, ratio);
+  context.font = "12px system-ui, 'Segoe UI', Helvetica, Arial, sans-serif";
+  context.lineJoin = context.lineCap = "round";
+  return { context, width, height, ratio };
+}
 
 // Colour scale: its stops, the position of a value from 0 to 1, values to label, words.
 function deviationScale([least, most], words = "standard deviation σ") {
@@ -30,10 +80,10 @@ function drawColours(context, width, height, scale) {
   const length = Math.min(320, width - 40);
   const isNarrow = width < 720;
   const [left, top] = [(width - length) / 2, height - 44];
-  for (let i = 0; i < length; i++) {
-    context.fillStyle = `rgb(${colour(scale, i / (length - 1)).map(Math.round)})`;
-    context.fillRect(left + i, top, 1.5, 12);
-  }
+  const bar = context.createLinearGradient(left, 0, left + length, 0);
+  scale.stops.forEach((stop, i) => bar.addColorStop(i / (scale.stops.length - 1), `rgb(${stop.map(Math.round)})`));
+  context.fillStyle = bar;
+  context.fillRect(left, top, length, 12);
   context.fillStyle = paint("ink");
   context.textAlign = isNarrow ? "center" : "right";
   const [wordsX, wordsY] = isNarrow ? [width / 2, top - 8] : [left - 12, top + 11];
@@ -63,6 +113,21 @@ function drawTouch(context, [x, y], pair, kind, isLast) {
   context.lineWidth = 1.3;
   if (kind !== "miss") context.fill();
   context.stroke();
+}
+
+// Draws where the next touch will be.
+function drawNext(context, [x, y]) {
+  for (const [ink, width] of [[paint("paper"), 4.5], [paint("link"), 2]]) {
+    context.strokeStyle = ink;
+    context.lineWidth = width;
+    context.beginPath();
+    context.arc(x, y, 9, 0, 7);
+    [[-14, 0, -5, 0], [5, 0, 14, 0], [0, -14, 0, -5], [0, 5, 0, 14]].forEach(([ax, ay, bx, by]) => {
+      context.moveTo(x + ax, y + ay);
+      context.lineTo(x + bx, y + by);
+    });
+    context.stroke();
+  }
 }
 
 // Turns the view by dragging and by the arrow keys; `turn.isDragged` is true during a drag.

@@ -7,22 +7,28 @@ function reliefView(canvas) {
   // that colours are readable on a slope.
   const turn = { azimuth: 38, elevation: 24, isDragged: false };
   const [LIGHT, AMBIENT, DIRECT] = [unit([0.45, 0.7, 0.55]), 0.5, 0.62];
-  const { x: xs, z: zs, stretch } = data;
-  const [columns, count] = [xs.length, xs.length * zs.length];
-  const [low, high] = data.space;
-  const ends = [[xs[0], xs[columns - 1]], [low, high], [zs[0], zs[zs.length - 1]]];
-  const middle = ends.map(([a, b]) => (a + b) / 2);
-  const sides = ends.map(([a, b]) => b - a);
-  const contours = roundNumbers(low, high, 10);
-  const contourStep = contours[1] - contours[0];
-  const heightScale = { stops: data.colours.height, at: (value) => (value - low) / (high - low), ticks: roundNumbers(low, high, 6), words: "height" };
-  const scales = {
-    height: heightScale,
-    deviation: deviationScale(data.deviation_range),
-    band: deviationScale(data.band_range, "width of the 95 % band"),
-    error: errorScale(0.5 * (high - low), "error: belief too low | too high"),
-  };
-  const size = Math.hypot(sides[0], sides[1] * stretch, sides[2]);
+  let known, xs, zs, stretch, columns, count, low, high, ends, middle, sides, contourStep, scales, size;
+
+  // Takes the present data.
+  function take() {
+    if (known === data) return;
+    known = data;
+    ({ x: xs, z: zs, stretch } = data);
+    [columns, count] = [xs.length, xs.length * zs.length];
+    [low, high] = data.space;
+    ends = [[xs[0], xs[columns - 1]], [low, high], [zs[0], zs[zs.length - 1]]];
+    middle = ends.map(([a, b]) => (a + b) / 2);
+    sides = ends.map(([a, b]) => b - a);
+    const contours = roundNumbers(low, high, 10);
+    contourStep = contours[1] - contours[0];
+    scales = {
+      height: { stops: data.colours.height, at: (value) => (value - low) / (high - low), ticks: roundNumbers(low, high, 6), words: "height" },
+      deviation: deviationScale(data.deviation_range),
+      band: deviationScale(data.band_range, "width of the 95 % band"),
+      error: errorScale(0.5 * (high - low), "error: belief too low | too high"),
+    };
+    size = Math.hypot(sides[0], sides[1] * stretch, sides[2]);
+  }
 
   function unit(v) {
     const length = Math.hypot(...v);
@@ -158,6 +164,7 @@ function reliefView(canvas) {
   }
 
   function draw(state) {
+    take();
     const { context, width, height, ratio } = pen(canvas);
     const frame = frameOf(state);
     const scale = scales[state.colour];
@@ -188,7 +195,32 @@ function reliefView(canvas) {
       return layer.depth[pixel] > depth + 0.02 * size;
     };
     drawTouches(context, project, frame, state.planner, isHidden);
+    if (state.next) drawNext(context, project(state.next[0], heightAt(frame, state.next), state.next[1]));
     drawColours(context, width, height, scale);
+    draw.pick = (x, y) => pick(project, frame, x, y);
+  }
+
+  // Returns the believed height at a place: that of the nearest place of the grid.
+  function heightAt(frame, [x, z]) {
+    const index = (at, [a, b], length) => Math.min(Math.max(Math.round((at - a) / (b - a) * (length - 1)), 0), length - 1);
+    const h = frame.mean[index(z, ends[2], zs.length) * columns + index(x, ends[0], columns)];
+    return Number.isNaN(h) ? low : Math.min(Math.max(h, low), high);
+  }
+
+  // Returns the place (x, z) of the front of the surface at a point of the canvas, or null beside it.
+  function pick(project, frame, px, py) {
+    const [FINE, NEAR] = [4, 6];
+    let best = null;
+    for (let j = 0; j <= FINE * (zs.length - 1); j++) {
+      for (let i = 0; i <= FINE * (columns - 1); i++) {
+        const place = [ends[0][0] + sides[0] * i / FINE / (columns - 1), ends[2][0] + sides[2] * j / FINE / (zs.length - 1)];
+        const [x, y, depth] = project(place[0], heightAt(frame, place), place[1]);
+        const away = Math.hypot(x - px, y - py);
+        if (away > NEAR || best && depth - 0.02 * size * away < best.rank) continue;
+        best = { place, rank: depth - 0.02 * size * away };
+      }
+    }
+    return best && best.place;
   }
 
   // Turning keeps the front in front, because the object's back was never touched.

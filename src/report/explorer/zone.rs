@@ -1,6 +1,6 @@
 //! Interactive view of beliefs over a zone: values on a grid after many touch counts, in few bytes.
 
-use super::{InteractiveView, LEAST_SHARE, PARTS, counts, encode, encode_log, short};
+use super::{Counts, InteractiveView, LEAST_SHARE, PARTS, counts, encode, encode_log, short};
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{self, Axis, Length};
@@ -12,11 +12,12 @@ use palpate_input::format::counted;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
 
-const SCRIPTS: [&str; 4] =
+/// Scripts of the view.
+pub const SCRIPTS: [&str; 4] =
     [PARTS, include_str!("relief.js"), include_str!("curve.js"), include_str!("heights.js")];
 
 /// Colour maps of a surface: names in scripts, and labels.
-const COLOURS: [(&str, &str); 4] =
+pub const COLOURS: [(&str, &str); 4] =
     [("height", "height"), ("deviation", "σ"), ("band", "95 % band"), ("error", "error")];
 
 /// Returns the section as HTML; empty if no planner has a belief to show.
@@ -24,7 +25,13 @@ const COLOURS: [(&str, &str); 4] =
 /// # Errors
 /// If the recorded touches do not belong to the zone or cannot be conditioned on.
 pub fn section(run: &Run) -> anyhow::Result<String> {
-    let Some(data) = data(run)? else { return Ok(String::new()) };
+    let experiment = &run.experiment;
+    let Some(zone) = &experiment.scene.zone else { return Ok(String::new()) };
+    let places = PLACES_MAX[zone.dimension() - 1].min(experiment.grid as usize);
+    let places = places.pow(zone.dimension() as u32);
+    let bytes = BYTES_OF_PLACE * experiment.planners.len() * places;
+    let counts = counts(experiment.first_fit(), experiment.touches, bytes);
+    let Some(data) = data(run, &|_| counts.clone())? else { return Ok(String::new()) };
     // The true curve hides nothing, so it is visible by default.
     let (class, colours, is_shown, help) = match data["z"].is_null() {
         true => ("curve", &[][..], true, "Drag the slider, or press the arrow keys."),
@@ -87,9 +94,12 @@ impl HeightFrame {
     }
 }
 
-/// Returns the replayed data of the drawn trial, with lengths in the unit of the page; `None` if
-/// there is nothing to show.
-fn data(run: &Run) -> anyhow::Result<Option<Value>> {
+/// Returns the data of the view: beliefs of the drawn trial, replayed after the `counts` of touches
+/// of each planner, with lengths in the unit of the page. `None` if there is nothing to show.
+///
+/// # Errors
+/// If the recorded touches do not belong to the zone or cannot be conditioned on.
+pub fn data(run: &Run, counts: &Counts) -> anyhow::Result<Option<Value>> {
     let experiment = &run.experiment;
     let Some(zone) = &experiment.scene.zone else { return Ok(None) };
     let kind = zone.dimension() - 1;
@@ -98,8 +108,6 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     let Some(axis) = Axis::around(heights_m, MARGIN[kind], 5.0) else { return Ok(None) };
     let grid = Grid::new(run, zone.dimension(), PLACES_MAX[kind])?;
     let places: Vec<&[f64]> = grid.places().collect();
-    let (first, last) = (experiment.first_fit(), experiment.touches);
-    let touch_counts = counts(first, last, BYTES_OF_PLACE * names().len() * places.len());
     let mut beliefs = Vec::new();
     for name in names() {
         let frame = |&count: &u32| {
@@ -107,7 +115,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
             anyhow::Ok(replay.map(|replay| HeightFrame::of(&replay, &places)))
         };
         let frames: Vec<Option<HeightFrame>> =
-            touch_counts.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
+            counts(name).par_iter().map(frame).collect::<anyhow::Result<_>>()?;
         let frames: Vec<HeightFrame> = frames.into_iter().flatten().collect();
         if !frames.is_empty() {
             beliefs.push((name, frames));
@@ -160,6 +168,7 @@ fn data(run: &Run) -> anyhow::Result<Option<Value>> {
     };
     Ok(Some(json!({
         "unit": unit.symbol,
+        "per_m": unit.per_m,
         "x": axis(0),
         "z": zone.z_m.map(|_| axis(1)),
         // Range of the heights drawn, and their stretch.

@@ -9,7 +9,7 @@ mod section;
 
 pub use figure::{FilmPanels, figure};
 pub use reach::picture;
-pub use section::{counts, deviation_axis, section};
+pub use section::{COLOURS, SCRIPTS, counts, data, deviation_axis, section};
 
 use crate::report::points::PointCloud;
 use crate::report::style;

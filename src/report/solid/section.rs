@@ -19,13 +19,15 @@ use palpate_input::format::counted;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-const SCRIPTS: [&str; 3] = [PARTS, include_str!("surface.js"), include_str!("solid.js")];
+/// Scripts of the view.
+pub const SCRIPTS: [&str; 3] = [PARTS, include_str!("surface.js"), include_str!("solid.js")];
 
 // Largest number of triangles of the true surface.
 // heuristic: 80 kB of a page.
 pub(super) const TRUTH_TRIANGLES: usize = 8000;
 
-const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
+/// Colour maps of a surface: names in scripts, and labels.
+pub const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
 
 /// Returns the touch counts whose beliefs are drawn: as many as fit on a page, including the first
 /// and the last, if the surfaces of `planners` planners have about `triangles` triangles each.
@@ -77,12 +79,11 @@ const ALIKE_SHARE: f64 = 0.1;
 // heuristic: range of standard deviations if there are none.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
-/// Returns the beliefs and the true surface as a JSON object; `None` if there is nothing to
-/// draw.
+/// Returns the data of the view: beliefs and true surface; `None` if there is nothing to draw.
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
-fn data(
+pub fn data(
     sequences: &[&PlannerSurfaces],
     truth: Option<&Triangles>,
 ) -> anyhow::Result<Option<Value>> {
@@ -108,6 +109,9 @@ fn data(
     let truth = truth.map(|mesh| Coded::new(cube, mesh));
     Ok(Some(json!({
         "unit": MM.symbol,
+        "per_m": MM.per_m,
+        // Middle of everything, in `W`, m.
+        "middle_m": <[f64; 3]>::from(middle.coords),
         // Range of the codes of a position, from the middle of everything.
         "cube": in_mm([-0.5 * cube.side_m, 0.5 * cube.side_m]),
         // Largest distance of a vertex or contact from the middle.

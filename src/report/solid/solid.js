@@ -11,6 +11,9 @@ function frameOf(state) {
   return frame;
 }
 
+// Decodes what is not of a frame: nothing.
+function prepare() {}
+
 function viewOf(canvas) {
   // Initial view and direction of light (to the right, up and towards the viewer), as in the
   // printed figures, with more ambient light, so that colours are readable on a slope.
@@ -21,17 +24,24 @@ function viewOf(canvas) {
   // the size.
   const [OPACITY, LIFT] = [0.62, 0.004];
   const FOOT = 74;
-  const truth = data.truth && meshOf(data.truth);
-  const truthTints = truth && Uint8Array.from(truth.positions, (_, i) => data.colours.truth[i % 3]);
-  const scales = {
-    deviation: deviationScale(data.deviation_range),
-    error: data.error_range && errorScale(data.error_range[1], "error: inside the true surface | outside"),
-  };
+  let known, truth, truthTints, scales;
   const paintAll = painter(() => window.draw());
   if (!paintAll) {
     explorer.classList.add("lacking");
     const words = "This view needs WebGL, which this browser does not provide; the figures do not.";
     canvas.insertAdjacentHTML("beforebegin", `<p class="notices">${words}</p>`);
+  }
+
+  // Takes the present data.
+  function take() {
+    if (known === data) return;
+    known = data;
+    truth = data.truth && meshOf(data.truth);
+    truthTints = truth && Uint8Array.from(truth.positions, (_, i) => data.colours.truth[i % 3]);
+    scales = {
+      deviation: deviationScale(data.deviation_range),
+      error: data.error_range && errorScale(data.error_range[1], "error: inside the true surface | outside"),
+    };
   }
 
   // Returns the mapping from space to canvas: orthographic, with the same scale from every
@@ -49,11 +59,14 @@ function viewOf(canvas) {
     };
   }
 
-  // Draws the surface, and the true one in front of it if it is selected.
-  function surface({ rows, middle, scale }, frame, values, [width, height, ratio], isTruthShown) {
-    const tints = new Uint8Array(3 * values.length);
-    const shown = scales[state.colour];
-    values.forEach((value, i) => tints.set(colour(shown, shown.at(value)), 3 * i));
+  // Draws the surface coloured by `shown`, and the true one in front of it if it is selected.
+  function surface({ rows, middle, scale }, frame, [shown, values], [width, height, ratio], isTruthShown) {
+    if (frame.painted !== shown) {
+      frame.painted = shown;
+      frame.tints = new Uint8Array(3 * values.length);
+      values.forEach((value, i) => frame.tints.set(colour(shown, shown.at(value)), 3 * i));
+    }
+    const { tints } = frame;
     const view = {
       width: Math.round(width * ratio), height: Math.round(height * ratio),
       turn: [0, 1, 2].flatMap((column) => rows.map((row) => row[column])),
@@ -65,21 +78,36 @@ function viewOf(canvas) {
     return paintAll(view, { mesh: frame.mesh, tints }, over);
   }
 
-  // Returns whether the surface hides a point on it or behind it.
+  // Returns a function that tells whether the surface hides a point on it or behind it. Triangles are
+  // sorted into cells of the canvas, so that a point is compared with few.
   function hider({ positions, indices }, at) {
+    const CELL = 16;
     const corners = [];
     for (let i = 0; i < positions.length; i += 3) corners.push(at(positions.subarray(i, i + 3)));
+    const cells = new Map();
+    const cellOf = (x, y) => 65536 * Math.floor(y / CELL) + Math.floor(x / CELL);
+    const span = (a, b, c) => [Math.floor(Math.min(a, b, c) / CELL), Math.floor(Math.max(a, b, c) / CELL)];
+    for (let i = 0; i < indices.length; i += 3) {
+      const [a, b, c] = [corners[indices[i]], corners[indices[i + 1]], corners[indices[i + 2]]];
+      const [[left, right], [top, bottom]] = [0, 1].map((axis) => span(a[axis], b[axis], c[axis]));
+      for (let row = top; row <= bottom; row++) {
+        for (let column = left; column <= right; column++) {
+          const cell = 65536 * row + column;
+          if (cells.has(cell)) cells.get(cell).push(i);
+          else cells.set(cell, [i]);
+        }
+      }
+    }
     return ([x, y, depth]) => {
       const front = depth + 0.03 * data.reach;
-      for (let i = 0; i < indices.length; i += 3) {
+      return (cells.get(cellOf(x, y)) ?? []).some((i) => {
         const [a, b, c] = [corners[indices[i]], corners[indices[i + 1]], corners[indices[i + 2]]];
-        if (a[2] < front && b[2] < front && c[2] < front) continue;
+        if (a[2] < front && b[2] < front && c[2] < front) return false;
         const area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
         const s = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / area;
         const t = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / area;
-        if (s >= 0 && t >= 0 && s + t <= 1 && a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]) > front) return true;
-      }
-      return false;
+        return s >= 0 && t >= 0 && s + t <= 1 && a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]) > front;
+      });
     };
   }
 
@@ -136,6 +164,7 @@ function viewOf(canvas) {
 
   function draw(state) {
     if (!paintAll) return;
+    take();
     const { context, width, height, ratio } = pen(canvas);
     const frame = frameOf(state);
     const values = frame[state.colour] ?? new Float32Array(frame.deviation.length).fill(NaN);
@@ -145,7 +174,9 @@ function viewOf(canvas) {
     context.save();
     context.rect(0, 0, width, height - FOOT + 6);
     context.clip();
-    context.drawImage(surface(eye, frame, values, [width, height, ratio], state.truth), 0, 0, width, height);
+    // Coarser while it is dragged, because a browser without a graphics card takes 30 ms for all pixels.
+    const dense = turn.isDragged ? 0.6 * ratio : ratio;
+    context.drawImage(surface(eye, frame, [scales[state.colour], values], [width, height, dense], state.truth), 0, 0, width, height);
     const shown = data.planners[state.planner].touches.slice(0, frame.touches);
     shown.forEach((touch, i) => {
       const pair = touch.is_initial ? data.colours.initial : data.colours.later;
@@ -155,9 +186,31 @@ function viewOf(canvas) {
       const kind = touch.contact === null ? "miss" : isHidden(point) ? "hidden" : "seen";
       drawTouch(context, point, pair, kind, isLast);
     });
+    if (state.next) drawArrow(context, state.next, eye.at, isHidden, paint("link"));
     context.restore();
     drawFrame(context, eye, height);
     drawColours(context, width, height, scales[state.colour]);
+    draw.pick = (x, y) => pick(frame.mesh, eye.at, x, y);
+  }
+
+  // Returns the front of the surface at a point of the canvas, from the middle of everything, and
+  // the direction against its normal; null beside it.
+  function pick({ positions, indices, normals }, at, px, py) {
+    let best = null;
+    for (let i = 0; i < indices.length; i += 3) {
+      const corners = [0, 1, 2].map((corner) => 3 * indices[i + corner]);
+      const [a, b, c] = corners.map((start) => at(positions.subarray(start, start + 3)));
+      const area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+      const s = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area;
+      const t = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area;
+      const depth = a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]);
+      if (!(s >= 0 && t >= 0 && s + t <= 1) || best && depth <= best.depth) continue;
+      const mean = (values, axis) => (1 - s - t) * values[corners[0] + axis] + s * values[corners[1] + axis] + t * values[corners[2] + axis];
+      const aim = [0, 1, 2].map((axis) => mean(positions, axis));
+      const normal = [0, 1, 2].map((axis) => mean(normals, axis));
+      best = { depth, aim, along: normal.map((part) => -part / Math.hypot(...normal)) };
+    }
+    return best && { aim: best.aim, along: best.along };
   }
 
   function turnBy(right, up) {

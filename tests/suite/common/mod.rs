@@ -15,3 +15,4 @@ pub mod shapes;
 pub mod shipped;
 pub mod solids;
 pub mod tap;
+pub mod viewer;

@@ -1,29 +1,54 @@
-//! Backend wrapper that publishes the joint state and runs in real time.
+//! Backend wrapper that publishes each reading and runs at the pace of the clock.
 
 use super::{Backend, Capabilities, Command, Fault, Reading};
+use crate::robot::sensor::Sample;
 use nalgebra::Point3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// State of a backend for display.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ViewState {
     /// Time since reset, s.
     pub time_s: f64,
     /// Joint positions, rad or m.
     pub q: Vec<f64>,
+    /// Magnitude of the force on the finger, if a sensor measures it.
+    pub force_n: Option<f64>,
+    /// Value of the fingertip's sensor, as [`Sample::level`] gives it.
+    pub sensor: Option<f64>,
+    /// Simulated seconds per second of the clock; infinite for as many as there can be.
+    pub speed: f64,
     /// Marked points, in `W`.
     pub marks_w: Vec<Point3<f64>>,
     /// Whether the window was closed.
     pub is_closed: bool,
 }
 
+impl ViewState {
+    /// Returns a state before the first reading.
+    fn new(speed: f64) -> Self {
+        let (force_n, sensor, is_closed) = (None, None, false);
+        Self { time_s: 0.0, q: Vec::new(), force_n, sensor, speed, marks_w: Vec::new(), is_closed }
+    }
+}
+
 /// The displayed state, shared between the thread that moves the robot and the one that draws it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct LiveView(Arc<Mutex<ViewState>>);
 
 impl LiveView {
+    /// Creates a view of a backend in which `speed` seconds pass per second of the clock.
+    pub fn new(speed: f64) -> Self {
+        Self(Arc::new(Mutex::new(ViewState::new(speed))))
+    }
+
+    /// Changes the speed.
+    pub fn set_speed(&self, speed: f64) {
+        self.lock().speed = speed;
+    }
+
     /// Returns the current state.
     pub fn seen(&self) -> ViewState {
         self.lock().clone()
@@ -47,25 +72,26 @@ impl LiveView {
         let mut seen = self.lock();
         seen.time_s = reading.time_s;
         seen.q.clone_from(&reading.q);
+        seen.force_n = reading.wrench.map(|wrench| wrench.force_n.norm());
+        if let Some(level) = reading.samples.last().map(Sample::level) {
+            seen.sensor = Some(level);
+        }
     }
 }
 
-/// A backend that publishes every reading and runs at no more than `speed` times real time. Its
-/// readings, including their time, are those of the wrapped backend, whatever the clock says.
+/// A backend that publishes every reading and runs at no more than the view's speed. Its readings,
+/// including their time, are those of the wrapped backend, whatever the clock says.
 pub struct ViewedBackend {
     inner: Box<dyn Backend>,
     sight: LiveView,
-    /// Simulated seconds per second of the clock.
-    speed: f64,
-    /// Reference: an instant of the clock and the backend's time then.
-    since: Option<(Instant, f64)>,
+    /// Reference: an instant of the clock, the backend's time then, and its speed since.
+    since: Option<(Instant, f64, f64)>,
 }
 
 impl ViewedBackend {
-    /// Wraps `inner` so that `speed` of its seconds pass per second of the clock.
-    pub fn new(inner: Box<dyn Backend>, speed: f64) -> (Self, LiveView) {
-        let sight = LiveView::default();
-        (Self { inner, sight: sight.clone(), speed, since: None }, sight)
+    /// Wraps `inner` so that `sight` shows it and sets its speed.
+    pub fn new(inner: Box<dyn Backend>, sight: LiveView) -> Self {
+        Self { inner, sight, since: None }
     }
 }
 
@@ -82,15 +108,20 @@ impl Backend for ViewedBackend {
     }
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        let ViewState { is_closed, time_s, .. } = *self.sight.lock();
+        let ViewState { is_closed, time_s, speed, .. } = *self.sight.lock();
         if is_closed {
             return Err(Fault::Stopped { time_s });
         }
         let reading = self.inner.step(command)?;
         self.sight.take(reading);
+        if speed.is_infinite() {
+            return Ok(reading);
+        }
         let time_s = reading.time_s;
-        let (moment, from_s) = *self.since.get_or_insert_with(|| (Instant::now(), time_s));
-        let ahead_s = (time_s - from_s) / self.speed - moment.elapsed().as_secs_f64();
+        self.since = self.since.filter(|(.., since)| *since == speed);
+        let (moment, from_s, _) =
+            *self.since.get_or_insert_with(|| (Instant::now(), time_s, speed));
+        let ahead_s = (time_s - from_s) / speed - moment.elapsed().as_secs_f64();
         if ahead_s < -LATE_S {
             self.since = None;
         } else if ahead_s > GRAIN_S {

@@ -22,6 +22,21 @@ pub enum Sample {
     Channels(Channels),
 }
 
+impl Sample {
+    /// Returns one number that grows with the contact, for display: pressure in counts, force in N,
+    /// 0 or 1, largest indentation in m, or the largest channel.
+    pub fn level(&self) -> f64 {
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        match self {
+            Self::BioTac(frame) => frame.pdc_counts.unwrap_or_default(),
+            Self::Ideal(contact) => contact.force_n,
+            Self::Flag(is_closed) => f64::from(u8::from(*is_closed)),
+            Self::Depth(image) => largest(&mut image.depths_m.iter().copied().map(f64::from)),
+            Self::Channels(channels) => largest(&mut channels.values.iter().copied()),
+        }
+    }
+}
+
 /// Indentation of a pad at every pixel of its camera.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DepthImage {

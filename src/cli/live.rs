@@ -1,0 +1,377 @@
+//! Command `palpate live`.
+
+use super::find::{EXPERIMENTS, SCENES, find, find_mesh, is_experiment};
+use super::host::Host as Program;
+use super::new::{self, Written};
+use super::prepare::{planners_setting, prepare_arm, prepare_simulation};
+use super::progress::stop_on_interrupt;
+use super::terminal::{Outcome, Verbosity, error, print};
+use crate::experiment::Experiment;
+use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::store::{Journal, RESOLVED, Run, RunFolder};
+use crate::experiment::trial::planner_names::known_planners;
+use crate::live::session::{Session, replay};
+use crate::live::{Brought, Host, MeshWish, Phase, Server};
+use crate::report;
+use crate::sim::Scene;
+use anyhow::{Context, bail};
+use palpate_geometry::import::is_mesh_file;
+use palpate_input::error::InputError;
+use palpate_input::files;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate live                                   drop a mesh on the page
+  palpate live toy --planner human               play against the experiment's planners
+  palpate live experiments/bird.toml --hold      step through the touches
+  palpate live real_arm --approve                approve each touch of a real arm
+  palpate live runs/bird                         replay a finished run
+  palpate live bird --listen 0.0.0.0:8080        for other machines; the printed address has a token
+
+Serves one page on which you watch trials while they run, hold them, step, approve a touch or choose the next one. The rows are \
+those of `palpate run`, also of the planner `human`, and palpate run continues an unfinished run. Ctrl-C ends it.
+
+A real arm holds before a touch while no page has been visible for 5 s. Closing the page, a sleeping laptop or a cut network let it \
+finish the touch and then hold. Stop ends the trials before the next touch, as Ctrl-C does.")]
+pub(super) struct Args {
+    /// Experiment, scene, mesh or run folder.
+    path: Option<PathBuf>,
+    /// Also run this planner; `human` is you.
+    #[arg(long, value_name = "NAME")]
+    planner: Vec<String>,
+    /// Change one setting of the experiment; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder of the run [default: runs/NAME-live].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Start again.
+    #[arg(long)]
+    fresh: bool,
+    /// Hold before the first touch.
+    #[arg(long)]
+    hold: bool,
+    /// Ask before each touch.
+    #[arg(long)]
+    approve: bool,
+    /// Clear latched faults on the robot before moving (operator only).
+    #[arg(long)]
+    clear_fault: bool,
+    /// Address of the page.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0", value_parser = address)]
+    listen: SocketAddr,
+    /// Open no browser.
+    #[arg(long)]
+    no_browser: bool,
+}
+
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let port =
+        |text: &str| Some(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), text.parse().ok()?));
+    let found = text.parse().ok().or_else(|| port(text));
+    found.ok_or("allowed is ADDRESS:PORT, as in 0.0.0.0:8080, or a port".into())
+}
+
+/// Wait for a start on the page.
+const LOOK: Duration = Duration::from_millis(200);
+
+pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Result<Outcome> {
+    let interrupt = stop_on_interrupt("touches")?;
+    let (wishes, starts) = channel();
+    let page = Page { folder: Path::new("runs").join("live"), brought: Mutex::new(None), wishes };
+    let work = match &args.path {
+        Some(path) => Some(work(args, path, &page)?),
+        None => None,
+    };
+    let server = Server::open(args.listen, Box::new(page))?;
+    print(&format!("live page: {}", server.url()))?;
+    if !args.no_browser {
+        open_browser(&server.url());
+    }
+    let live = Live { args, talk, program, server, interrupt };
+    let mut outcome = work.map_or(Ok(Outcome::Done), |work| live.show(work))?;
+    while let Some(experiment) = live.next(&starts) {
+        // A mistake on the page leaves the page open.
+        let path = new_folder(&experiment.name);
+        match live.explore(experiment, path) {
+            Ok(done) => outcome = done,
+            Err(failure) => error(format!("{failure:#}")),
+        }
+    }
+    Ok(outcome)
+}
+
+/// Work that the page shows.
+enum Work {
+    Experiment(Box<Experiment>),
+    Run(PathBuf),
+}
+
+/// Finds what to show at a path.
+fn work(args: &Args, path: &Path, page: &Page) -> anyhow::Result<Work> {
+    if path.join(RESOLVED).is_file() {
+        return Ok(Work::Run(path.into()));
+    }
+    let path = match is_mesh_file(path) {
+        true => find_mesh(&path.to_string_lossy())?,
+        false => find(path, EXPERIMENTS).or_else(|error| find(path, SCENES).map_err(|_| error))?,
+    };
+    if path.extension().is_some_and(|extension| extension == "toml") {
+        let load = |sets: &[String]| match is_experiment(&path) {
+            true => Ok(Experiment::load(&path, sets)?),
+            false => {
+                let scene = Scene::load(&path, &args.set)?;
+                anyhow::Ok(Experiment::with_defaults(&scene, &["active"], 1, TOUCHES))
+            }
+        };
+        let mut experiment = load(&args.set)?;
+        let too = args.planner.iter().filter(|name| !experiment.planners.contains(name));
+        let planners: Vec<String> = experiment.planners.iter().chain(too).cloned().collect();
+        if is_experiment(&path) && planners != experiment.planners {
+            experiment = load(&[&args.set[..], &[planners_setting(planners.iter())]].concat())?;
+        } else {
+            experiment.planners = planners;
+        }
+        return Ok(Work::Experiment(Box::new(experiment)));
+    }
+    let folder = page.folder.to_string_lossy().into_owned();
+    let words = [path.to_string_lossy().into_owned(), "--out".into(), folder];
+    let written = new::write(&new::Args::of_words(&own_files(&words))?, Verbosity { quiet: true })?;
+    let planners = match args.planner.is_empty() {
+        true => vec!["active".into(), "random".into()],
+        false => args.planner.clone(),
+    };
+    Ok(Work::Experiment(Box::new(brought(&written.experiment, &planners, &args.set)?)))
+}
+
+/// Number of touches of a scene's trial.
+// heuristic: the number that `palpate new` writes.
+const TOUCHES: u32 = 40;
+
+/// Adds the options of files that belong to the page.
+fn own_files(words: &[String]) -> Vec<String> {
+    words.iter().cloned().chain(["--yes".into(), "--force".into()]).collect()
+}
+
+/// Returns one trial of an experiment that was written for a mesh.
+fn brought(path: &Path, planners: &[String], sets: &[String]) -> anyhow::Result<Experiment> {
+    let own = [planners_setting(planners.iter()), "trials=1".into()];
+    Ok(Experiment::load(path, &[&own[..], sets].concat())?)
+}
+
+/// Command with its page.
+struct Live<'a> {
+    args: &'a Args,
+    talk: Verbosity,
+    program: &'a Program<'a>,
+    server: Arc<Server>,
+    /// Set by Ctrl-C.
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Live<'_> {
+    fn is_interrupted(&self) -> bool {
+        self.interrupt.load(Ordering::Relaxed)
+    }
+
+    /// Waits for a start on the page; `None` after Ctrl-C.
+    fn next(&self, starts: &Receiver<Experiment>) -> Option<Experiment> {
+        while !self.is_interrupted() {
+            if let Ok(experiment) = starts.recv_timeout(LOOK) {
+                return Some(experiment);
+            }
+        }
+        None
+    }
+
+    fn show(&self, work: Work) -> anyhow::Result<Outcome> {
+        match work {
+            Work::Run(path) => {
+                let run = Run::read(&path)?;
+                let simulation = prepare_simulation(run.experiment.clone(), self.talk)?;
+                let desk = replay(&run, simulation.task().clone());
+                self.server.show(desk, run.truth, &path);
+                Ok(Outcome::Done)
+            }
+            Work::Experiment(experiment) => {
+                let name = &experiment.name;
+                let usual = || Path::new("runs").join(format!("{name}-live"));
+                let path = self.args.out.clone().unwrap_or_else(usual);
+                self.explore(*experiment, path)
+            }
+        }
+    }
+
+    /// Runs an experiment's trials that the folder lacks.
+    fn explore(&self, experiment: Experiment, path: PathBuf) -> anyhow::Result<Outcome> {
+        let (own, lacking) = self.program.load_planners(&experiment.planners);
+        if let Some(why) = lacking {
+            return Err(why);
+        }
+        let simulation = prepare_simulation(experiment, self.talk)?.with_planners(own);
+        let mut session = Session::new(simulation, Arc::clone(&self.interrupt));
+        let commit = self.program.commit;
+        let fresh = self.args.fresh;
+        let (mut folder, done) = RunFolder::open(&path, session.simulation(), commit, fresh)?;
+        if session.simulation().is_real() {
+            let journal = Journal::open(&path)?;
+            let halted = journal.halt_reason();
+            if let Some(reason) = halted.filter(|_| !self.args.clear_fault) {
+                bail!(
+                    "{}: a fault halted the run: {reason}\ncheck the arm, then use --clear-fault",
+                    path.display()
+                );
+            }
+            if let Some(arm) = session.simulation_mut().connect()? {
+                prepare_arm(&arm, self.args.clear_fault)?;
+            }
+        }
+        let desk = Arc::clone(session.desk());
+        desk.set_start(self.args.hold, self.args.approve);
+        let truth = session.simulation().truth().clone();
+        self.server.show(Arc::clone(&desk), truth, &path);
+        let halted = session.run(&mut folder, &done)?;
+        let experiment = desk.experiment();
+        let tally = folder.sort(experiment)?;
+        let is_whole =
+            tally.trials as u64 == u64::from(experiment.trials) * experiment.planners.len() as u64;
+        let mut line = match (&halted, is_whole) {
+            (Some(reason), _) => reason.clone(),
+            (None, true) => "all trials are finished".into(),
+            (None, false) => "stopped; the finished trials are stored".into(),
+        };
+        if tally.trials > 0 {
+            let run = Run::read(&path)?;
+            let analysis = Analysis::new(&run);
+            report::write_tables(&run, &analysis, &path)?;
+            report::write(&run, &analysis, &path)?;
+            line += &format!("; report: {}", path.join("report.html").display());
+        }
+        desk.set_phase(Phase::Ended, &line);
+        print(&line)?;
+        Ok(if is_whole { Outcome::Done } else { Outcome::Interrupted })
+    }
+}
+
+/// Files and trials that the page may change.
+struct Page {
+    /// Folder of all files that the page writes.
+    folder: PathBuf,
+    /// Experiment that was written last.
+    brought: Mutex<Option<PathBuf>>,
+    wishes: Sender<Experiment>,
+}
+
+/// Endings of mesh files that the page takes: one file holds all.
+const ENDINGS: [&str; 4] = ["stl", "obj", "ply", "glb"];
+
+impl Host for Page {
+    fn bring(&self, wish: &MeshWish, mesh: &[u8]) -> Result<Brought, InputError> {
+        let path = self.folder.join(file_name(&wish.name)?);
+        let out = self.folder.to_string_lossy().into_owned();
+        let mut words = vec![path.to_string_lossy().into_owned(), "--out".into(), out];
+        let pairs = [
+            ("--side", Some(&wish.side)),
+            ("--finger", Some(&wish.finger)),
+            ("--unit", wish.unit.as_ref()),
+        ];
+        for (option, value) in pairs {
+            words.extend(value.into_iter().flat_map(|value| [option.to_owned(), value.clone()]));
+        }
+        words.extend(wish.around.then(|| "--around".to_owned()));
+        let write = || -> anyhow::Result<Brought> {
+            files::make_folder(&self.folder).with_context(|| self.folder.display().to_string())?;
+            let args = new::Args::of_words(&own_files(&words))?;
+            let mut brought = self.brought.lock().unwrap_or_else(PoisonError::into_inner);
+            files::replace_by(&path, |to| std::io::Write::write_all(to, mesh))?;
+            let Written { words, experiment, picture, .. } =
+                new::write(&args, Verbosity { quiet: true })?;
+            let picture = std::fs::read(&picture).unwrap_or_default();
+            *brought = Some(experiment);
+            Ok(Brought { words, picture })
+        };
+        write().map_err(|error| InputError::new(format!("{error:#}")))
+    }
+
+    fn start(&self, planners: Vec<String>) -> Result<(), InputError> {
+        let path = self.brought.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let path = path.ok_or_else(|| InputError::new("no mesh was brought"))?;
+        let loaded = brought(&path, &planners, &[]);
+        let experiment = loaded.map_err(|error| InputError::new(format!("{error:#}")))?;
+        self.wishes.send(experiment).map_err(|_| InputError::new("the command has ended"))
+    }
+
+    fn planners(&self) -> Vec<String> {
+        known_planners().map(|(name, _)| name.to_owned()).collect()
+    }
+}
+
+/// Returns the name under which the page's file is stored: letters, digits and `-_.`.
+fn file_name(name: &str) -> Result<String, InputError> {
+    let wrong = || {
+        let allowed = ENDINGS.join(", .");
+        InputError::new(format!("file name {name:?}: allowed are names that end in .{allowed}"))
+    };
+    let (stem, ending) = name.rsplit_once('.').ok_or_else(wrong)?;
+    let ending = ending.to_lowercase();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    let stem: String = stem.chars().map(|c| if is_plain(c) { c } else { '-' }).take(60).collect();
+    let stem = stem.trim_matches('-');
+    let is_fine = ENDINGS.contains(&ending.as_str()) && !stem.is_empty();
+    is_fine.then(|| format!("{stem}.{ending}")).ok_or_else(wrong)
+}
+
+/// Returns a folder that does not exist, for a run that is started on the page.
+fn new_folder(name: &str) -> PathBuf {
+    let folder = |number: u32| Path::new("runs").join(format!("{name}-live-{number}"));
+    (1..).map(folder).find(|path| !path.exists()).unwrap_or_else(|| folder(0))
+}
+
+/// Opens the page, if there is a screen; a failure is none, because the address is printed.
+fn open_browser(url: &str) {
+    let has_screen =
+        ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
+    let opener = match () {
+        () if cfg!(target_os = "macos") => "open",
+        () if has_screen => "xdg-open",
+        () => return,
+    };
+    let quiet = || std::process::Stdio::null();
+    let _ = std::process::Command::new(opener).arg(url).stdout(quiet()).stderr(quiet()).spawn();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{address, file_name};
+
+    #[test]
+    fn names_of_files_stay_in_their_folder() {
+        for (name, expected) in [
+            ("part.stl", Some("part.stl")),
+            ("My Part (2).STL", Some("My-Part--2.stl")),
+            ("../../etc/part.obj", Some("etc-part.obj")),
+            ("..\\part.ply", Some("part.ply")),
+            (".stl", None),
+            ("part", None),
+            ("part.gltf", None),
+            ("part.toml", None),
+            ("..", None),
+        ] {
+            assert_eq!(file_name(name).ok().as_deref(), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn an_address_may_be_a_port() {
+        assert_eq!(address("8080").unwrap(), ([127, 0, 0, 1], 8080).into());
+        assert_eq!(address("0.0.0.0:80").unwrap(), ([0, 0, 0, 0], 80).into());
+        assert!(address("example.com:80").unwrap_err().contains("ADDRESS:PORT"));
+    }
+}
