@@ -68,7 +68,11 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         cases.truncate(QUICK.0);
         options.set.extend(QUICK.1.map(String::from));
     }
-    let load = |case| run::with_planners(&options, |sets| Experiment::load_cell(&path, case, sets));
+    let load = |case| {
+        run::with_planners((&options.set, &args.planner), |sets| {
+            Experiment::load_cell(&path, case, sets)
+        })
+    };
     let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let mut stop = None;
     let mut runs = Vec::new();

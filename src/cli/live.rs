@@ -3,8 +3,9 @@
 use super::find::{EXPERIMENTS, SCENES, find, find_mesh, is_experiment};
 use super::host::Host as Program;
 use super::new::{self, Written};
-use super::prepare::{planners_setting, prepare_arm, prepare_simulation};
+use super::prepare::{load_experiment, planners_setting, prepare_arm, prepare_simulation};
 use super::progress::stop_on_interrupt;
+use super::run::with_planners;
 use super::terminal::{Outcome, Verbosity, error, print};
 use crate::experiment::Experiment;
 use crate::experiment::statistics::analysis::Analysis;
@@ -13,7 +14,6 @@ use crate::experiment::trial::planner_names::known_planners;
 use crate::live::session::{Session, replay};
 use crate::live::{Brought, Host, MeshWish, Phase, Server};
 use crate::report;
-use crate::sim::Scene;
 use anyhow::{Context, bail};
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
@@ -124,21 +124,17 @@ fn work(args: &Args, path: &Path, page: &Page) -> anyhow::Result<Work> {
         false => find(path, EXPERIMENTS).or_else(|error| find(path, SCENES).map_err(|_| error))?,
     };
     if path.extension().is_some_and(|extension| extension == "toml") {
-        let load = |sets: &[String]| match is_experiment(&path) {
-            true => Ok(Experiment::load(&path, sets)?),
+        let load = |sets: &[String]| load_experiment(&path, sets);
+        let experiment = match is_experiment(&path) {
+            true => with_planners((&args.set, &args.planner), load)?,
             false => {
-                let scene = Scene::load(&path, &args.set)?;
-                anyhow::Ok(Experiment::with_defaults(&scene, &["active"], 1, TOUCHES))
+                let mut experiment = load(&args.set)?;
+                let too = args.planner.iter().filter(|name| !experiment.planners.contains(name));
+                let too: Vec<String> = too.cloned().collect();
+                experiment.planners.extend(too);
+                experiment
             }
         };
-        let mut experiment = load(&args.set)?;
-        let too = args.planner.iter().filter(|name| !experiment.planners.contains(name));
-        let planners: Vec<String> = experiment.planners.iter().chain(too).cloned().collect();
-        if is_experiment(&path) && planners != experiment.planners {
-            experiment = load(&[&args.set[..], &[planners_setting(planners.iter())]].concat())?;
-        } else {
-            experiment.planners = planners;
-        }
         return Ok(Work::Experiment(Box::new(experiment)));
     }
     let folder = page.folder.to_string_lossy().into_owned();
@@ -150,10 +146,6 @@ fn work(args: &Args, path: &Path, page: &Page) -> anyhow::Result<Work> {
     };
     Ok(Work::Experiment(Box::new(brought(&written.experiment, &planners, &args.set)?)))
 }
-
-/// Number of touches of a scene's trial.
-// heuristic: the number that `palpate new` writes.
-const TOUCHES: u32 = 40;
 
 /// Adds the options of files that belong to the page.
 fn own_files(words: &[String]) -> Vec<String> {

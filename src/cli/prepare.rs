@@ -1,5 +1,6 @@
 //! Preparation of files for a run: invalid input is an error, likely mistakes are notes on stderr.
 
+use super::find::is_experiment;
 use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
 use crate::experiment::real_arm::RealArm;
@@ -7,6 +8,7 @@ use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, bail, ensure};
+use palpate_input::config::ConfigError;
 use palpate_input::format::counted;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,6 +23,18 @@ pub(super) fn planners_setting<'a>(names: impl Iterator<Item = &'a String>) -> S
 pub(super) fn set_thread_count(threads: u16) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
     pool.build_global().with_context(|| format!("cannot start {}", counted(threads, "thread")))
+}
+
+/// Number of touches of a scene's trial.
+// heuristic: the number that `palpate new` writes.
+const TOUCHES: u32 = 40;
+
+/// Loads an experiment; for a scene, one trial of `active`.
+pub(super) fn load_experiment(path: &Path, sets: &[String]) -> Result<Experiment, ConfigError> {
+    match is_experiment(path) {
+        true => Experiment::load(path, sets),
+        false => Ok(Experiment::with_defaults(&Scene::load(path, sets)?, &["active"], 1, TOUCHES)),
+    }
 }
 
 /// Prepares the simulation of an experiment.

@@ -154,7 +154,8 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     let mut stop = None;
     if cases.is_empty() {
         let out = args.out.clone();
-        let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
+        let experiment =
+            with_planners((&args.set, &args.planner), |sets| Experiment::load(&path, sets))?;
         if let Some(shards) = args.plan {
             return plan(experiment, shards, args.threads, talk);
         }
@@ -166,7 +167,9 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         path.display()
     );
     // All combinations are loaded before the first is run.
-    let load = |case| with_planners(args, |sets| Experiment::load_cell(&path, case, sets));
+    let load = |case| {
+        with_planners((&args.set, &args.planner), |sets| Experiment::load_cell(&path, case, sets))
+    };
     let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let first = experiments[0].clone();
     let name = first.name.strip_suffix(&cases[0].label).unwrap_or(&first.name);
@@ -222,19 +225,19 @@ pub(super) fn name_objects(compared: &mut SuiteComparison, sweep: &str) {
     }
 }
 
-/// Loads the experiment with the given settings and adds the planners of `--planner`.
+/// Loads the experiment with the settings of `--set` and adds the planners of `--planner`.
 pub(super) fn with_planners(
-    args: &Args,
+    (sets, planners): (&[String], &[String]),
     load: impl Fn(&[String]) -> Result<Experiment, ConfigError>,
 ) -> Result<Experiment, ConfigError> {
-    let experiment = load(&args.set)?;
-    if args.planner.is_empty() {
+    let experiment = load(sets)?;
+    if planners.is_empty() {
         return Ok(experiment);
     }
     let listed = |name: &&String| experiment.planners.contains(name);
-    let too = args.planner.iter().filter(|name| !listed(name));
+    let too = planners.iter().filter(|name| !listed(name));
     let planners = planners_setting(experiment.planners.iter().chain(too));
-    load(&[&args.set[..], &[planners]].concat())
+    load(&[sets, &[planners]].concat())
 }
 
 /// Result of a run.

@@ -1,12 +1,10 @@
 //! `palpate show --watch`: shows a running trial in a window.
 
-use super::find::is_experiment;
-use super::prepare::prepare_simulation;
+use super::prepare::{load_experiment, prepare_simulation};
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::trial::row::TrialRow;
-use crate::sim::Scene;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
@@ -37,10 +35,6 @@ pub(super) struct WatchArgs {
     #[arg(long, default_value_t = 1.0, value_name = "X", requires = "watch", value_parser = speed)]
     speed: f64,
 }
-
-/// Default number of touches.
-// heuristic: the number that `palpate new` writes.
-const TOUCHES: u32 = 40;
 
 fn speed(text: &str) -> Result<f64, String> {
     let speed = text.parse().ok().filter(|speed| (0.01..=100.0).contains(speed));
@@ -85,10 +79,7 @@ pub(super) fn watch(
 }
 
 fn experiment(path: &Path, sets: &[String], args: &WatchArgs) -> anyhow::Result<Experiment> {
-    let mut experiment = match is_experiment(path) {
-        true => Experiment::load(path, sets)?,
-        false => Experiment::with_defaults(&Scene::load(path, sets)?, &["active"], 1, TOUCHES),
-    };
+    let mut experiment = load_experiment(path, sets)?;
     if let Some(touches) = args.touches {
         experiment.touches = touches;
         experiment.initial_touches = experiment.initial_touches.min(touches);

@@ -19,7 +19,7 @@ pub struct Access {
     token: Option<String>,
 }
 
-/// Passage of a request.
+/// Answer that an allowed request gets.
 #[derive(Debug, PartialEq)]
 pub(super) enum Passage {
     /// It is answered.

@@ -96,7 +96,7 @@ pub trait Host: Send + Sync {
     /// Writes an experiment for a mesh.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If the file is no mesh, or an answer is not allowed.
     fn bring(&self, wish: &MeshWish, mesh: &[u8]) -> Result<Brought, InputError>;
 
     /// Starts the experiment that was written last, with these planners.

@@ -55,7 +55,7 @@ fn a_person_explores_over_topics() {
     let is_at = |status: &'static str, count: u64| {
         move |state: &serde_json::Value| statuses(state) == [status] && touches(state) == [count]
     };
-    // Nobody watches.
+    // No page is visible yet.
     viewer.when(is_at("held", 0));
     sleep(Duration::from_secs(2));
     viewer.when(is_at("held", 0));

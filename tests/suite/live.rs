@@ -221,7 +221,7 @@ const CROWD: usize = 400;
 
 /// A crowd of connections and a viewer that does not read do not keep trials or later viewers.
 #[test]
-fn nobody_waits_for_a_viewer() {
+fn no_trial_waits_for_a_viewer() {
     let page = Page::of(TOY, &["planners=['random']", "trials=1", "touches=300"]);
     let host = page.viewer.host.clone();
     let mut crowd: Vec<TcpStream> =
