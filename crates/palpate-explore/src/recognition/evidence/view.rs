@@ -232,8 +232,8 @@ mod tests {
         }
     }
 
-    /// A shift of all points that the camera's error may have caused is weak evidence; with an exact
-    /// camera a raised surface is unlikely.
+    /// A shift of all points that the camera's error may have caused is weak evidence; with an
+    /// exact camera a raised surface is unlikely.
     #[test]
     fn an_error_that_points_have_in_common_explains_a_shift() {
         let raised = [3e-3; 8];
