@@ -3,18 +3,18 @@
 use super::find::{EXPERIMENTS, SCENES, find, find_mesh, is_experiment};
 use super::host::Host as Program;
 use super::new::{self, Written};
-use super::prepare::{load_experiment, planners_setting, prepare_arm, prepare_simulation};
+use super::prepare::{connect_arm, load_experiment, planners_setting, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::run::with_planners;
-use super::terminal::{Outcome, Verbosity, error, print};
+use super::terminal::{Outcome, Verbosity, error, print, quoted};
 use crate::experiment::Experiment;
 use crate::experiment::statistics::analysis::Analysis;
-use crate::experiment::store::{Journal, RESOLVED, Run, RunFolder};
+use crate::experiment::store::{RESOLVED, Run, RunFolder};
 use crate::experiment::trial::planner_names::known_planners;
 use crate::live::session::{Session, replay};
-use crate::live::{Brought, Host, MeshWish, Phase, Server};
+use crate::live::{Brought, Host, MeshWish, Server};
 use crate::report;
-use anyhow::{Context, bail};
+use anyhow::Context;
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
 use palpate_input::files;
@@ -72,6 +72,18 @@ pub(super) struct Args {
     no_browser: bool,
 }
 
+impl Args {
+    /// Returns the command that continues the run of a real arm after a fault.
+    fn command_after_fault(&self) -> String {
+        let path = self.path.iter().map(|path| quoted(&path.to_string_lossy()));
+        let out = self.out.iter().map(|out| format!("--out {}", quoted(&out.to_string_lossy())));
+        let sets = self.set.iter().map(|set| format!("--set {}", quoted(set)));
+        let planners = self.planner.iter().map(|name| format!("--planner {}", quoted(name)));
+        let words: Vec<String> = path.chain(out).chain(sets).chain(planners).collect();
+        format!("palpate live {} --clear-fault", words.join(" "))
+    }
+}
+
 fn address(text: &str) -> Result<SocketAddr, String> {
     let port =
         |text: &str| Some(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), text.parse().ok()?));
@@ -102,7 +114,10 @@ pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Re
         let path = new_folder(&experiment.name);
         match live.explore(experiment, path) {
             Ok(done) => outcome = done,
-            Err(failure) => error(format!("{failure:#}")),
+            Err(failure) => {
+                live.server.alert(format!("{failure:#}"));
+                error(format!("{failure:#}"));
+            }
         }
     }
     Ok(outcome)
@@ -212,19 +227,8 @@ impl Live<'_> {
         let commit = self.program.commit;
         let fresh = self.args.fresh;
         let (mut folder, done) = RunFolder::open(&path, session.simulation(), commit, fresh)?;
-        if session.simulation().is_real() {
-            let journal = Journal::open(&path)?;
-            let halted = journal.halt_reason();
-            if let Some(reason) = halted.filter(|_| !self.args.clear_fault) {
-                bail!(
-                    "{}: a fault halted the run: {reason}\ncheck the arm, then use --clear-fault",
-                    path.display()
-                );
-            }
-            if let Some(arm) = session.simulation_mut().connect()? {
-                prepare_arm(&arm, self.args.clear_fault)?;
-            }
-        }
+        let continues = (self.args.clear_fault, self.args.command_after_fault());
+        connect_arm(session.simulation_mut(), &path, continues)?;
         let desk = Arc::clone(session.desk());
         desk.set_start(self.args.hold, self.args.approve);
         let truth = session.simulation().truth().clone();
@@ -239,15 +243,17 @@ impl Live<'_> {
             (None, true) => "all trials are finished".into(),
             (None, false) => "stopped; the finished trials are stored".into(),
         };
+        let mut rows = Vec::new();
         if tally.trials > 0 {
             let run = Run::read(&path)?;
             let analysis = Analysis::new(&run);
             report::write_tables(&run, &analysis, &path)?;
             report::write(&run, &analysis, &path)?;
             line += &format!("; report: {}", path.join("report.html").display());
+            rows = run.rows;
         }
-        desk.set_phase(Phase::Ended, &line);
         print(&line)?;
+        desk.close(rows, &line);
         Ok(if is_whole { Outcome::Done } else { Outcome::Interrupted })
     }
 }

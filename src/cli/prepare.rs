@@ -4,6 +4,7 @@ use super::find::is_experiment;
 use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
 use crate::experiment::real_arm::RealArm;
+use crate::experiment::store::Journal;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
@@ -90,6 +91,31 @@ pub(super) fn prepare_simulator(
     simulator.check_reach()?;
     simulator.notices().iter().for_each(|notice| talk.note(notice));
     Ok(simulator)
+}
+
+/// Connects to a real arm and checks that it may be moved; first clears latched faults if
+/// `clears_fault`. A simulation needs nothing.
+///
+/// # Errors
+/// If a fault halted the run of this folder, with the command that continues it; if the arm cannot
+/// be reached, or may not move.
+pub(super) fn connect_arm(
+    simulation: &mut Simulation,
+    folder: &Path,
+    (clears_fault, command): (bool, String),
+) -> anyhow::Result<()> {
+    if !simulation.is_real() {
+        return Ok(());
+    }
+    // Before the connection: another program may hold the folder.
+    if let Some(reason) = Journal::open(folder)?.halt_reason().filter(|_| !clears_fault) {
+        bail!(
+            "{}: a fault halted the run: {reason}\ncheck the arm, then continue with: {command}\n(or use --fresh to \
+             start again)",
+            folder.display(),
+        );
+    }
+    simulation.connect()?.map_or(Ok(()), |arm| prepare_arm(&arm, clears_fault))
 }
 
 /// Checks that a real arm may be moved; first clears faults latched on the robot if `clear_fault`.

@@ -4,14 +4,14 @@ use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::plan::plan;
-use super::prepare::{planners_setting, prepare_arm, prepare_simulation, set_thread_count};
+use super::prepare::{connect_arm, planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, error, print, quoted};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
-use crate::experiment::store::{Journal, RECORDINGS, RowCounts, Run, RunFolder};
+use crate::experiment::store::{RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::TrialEvent;
 use crate::experiment::trial::row::TrialId;
@@ -310,21 +310,7 @@ pub(super) fn run_missing(
         PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
     });
     let (mut folder, done) = RunFolder::open(&path, &simulation, host.commit, args.fresh)?;
-    // Checked before the connection to an arm: another program may hold the folder, or a fault may
-    // need an operator.
-    if simulation.is_real() {
-        if let Some(reason) = Journal::open(&path)?.halt_reason().filter(|_| !args.clear_fault) {
-            bail!(
-                "{}: a fault halted the run: {reason}\ncheck the arm, then continue with: {}\n(or use --fresh to \
-                 start again)",
-                path.display(),
-                args.command_after_fault()
-            );
-        }
-        if let Some(lab) = simulation.connect()? {
-            prepare_arm(&lab, args.clear_fault)?;
-        }
-    }
+    connect_arm(&mut simulation, &path, (args.clear_fault, args.command_after_fault()))?;
     let simulation = simulation;
     let experiment = simulation.experiment();
     let recorded = args.record.then_some(path.as_path());

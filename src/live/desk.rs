@@ -28,8 +28,6 @@ const LINES: usize = 200;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// A mesh or an experiment is chosen.
-    Choosing,
     /// Trials run.
     Running,
     /// All trials are finished, or stopped.
@@ -78,6 +76,13 @@ pub(super) struct Track {
     since: Option<Instant>,
 }
 
+impl Track {
+    fn end(&mut self, row: &TrialRow) {
+        self.status = if row.failure.is_some() { Status::Failed } else { Status::Done };
+        (self.row, self.next) = (row.clone(), None);
+    }
+}
+
 /// State behind the lock.
 pub(super) struct State {
     pub phase: Phase,
@@ -89,6 +94,8 @@ pub(super) struct State {
     /// Seconds, or touches of a finger that does not move, per second of the clock.
     pub speed: f64,
     pub log: Vec<String>,
+    /// Rows of the ended trials, of which a viewer chooses one.
+    rows: Vec<TrialRow>,
     /// Last sign of a visible page.
     seen: Option<Instant>,
     /// Grows with every change.
@@ -124,6 +131,7 @@ impl Desk {
             approves: false,
             speed: f64::INFINITY,
             log: Vec::new(),
+            rows: Vec::new(),
             seen: None,
             version: 1,
         };
@@ -164,28 +172,31 @@ impl Desk {
     /// Starts a trial; returns the views of its planners' bodies, in the experiment's order.
     pub fn begin(&self, trial: u32) -> Vec<LiveView> {
         self.change(|state| {
-            state.trial = trial;
-            let track = |name: &String| Track {
-                status: Status::Waiting,
-                row: TrialRow::without_touches(trial, name, None),
-                next: None,
-                answer: None,
-                steps: 0,
-                view: LiveView::new(state.speed),
-                since: None,
-            };
-            state.tracks = self.experiment.planners.iter().map(track).collect();
+            self.set_trial(state, trial);
             state.tracks.iter().map(|track| track.view.clone()).collect()
         })
+    }
+
+    /// Replaces the tracks by those of a trial that has not begun.
+    fn set_trial(&self, state: &mut State, trial: u32) {
+        state.trial = trial;
+        let track = |name: &String| Track {
+            status: Status::Waiting,
+            row: TrialRow::without_touches(trial, name, None),
+            next: None,
+            answer: None,
+            steps: 0,
+            view: LiveView::new(state.speed),
+            since: None,
+        };
+        state.tracks = self.experiment.planners.iter().map(track).collect();
     }
 
     /// Ends a planner's trial with its row.
     pub fn end(&self, planner: usize, row: &TrialRow) {
         let name = &self.experiment.planners[planner];
         self.change(|state| {
-            let track = &mut state.tracks[planner];
-            track.status = if row.failure.is_some() { Status::Failed } else { Status::Done };
-            (track.row, track.next) = (row.clone(), None);
+            state.tracks[planner].end(row);
             if let Some(reason) = &row.failure {
                 note(state, format!("{name}: {reason}"));
             }
@@ -210,12 +221,35 @@ impl Desk {
         });
     }
 
-    /// Changes the phase, with a line for the log.
-    pub fn set_phase(&self, phase: Phase, line: &str) {
+    /// Ends all trials with a line for the log; a viewer may then choose one of these rows' trials.
+    pub fn close(&self, rows: Vec<TrialRow>, line: &str) {
         self.change(|state| {
-            state.phase = phase;
+            (state.phase, state.rows) = (Phase::Ended, rows);
             note(state, line.to_owned());
         });
+    }
+
+    /// Shows an ended trial.
+    ///
+    /// # Errors
+    /// If trials run, or there is no such trial.
+    pub(super) fn show(&self, trial: u32) -> Result<(), OrderError> {
+        let is_known = trial < self.experiment.trials;
+        let is_shown = self.change(|state| {
+            let is_shown = is_known && state.phase == Phase::Ended;
+            if is_shown {
+                self.set_trial(state, trial);
+                let tracks = self.experiment.planners.iter().zip(&mut state.tracks);
+                for (planner, track) in tracks {
+                    let is_its = |row: &&TrialRow| row.trial == trial && row.planner == *planner;
+                    state.rows.iter().find(is_its).into_iter().for_each(|row| track.end(row));
+                }
+            }
+            is_shown
+        });
+        let last = self.experiment.trials.saturating_sub(1);
+        let words = format!("trial {trial}: allowed is 0 to {last}, after the trials have ended");
+        is_shown.then_some(()).ok_or(OrderError(words))
     }
 
     /// Takes in a moment of a planner's trial. Before a touch it waits while the trials are held,
@@ -388,6 +422,7 @@ impl Desk {
                 self.stops[0].store(true, Ordering::Relaxed);
                 self.change(|state| note(state, "stopped on the page".into()));
             }
+            Order::Trial { number } => self.show(number)?,
             Order::Touch { planner: name, target } => {
                 let planner = planner(&name)?;
                 let target = self.allowed(&target)?;

@@ -219,6 +219,8 @@ function show(state) {
   explorer.querySelector("[name=approve]").checked = state.approves;
   explorer.querySelector("[name=speed]").value = state.speed ?? "";
   if (before && before.trial !== state.trial) chosen = null;
+  find("trials").hidden = state.phase !== "ended" || state.trials < 2;
+  Object.assign(find("trial"), { max: state.trials, value: state.trial + 1 });
   for (const planner of state.planners) {
     const panel = panelOf(planner);
     panel.figure.style.setProperty("--own", onPaper(planner.colours));
@@ -234,7 +236,7 @@ function show(state) {
   showForm();
   showCurves();
   const count = (it) => it?.planners?.map(({ touches }) => touches).join();
-  if (count(before) !== count(state) || before.phase !== state.phase) refresh();
+  if (count(before) !== count(state) || before.phase !== state.phase || before.trial !== state.trial) refresh();
   draw();
 }
 
@@ -293,6 +295,7 @@ find("target").addEventListener("submit", async (event) => {
   if (await order("touch", { planner, target: numbers })) target = null;
 });
 find("confirm").addEventListener("click", () => order("confirm", { planner: find("target").dataset.planner }));
+find("trial").addEventListener("change", ({ target: { value } }) => order("trial", { number: Number(value) - 1 }));
 find("slider").addEventListener("input", ({ target: { value, max } }) => {
   chosen = value === max ? null : Number(value);
   refresh();
@@ -342,6 +345,7 @@ find("start").addEventListener("click", () => {
 // Events. The browser connects again by itself.
 const source = new EventSource("/events");
 source.addEventListener("state", ({ data: text }) => show(JSON.parse(text)));
+source.addEventListener("alert", ({ data: text }) => say(JSON.parse(text)));
 source.addEventListener("reload", () => location.reload());
 source.addEventListener("readings", ({ data: text }) => told?.planners && trace(JSON.parse(text)));
 source.addEventListener("error", () => say("The connection is lost. A real arm finishes its touch and holds."));

@@ -12,5 +12,5 @@ mod picture;
 mod server;
 pub mod session;
 
-pub use desk::{Desk, Phase};
+pub use desk::Desk;
 pub use server::{Brought, Host, MeshWish, Server};

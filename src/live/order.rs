@@ -24,6 +24,11 @@ pub(super) enum Order {
     },
     /// Stop all trials before their next touch, as Ctrl-C does.
     Stop,
+    /// Show another trial, after the trials have ended.
+    Trial {
+        /// Number of the trial, from 0.
+        number: u32,
+    },
     /// Touch a target: a person's own, or in place of a planner's that waits.
     Touch {
         /// Name of the planner.

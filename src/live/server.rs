@@ -114,6 +114,8 @@ pub struct Server {
     access: Access,
     host: Box<dyn Host>,
     shown: RwLock<Option<Arc<Shown>>>,
+    /// Mistake that viewers are shown; empty without.
+    alert: RwLock<String>,
 }
 
 type Body = BoxBody<Bytes, Infallible>;
@@ -131,7 +133,8 @@ impl Server {
             .with_context(|| format!("cannot listen at {address}; choose another --listen"))?;
         listener.set_nonblocking(true)?;
         let access = Access::new(listener.local_addr()?);
-        let server = Arc::new(Self { access, host, shown: RwLock::new(None) });
+        let (shown, alert) = Default::default();
+        let server = Arc::new(Self { access, host, shown, alert });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let own = Arc::clone(&server);
         std::thread::Builder::new().name("live page".into()).spawn(move || {
@@ -154,6 +157,12 @@ impl Server {
         let (picture, folder) = (Picture::new(truth), folder.to_owned());
         let shown = Arc::new(Shown { desk, picture, folder });
         *self.shown.write().unwrap_or_else(PoisonError::into_inner) = Some(shown);
+        self.alert(String::new());
+    }
+
+    /// Shows words about a mistake until something else is shown.
+    pub fn alert(&self, words: String) {
+        *self.alert.write().unwrap_or_else(PoisonError::into_inner) = words;
     }
 
     fn shown(&self) -> Option<Arc<Shown>> {
@@ -304,16 +313,16 @@ impl Server {
         html::page_with("Palpate live", name, "", &body, HEAD)
     }
 
-    /// Returns the stream of events: `state` after each change, and `readings` of bodies that move.
+    /// Returns the stream of events: `state` after each change, `readings` of bodies that move, and
+    /// `alert`.
     fn events(self: Arc<Self>, cut: Cut) -> Response<Body> {
         let (mut sender, body) = Channel::<Bytes, Infallible>::new(1);
         tokio::spawn(async move {
-            let (mut before, mut readings, mut quiet) = (None, Value::Null, 0);
+            let mut sent = Sent::default();
             loop {
-                let text = self.news(&mut before, &mut readings, &mut quiet);
+                let text = self.news(&mut sent);
                 if let Some(text) = text {
-                    let sent = timeout(READS, sender.send(Frame::data(text.into()))).await;
-                    match sent {
+                    match timeout(READS, sender.send(Frame::data(text.into()))).await {
                         Ok(Ok(())) => (),
                         Ok(Err(_)) => return,
                         Err(_) => return cut.get().map(AbortHandle::abort).unwrap_or_default(),
@@ -328,20 +337,15 @@ impl Server {
         response
     }
 
-    /// Returns what is new since the desk and version `before`, as events.
-    fn news(
-        &self,
-        before: &mut Option<(usize, u64)>,
-        readings: &mut Value,
-        quiet: &mut u32,
-    ) -> Option<String> {
+    /// Returns what is new since `sent`, as events.
+    fn news(&self, sent: &mut Sent) -> Option<String> {
         let mut text = String::new();
         let shown = self.shown();
         let number = |shown: &Arc<Shown>| (Arc::as_ptr(shown) as usize, shown.desk.lock().version);
         let now = shown.as_ref().map(number).unwrap_or_default();
-        if *before != Some(now) {
-            let is_other = before.is_some_and(|before| before.0 != now.0);
-            *before = Some(now);
+        if sent.version != Some(now) {
+            let is_other = sent.version.is_some_and(|before| before.0 != now.0);
+            sent.version = Some(now);
             let state = shown
                 .as_ref()
                 .map_or(json!({ "phase": "choosing" }), |it| picture::state(&it.desk));
@@ -350,18 +354,33 @@ impl Server {
         }
         if let Some(shown) = &shown {
             let now = picture::readings(&shown.desk);
-            if now != *readings {
+            if now != sent.readings {
                 text += &format!("event: readings\ndata: {now}\n\n");
-                *readings = now;
+                sent.readings = now;
             }
         }
-        *quiet = if text.is_empty() { *quiet + 1 } else { 0 };
-        if *quiet >= QUIET_TICKS {
-            *quiet = 0;
+        let alert = self.alert.read().unwrap_or_else(PoisonError::into_inner).clone();
+        if alert != sent.alert {
+            text += &format!("event: alert\ndata: {}\n\n", json!(alert));
+            sent.alert = alert;
+        }
+        sent.quiet_ticks = if text.is_empty() { sent.quiet_ticks + 1 } else { 0 };
+        if sent.quiet_ticks >= QUIET_TICKS {
+            sent.quiet_ticks = 0;
             text += ": quiet\n\n";
         }
         (!text.is_empty()).then_some(text)
     }
+}
+
+/// News that a viewer was sent.
+#[derive(Default)]
+struct Sent {
+    /// Desk, and version of its state.
+    version: Option<(usize, u64)>,
+    readings: Value,
+    alert: String,
+    quiet_ticks: u32,
 }
 
 const HEAD: &str = "<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"/live.css\">\n<script src=\"/live.js\" defer></script>\n";

@@ -1,13 +1,12 @@
 //! Trials of a live page.
 
-use super::desk::{Desk, Phase};
+use super::desk::Desk;
 use super::human::HumanFactory;
 use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Job};
 use crate::experiment::store::{Run, RunError, RunFolder};
 use crate::experiment::trial::TrialEvent;
 use crate::experiment::trial::row::{TrialId, TrialRow};
-use crate::report::replay::row;
 use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::task::Task;
 use std::sync::Arc;
@@ -130,15 +129,11 @@ impl Session {
     }
 }
 
-/// Returns the desk of a finished run: the trial that its report draws.
+/// Returns the desk of a finished run, at the trial that its report draws.
 pub fn replay(run: &Run, task: Task) -> Arc<Desk> {
     let desk = Desk::new(run.experiment.clone(), task, false, Default::default());
-    desk.begin(run.experiment.report.trial);
-    for (number, planner) in run.experiment.planners.iter().enumerate() {
-        if let Some(row) = row(run, planner) {
-            desk.end(number, row);
-        }
-    }
-    desk.set_phase(Phase::Ended, "");
+    desk.close(run.rows.clone(), "");
+    // A run without this trial shows none.
+    let _ = desk.show(run.experiment.report.trial);
     Arc::new(desk)
 }

@@ -1,6 +1,6 @@
 //! A live page in front of an arm over topics; see `lab`.
 
-use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess};
+use crate::common::lab::{CELL, Network, TwinProcess};
 use crate::common::viewer::{Viewer, statuses, touches};
 use palpate::experiment::store::Run;
 use serde_json::json;
@@ -34,17 +34,26 @@ impl Drop for Killed {
     }
 }
 
-/// A person explores by ten touches over topics. Without a visible page the arm does not begin; a
-/// page that is closed during an approach lets it finish the touch, and then it holds.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
-fn a_person_explores_over_topics() {
+fn a_person_explores_by_a_pa10() {
+    a_person_explores(&Network::new(15));
+}
+
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_person_explores_by_a_ur() {
+    a_person_explores(&Network::of_ur(16));
+}
+
+/// A person explores by ten touches over topics. Without a visible page the arm does not begin; a
+/// page that is closed during an approach lets it finish the touch, and then it holds.
+fn a_person_explores(network: &Network) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run");
-    let network = Network::new(15);
-    let twin = TwinProcess::new(&network, EXPERIMENT, &[]);
+    let twin = TwinProcess::new(network, network.experiment, &[]);
     let out = path.to_str().unwrap();
-    let mut command = network.palpate(&["live", EXPERIMENT, "--no-browser", "--out", out]);
+    let mut command = network.palpate(&["live", network.experiment, "--no-browser", "--out", out]);
     let own = ["planners=[\"human\"]", "trials=1", "initial_touches=1", "touches=10"];
     command.args(CELL.iter().chain(&own).flat_map(|set| ["--set", *set]));
     let mut child = Killed(command.stdout(Stdio::piped()).spawn().unwrap());

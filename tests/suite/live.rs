@@ -244,7 +244,31 @@ fn no_trial_waits_for_a_viewer() {
     let mut silent = TcpStream::connect(&host).unwrap();
     write!(silent, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
     page.viewer.order(&json!({ "order": "go" }));
+    page.viewer.when(|state| touches(state) == [300]);
+    // Each change is an event of the whole state, so that the buffers of a viewer that does not read
+    // are soon full. A byte to a connection that was cut is refused.
+    let begun = Instant::now();
+    while silent.write_all(b"x").is_ok() {
+        assert!(begun.elapsed() < LONGEST, "a viewer that does not read is kept");
+        page.viewer.order(&json!({ "order": "speed", "times": null }));
+        std::thread::sleep(Duration::from_millis(40));
+    }
+    assert_eq!(statuses(&page.viewer.when(|state| !statuses(state).is_empty())), ["done"]);
     assert_eq!(page.ended().rows[0].touches.len(), 300);
+}
+
+/// A mistake of work that was started on the page is shown there.
+#[test]
+fn a_mistake_is_shown() {
+    let server = Server::open(([127, 0, 0, 1], 0).into(), Box::new(NoFiles)).unwrap();
+    server.alert("no \"mesh\"\n2".into());
+    let host = Viewer::new(&server.url()).host;
+    let mut stream = TcpStream::connect(&host).unwrap();
+    stream.set_read_timeout(Some(LONGEST)).unwrap();
+    write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+    let lines = BufReader::new(stream).lines().map_while(Result::ok);
+    let after = lines.skip_while(|line| line != "event: alert").nth(1);
+    assert_eq!(after.as_deref(), Some(r#"data: "no \"mesh\"\n2""#));
 }
 
 /// The command serves a run folder as a replay, and a wrong path is an error with code 2.
@@ -258,7 +282,7 @@ fn the_command_replays_a_run() {
             "run",
             "toy",
             "--set",
-            "trials=1",
+            "trials=2",
             "--set",
             "touches=6",
             "--no-report",
@@ -283,8 +307,16 @@ fn the_command_replays_a_run() {
         }
         std::thread::sleep(Duration::from_millis(50));
     };
+    let shown = viewer.when(|state| state["phase"] == "ended")["trial"].clone();
+    let other = 1 - shown.as_u64().unwrap();
+    viewer.order(&json!({ "order": "trial", "number": other }));
+    viewer.when(|state| state["trial"] == other && touches(state).iter().all(|count| *count == 6));
+    let (_, changed) = viewer.get("/beliefs?touches=99");
+    let (status, words) = viewer.post("/order", &json!({ "order": "trial", "number": 2 }));
     child.kill().unwrap();
     child.wait().unwrap();
+    assert_ne!(changed, found);
+    assert!(status == 422 && words.contains("allowed is 0 to 1"), "{words}");
     let beliefs: Value = serde_json::from_str(&found).unwrap();
     assert_eq!(beliefs["planners"][0]["frames"][0]["touches"], json!(6), "{beliefs}");
 }

@@ -152,6 +152,24 @@ function reliefView(canvas) {
     write(`z (${data.unit})`, project(x1, h0, z1), -8, -14, "right");
   }
 
+  // Draws the silhouette: the edge between places that are believed to have a surface and the others.
+  function drawSilhouette(context, project, frame, isHidden) {
+    const isDrawn = (i, j) => [0, 1, columns, columns + 1].every((k) => !Number.isNaN(frame.mean[j * columns + i + k]));
+    const corner = (i, j) => project(xs[i], Math.min(Math.max(frame.mean[j * columns + i], low), high), zs[j]);
+    context.strokeStyle = paint("ink");
+    context.lineWidth = 1.4;
+    for (let j = 0; j < zs.length - 1; j++) {
+      for (let i = 0; i < columns - 1; i++) {
+        // The cell to the right and the one above; an edge belongs to the cell that is drawn.
+        for (const [di, dj] of [[1, 0], [0, 1]]) {
+          if (i + di > columns - 2 || j + dj > zs.length - 2 || isDrawn(i, j) === isDrawn(i + di, j + dj)) continue;
+          const edge = [corner(i + di, j + dj), corner(i + 1, j + 1)];
+          if (!edge.some(isHidden)) line(context, edge);
+        }
+      }
+    }
+  }
+
   // Draws the touches so far: full in front of the surface, hollow behind it, a diamond for a miss.
   function drawTouches(context, project, frame, planner, isHidden) {
     const shown = data.planners[planner].contacts.slice(0, frame.touches);
@@ -194,6 +212,7 @@ function reliefView(canvas) {
       const pixel = Math.round(y * dense) * wide + Math.round(x * dense);
       return layer.depth[pixel] > depth + 0.02 * size;
     };
+    drawSilhouette(context, project, frame, isHidden);
     drawTouches(context, project, frame, state.planner, isHidden);
     if (state.next) drawNext(context, project(state.next[0], heightAt(frame, state.next), state.next[1]));
     drawColours(context, width, height, scale);
