@@ -18,6 +18,7 @@ use crate::study::accuracy::tolerance::{Criterion, Origin};
 use crate::study::accuracy::variant::Variant;
 use anyhow::{bail, ensure};
 use palpate_input::format::counted;
+use palpate_input::tables;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -215,7 +216,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         format!("cheapest within {within}: {name}, {}\n{described}", cheapest.selected.name);
     let head: String = described.lines().map(|line| format!("# {line}\n")).collect();
     let path = out.join("cheapest.toml");
-    let scene = toml::to_string(&cheapest.scene)?;
+    let scene = tables::text(&cheapest.scene)?;
     write_whole(&path, format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
     print(&format!("{described}\nscene: {}", path.display()))?;
     Ok(if cheapest.is_confirmed { Outcome::Done } else { Outcome::Failed })

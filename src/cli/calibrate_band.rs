@@ -17,6 +17,7 @@ use crate::study::band::{
 };
 use anyhow::ensure;
 use palpate_explore::band::LearnedBand;
+use palpate_input::tables;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -150,7 +151,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut text = table(&covered);
     if let Some(band) = band {
         let file = out.join("band.toml");
-        let band = toml::to_string(&BandFile { gp: BandTable { band } })?;
+        let band = tables::text(&BandFile { gp: BandTable { band } })?;
         write_whole(&file, &band)?;
         text += &format!("\n\n{band}");
     }

@@ -22,6 +22,7 @@ use crate::sim::{Environment, Scene, mjcf};
 use anyhow::{Context, bail, ensure};
 use palpate_explore::task::Ball;
 use palpate_geometry::import::import_with;
+use palpate_input::tables;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -140,7 +141,7 @@ fn run_folder(run: &Run, json: bool) -> String {
 
 fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
     let scene = Scene::load(path, &args.set)?;
-    let mut text = toml::to_string(&scene).context("cannot write the scene")?;
+    let mut text = tables::text(&scene).context("cannot write the scene")?;
     let environment = prepare_environment(scene, talk)?;
     prepare_simulator(&environment, talk)?;
     let whole_object = environment.task().ball().map(|ball| (ball, shape(&environment, talk)));

@@ -8,6 +8,7 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::report::table::{Cell, Column, Table};
 use palpate_gp::fit::Fit;
 use palpate_input::config::Rules;
+use palpate_input::tables;
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -34,7 +35,9 @@ pub fn is_setting(key: &str) -> bool {
 const AROUND: &str = "space";
 
 fn allowed() -> BTreeMap<String, String> {
-    let Ok(complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
+    let Ok(complete) = tables::read::<Experiment>(COMPLETE.parse().unwrap_or_default()) else {
+        return BTreeMap::new();
+    };
     let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
     let rules = Rules::allowed_values(&complete).into_iter();
     // A check that all entries share is listed once.

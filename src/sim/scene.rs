@@ -19,6 +19,7 @@ use palpate_explore::task::zone::Zone;
 use palpate_geometry::surfaces;
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
+use palpate_input::tables;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -490,8 +491,8 @@ impl Scene {
     /// Returns the scene with all defaults as TOML, on one line if it is the value of a key.
     pub fn to_toml(&self, is_value: bool) -> String {
         match is_value {
-            true => toml::Value::try_from(self).map(|value| value.to_string()),
-            false => toml::to_string(self),
+            true => tables::value(self).map(|value| value.to_string()),
+            false => tables::text(self),
         }
         .unwrap_or_default()
     }

@@ -12,6 +12,7 @@ use crate::experiment::trial::row::{TrialRow, planner_rows};
 use crate::experiment::{Experiment, Simulation};
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::error::InputError;
+use palpate_input::tables;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -131,7 +132,7 @@ impl SensorKit {
         let mut all = vec!["scene.simulator=\"kinematic\"".into()];
         all.extend(self.sets.iter().map(|set| format!("scene.{set}")));
         if let Some(effect) = registration {
-            let settings = toml::Value::try_from(&effect).map(|it| it.to_string());
+            let settings = tables::value(&effect).map(|it| it.to_string());
             all.extend(settings.map(|it| format!("scene.effects.registration={it}")));
         }
         all.extend_from_slice(sets);

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`files`] | reads and replaces files named by users |
 //! | [`config`] | settings from a TOML file and `key=value` overrides |
+//! | [`tables`] | settings from TOML tables and back |
 //! | [`error`] | error of invalid input: place, value, allowed values |
 //! | [`shipped`] | lookup of shipped files by name |
 //! | [`mod@format`] | formatting of values and parser messages for users |
@@ -35,3 +36,4 @@ pub mod error;
 pub mod files;
 pub mod format;
 pub mod shipped;
+pub mod tables;

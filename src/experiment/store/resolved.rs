@@ -3,7 +3,7 @@
 use super::io::{RunError, check_equal, write_changed};
 use crate::experiment::experiment::Experiment;
 use palpate_input::error::InputError;
-use palpate_input::files;
+use palpate_input::{files, tables};
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
 
@@ -12,12 +12,12 @@ pub const RESOLVED: &str = "resolved.toml";
 
 /// Returns the experiment with all defaults as TOML.
 pub fn resolved(experiment: &Experiment) -> String {
-    let mut text = toml::to_string(experiment).unwrap_or_default();
+    let mut text = tables::text(experiment).unwrap_or_default();
     // Around an object, `[gp]` is the table of that belief.
     if experiment.scene.whole_object.is_some()
         && let (Ok(mut whole), Ok(Ok(belief))) = (
             text.parse::<DocumentMut>(),
-            toml::to_string(&experiment.space).map(|text| text.parse::<DocumentMut>()),
+            tables::text(&experiment.space).map(|text| text.parse::<DocumentMut>()),
         )
     {
         whole.remove("space");

@@ -147,14 +147,14 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
 /// Returns the target that an operator chose for touch `count`, if any.
 fn operators_target(recorded: &RecordedTrial, count: u32) -> Option<Target> {
     let touch = recorded.touches.get(count.checked_sub(1)? as usize)?;
-    let row: TouchRow = serde_json::from_str(&touch.row).ok()?;
+    let row: TouchRow = serde_json::from_slice(touch.row.as_bytes()).ok()?;
     (row.fallback == Some(Fallback::Operator)).then_some(row.target)
 }
 
 /// Returns the rows of the touches made before the recording started.
 fn made(recorded: &RecordedTrial) -> Result<Vec<TouchRow>, InputError> {
     let read = |touch: &recording::TouchMessage| {
-        serde_json::from_str(&touch.row).map_err(|error| {
+        serde_json::from_slice(touch.row.as_bytes()).map_err(|error| {
             InputError::new(format!(
                 "touch {}, made before the recording, has an unreadable row: {error}",
                 touch.touch
@@ -167,7 +167,7 @@ fn made(recorded: &RecordedTrial) -> Result<Vec<TouchRow>, InputError> {
 /// Returns a recorded row in this version's format: version 0.1 wrote targets without a name.
 /// Returns `None` if it cannot be read.
 fn upgrade_row(row: &str) -> Option<String> {
-    serde_json::to_string(&serde_json::from_str::<TouchRow>(row).ok()?).ok()
+    serde_json::to_string(&serde_json::from_slice::<TouchRow>(row.as_bytes()).ok()?).ok()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ mod rules;
 pub use error::{ConfigError, Origin};
 pub use rules::{Rules, Validate};
 
-use crate::{files, format, shipped};
+use crate::{files, format, shipped, tables};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -284,9 +284,8 @@ impl Loader {
     /// # Errors
     /// The first invalid value, with its origin.
     pub fn finish<T: DeserializeOwned + Validate>(self) -> Result<T, ConfigError> {
-        let config: T = serde_path_to_error::deserialize(self.table.clone()).map_err(|error| {
-            self.explain::<T>(&error.path().to_string(), error.inner().message())
-        })?;
+        let config: T = tables::read(self.table.clone())
+            .map_err(|error| self.explain::<T>(&error.key, &error.message))?;
         let mut rules = Rules::default();
         config.check(&mut rules);
         match rules.violation {
@@ -345,8 +344,8 @@ impl Loader {
     /// Returns the allowed names of `key`, found by parsing an invalid one.
     fn choices<T: DeserializeOwned>(&self, key: &str) -> Option<String> {
         let table = self.with_value(key, Value::String(UNKNOWN.into()))?;
-        let error = serde_path_to_error::deserialize::<_, T>(table).err()?;
-        format::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
+        let error = tables::read::<T>(table).err()?;
+        format::allowed(&error.message).filter(|_| error.key == key)
     }
 
     /// Returns the allowed numbers of `key` by its rule, if its parser's error `message` is about a
@@ -357,7 +356,7 @@ impl Loader {
             "f32" | "f64" => ("a number", Value::Float(1.0)),
             _ => return None,
         };
-        let config = T::deserialize(self.with_value(key, number)?).ok()?;
+        let config = tables::read::<T>(self.with_value(key, number)?).ok()?;
         let range = Rules::allowed_values(&config).remove(key)?;
         Some(format!("{kind} from {range}"))
     }

@@ -5,6 +5,7 @@ use super::constants::{DEFAULTS, SENSORS};
 use crate::sim::finger::Effects;
 use crate::sim::model_file;
 use palpate_input::config::{ConfigError, Loader};
+use palpate_input::tables;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -95,8 +96,8 @@ fn value<'a>(effects: &'a Table, name: &str) -> Option<&'a Value> {
 /// # Errors
 /// If a constant is not finite.
 pub fn text(effects: &Effects) -> Result<String, toml::ser::Error> {
-    let Some(Value::Table(constants)) = Table::try_from(effects)?.remove("sensor") else {
-        return Ok(String::new());
-    };
+    let mut effects = tables::value(effects)?;
+    let constants = effects.as_table_mut().and_then(|effects| effects.remove("sensor"));
+    let Some(Value::Table(constants)) = constants else { return Ok(String::new()) };
     toml::to_string(&constants)
 }

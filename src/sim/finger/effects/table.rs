@@ -30,7 +30,7 @@ macro_rules! effects {
                 let mut tables = toml::Table::new();
                 $(
                     if let Some(effect) = &self.$name {
-                        let table = toml::Value::try_from(effect);
+                        let table = palpate_input::tables::value(effect);
                         let table = table.map_err(serde::ser::Error::custom)?;
                         tables.insert(stringify!($name).into(), table);
                     }
