@@ -26,9 +26,11 @@ pub fn read<T: DeserializeOwned>(table: Table) -> Result<T, Mismatch> {
         let format = Deserializer::new(table, &mut track);
         erased_serde::deserialize(&mut <dyn erased_serde::Deserializer>::erase(format))
     };
-    read.map_err(|error: erased_serde::Error| Mismatch {
-        key: track.path().to_string(),
-        message: error.to_string().trim_end().to_owned(),
+    read.map_err(|error: erased_serde::Error| {
+        // The place that the format appends is that of the key.
+        let message = error.to_string();
+        let message = message.split("\nin `").next().unwrap_or_default().trim_end().to_owned();
+        Mismatch { key: track.path().to_string(), message }
     })
 }
 
