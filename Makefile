@@ -72,6 +72,7 @@ check-planners: setup
 
 # Compares instruction counts with experiments/baselines/cost.toml; skipped without valgrind.
 check-cost: export CARGO_INCREMENTAL := 0
+check-cost: export CARGO_PROFILE_DEV_CODEGEN_UNITS := 2
 check-cost: setup
 	cargo test --quiet --locked --features $(FEATURES) --no-run
 	tests/cost.py --program target/debug/palpate

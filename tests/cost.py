@@ -27,7 +27,7 @@ import tomllib
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Separately compiled parts have other instruction counts.
 BUILD = ["cargo", "build", "--quiet", "--locked", "--features", "ros2"]
-WHOLE = {"CARGO_INCREMENTAL": "0"}
+WHOLE = {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_CODEGEN_UNITS": "2"}
 SKIPPED = "cost: skipped, no valgrind (Debian: apt-get install valgrind)"
 HEAD = """\
 # Instructions of one trial of each planner, set-up subtracted. `make check-cost` compares the program

@@ -47,7 +47,8 @@ set -e
 first=() last=()
 case "$1" in
 run) first=(--set touches=21) last=(--set trials=4 --set grid=9 --no-report)
-    case "$*" in *suite*|*around_camera*) last=(--set trials=1 --set grid=9 --no-report) ;; esac
+    case "$*" in *suite*|*camera*|*strokes*|*pa10*|*arm/*) last=(--set trials=1 --set grid=9 --no-report) ;; esac
+    case "$*" in *suite/six*) first=(--set touches=10) ;; esac
     case "$*" in *suite_library*) first=(--set touches=2 --set recognition.particles=16) ;; esac
     case "$*" in *--plan*) set -- run bird --plan 2 --threads 2; last=(--set trials=4) ;; esac ;;
 check) last=(--max-trials 4) ;;

@@ -170,6 +170,42 @@ fn size_does_not_matter() {
 }
 
 /// Without an object there is no surface, every fit succeeds, and planners continue.
+/// Beyond a thousand numbers, hyperparameters are kept until the observations have grown by a
+/// twentieth, and the belief is the one that its row is drawn with.
+#[test]
+fn a_large_belief_is_searched_again_when_it_has_grown() {
+    let mut known = belief(0.07, 0.006);
+    let touch = |known: &mut ImplicitSurface, i: u32| {
+        let (up, turn) = (1.0 - (2.0 * f64::from(i) + 1.0) / 200.0, 2.4 * f64::from(i));
+        let around = (1.0 - up * up).sqrt();
+        let outward = Vector3::new(around * turn.cos(), around * turn.sin(), up);
+        let aim = Aim::against(Point3::origin(), &outward);
+        let p_wc = Point3::from(0.04 * outward);
+        meet(known, &aim, Some((p_wc, outward)), p_wc + 0.006 * outward);
+    };
+    (0..150).for_each(|i| touch(&mut known, i));
+    let first = known.refit().unwrap().0.clone();
+    assert!(first.factorisations > 1, "{first:?}");
+    let mut searched = Vec::new();
+    for i in 150..164 {
+        touch(&mut known, i);
+        let before = known.fit().cloned();
+        let fit = known.refit().unwrap().0.clone();
+        if fit.factorisations > 1 {
+            searched.push(i);
+            continue;
+        }
+        assert_eq!(fit.hyperparameters, first.hyperparameters);
+        let mut drawn = known.clone();
+        drawn.condition(before.as_ref(), &fit).unwrap();
+        for p_w in [Point3::new(0.01, 0.02, 0.03), Point3::new(-0.05, 0.0, 0.01)] {
+            let value = |belief: &ImplicitSurface| belief.surface().unwrap().field().value(&p_w);
+            assert_eq!(value(&known).to_bits(), value(&drawn).to_bits());
+        }
+    }
+    assert_eq!(searched, [157]);
+}
+
 #[test]
 fn an_object_that_is_not_there_is_not_found() {
     let mut belief = belief(0.1, 0.007);

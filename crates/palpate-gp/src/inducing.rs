@@ -66,7 +66,7 @@ impl Posterior {
         let heights = residuals.iter().map(|height| hyperparameters.mean + height);
         let kept = kept.with_heights(heights.collect());
         let left_sd = hyperparameters.signal_sd * left_variance.sqrt();
-        let posterior = Self::factored(kernel, hyperparameters, kept, &dense);
+        let posterior = Self::factored(kernel, hyperparameters, kept, (&dense, 0.0));
         Ok(InducingPosterior { posterior, nystrom_residual_sd: left_sd })
     }
 }

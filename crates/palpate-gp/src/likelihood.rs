@@ -6,6 +6,7 @@ use super::covariance::{Correlations, batches};
 use super::dense::DenseMatrix;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{NoiseRatio, Observations};
+use super::posterior::Posterior;
 use super::search_box::MeanModel;
 use super::search_box::SignalModel;
 use crate::math::simd::{widest, widest_dot};
@@ -29,6 +30,7 @@ pub struct Likelihood<'a> {
     /// Weights of a pair of places; see [`DerivativeCovariance::add_length_gradient`].
     pair: [Vec<f64>; 2],
     correlations: Correlations,
+    jitter: f64,
     factorisations: u32,
 }
 
@@ -69,6 +71,7 @@ impl<'a> Likelihood<'a> {
             scratch: Vec::with_capacity(count),
             pair: Default::default(),
             correlations: Correlations::default(),
+            jitter: 0.0,
             factorisations: 0,
         }
     }
@@ -101,6 +104,14 @@ impl<'a> Likelihood<'a> {
         let by_known = self.by_known(signal2, noise);
         *by_signal = fit / signal2 - self.observations.order() as f64 - by_noise - by_known;
         Ok(value)
+    }
+
+    /// Returns the posterior at `at`, without factoring again after a
+    /// [`value_gradient`](Self::value_gradient) there without a gradient.
+    pub fn posterior(&self, at: Hyperparameters) -> Posterior {
+        let observations = self.observations.clone();
+        let factor = (&self.dense, self.jitter);
+        Posterior::factored(self.kernel, at, observations, factor)
     }
 
     /// Returns the log marginal likelihood with signal_sd according to `scale`. A `gradient` is
@@ -179,7 +190,9 @@ impl<'a> Likelihood<'a> {
         let (kernel, observations) = (self.kernel, self.observations);
         let buffer = &mut self.correlations;
         let dense = &mut self.dense;
-        covariance::factor(dense, kernel, observations, length_scales, noise, buffer).map(|_| ())
+        self.jitter =
+            covariance::factor(dense, kernel, observations, length_scales, noise, buffer)?;
+        Ok(())
     }
 
     /// Sets the weights to L⁻¹·y for the heights above `mean`, and returns the squared norm yᵀA⁻¹y.

@@ -49,21 +49,21 @@ impl Posterior {
         let buffer = &mut Correlations::default();
         let jitter =
             covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
-        Ok(Self { jitter, ..Self::factored(kernel, hyperparameters, observations, &dense) })
+        Ok(Self::factored(kernel, hyperparameters, observations, (&dense, jitter)))
     }
 
     /// Creates the posterior from observations whose covariance, including that of their errors, is
-    /// already factored.
+    /// already factored with this jitter.
     pub(super) fn factored(
         kernel: &'static dyn Kernel,
         hyperparameters: Hyperparameters,
         observations: Observations,
-        covariance: &DenseMatrix,
+        (covariance, jitter): (&DenseMatrix, f64),
     ) -> Self {
         let factor = Factor::from(covariance);
         let (whitened, weights) = (Vec::new(), Vec::new());
         let mut new =
-            Self { kernel, hyperparameters, observations, factor, whitened, weights, jitter: 0.0 };
+            Self { kernel, hyperparameters, observations, factor, whitened, weights, jitter };
         new.weigh();
         new
     }

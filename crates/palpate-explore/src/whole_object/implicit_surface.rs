@@ -55,6 +55,12 @@ const CUBES: f64 = 2e8;
 const TRIED_MIN: f64 = 3.0;
 const TRIED_MAX: f64 = 60.0;
 
+/// Number of rows of the covariance above which hyperparameters are kept until the observations have
+/// grown by this factor since the last search.
+// heuristic: a search costs four factorisations, 30 ms of this order; between, one is left.
+const KEPT_ROWS: usize = 1000;
+const SEARCH_AGAIN: f64 = 1.05;
+
 /// First step of the first fit, first step of later fits, and smallest step, in logarithms;
 /// heuristics.
 const STEP_FIRST: f64 = 0.7;
@@ -155,15 +161,32 @@ impl ImplicitSurface {
     ///
     /// Coordinate search from the last optimum: a step along each parameter in turn, halved if none
     /// improves. The fit follows its optimum from touch to touch, and a large covariance is
-    /// factored only three times.
+    /// factored only three times; a very large one is searched again after it has grown.
     ///
     /// # Errors
     /// If the covariance of the touches cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Surface), CovarianceError> {
         let start = self.fit.as_ref().map(|fit| fit.hyperparameters.clone());
         let (prior, observations) = self.observations(start.as_ref());
-        let fit = self.search(start.as_ref(), &observations)?;
-        self.conclude((prior, observations), start, fit)
+        let (fit, posterior) = match self.fit.take_if(|last| is_kept(last, &observations)) {
+            Some(last) => self.keep(last, &observations)?,
+            None => (self.search(start.as_ref(), &observations)?, None),
+        };
+        self.conclude((prior, observations), start, (fit, posterior))
+    }
+
+    /// Returns the last fit with its likelihood of `observations`, and the posterior, unless errors
+    /// of cameras' poses are added to it.
+    fn keep(
+        &self,
+        last: Fit,
+        observations: &Observations,
+    ) -> Result<(Fit, Option<Posterior>), CovarianceError> {
+        let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
+        let log_likelihood = likelihood.value_gradient(&last.hyperparameters, &mut [])?;
+        let is_whole = self.evidence.seen.is_empty();
+        let posterior = is_whole.then(|| likelihood.posterior(last.hyperparameters.clone()));
+        Ok((Fit { log_likelihood, factorisations: 1, ..last }, posterior))
     }
 
     /// Conditions on all touches with the given fit, which started from `last`, e.g. to draw a
@@ -191,19 +214,20 @@ impl ImplicitSurface {
         fit: &Fit,
     ) -> Result<(), CovarianceError> {
         let made = self.observations(start.as_ref());
-        self.conclude(made, start, fit.clone()).map(|_| ())
+        self.conclude(made, start, (fit.clone(), None)).map(|_| ())
     }
 
     fn conclude(
         &mut self,
         (prior, observations): (PriorMean, Observations),
         start: Option<Hyperparameters>,
-        fit: Fit,
+        (fit, known): (Fit, Option<Posterior>),
     ) -> Result<(&Fit, &Surface), CovarianceError> {
         let posterior = |all| Posterior::new(self.kernel, fit.hyperparameters.clone(), all);
-        let (mut posterior, pose_errors) = match self.evidence.seen.is_empty() {
-            true => (posterior(observations)?, Vec::new()),
-            false => {
+        let (mut posterior, pose_errors) = match (known, self.evidence.seen.is_empty()) {
+            (Some(known), _) => (known, Vec::new()),
+            (None, true) => (posterior(observations)?, Vec::new()),
+            (None, false) => {
                 let (_, all) = self.observations_given(start.as_ref(), CameraPose::Certain);
                 let given = posterior(all)?;
                 let errors = self.pose_errors(&given, &observations);
@@ -366,6 +390,12 @@ impl ImplicitSurface {
     pub fn surface(&self) -> Option<&Surface> {
         self.surface.as_ref()
     }
+}
+
+/// Whether the hyperparameters of `last` are kept.
+fn is_kept(last: &Fit, observations: &Observations) -> bool {
+    let is_recent = (observations.len() as f64) < SEARCH_AGAIN * last.scanned_at as f64;
+    observations.order() > KEPT_ROWS && is_recent
 }
 
 /// Returns the length scale, m, and noise ratios from their logarithms; the slopes' noise is per

@@ -187,6 +187,25 @@ proptest! {
     }
 
     #[test]
+    fn the_posterior_of_a_likelihood_is_that_of_its_parameters(
+        at in any_parameters(), touches in any_touches(), choice in 0..2usize,
+        place in [-1.0..1.0f64, -1.0..1.0f64],
+    ) {
+        let observations = all(&touches);
+        let mut likelihood = Likelihood::new(kernel(choice), MeanModel::Zero, &observations);
+        likelihood.value_gradient(&at, &mut []).unwrap();
+        let ours = likelihood.posterior(at.clone());
+        let twin = Posterior::new(kernel(choice), at, observations.clone()).unwrap();
+        let mut scratch = Scratch::default();
+        let [ours, twin] = [ours, twin].map(|posterior| {
+            let [mean, variance] =
+                [posterior.mean(&place, &mut scratch), posterior.variance(&place, &mut scratch)];
+            [mean.to_bits(), variance.to_bits(), posterior.jitter().to_bits()]
+        });
+        prop_assert_eq!(ours, twin);
+    }
+
+    #[test]
     fn gradients_are_central_differences(
         at in any_parameters(), touches in any_touches(), choice in 0..2usize,
         place in [-1.0..1.0f64, -1.0..1.0f64],
