@@ -15,7 +15,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -216,6 +216,14 @@ bench: setup
 	cargo bench --locked --bench plant
 	cargo bench --locked --bench dynamic
 	cargo bench --locked --bench contact
+
+# Where the processor time of eight works goes, and how near its pieces are to the machine: docs/speed.md.
+# It needs perf (Debian: linux-perf) and an idle machine.
+PIECES := target/pieces.txt
+speed: setup
+	cargo build --locked --profile bench
+	cargo bench --locked --bench limits > $(PIECES)
+	python3 benches/profile.py $(PALPATE) --pieces $(PIECES)
 
 # Error of contacts located by the electrodes.
 contacts: setup

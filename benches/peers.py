@@ -119,7 +119,7 @@ def bird(folder):
     x, z = np.unique(table[:, 0]), np.unique(table[:, 1])
     order = np.lexsort((table[:, 1], table[:, 0]))
     heights = RegularGridInterpolator((x, z), table[order, 2].reshape(len(x), len(z)))
-    starts = [[touch["target"] for touch in touches[:20]] for touches in trials]
+    starts = [[touch["target"]["place"] for touch in touches[:20]] for touches in trials]
     return heights, [(x[0], x[-1]), (z[0], z[-1])], starts
 
 
@@ -140,7 +140,7 @@ def main():
         _, ours = palpate("toy", os.path.join(folder, "timed"), 10 * TRIALS, 2)
         heights, box, bird_starts = bird(os.path.join(folder, "bird"))
         _, ours_bird = palpate("bird", os.path.join(folder, "timed_bird"), 10 * BIRD_TRIALS, 2)
-    starts = [[touch["target"] for touch in touches[:3]] for touches in trials]
+    starts = [[touch["target"]["place"] for touch in touches[:3]] for touches in trials]
     curves = [[touch["metrics"]["r"] for touch in touches[2:]] for touches in trials]
     score = lambda model: correlation(toy(TEST[:, 0]), model.mean(TEST))
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")

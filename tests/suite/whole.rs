@@ -195,7 +195,7 @@ fn a_large_belief_is_searched_again_when_it_has_grown() {
             searched.push(i);
             continue;
         }
-        assert_eq!(fit.hyperparameters, first.hyperparameters);
+        assert_eq!(fit.hyperparameters, before.clone().unwrap().hyperparameters);
         let mut drawn = known.clone();
         drawn.condition(before.as_ref(), &fit).unwrap();
         for p_w in [Point3::new(0.01, 0.02, 0.03), Point3::new(-0.05, 0.0, 0.01)] {
