@@ -1,5 +1,5 @@
-"""Algorithm 1 on the toy and on the bird's face with scikit-learn, egobox and Palpate: the same initial touches,
-one thread.
+"""Algorithm 1 on the toy and on the bird's face with scikit-learn, egobox, BoTorch and Palpate: the same initial
+touches, one thread.
 
 Run by `make bench-peers`, which makes the environment. Prints processor seconds per trial, ratios to Palpate, and of
 the toy the touches after which the mean R (Eq. 5) first reaches 0.99. The others get the bird's heights from a grid
@@ -22,12 +22,22 @@ for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"):
 
 import egobox
 import numpy as np
+import torch
+from botorch.acquisition import PosteriorStandardDeviation
+from botorch.fit import fit_gpytorch_mll
+from botorch.models import SingleTaskGP
+from botorch.models.transforms import Standardize
+from botorch.optim import optimize_acqf
+from gpytorch.kernels import RBFKernel, ScaleKernel
+from gpytorch.mlls import ExactMarginalLogLikelihood
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import direct, minimize
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 warnings.filterwarnings("ignore")
+torch.set_num_threads(1)
+torch.set_default_dtype(torch.double)
 TRIALS, TOUCHES = 10, 50
 BIRD_TRIALS, BIRD_TOUCHES = 3, 120
 TOY_BOX = [(-2.0, 2.0)]
@@ -76,8 +86,30 @@ class Egobox:
         return float(np.sqrt(max(0.0, np.asarray(self.model.predict_var(x[None])).item())))
 
 
+class BoTorch:
+    """A squared exponential with a length per axis, fitted and searched as its tutorials do."""
+
+    def fit(self, x, y):
+        x, y = torch.tensor(x), torch.tensor(y)[:, None]
+        kernel = ScaleKernel(RBFKernel(ard_num_dims=x.shape[1]))
+        self.model = SingleTaskGP(x, y, covar_module=kernel, outcome_transform=Standardize(1))
+        fit_gpytorch_mll(ExactMarginalLogLikelihood(self.model.likelihood, self.model))
+
+    def mean(self, x):
+        with torch.no_grad():
+            return self.model.posterior(torch.tensor(x)).mean.numpy().ravel()
+
+    def next(self, box):
+        sides = torch.tensor(box).T
+        deviation = PosteriorStandardDeviation(self.model)
+        found, _ = optimize_acqf(deviation, sides, q=1, num_restarts=1, raw_samples=200)
+        return found.numpy()[0]
+
+
 def next_touch(model, box):
-    """DIRECT with 200 evaluations, refined by L-BFGS-B."""
+    """DIRECT with 200 evaluations, refined by L-BFGS-B; BoTorch has its own search."""
+    if isinstance(model, BoTorch):
+        return model.next(box)
     cost = lambda x: -model.deviation(np.asarray(x))
     found = direct(cost, box, maxfun=200)
     return minimize(cost, found.x, method="L-BFGS-B", bounds=box).x
@@ -146,13 +178,14 @@ def main():
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")
     print(f"{'toy':<24}{'s/trial':>9}{'ratio':>8}{'0.99 at':>9}")
     report("Palpate", ours, ours, reached(curves))
-    for name, model, note in (("egobox", Egobox, ""), ("egobox", two, " two starts"), ("scikit-learn", ScikitLearn, "")):
+    peers = [("egobox", Egobox, ""), ("egobox", two, " two starts"), ("scikit-learn", ScikitLearn, ""), ("botorch", BoTorch, "")]
+    for name, model, note in peers:
         results = [explore(model(), start, lambda x: toy(x[:, 0]), TOY_BOX, TOUCHES, score) for start in starts]
         seconds = float(np.mean([seconds for _, seconds in results]))
         report(f"{name} {version(name)}{note}", seconds, ours, reached([scores for scores, _ in results]))
     print(f"{f'bird, 20 to {BIRD_TOUCHES} touches':<24}{'s/trial':>9}{'ratio':>8}")
     report("Palpate", ours_bird, ours_bird, "")
-    for name, model, note in (("egobox", Egobox, ""), ("egobox", two, " two starts")):
+    for name, model, note in peers:
         results = [explore(model(), start, heights, box, BIRD_TOUCHES) for start in bird_starts]
         seconds = float(np.mean([seconds for _, seconds in results]))
         report(f"{name} {version(name)}{note}", seconds, ours_bird, "")

@@ -29,7 +29,7 @@ LEAST = 0.03
 WORKS = [
     ("toy", "toy", ["trials=40"]),
     ("bird", "bird", ["trials=4"]),
-    ("bird, belief `objects`", "bird", ["trials=2", 'gp="beliefs/objects.toml"', "touches=80"]),
+    ("bird, belief `objects`", "bird", ["trials=2", 'gp="experiments/beliefs/objects.toml"', "touches=80"]),
     ("around an object", "around", ["trials=1", "touches=150"]),
     ("bird, soft finger", "bird_finger", ["trials=1"]),
     ("bird, PA-10", "bird_pa10", ["trials=1", "touches=40"]),
@@ -41,9 +41,10 @@ WORKS = [
 PARTS = [
     ("MuJoCo", r"^libmujoco|mujoco_rs"),
     ("factorisation, inverse", r"palpate_gp::(dense|cholesky|tiles)|gemm|faer"),
-    ("covariance", r"palpate_gp::(covariance|kernel|observations|math)|^libm\."),
+    ("covariance", r"palpate_gp::(covariance|kernel|observations)|^libm\."),
     ("prediction", r"palpate_gp::(posterior|batch|reduction|inducing|means)"),
-    ("search of hyperparameters", r"palpate_gp"),
+    ("gradient of the likelihood", r"palpate_gp::likelihood"),
+    ("searches (DIRECT, BFGS)", r"palpate_gp"),
     ("mesh of the belief", r"palpate_geometry::(implicit|surface|decimate)|fast_surface_nets"),
     ("rays and nearest points", r"palpate_geometry|obvhs"),
     ("skin and electrodes", r"palpate::sim::finger"),
@@ -91,16 +92,12 @@ def profile(program: pathlib.Path, title: str, experiment: str, sets: list[str])
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         call(record + run + settings, env=os.environ | {"RAYON_NUM_THREADS": "1"})
         spent_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-        lines = call(["perf", "report", "-i", data, "--stdio", "--quiet", "--sort", "dso,symbol", "-t", ";"])
+        shares = parts(program, data)
         rows = [json.loads(line) for line in pathlib.Path(out, "trials.jsonl").read_text().splitlines()]
-    shares: collections.Counter[str] = collections.Counter()
-    for line in lines.splitlines():
-        fields = [field.strip() for field in line.split(";", 2)]
-        if len(fields) == 3 and fields[0].endswith("%"):
-            shares[part_of(fields[1], fields[2])] += float(fields[0][:-1]) / 100
     touches = [touch for row in rows for touch in row["touches"]]
     factorisations = sum(touch.get("fit", {}).get("factorisations", 0) for touch in touches) / len(touches)
-    moved_s = sum(touch.get("time_s") or 0 for touch in touches) / len(touches)
+    # The time of a row is that since the start of its trial.
+    moved_s = sum(row["touches"][-1].get("time_s") or 0 for row in rows) / len(touches)
     listed = [f"{part} {100 * share:.0f}" for part, share in shares.most_common() if share >= LEAST]
     print(title, f"{spent_s:.1f} s", listed, sep=": ")
     moved = f"{moved_s:.1f}" if moved_s else "–"
@@ -108,9 +105,44 @@ def profile(program: pathlib.Path, title: str, experiment: str, sets: list[str])
     return "|" + "|".join(map(str, cells)) + "|"
 
 
-def part_of(library: str, symbol: str) -> str:
-    found = (part for part, pattern in PARTS if re.search(pattern, library) or re.search(pattern, symbol))
-    return next(found, "other")
+def parts(program: pathlib.Path, data: str) -> collections.Counter[str]:
+    """Returns the share of each part in the samples; inlined functions count as functions."""
+    mapped = call(["perf", "script", "-i", data, "--show-mmap-events", "-F", "ip,dso"])
+    place = re.search(rf"\[0x(\w+)\(\w+\) @ (\w+) .*r-xp {re.escape(str(program))}", mapped)
+    segments = call(["readelf", "--program-headers", "--wide", str(program)])
+    segment = re.search(r"LOAD +0x(\w+) 0x(\w+) .* R E ", segments)
+    if not place or not segment:
+        raise Bad(f"{program} was not sampled")
+    start, offset = (int(number, 16) for number in place.groups())
+    at, address = (int(number, 16) for number in segment.groups())
+    counts: collections.Counter[str] = collections.Counter()
+    own: collections.Counter[int] = collections.Counter()
+    for ip, library in re.findall(r"^ *([0-9a-f]+) \((.*)\)$", mapped, re.MULTILINE):
+        if library == str(program):
+            own[int(ip, 16) - start + offset + address - at] += 1
+        else:
+            counts[part_of(pathlib.Path(library).name, [])] += 1
+    places = "\n".join(map(hex, own))
+    frames = call(["addr2line", "-afiC", "-e", str(program)], input=places)
+    for one in re.split(r"^0x", frames, flags=re.MULTILINE)[1:]:
+        found, *lines = one.splitlines()
+        counts[part_of("", lines[::2])] += own[int(found, 16)]
+    total = counts.total()
+    return collections.Counter({part: count / total for part, count in counts.items()})
+
+
+# Primitives and code of other crates count as the function that uses them.
+OF_OTHERS = re.compile(r"^<?(core|alloc|std|pulp|nalgebra|rayon|simba|hashbrown|[fiu]\d+|usize|\[|palpate_gp::math::(vector|simd))\b|^<\[")
+
+
+def part_of(library: str, frames: list[str]) -> str:
+    """Returns the part of a library, or of the innermost own one of inlined functions."""
+    names = [library] if library else [name for name in frames if not OF_OTHERS.match(name)]
+    for name in names:
+        for part, pattern in PARTS:
+            if re.search(pattern, name):
+                return part
+    return "other"
 
 
 def read_pieces(text: str) -> str:
@@ -140,7 +172,7 @@ After this page you know where the time of a touch goes, and how far each piece 
 ## Works
 
 Processor time of a touch, factorisations of the covariance in it, seconds that the finger moves, and the share of each
-part in percent. Samples of the processor's clock, {RATE} in a second, by the innermost function.
+part in percent. Samples of the processor's clock, {RATE} in a second, by the innermost function of Palpate.
 
 |work|touches|ms|factorisations|moves, s|parts, %|
 |---|---|---|---|---|---|

@@ -14,7 +14,7 @@ const EVALUATIONS: usize = 16;
 const PLACES: usize = 1024;
 
 pub fn pieces() -> Vec<Piece> {
-    let mut pieces: Vec<Piece> = [50, 100, 200, 1000].map(likelihood).into();
+    let mut pieces: Vec<Piece> = [25, 50, 100, 200, 1000].map(likelihood).into();
     pieces.extend([50, 100].map(cold_fit));
     pieces.extend([100, 1000].into_iter().filter_map(variance));
     pieces.extend([100, 1000].into_iter().filter_map(variance_gradient));

@@ -207,6 +207,9 @@ const MANNER: BfgsOptions =
 const HOPE: f64 = 4.0;
 /// Distance from the highest optimum, in units of the box's sides, at which a lower climb stops.
 const SAME_TOP: f64 = 0.02;
+/// Step, in logarithms, to which the scan rounds bounds that follow the heights' scale; a heuristic:
+/// a factor of ten, which the scale of a surface's heights rarely crosses.
+const ROUNDED: f64 = std::f64::consts::LN_10;
 /// Largest number of local maxima of the scan
 /// that are refined; a heuristic: sufficient for the fits of the toy that were compared with a
 /// dense grid.
@@ -300,13 +303,23 @@ impl<'a> Search<'a> {
     /// the best optimum. With a `scan`, reuses its cached factors.
     fn scan(&mut self, scan: Option<&mut Scan>) {
         // A searched signal starts at one value.
-        let noises = self.sought.noises().end;
-        let bounds =
-            Bounds { lower: &self.bounds.lower[..noises], upper: &self.bounds.upper[..noises] };
-        let grid = Grid::new(bounds, self.sought.length_scales.len());
+        let noises = self.sought.noises();
+        let [mut lower, mut upper] =
+            [self.bounds.lower, self.bounds.upper].map(|ends| ends[..noises.end].to_vec());
+        if let TouchNoise::Known(_) = self.sought.touch_noise {
+            // The ratio's bounds follow the heights' scale, which each touch changes; rounded outwards,
+            // they are the same from touch to touch, and the cached factors remain valid.
+            let (low, high) = (&mut lower[noises.start], &mut upper[noises.start]);
+            (*low, *high) =
+                ((*low / ROUNDED).floor() * ROUNDED, (*high / ROUNDED).ceil() * ROUNDED);
+        }
+        let grid =
+            Grid::new(Bounds { lower: &lower, upper: &upper }, self.sought.length_scales.len());
         let signal = self.sought.start_sd.filter(|_| self.sought.is_signal_searched());
         let place = |index: usize| {
             let mut place = grid.place(index);
+            let ends = self.bounds.lower.iter().zip(self.bounds.upper);
+            place.iter_mut().zip(ends).for_each(|(at, (low, high))| *at = at.clamp(*low, *high));
             place.extend(signal.map(f64::ln));
             place
         };

@@ -94,10 +94,11 @@ impl Search {
         zone: &Zone,
         mut score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> (f64, Vec<f64>) {
-        let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
+        let evaluations = self.settings.direct_evaluations;
+        let mut seen: Vec<(f64, Vec<f64>)> = Vec::with_capacity(evaluations as usize);
         let (lower, upper) = corners(zone, MARGIN);
         let bounds = Bounds { lower: &lower, upper: &upper };
-        direct(bounds, self.settings.direct_evaluations, |places| {
+        direct(bounds, evaluations, |places| {
             let places: Vec<_> = places.iter().map(|place| clamped(zone, place)).collect();
             let values = score(&places, &mut []);
             seen.extend(values.iter().copied().zip(places));
@@ -112,7 +113,7 @@ impl Search {
             budget: self.settings.bfgs_evaluations,
         };
         let start = |start: Vec<f64>| BfgsClimb::new(bounds, &start, None, manner);
-        let mut climbs: Vec<BfgsClimb> = hills(zone, seen).into_iter().map(start).collect();
+        let mut climbs: Vec<BfgsClimb> = hills(zone, &seen).into_iter().map(start).collect();
         loop {
             let asked: Vec<Vec<f64>> =
                 climbs.iter().filter_map(|climb| climb.requested().map(<[f64]>::to_vec)).collect();
@@ -201,13 +202,15 @@ fn clamped(zone: &Zone, place: &[f64]) -> Vec<f64> {
 }
 
 /// Returns the best places evaluated that have no better neighbour.
-fn hills(zone: &Zone, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
-    seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+fn hills(zone: &Zone, seen: &[(f64, Vec<f64>)]) -> Vec<Vec<f64>> {
+    // Of equal values the first counts.
+    let mut order: Vec<usize> = (0..seen.len()).collect();
+    order.sort_unstable_by(|a, b| seen[*b].0.total_cmp(&seen[*a].0).then(a.cmp(b)));
     let mut hills: Vec<Vec<f64>> = Vec::new();
-    for (_, place) in seen {
-        let is_apart = |hill: &Vec<f64>| zone.distance(hill, &place) > SAME_HILL;
+    for (_, place) in order.into_iter().map(|index| &seen[index]) {
+        let is_apart = |hill: &Vec<f64>| zone.distance(hill, place) > SAME_HILL;
         if hills.iter().all(is_apart) {
-            hills.push(place);
+            hills.push(place.clone());
         }
         if hills.len() == HILLS {
             break;

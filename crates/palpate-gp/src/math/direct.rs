@@ -55,6 +55,8 @@ struct Division<'a, F> {
     left: u32,
     /// Buffer reused in each round.
     hull: Vec<Corner>,
+    /// Points of the hull so far, with their groups.
+    kept: Vec<((f64, f64), usize)>,
     chosen: Vec<usize>,
     places: Vec<Vec<f64>>,
     pairs: Vec<(usize, [f64; 2])>,
@@ -67,17 +69,23 @@ pub fn direct(bounds: Bounds, evaluations: u32, values: impl FnMut(&[Vec<f64>]) 
     if count == 0 || evaluations == 0 {
         return;
     }
+    let with_first = |first: f64| {
+        let mut numbers = Vec::with_capacity(count * evaluations as usize);
+        numbers.resize(count, first);
+        numbers
+    };
     let mut division = Division {
         bounds,
         values,
         rectangles: Vec::with_capacity(evaluations as usize),
-        middles: vec![0.5; count],
-        sides: vec![1.0; count],
+        middles: with_first(0.5),
+        sides: with_first(1.0),
         sorted: Vec::new(),
         least: f64::INFINITY,
         age: 0,
         left: evaluations,
         hull: Vec::new(),
+        kept: Vec::new(),
         chosen: Vec::new(),
         places: vec![vec![0.5; count]],
         pairs: Vec::new(),
@@ -175,8 +183,9 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
     /// Divides all potentially optimal rectangles.
     fn round(&mut self) {
         let mut hull = std::mem::take(&mut self.hull);
+        let mut kept = std::mem::take(&mut self.kept);
         let mut chosen = std::mem::take(&mut self.chosen);
-        self.find_hull(&mut hull);
+        self.find_hull(&mut hull, &mut kept);
         chosen.clear();
         chosen.extend((0..hull.len()).filter(|at| self.may_hold_least(&hull, *at)));
         let count = chosen.iter().fold(0, |count, at| self.hand_out(hull[*at].index, count));
@@ -199,7 +208,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
                 self.divide(index, axes, own);
             }
         }
-        (self.hull, self.chosen) = (hull, chosen);
+        (self.hull, self.kept, self.chosen) = (hull, kept, chosen);
     }
 
     /// Writes the centres of the outer thirds along each axis of a rectangle after the first
@@ -250,15 +259,17 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         self.pairs = pairs;
     }
 
-    /// Computes the lower hull of (radius, cost), including ties, by increasing radius.
-    fn find_hull(&self, hull: &mut Vec<Corner>) {
+    /// Computes the lower hull of (radius, cost), including ties, by increasing radius; `kept` is a
+    /// buffer.
+    fn find_hull(&self, hull: &mut Vec<Corner>, kept: &mut Vec<((f64, f64), usize)>) {
         hull.clear();
         // The rectangles of lowest cost for each radius; the first one represents all.
         let lowest = |equals: &RadiusGroup| {
             let (_, _, index) = *equals.keys.last()?;
             Some((equals.radius.into(), self.rectangles[index].cost))
         };
-        let mut groups = self.sorted.iter().filter_map(|equals| Some((lowest(equals)?, equals)));
+        let numbered = self.sorted.iter().enumerate();
+        let mut groups = numbered.filter_map(|(group, equals)| Some((lowest(equals)?, group)));
         let Some(first) = groups.next() else { return };
         let last = groups.next_back();
         let (from, to): ((f64, f64), (f64, f64)) = (first.0, last.map_or(first.0, |last| last.0));
@@ -267,14 +278,15 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
             from.1 + (radius - from.0) * slope
         };
         // Hull points; those at a right turn are dropped.
-        let mut kept: Vec<((f64, f64), &RadiusGroup)> = vec![first];
-        for (new, equals) in groups {
+        kept.clear();
+        kept.push(first);
+        for (new, group) in groups {
             if new.1 > chord(new.0) {
                 continue;
             }
-            while let [earlier @ .., (before, group), (last, _)] = kept.as_slice() {
+            while let [earlier @ .., (before, lone), (last, _)] = kept.as_slice() {
                 // As in NLopt, which drops no point that has a single predecessor.
-                if earlier.is_empty() && group.lowest().nth(1).is_none() {
+                if earlier.is_empty() && self.sorted[*lone].lowest().nth(1).is_none() {
                     break;
                 }
                 let turn = (last.0 - before.0) * (new.1 - before.1)
@@ -284,10 +296,11 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
                 }
                 kept.pop();
             }
-            kept.push((new, equals));
+            kept.push((new, group));
         }
-        for ((radius, cost), equals) in kept.into_iter().chain(last) {
-            hull.extend(equals.lowest().map(|index| Corner { radius, cost, index }));
+        for ((radius, cost), group) in kept.iter().copied().chain(last) {
+            let lowest = self.sorted[group].lowest();
+            hull.extend(lowest.map(|index| Corner { radius, cost, index }));
         }
     }
 
