@@ -303,9 +303,9 @@ impl<'a> Search<'a> {
     /// the best optimum. With a `scan`, reuses its cached factors.
     fn scan(&mut self, scan: Option<&mut Scan>) {
         // A searched signal starts at one value.
-        let noises = self.sought.noises();
+        let (noises, bounds) = (self.sought.noises(), self.bounds);
         let [mut lower, mut upper] =
-            [self.bounds.lower, self.bounds.upper].map(|ends| ends[..noises.end].to_vec());
+            [bounds.lower, bounds.upper].map(|ends| ends[..noises.end].to_vec());
         if let TouchNoise::Known(_) = self.sought.touch_noise {
             // The ratio's bounds follow the heights' scale, which each touch changes; rounded outwards,
             // they are the same from touch to touch, and the cached factors remain valid.
@@ -318,7 +318,7 @@ impl<'a> Search<'a> {
         let signal = self.sought.start_sd.filter(|_| self.sought.is_signal_searched());
         let place = |index: usize| {
             let mut place = grid.place(index);
-            let ends = self.bounds.lower.iter().zip(self.bounds.upper);
+            let ends = bounds.lower.iter().zip(bounds.upper);
             place.iter_mut().zip(ends).for_each(|(at, (low, high))| *at = at.clamp(*low, *high));
             place.extend(signal.map(f64::ln));
             place
