@@ -208,6 +208,25 @@ def main() -> None:
         page.wait_for_function("told.phase === 'ended'", timeout=LONGEST_MS)
         assert not errors, errors
         print("all around")
+
+        # A finished run of several trials: each is seen, and the belief is that of its touches.
+        with tempfile.TemporaryDirectory() as folder:
+            program = str(pathlib.Path(args.program).resolve())
+            run = [program, "--quiet", "run", "container", "--no-report", "--out", "run", "--set", "trials=2", "--set", "touches=12"]
+            subprocess.run(run, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+            with Live(args.program, f"{folder}/run") as replay:
+                page.goto(replay.url)
+                when(lambda: is_drawn(page, 0), "the belief of a replay is not drawn")
+                other = 1 - page.evaluate("told.trial")
+                mean = page.evaluate("Array.from(data.planners[0].frames[0].mean).join()")
+                page.fill("#trial", str(other + 1))
+                page.keyboard.press("Enter")
+                page.wait_for_function("other => told.trial === other", arg=other, timeout=LONGEST_MS)
+                when(lambda: page.evaluate("Array.from(data.planners[0].frames[0].mean).join()") != mean, "the same belief is drawn")
+                axe(page, args.axe, "replay")
+                picture(page, "6-replay")
+        assert not errors, errors
+        print("another trial of a finished run")
         browser.close()
     print("ok")
 

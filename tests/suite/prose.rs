@@ -21,6 +21,9 @@ const SENTENCE_MAX: usize = 35;
 /// Largest numbers of words of the guides, and of those that are generated.
 const WORDS_MAX: [usize; 2] = [25_000, 9_000];
 
+/// Largest number of words of the page of measured speeds, which the others do not include.
+const SPEED_WORDS_MAX: usize = 900;
+
 const GENERATED: [&str; 2] = ["hard-cases.md", "reference.md"];
 
 fn root() -> &'static Path {
@@ -194,6 +197,10 @@ fn guides_are_short() {
     for page in files(&root().join("docs"), "md") {
         let name = page.file_name().unwrap().to_str().unwrap();
         let count = fs::read_to_string(&page).unwrap().split_whitespace().count();
+        if name == "speed.md" {
+            assert!(count <= SPEED_WORDS_MAX, "{count} of {SPEED_WORDS_MAX} in {name}");
+            continue;
+        }
         words[0] += count;
         words[1] += if GENERATED.contains(&name) { count } else { 0 };
     }

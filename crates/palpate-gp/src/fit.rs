@@ -207,8 +207,8 @@ const MANNER: BfgsOptions =
 const HOPE: f64 = 4.0;
 /// Distance from the highest optimum, in units of the box's sides, at which a lower climb stops.
 const SAME_TOP: f64 = 0.02;
-/// Step, in logarithms, to which the scan rounds bounds that follow the heights' scale; a heuristic:
-/// a factor of ten, which the scale of a surface's heights rarely crosses.
+/// Step, in logarithms, to which the scan rounds bounds that follow the heights' scale.
+// heuristic: a factor of ten, which the scale of a surface's heights rarely crosses.
 const ROUNDED: f64 = std::f64::consts::LN_10;
 /// Largest number of local maxima of the scan
 /// that are refined; a heuristic: sufficient for the fits of the toy that were compared with a
@@ -307,8 +307,8 @@ impl<'a> Search<'a> {
         let [mut lower, mut upper] =
             [bounds.lower, bounds.upper].map(|ends| ends[..noises.end].to_vec());
         if let TouchNoise::Known(_) = self.sought.touch_noise {
-            // The ratio's bounds follow the heights' scale, which each touch changes; rounded outwards,
-            // they are the same from touch to touch, and the cached factors remain valid.
+            // The ratio's bounds follow the heights' scale, which each touch changes. Rounded
+            // outwards they are the same from touch to touch, and the cached factors remain valid.
             let (low, high) = (&mut lower[noises.start], &mut upper[noises.start]);
             (*low, *high) =
                 ((*low / ROUNDED).floor() * ROUNDED, (*high / ROUNDED).ceil() * ROUNDED);
