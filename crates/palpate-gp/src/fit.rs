@@ -37,11 +37,11 @@ pub struct Fit {
     pub stop: Stop,
 }
 
-/// Number of observations up to which each fit scans the whole box; a
+/// Number of heights up to which each fit scans the whole box; a
 /// heuristic: the scans need 8 MB.
 const SCAN_ALWAYS: usize = 128;
-/// Growth of the observations since the last scan at which a larger fit scans again; in between it
-/// climbs from the last optimum; a heuristic.
+/// Growth of the observations since the last scan at which a larger fit, or one with slopes, scans
+/// again; in between it climbs from the last optimum; a heuristic.
 const SCAN_AGAIN: f64 = 1.2;
 /// Number of observations above which the scan uses every second one, with twice as many every
 /// fourth, and so on. A heuristic: with 150 of 300, surfaces of two scales and surfaces with edges
@@ -112,9 +112,11 @@ impl FitState {
         let is_recent = |last: &&Fit| count as f64 <= SCAN_AGAIN * last.scanned_at as f64;
         let last = self.last.as_ref();
         let is_searched = sought.is_signal_searched() || observations.has_known_errors();
+        // Factors of heights alone are kept from scan to scan; others would be computed anew.
         let is_plain = !observations.has_slopes() && !is_searched;
-        let is_kept = last.is_some() && count <= SCAN_ALWAYS && is_plain;
-        let recent = last.filter(is_recent).filter(|_| count > SCAN_ALWAYS || is_searched);
+        let is_cheap = count <= SCAN_ALWAYS && is_plain;
+        let is_kept = last.is_some() && is_cheap;
+        let recent = last.filter(is_recent).filter(|_| !is_cheap);
         let mut in_half = 0;
         if !observations.is_empty() {
             if let Some(last) = last {
