@@ -55,8 +55,8 @@ const CUBES: f64 = 2e8;
 const TRIED_MIN: f64 = 3.0;
 const TRIED_MAX: f64 = 60.0;
 
-/// Number of rows of the covariance above which hyperparameters are kept until the observations have
-/// grown by this factor since the last search.
+/// Number of rows of the covariance above which hyperparameters are kept until the observations
+/// have grown by this factor since the last search.
 // heuristic: a search costs four factorisations, 30 ms of this order; between, one is left.
 const KEPT_ROWS: usize = 1000;
 const SEARCH_AGAIN: f64 = 1.05;
