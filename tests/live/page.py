@@ -216,6 +216,7 @@ def main() -> None:
             subprocess.run(run, cwd=folder, check=True, stdout=subprocess.DEVNULL)
             with Live(args.program, f"{folder}/run") as replay:
                 page.goto(replay.url)
+                expect(page.locator("#panels canvas").first).to_be_visible(timeout=LONGEST_MS)
                 when(lambda: is_drawn(page, 0), "the belief of a replay is not drawn")
                 other = 1 - page.evaluate("told.trial")
                 contacts = page.evaluate("JSON.stringify(data.planners[0].contacts)")
