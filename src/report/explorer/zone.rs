@@ -50,7 +50,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
 
 const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \
                     Green: the true surface in front of the belief. Mauve: believed to be out of the \
-                    finger's reach. Lines join equal heights. Drag the surface to turn it and the slider to step through the touches, or press the \
+                    finger's reach. Lines join equal heights; the dark one is the silhouette. Drag the surface to turn it and the slider to step through the touches, or press the \
                     arrow keys.";
 
 // Largest number of places along the side of a curve and of a surface.
