@@ -250,6 +250,7 @@ growth-hypotheses: setup
 	cargo bench --locked --bench hypotheses
 
 # Compares Palpate with scikit-learn and egobox, in a separate environment.
+# BoTorch's packages take 3 GB.
 bench-peers: setup $(DEPS)/peers/bin/python
 	cargo build --release --locked
 	$(DEPS)/peers/bin/python benches/peers.py

@@ -6,7 +6,7 @@ use super::new::{self, Written};
 use super::prepare::{connect_arm, load_experiment, planners_setting, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::run::with_planners;
-use super::terminal::{Outcome, Verbosity, error, print, quoted};
+use super::terminal::{Outcome, Verbosity, command_line, error, print};
 use crate::experiment::Experiment;
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{RESOLVED, Run, RunFolder};
@@ -75,12 +75,21 @@ pub(super) struct Args {
 impl Args {
     /// Returns the command that continues the run of a real arm after a fault.
     fn command_after_fault(&self) -> String {
-        let path = self.path.iter().map(|path| quoted(&path.to_string_lossy()));
-        let out = self.out.iter().map(|out| format!("--out {}", quoted(&out.to_string_lossy())));
-        let sets = self.set.iter().map(|set| format!("--set {}", quoted(set)));
-        let planners = self.planner.iter().map(|name| format!("--planner {}", quoted(name)));
-        let words: Vec<String> = path.chain(out).chain(sets).chain(planners).collect();
-        format!("palpate live {} --clear-fault", words.join(" "))
+        let text = |path: &PathBuf| path.to_string_lossy().into_owned();
+        let path = self.path.as_ref().map(text).unwrap_or_default();
+        let valued = [
+            ("set", self.set.clone()),
+            ("out", self.out.iter().map(text).collect()),
+            ("planner", self.planner.clone()),
+            ("listen", vec![self.listen.to_string()]),
+        ];
+        let flags = [
+            ("hold", self.hold),
+            ("approve", self.approve),
+            ("no-browser", self.no_browser),
+            ("clear-fault", true),
+        ];
+        command_line(&["palpate", "live", &path], &valued, &flags)
     }
 }
 
@@ -115,8 +124,9 @@ pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Re
         match live.explore(experiment, path) {
             Ok(done) => outcome = done,
             Err(failure) => {
-                live.server.alert(format!("{failure:#}"));
-                error(format!("{failure:#}"));
+                let words = format!("{failure:#}");
+                live.server.alert(words.clone());
+                error(words);
             }
         }
     }
@@ -347,7 +357,20 @@ fn open_browser(url: &str) {
 
 #[cfg(test)]
 mod tests {
-    use super::{address, file_name};
+    use super::{Args, address, file_name};
+    use clap::{Args as _, FromArgMatches};
+
+    #[test]
+    fn the_command_after_a_fault_asks_as_before_and_does_not_start_again() {
+        let given =
+            "live real_arm --planner human --set trials=2 --approve --fresh --listen 0.0.0.0:80";
+        let parser = Args::augment_args(clap::Command::new("live"));
+        let mut found = parser.get_matches_from(given.split(' '));
+        let command = Args::from_arg_matches_mut(&mut found).unwrap().command_after_fault();
+        let expected = "palpate live real_arm --set trials=2 --planner human --listen 0.0.0.0:80 \
+                        --approve --clear-fault";
+        assert_eq!(command, expected);
+    }
 
     #[test]
     fn names_of_files_stay_in_their_folder() {

@@ -7,7 +7,7 @@ use super::plan::plan;
 use super::prepare::{connect_arm, planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::step::{Stepper, is_unregistered};
-use super::terminal::{Outcome, Verbosity, error, print, quoted};
+use super::terminal::{Outcome, Verbosity, command_line, error, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
@@ -128,22 +128,17 @@ impl Args {
 
     /// Returns the command that continues this run of a real arm after a fault.
     fn command_after_fault(&self) -> String {
-        let mut command = format!("palpate run {}", quoted(&self.experiment.to_string_lossy()));
-        let out = self.out.as_ref().map(|out| out.to_string_lossy().into_owned());
-        let valued = (self.set.iter().map(|set| ("set", set)))
-            .chain(out.iter().map(|out| ("out", out)))
-            .chain(self.planner.iter().map(|planner| ("planner", planner)));
-        valued.for_each(|(name, value)| command += &format!(" --{name} {}", quoted(value)));
+        let out = self.out.iter().map(|out| out.to_string_lossy().into_owned()).collect();
+        let valued = [("set", self.set.clone()), ("out", out), ("planner", self.planner.clone())];
         let flags = [
             ("record", self.record),
             ("step", self.step),
             ("no-step", self.no_step),
             ("no-report", self.no_report),
             ("json", self.json),
+            ("clear-fault", true),
         ];
-        let given = flags.iter().filter(|(_, is_given)| *is_given);
-        given.for_each(|(name, _)| command += &format!(" --{name}"));
-        command + " --clear-fault"
+        command_line(&["palpate", "run", &self.experiment.to_string_lossy()], &valued, &flags)
     }
 }
 

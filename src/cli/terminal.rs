@@ -63,6 +63,21 @@ pub(super) fn quoted(word: &str) -> String {
     }
 }
 
+/// Returns a command line of words, options with values and flags, quoted for a shell.
+pub(super) fn command_line(
+    words: &[&str],
+    valued: &[(&str, Vec<String>)],
+    flags: &[(&str, bool)],
+) -> String {
+    let mut line: Vec<String> = words.iter().map(|word| quoted(word)).collect();
+    for (name, values) in valued {
+        line.extend(values.iter().map(|value| format!("--{name} {}", quoted(value))));
+    }
+    let given = flags.iter().filter(|(_, is_given)| *is_given);
+    line.extend(given.map(|(name, _)| format!("--{name}")));
+    line.join(" ")
+}
+
 /// Prints to stderr; write errors are ignored.
 pub(super) fn print_stderr(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");

@@ -242,7 +242,9 @@ impl Desk {
                 let tracks = self.experiment.planners.iter().zip(&mut state.tracks);
                 for (planner, track) in tracks {
                     let is_its = |row: &&TrialRow| row.trial == trial && row.planner == *planner;
-                    state.rows.iter().find(is_its).into_iter().for_each(|row| track.end(row));
+                    if let Some(row) = state.rows.iter().find(is_its) {
+                        track.end(row);
+                    }
                 }
             }
             is_shown
