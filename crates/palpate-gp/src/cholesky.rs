@@ -70,6 +70,16 @@ impl Factor {
         Ok(())
     }
 
+    /// Returns the order of A.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// Returns the bytes held.
+    pub fn bytes(&self) -> usize {
+        self.rows.capacity() * size_of::<f64>()
+    }
+
     /// Removes the last rows and columns of A, down to `order`.
     pub fn truncate(&mut self, order: usize) {
         self.order = self.order.min(order);

@@ -9,6 +9,9 @@ use super::simd::{dot, widest_fn};
 /// Number of rows per block: single-precision numbers in a vector of 256 bits.
 const LANES: usize = 8;
 
+/// Number of sums that the processor adds in parallel.
+const SUMS: usize = 8;
+
 /// Smallest pivot as a fraction of its diagonal; smaller ones are replaced by it, since a nearly
 /// singular matrix has no factor in single precision; a heuristic.
 const LEAST_PIVOT: f64 = 1e-9;
@@ -154,11 +157,11 @@ impl Triangle {
                 true => &beside[..known.len()],
                 false => &beside[width - known.len()..],
             };
-            let mut sums = [[0.0; LANES]; 4];
-            let (values, rest) = x[known].as_chunks::<4>();
-            let (columns, rest_columns) = beside.as_chunks::<4>();
+            let mut sums = [[0.0; LANES]; SUMS];
+            let (values, rest) = x[known].as_chunks::<SUMS>();
+            let (columns, rest_columns) = beside.as_chunks::<SUMS>();
             for (columns, values) in columns.iter().zip(values) {
-                for part in 0..4 {
+                for part in 0..SUMS {
                     for lane in 0..LANES {
                         sums[part][lane] += columns[part][lane] * values[part];
                     }
@@ -172,7 +175,8 @@ impl Triangle {
             let mut left = [0.0; LANES];
             left[..last - first].copy_from_slice(&x[first..last]);
             for lane in 0..LANES {
-                left[lane] -= (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane]);
+                let [a, b, c, d, e, f, g, h] = sums.map(|sum| sum[lane]);
+                left[lane] -= ((a + e) + (b + f)) + ((c + g) + (d + h));
             }
             let [mut even, mut odd] = [[0.0; LANES]; 2];
             for (j, (column, left)) in inverse.iter().zip(left).enumerate() {

@@ -79,18 +79,26 @@ impl Compliance {
         }
     }
 
-    /// Returns the displacement of one node along its normal per newton along the normal of
-    /// another, in m/N.
-    #[inline]
-    pub fn between(&self, own: (usize, &Quad), other: (usize, &Quad)) -> f64 {
-        let ((p, normal_p), (q, normal_q)) =
-            if own.0 < other.0 { (other, own) } else { (own, other) };
-        let block = &self.blocks[p * (p + 1) / 2 + q];
-        let row = |a: usize| {
-            let [x, y, z] = block[a].map(f64::from);
-            x * normal_q[0] + y * normal_q[1] + z * normal_q[2]
-        };
-        normal_p[0] * row(0) + normal_p[1] * row(1) + normal_p[2] * row(2)
+    /// Writes the displacement of each point along its normal per newton along the normal of
+    /// another, in m/N, by rows; a point is the index of a node with a normal.
+    pub fn between(&self, points: &[(usize, Quad)], softness_m_n: &mut Vec<f64>) {
+        let count = points.len();
+        softness_m_n.resize(count * count, 0.0);
+        for (i, (p, normal_p)) in points.iter().enumerate() {
+            let normal_p = normal_p.map(|x| x as f32);
+            for (j, (q, normal_q)) in points[..=i].iter().enumerate() {
+                let normal_q = normal_q.map(|x| x as f32);
+                let (high, low, rows, columns) =
+                    if p < q { (q, p, normal_q, normal_p) } else { (p, q, normal_p, normal_q) };
+                let mut sum = 0.0;
+                for (row, across) in self.blocks[high * (high + 1) / 2 + low].iter().zip(rows) {
+                    sum +=
+                        across * (row[0] * columns[0] + row[1] * columns[1] + row[2] * columns[2]);
+                }
+                softness_m_n[i * count + j] = f64::from(sum);
+                softness_m_n[j * count + i] = f64::from(sum);
+            }
+        }
     }
 
     /// Returns the bytes held.

@@ -12,7 +12,7 @@
 
 use super::membrane::{ContactSpring, Membrane, NodeContact, ShellState};
 use nalgebra::Vector3;
-use palpate_gp::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest};
+use palpate_gp::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest, widest_dot};
 
 /// Convergence threshold: predicted gain of a correction, relative to the energy. Force and
 /// pressure are then within 0.5 % (measured, 1.5 mm deep on a plane at three pitches, ticks of 10
@@ -48,6 +48,7 @@ impl Membrane {
     pub fn settle(&self, pushes: &[NodeContact], state: &mut ShellState) {
         let mut energy_j = self.extrapolate(pushes, state);
         for correction in 0..CORRECTIONS {
+            self.sheet.differentiate(&mut state.here.strained);
             if state.fluid_age.is_multiple_of(FLUID_AGES) {
                 self.update_fluid_compliance(state);
             }
@@ -88,7 +89,7 @@ impl Membrane {
             *went_m = -here_m;
         }
         if times != 0.0 {
-            self.sheet.strain(&there.moved_m, &mut there.strained);
+            self.sheet.stretch(&there.moved_m, &mut there.strained);
             let there_j = self.held_j(pushes, there);
             if there_j < energy_j {
                 std::mem::swap(here, there);
@@ -156,6 +157,9 @@ impl Membrane {
             reaction_m,
             residual_n,
             halves,
+            linked,
+            sheet_m_n,
+            swells_m_pa,
             ..
         } = state;
         let fluid_pa_m3 = state.fluid_pa_m3;
@@ -169,26 +173,26 @@ impl Membrane {
         unbalanced.for_each(|(force_n, residual_n)| *force_n = -residual_n as f32);
         yields(correction_m);
         springs.force_n.extend(links.iter().map(|link| link.force_n));
-        springs.free_m.resize(links.len(), 0.0);
-        springs.softness_m_n.resize(links.len() * links.len(), 0.0);
-        let swells =
-            |link: &ContactSpring| dot_quad(&link.normal_t, &to_f64(&fluid_m_pa[3 * link.place..]));
-        for (i, own) in links.iter().enumerate() {
-            let moved_m = to_f64(&correction_m[3 * own.place..]);
-            springs.free_m[i] += own.overlap_m - dot_quad(&own.normal_t, &moved_m);
-            let swelling = fluid_pa_m3 * swells(own);
-            for (j, other) in links[..=i].iter().enumerate() {
-                let sheet_m_n = self
-                    .softness
-                    .between((own.place, &own.normal_t), (other.place, &other.normal_t));
-                let softness_m_n = sheet_m_n - swelling * swells(other);
-                springs.softness_m_n[i * links.len() + j] = softness_m_n;
-                springs.softness_m_n[j * links.len() + i] = softness_m_n;
-                springs.free_m[i] += softness_m_n * other.force_n;
-                if j < i {
-                    springs.free_m[j] += softness_m_n * own.force_n;
-                }
+        let at = |link: &ContactSpring| (link.place, link.normal_t);
+        if !links.iter().map(at).eq(linked.iter().copied()) {
+            linked.clear();
+            linked.extend(links.iter().map(at));
+            self.softness.between(linked, sheet_m_n);
+        }
+        swells_m_pa.clear();
+        swells_m_pa
+            .extend(linked.iter().map(|(place, n)| dot_quad(n, &to_f64(&fluid_m_pa[3 * place..]))));
+        springs.softness_m_n.resize(sheet_m_n.len(), 0.0);
+        let rows = springs.softness_m_n.chunks_exact_mut(links.len().max(1));
+        let rows = rows.zip(sheet_m_n.chunks_exact(links.len().max(1)));
+        for ((own, swells), (row, sheet_m_n)) in links.iter().zip(&*swells_m_pa).zip(rows) {
+            let swelling = fluid_pa_m3 * swells;
+            for ((entry, sheet_m_n), other) in row.iter_mut().zip(sheet_m_n).zip(&*swells_m_pa) {
+                *entry = sheet_m_n - swelling * other;
             }
+            let moved_m = to_f64(&correction_m[3 * own.place..]);
+            let held_m = widest_dot(row, &springs.force_n);
+            springs.free_m.push(own.overlap_m - dot_quad(&own.normal_t, &moved_m) + held_m);
         }
         springs.solve();
         reaction_m.fill(0.0);
@@ -257,7 +261,7 @@ impl Membrane {
                 let [x, y, z, _] = to_f64(correction_m);
                 there.moved_m[k] = here.moved_m[k] + Vector3::new(x, y, z) * part;
             }
-            self.sheet.strain(&there.moved_m, &mut there.strained);
+            self.sheet.stretch(&there.moved_m, &mut there.strained);
             let there_j = self.held_j(pushes, there);
             let freed_j = energy_j - there_j;
             if freed_j >= ARMIJO * part * promised_j {

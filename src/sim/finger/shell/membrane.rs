@@ -61,6 +61,12 @@ pub struct ShellState {
     pushes: Vec<NodeContact>,
     pub(super) links: Vec<ContactSpring>,
     pub(super) springs: UnilateralSprings,
+    /// Places and normals of `links` for which the sheet's compliance is known, and it, by rows, in
+    /// m/N.
+    pub(super) linked: Vec<(usize, Quad)>,
+    pub(super) sheet_m_n: Vec<f64>,
+    /// Displacement of each link along its normal per pressure of the fluid, in m/Pa.
+    pub(super) swells_m_pa: Vec<f64>,
     pub(super) residual_n: Vec<f64>,
     pub(super) correction_m: Vec<f32>,
     pub(super) reaction_m: Vec<f32>,
@@ -131,6 +137,9 @@ impl Membrane {
             pushes: Vec::new(),
             links: Vec::new(),
             springs: UnilateralSprings::default(),
+            linked: Vec::new(),
+            sheet_m_n: Vec::new(),
+            swells_m_pa: Vec::new(),
             residual_n: vec![0.0; size],
             correction_m: vec![0.0; size],
             reaction_m: vec![0.0; size],
@@ -262,6 +271,8 @@ impl ShellState {
             + self.pushes.capacity() * size_of::<NodeContact>()
             + self.links.capacity() * size_of::<ContactSpring>()
             + self.springs.bytes()
+            + self.linked.capacity() * size_of::<(usize, Quad)>()
+            + (self.sheet_m_n.capacity() + self.swells_m_pa.capacity()) * size_of::<f64>()
             + self.residual_n.capacity() * size_of::<f64>()
             + singles.map(|values| values.capacity() * size_of::<f32>()).iter().sum::<usize>()
     }
