@@ -109,13 +109,14 @@ impl MeshBvh {
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
     ) -> Option<RayHit> {
-        self.ray_near(&MeshParts::WHOLE, origin, direction, max_distance_m)
+        self.ray_near((&MeshParts::WHOLE, None), origin, direction, max_distance_m)
     }
 
-    /// Returns the first intersection of a ray that stays in the ball of `near`.
+    /// Returns the first intersection of a ray that stays in the ball of `near`. A good `guess` of
+    /// the triangle that it meets spares most others.
     pub fn ray_near(
         &self,
-        near: &MeshParts,
+        (near, guess): (&MeshParts, Option<u32>),
         origin: &Point3<f64>,
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
@@ -123,21 +124,20 @@ impl MeshBvh {
         let slab = SingleSlab::new(&(origin - self.centre), direction);
         let line = Line::along(direction);
         let mut hit = None;
-        self.visit(
-            near,
-            max_distance_m.next_up(),
-            |node| slab.enter_m(node),
-            |triangle, limit_m| {
-                let distance_m = line.distance_m(origin, &self.corners(triangle));
-                match distance_m.filter(|distance_m| (0.0..limit_m).contains(distance_m)) {
-                    Some(distance_m) => {
-                        hit = Some((distance_m, triangle));
-                        distance_m
-                    }
-                    None => limit_m,
+        let mut ask = |triangle: u32, limit_m: f64| {
+            let distance_m = line.distance_m(origin, &self.corners(triangle));
+            match distance_m.filter(|distance_m| (0.0..limit_m).contains(distance_m)) {
+                Some(distance_m) => {
+                    hit = Some((distance_m, triangle));
+                    distance_m
                 }
-            },
-        );
+                None => limit_m,
+            }
+        };
+        let limit_m = max_distance_m.next_up();
+        let guess = guess.filter(|triangle| (*triangle as usize) < self.mesh.triangles().len());
+        let limit_m = guess.map_or(limit_m, |triangle| ask(triangle, limit_m));
+        self.visit(near, limit_m, |node| slab.enter_m(node), ask);
         hit.map(|(distance_m, triangle)| RayHit {
             distance_m,
             triangle,
@@ -489,6 +489,7 @@ mod tests {
             from in prop::array::uniform3(-0.5..0.5f64),
             towards in prop::array::uniform3(-1.0..1.0f64),
             part in 0.0..1.0f64,
+            guess in prop::option::of(0..2000u32),
         ) {
             let bvh = sheet();
             let centre = Point3::from(centre);
@@ -498,10 +499,9 @@ mod tests {
                 return Ok(());
             };
             let max_m = (radius_m - (start - centre).norm()).max(0.0);
-            let distance_m = |near: &MeshParts| {
-                bvh.ray_near(near, &start, &direction, max_m).map(|hit| hit.distance_m)
-            };
-            prop_assert_eq!(distance_m(&near), distance_m(&MeshParts::WHOLE));
+            let hit = bvh.ray_near((&near, guess), &start, &direction, max_m);
+            let whole_m = bvh.ray(&start, &direction, max_m).map(|hit| hit.distance_m);
+            prop_assert_eq!(hit.map(|hit| hit.distance_m), whole_m);
             let touches = |near: &MeshParts| bvh.touches_near(near, &start, part * max_m);
             prop_assert_eq!(touches(&near), touches(&MeshParts::WHOLE));
         }

@@ -18,7 +18,8 @@ pub fn extent<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<[
 /// zero counts as inside: a line through an edge or a vertex always meets a triangle there.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    axes: [usize; 3],
+    /// Axis along which the direction is longest.
+    z: usize,
     shear: [f64; 3],
 }
 
@@ -28,14 +29,28 @@ impl Line {
         let z = direction.iamax();
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let shear = [direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]];
-        Self { axes: [x, y, z], shear }
+        Self { z, shear }
     }
 
     /// Returns the signed distance from `origin` along the line to the triangle, in metres; `None`
     /// if the line misses it or lies in its plane.
     #[inline]
     pub fn distance_m(&self, origin: &Point3<f64>, triangle: &[Point3<f64>; 3]) -> Option<f64> {
-        let [x, y, z] = self.axes;
+        // With constant axes, coordinates stay in registers.
+        match self.z {
+            0 => self.along_m::<0>(origin, triangle),
+            1 => self.along_m::<1>(origin, triangle),
+            _ => self.along_m::<2>(origin, triangle),
+        }
+    }
+
+    #[inline(always)]
+    fn along_m<const Z: usize>(
+        &self,
+        origin: &Point3<f64>,
+        triangle: &[Point3<f64>; 3],
+    ) -> Option<f64> {
+        let (x, y, z) = ((Z + 1) % 3, (Z + 2) % 3, Z);
         let [sx, sy, sz] = self.shear;
         let [a, b, c] = triangle.map(|corner| {
             let arm = corner - origin;

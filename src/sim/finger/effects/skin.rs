@@ -95,6 +95,8 @@ pub struct Skin {
 pub struct SkinState {
     touches: Vec<SkinContact>,
     vicinity: NearbyPatches,
+    /// Triangle that each sample's ray met last.
+    met: Vec<Option<u32>>,
     shell: Option<ShellState>,
     /// Inward motion of the skin's inner side at each sample, in metres.
     pub inward_m: Vec<f64>,
@@ -109,6 +111,7 @@ impl SkinState {
         self.shell.as_ref().map_or(0, ShellState::bytes)
             + self.vicinity.bytes()
             + self.touches.capacity() * size_of::<SkinContact>()
+            + self.met.capacity() * size_of::<Option<u32>>()
             + numbers * size_of::<f64>()
     }
 
@@ -179,6 +182,7 @@ impl Skin {
         SkinState {
             touches: Vec::with_capacity(self.samples.len()),
             vicinity: self.patches.nearby_patches(),
+            met: vec![None; self.samples.len()],
             shell: self.shell.as_ref().map(Membrane::relaxed),
             inward_m: vec![0.0; self.samples.len()],
             indentation_m: vec![0.0; self.samples.len()],
@@ -222,7 +226,7 @@ impl Skin {
 
     /// Collects the rays that meet the object.
     fn collect_contacts(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, pressed: &mut SkinState) {
-        let SkinState { touches, vicinity, .. } = pressed;
+        let SkinState { touches, vicinity, met, .. } = pressed;
         let (skipped_m, near) = self.patches.near(bvh, x_wt, vicinity);
         for (range, near) in near {
             for i in range.clone() {
@@ -231,8 +235,9 @@ impl Skin {
                 let direction_w = x_wt.rotation * sample.direction;
                 let start_w = x_wt * sample.start + direction_w.scale(skipped_m);
                 let reach_m = outer_m + self.bulge_m - skipped_m;
-                let hit = bvh.ray_near(near, &start_w, &direction_w, reach_m);
+                let hit = bvh.ray_near((near, met[i]), &start_w, &direction_w, reach_m);
                 if let Some(hit) = hit {
+                    met[i] = Some(hit.triangle);
                     let slope = hit.normal.dot(&direction_w);
                     let facing = hit.normal * -slope.signum();
                     let indentation_m = outer_m - skipped_m - hit.distance_m;
