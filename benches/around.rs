@@ -1,8 +1,9 @@
 //! Cost of the exploration of a whole object as touches grow: `make growth-around`.
 //!
-//! `active` chooses the touches on a mug. The update with its refit, the choice of the next touch,
-//! and the mesh of the surface are timed on one thread. Prints a table with measured exponents and
-//! draws `docs/growth-around.svg` and `.png`.
+//! `active` chooses the first 300 touches on a mug, a Sobol sequence the others. The update with
+//! and without a search of the hyperparameters, the choice of the next touch, and the mesh of the
+//! surface are timed on one thread. Prints a table with measured exponents and draws
+//! `docs/growth-around.svg` and `.png`.
 
 #[path = "common/curves.rs"]
 mod curves;
@@ -19,8 +20,16 @@ use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
-const COUNTS: [usize; 9] = [5, 10, 20, 40, 60, 100, 150, 220, 300];
+/// Counts at which choice and mesh are timed.
+const COUNTS: [usize; 13] = [5, 10, 20, 40, 60, 100, 150, 220, 300, 600, 1000, 2000, 3000];
+/// Touches by a Sobol sequence at first, and the last that `active` chooses.
+const BEGIN: usize = 5;
+const CHOSEN: usize = 300;
+/// Touches before each count after which the belief is updated: the first update searches, the
+/// second factors with the new hyperparameters, the third extends.
+const UPDATED: usize = 3;
 const CELLS: u32 = 64;
 
 fn main() -> anyhow::Result<()> {
@@ -35,47 +44,51 @@ fn main() -> anyhow::Result<()> {
     let mut belief = Belief::new(task, (finger, false), &gp, &SpatialGpSettings::default());
     let make = |name| planner::by_name(name).ok_or(anyhow::anyhow!("no planner {name}"));
     let mut planner = (make("active")?.make)(&Default::default(), stream(1, 0, "active"));
-    let mut begin = (make("sobol")?.make)(&Default::default(), stream(1, 0, "begin"));
+    let mut other = (make("sobol")?.make)(&Default::default(), stream(1, 0, "begin"));
     let mut probe = exact_probe(Arc::clone(&environment));
     let curve = |name, colour, expected| Curve { name, colour, expected, values: Vec::new() };
-    let mut refit = curve("update with refit", "#0072b2", 3.0);
+    let mut searched = curve("update with a search", "#0072b2", 3.0);
+    let mut extended = curve("update without", "#56b4e9", 2.0);
     let mut choice = curve("choice of the next touch", "#d55e00", 2.0);
-    let mut both = curve("both", style::TRUTH, 3.0);
     let mut mesh = curve("mesh, 64 cells along a side", "#e69f00", 1.0);
-    for count in 1..=COUNTS[COUNTS.len() - 1] {
-        let plan = if count <= 5 { begin.plan(&belief) } else { planner.plan(&belief) }?;
-        let approach = task.approach(&plan.target).unwrap();
-        let touch = probe.touch(&approach)?;
-        let before = belief.clone();
-        let update = |belief: &mut Belief| {
+    let mut count = 0;
+    for last in COUNTS {
+        let n = last as f64;
+        let (mut search_s, mut extension_s) = (None, None);
+        while count < last {
+            let is_chosen = (BEGIN..CHOSEN).contains(&count);
+            let plan = if is_chosen { planner.plan(&belief) } else { other.plan(&belief) }?;
+            let Some(approach) = task.approach(&plan.target) else { continue };
+            let touch = probe.touch(&approach)?;
             belief.observe(&plan.target, &approach, (&touch, probe.swept_volume().as_ref()));
-            belief.refit().map(|_| ())
-        };
-        update(&mut belief)?;
-        if !COUNTS.contains(&count) {
-            continue;
+            count += 1;
+            let is_near = count + UPDATED > last;
+            if count > CHOSEN && !is_near {
+                continue;
+            }
+            let begun = Instant::now();
+            let factorisations = belief.refit()?.factorisations;
+            let updated_s = Some(begun.elapsed().as_secs_f64());
+            match factorisations {
+                0 => extension_s = updated_s,
+                1 => {}
+                _ => search_s = updated_s,
+            }
         }
-        let n = count as f64;
-        let copied = seconds(|| {
-            black_box(before.clone());
-        });
-        let updated = seconds(|| {
-            let mut again = before.clone();
-            let _ = black_box(update(&mut again));
-        });
+        searched.values.extend(search_s.map(|seconds| (n, seconds)));
+        extended.values.extend(extension_s.map(|seconds| (n, seconds)));
+        eprintln!("{count} touches");
         let chosen = seconds(|| {
             let _ = black_box(planner.plan(&belief));
         });
-        refit.values.push((n, updated - copied));
         choice.values.push((n, chosen));
-        both.values.push((n, updated - copied + chosen));
         let meshed = seconds(|| {
             let surface = belief.implicit_surface().and_then(|belief| belief.surface());
             black_box(surface.and_then(|surface| surface.mesh(CELLS)));
         });
         mesh.values.push((n, meshed));
     }
-    let curves = [refit, choice, both, mesh];
+    let curves = [searched, extended, choice, mesh];
     print("seconds", &curves);
     draw("growth-around", &[("seconds", &curves)])
 }

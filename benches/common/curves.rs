@@ -76,14 +76,18 @@ fn drawn(of: &str, panels: &[(&str, &[Curve])]) -> Option<String> {
 }
 
 pub fn print(unit: &str, curves: &[Curve]) {
-    let counts: String =
-        (curves.iter()).max_by_key(|curve| curve.values.len()).map_or(String::new(), |curve| {
-            curve.values.iter().map(|(n, _)| format!("{n:>10}")).collect()
-        });
-    println!("{:<34}{counts}", format!("{unit} at n ="));
+    let mut counts: Vec<f64> =
+        curves.iter().flat_map(|curve| &curve.values).map(|at| at.0).collect();
+    counts.sort_by(f64::total_cmp);
+    counts.dedup();
+    let header: String = counts.iter().map(|n| format!("{n:>10}")).collect();
+    println!("{:<34}{header}", format!("{unit} at n ="));
     for curve in curves {
-        let cells: String =
-            curve.values.iter().map(|(_, value)| format!("{value:>10.2e}")).collect();
+        let cell = |n: &f64| match curve.values.iter().find(|at| at.0 == *n) {
+            Some((_, value)) => format!("{value:>10.2e}"),
+            None => format!("{:>10}", "-"),
+        };
+        let cells: String = counts.iter().map(cell).collect();
         let (measured, expected) = (exponent(curve), curve.expected);
         println!("{:<34}{cells}   n^{measured:.2}, expected n^{expected}", curve.name);
     }

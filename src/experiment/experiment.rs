@@ -384,8 +384,8 @@ impl Experiment {
 }
 
 /// Maximum touches around an object; each adds seven values to the Gaussian process.
-// heuristic: the covariance then takes a gigabyte.
-const AROUND_TOUCHES_MAX: u32 = 1500;
+// heuristic: covariance and factor then take five gigabytes.
+const AROUND_TOUCHES_MAX: u32 = 3000;
 
 impl Validate for Experiment {
     fn check(&self, rules: &mut Rules) {

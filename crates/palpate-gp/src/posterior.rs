@@ -87,7 +87,8 @@ impl Posterior {
         Ok(())
     }
 
-    fn append(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
+    /// Adds an observation; the weights are then those without it.
+    pub(super) fn append(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
         let order = self.observations.order();
         let noise = self.hyperparameters.noise_ratio();
         let mut scratch = Scratch::default();
@@ -146,6 +147,26 @@ impl Posterior {
         let mut observations = self.observations.clone();
         places.for_each(|place| observations.push_height(place, 0.0));
         Self::new(self.kernel, self.hyperparameters.clone(), observations)
+    }
+
+    /// Replaces all heights and slopes by those that `values` returns for their numbers, and the
+    /// hyperparameters by some of the same ratios.
+    pub(super) fn revalue<'a>(
+        &mut self,
+        hyperparameters: Hyperparameters,
+        values: impl Fn(usize) -> (f64, &'a [f64]),
+    ) {
+        self.hyperparameters = hyperparameters;
+        self.observations.revalue(values);
+        self.whitened.clear();
+        self.weigh();
+    }
+
+    /// Returns yᵀA⁻¹y of the residuals y, and ln |A|, with the covariance s²·A.
+    pub(super) fn evidence(&self) -> (f64, f64) {
+        let pivot = |i: usize| self.factor.row(i)[i];
+        let logs = (0..self.factor.order()).map(|i| 2.0 * pivot(i).ln());
+        (widest_dot(&self.whitened, &self.whitened), logs.sum())
     }
 
     /// Computes the weights; for earlier observations only L⁻ᵀ is solved again.

@@ -61,6 +61,11 @@ const TRIED_MAX: f64 = 60.0;
 const KEPT_ROWS: usize = 1000;
 const SEARCH_AGAIN: f64 = 1.05;
 
+/// Largest number of rows of the covariance with which hyperparameters are searched; of more, every
+/// second observation is used, or every third, and so on.
+// heuristic: a few hundred touches fix one length and three standard deviations.
+const SEARCHED_ROWS: usize = 3000;
+
 /// First step of the first fit, first step of later fits, and smallest step, in logarithms;
 /// heuristics.
 const STEP_FIRST: f64 = 0.7;
@@ -161,7 +166,8 @@ impl ImplicitSurface {
     ///
     /// Coordinate search from the last optimum: a step along each parameter in turn, halved if none
     /// improves. The fit follows its optimum from touch to touch, and a large covariance is
-    /// factored only three times; a very large one is searched again after it has grown.
+    /// factored only three times; a very large one is searched again, with a part of the
+    /// observations, after it has grown, and extended in between.
     ///
     /// # Errors
     /// If the covariance of the touches cannot be factored.
@@ -170,23 +176,52 @@ impl ImplicitSurface {
         let (prior, observations) = self.observations(start.as_ref());
         let (fit, posterior) = match self.fit.take_if(|last| is_kept(last, &observations)) {
             Some(last) => self.keep(last, &observations)?,
-            None => (self.search(start.as_ref(), &observations)?, None),
+            None => {
+                let step = observations.order().div_ceil(SEARCHED_ROWS);
+                match step {
+                    0 | 1 => (self.search(start.as_ref(), &observations)?, None),
+                    _ => {
+                        let found = self.search(start.as_ref(), &observations.subsample(step))?;
+                        let found = Fit { scanned_at: observations.len(), ..found };
+                        self.conditioned(found, &observations)?
+                    }
+                }
+            }
         };
         self.conclude((prior, observations), start, (fit, posterior))
     }
 
     /// Returns the last fit with its likelihood of `observations`, and the posterior, unless errors
-    /// of cameras' poses are added to it.
+    /// of cameras' poses are added to it. The last posterior is extended, if that is possible.
     fn keep(
-        &self,
+        &mut self,
         last: Fit,
         observations: &Observations,
     ) -> Result<(Fit, Option<Posterior>), CovarianceError> {
-        let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
-        let log_likelihood = likelihood.value_gradient(&last.hyperparameters, &mut [])?;
+        let at = &last.hyperparameters;
         let is_whole = self.evidence.seen.is_empty();
-        let posterior = is_whole.then(|| likelihood.posterior(last.hyperparameters.clone()));
-        Ok((Fit { log_likelihood, factorisations: 1, ..last }, posterior))
+        let known = self.surface.take().filter(|_| is_whole).map(Surface::into_posterior);
+        let extended = known.and_then(|known| known.extended(at.clone(), observations));
+        if let Some((posterior, log_likelihood)) = extended {
+            return Ok((Fit { log_likelihood, factorisations: 0, ..last }, Some(posterior)));
+        }
+        self.conditioned(Fit { factorisations: 0, ..last }, observations)
+    }
+
+    /// Returns the fit with its likelihood of `observations`, and the posterior, unless errors of
+    /// cameras' poses are added to it.
+    fn conditioned(
+        &self,
+        fit: Fit,
+        observations: &Observations,
+    ) -> Result<(Fit, Option<Posterior>), CovarianceError> {
+        let at = &fit.hyperparameters;
+        let mut likelihood = Likelihood::new(self.kernel, MeanModel::Zero, observations);
+        let log_likelihood = likelihood.value_gradient(at, &mut [])?;
+        let is_whole = self.evidence.seen.is_empty();
+        let posterior = is_whole.then(|| likelihood.posterior(at.clone()));
+        let factorisations = fit.factorisations + 1;
+        Ok((Fit { log_likelihood, factorisations, ..fit }, posterior))
     }
 
     /// Conditions on all touches with the given fit, which started from `last`, e.g. to draw a

@@ -305,3 +305,74 @@ proptest! {
         }
     }
 }
+
+proptest! {
+    /// An extended posterior is the one that is factored anew, whatever changed: more
+    /// observations, other heights and slopes, another order, smaller noises; twice in a row.
+    #[test]
+    fn extended_as_if_factored_anew(
+        touches in any_touches(),
+        begun in 0usize..12,
+        changes in proptest::collection::vec((1.0..3.0f64, 1.0..3.0f64, -1.0..1.0f64), 12),
+        parameters in any_parameters(),
+        choice in 0usize..2,
+        at in [-1.0..1.0f64, -1.0..1.0f64],
+    ) {
+        let begun = begun % (touches.len() + 1);
+        let mut stages = [touches[..begun].to_vec(), touches[..begun].to_vec(), touches.clone()];
+        for (stage, touches) in stages.iter_mut().enumerate() {
+            for (touch, (first, second, rise)) in touches.iter_mut().zip(&changes) {
+                let noisier = if stage == 0 { first * second } else if stage == 1 { *first } else { 1.0 };
+                // Slopes keep their noise.
+                touch.noise *= if touch.slope.is_some() { 1.0 } else { noisier };
+                touch.height += rise * stage as f64;
+            }
+        }
+        stages[2].reverse();
+        let [first, second, last] = stages.map(|touches| all(&touches));
+        let kernel = kernel(choice);
+        let posterior = Posterior::new(kernel, parameters.clone(), first).unwrap();
+        prop_assume!(posterior.jitter() == 0.0);
+        let mut extended = posterior;
+        for observations in [&second, &last] {
+            let (next, log_likelihood) = extended.extended(parameters.clone(), observations).unwrap();
+            let anew = Posterior::new(kernel, parameters.clone(), observations.clone()).unwrap();
+            let mut likelihood = Likelihood::new(kernel, MeanModel::Zero, observations);
+            let twin = likelihood.value_gradient(&parameters, &mut []).unwrap();
+            let scale = 1.0 + twin.abs();
+            prop_assert!((log_likelihood - twin).abs() < 1e-8 * scale, "{log_likelihood} {twin}");
+            let scratch = &mut Scratch::default();
+            let [mean, variance] = [next.mean(&at, scratch), next.variance(&at, scratch)];
+            let off = [mean - anew.mean(&at, scratch), variance - anew.variance(&at, scratch)];
+            prop_assert!(off.iter().all(|off| off.abs() < 1e-7), "{off:?}");
+            extended = next;
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_extended() {
+    let touch = |x: f64, noise: f64| Touch { place: [x, 0.0], height: 0.3, slope: None, noise };
+    let parameters = Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![1.0, 1.0],
+        noise_sd: 0.1,
+        slope_noise_sd: 0.1,
+        mean: 0.0,
+    };
+    let begun = [touch(0.0, 1.0), touch(0.5, 1.0)];
+    let extended = |touches: &[Touch]| {
+        let posterior = Posterior::new(kernel(0), parameters.clone(), all(&begun)).unwrap();
+        posterior.extended(parameters.clone(), &all(touches)).is_some()
+    };
+    assert!(extended(&[touch(0.0, 1.0), touch(0.5, 0.9), touch(0.7, 1.0)]));
+    let fewer = [touch(0.0, 1.0)];
+    let noisier = [touch(0.0, 1.1), touch(0.5, 1.0)];
+    let twice = [touch(0.0, 1.0), touch(0.5, 1.0), touch(0.5, 1.0)];
+    let infinite = [touch(0.0, 1.0), touch(0.5, 1.0), touch(f64::INFINITY, 1.0)];
+    for touches in [&fewer[..], &noisier, &twice, &infinite] {
+        assert!(!extended(touches), "{touches:?}");
+    }
+    let sloped = Touch { slope: Some([0.1, 0.2]), ..touch(0.5, 1.0) };
+    assert!(!extended(&[touch(0.0, 1.0), sloped]));
+}

@@ -1,0 +1,91 @@
+//! Extension of a posterior by further observations without a new factorisation.
+
+use super::kernel::Hyperparameters;
+use super::likelihood;
+use super::observations::{Observation, Observations};
+use super::posterior::Posterior;
+use std::collections::HashMap;
+
+/// Relative difference between two precisions that counts as rounding.
+const ROUNDING: f64 = 1e-12;
+
+impl Posterior {
+    /// Conditions on `observations` with unchanged hyperparameters, and returns the posterior with
+    /// its log marginal likelihood; n² operations per new number. Heights, slopes and the order
+    /// of the observations may all have changed, and noises may have become smaller: a height with
+    /// a smaller noise is the same as two independent ones of that height, the earlier one and one
+    /// more, with the same sum of precisions.
+    ///
+    /// Returns `None` if only a new factorisation serves: with an observation less, a larger
+    /// noise, two observations at one place, errors of known size, or jitter.
+    pub fn extended(
+        mut self,
+        hyperparameters: Hyperparameters,
+        observations: &Observations,
+    ) -> Option<(Self, f64)> {
+        let [earlier, later] =
+            [self.observations(), observations].map(Observations::has_known_errors);
+        if earlier || later || self.jitter() != 0.0 || observations.first_not_finite().is_some() {
+            return None;
+        }
+        let key = |all: &Observations, i: usize| all.place(i).map(f64::to_bits).collect::<Vec<_>>();
+        let mut found = HashMap::with_capacity(observations.len());
+        for i in 0..observations.len() {
+            if found.insert(key(observations, i), i).is_some() {
+                return None;
+            }
+        }
+        let signal2 = hyperparameters.signal_sd.powi(2);
+        let ratio = hyperparameters.noise_ratio();
+        let mut twice = 0.0;
+        // Density of two heights of which the difference is 0, instead of one.
+        let mut halve = |noise2: f64| {
+            twice +=
+                0.5 * (2.0 * std::f64::consts::PI * signal2 * ratio.height.powi(2) * noise2).ln();
+        };
+        let mut precisions = vec![0.0; observations.len()];
+        let mut rows = Vec::with_capacity(self.observations().len());
+        for i in 0..self.observations().len() {
+            let at = *found.get(&key(self.observations(), i))?;
+            let noise2 = self.observations().height_noise2(i, 1.0.into());
+            let is_further = precisions[at] > 0.0;
+            if is_further {
+                halve(noise2 + 1.0 / precisions[at]);
+            } else if !self.observations().has_same_slope(i, observations, at) {
+                return None;
+            }
+            precisions[at] += 1.0 / noise2;
+            rows.push(at);
+        }
+        let mut place = Vec::new();
+        for (at, known) in precisions.iter().enumerate() {
+            let observation = observations.observation(at, &mut place);
+            let wanted = 1.0 / (observation.noise * observation.noise);
+            let missing = wanted - known;
+            if missing < -ROUNDING * wanted {
+                return None;
+            }
+            if *known == 0.0 {
+                self.append(&observation).ok()?;
+            } else if missing > ROUNDING * wanted {
+                halve(1.0 / missing + 1.0 / known);
+                let noise = missing.sqrt().recip();
+                self.append(&Observation { noise, slope: None, ..observation }).ok()?;
+            } else {
+                continue;
+            }
+            rows.push(at);
+        }
+        self.revalue(hyperparameters, |i| {
+            let at = rows[i];
+            (observations.heights()[at], observations.slope(at))
+        });
+        let (fit, log_determinant) = self.evidence();
+        let at = self.hyperparameters();
+        let order = self.observations().order();
+        let value = likelihood::of_height(fit, at.signal_sd, order, log_determinant);
+        let logs: f64 = at.length_scales.iter().map(|length| length.ln()).sum();
+        let log_likelihood = value + observations.slope_count() as f64 * logs + twice;
+        Some((self, log_likelihood))
+    }
+}
