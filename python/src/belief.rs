@@ -2,6 +2,7 @@
 
 use crate::ball::Ball;
 use crate::errors;
+use crate::fork;
 use crate::known::{Known, target_numbers};
 use crate::mesh::triangles_of;
 use crate::pickle::{self, Reduced, Version};
@@ -263,13 +264,13 @@ impl Belief {
         let places = Places::of(points, 3)?;
         let points_w: Vec<Point3<f64>> =
             places.each.iter().map(|place| Point3::from_slice(place)).collect();
-        let (means_m, sds_m) = points.py().detach(|| match surface {
+        let (means_m, sds_m) = fork::detach(points.py(), || match surface {
             Some(surface) => {
                 let mut field = surface.field();
                 (points_w.iter().map(|p_w| field.value(p_w)).collect(), surface.sds_m(&points_w))
             }
             None => (vec![f64::NAN; points_w.len()], vec![f64::NAN; points_w.len()]),
-        });
+        })?;
         Ok((places.reshape(points.py(), means_m)?, places.reshape(points.py(), sds_m)?))
     }
 
@@ -279,13 +280,13 @@ impl Belief {
     fn mesh<'py>(&self, py: Python<'py>, cells: u32) -> PyResult<Solid<'py>> {
         let surface = self.around("mesh")?.surface();
         errors::within("cells", cells, CELLS)?;
-        let (vertices, triangles, sds_m) = py.detach(|| {
+        let (vertices, triangles, sds_m) = fork::detach(py, || {
             let found = surface.and_then(|surface| Some((surface, surface.mesh(cells)?)));
             found.map_or_else(Default::default, |(surface, mesh)| {
                 let sds_m = surface.offsets_m(mesh.vertices());
                 (mesh.vertices().to_vec(), mesh.triangles().to_vec(), sds_m)
             })
-        });
+        })?;
         let (vertices, triangles) = triangles_of(py, &vertices, &triangles)?;
         Ok((vertices, triangles, PyArray1::from_vec(py, sds_m)))
     }

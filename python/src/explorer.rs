@@ -59,10 +59,10 @@ impl Exploration {
     /// Errors of the belief, named as in rows; None before the first touch.
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let measured = py.detach(|| {
+        let measured = fork::detach(py, || {
             let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).clone();
             self.truth.measure(&known, CELLS)
-        });
+        })?;
         let json = match measured {
             Some(BeliefErrors::Zone(metrics)) => serde_json::to_value(metrics),
             Some(BeliefErrors::Around(metrics)) => serde_json::to_value(metrics),

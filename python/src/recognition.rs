@@ -92,13 +92,12 @@ impl RecognitionEpisode {
             let words = format!("an action has {} numbers; allowed are {needed}", action.len());
             return Err(PyValueError::new_err(words));
         }
-        py.detach(|| {
+        fork::detach(py, || {
             let episode = &mut self.lock().episode;
             if !episode.is_over {
                 episode.touch(&action);
             }
-        });
-        Ok(())
+        })
     }
 
     /// Rows of the touches, one after another, their number, whether the episode has ended, and the

@@ -52,7 +52,9 @@ def explore(answers, envs):
     exploration = palpate.Exploration(scene)
     touch = exploration.touch(scene.ball.aim([0, 1, 0]))
     reward = None if envs is None else envs.reset(seed=0)[0]["count"].tolist()
-    answers.put((run.rows(), str(run), touch.outcome, exploration.metrics is not None, reward))
+    belief = exploration.belief
+    counts = len(belief.mesh()[0]), len(belief.field(touch.p_wc[None])[0])
+    answers.put((run.rows(), str(run), touch.outcome, exploration.metrics is not None, counts, reward))
 
 
 @pytest.mark.parametrize("context", CONTEXTS)
@@ -64,11 +66,11 @@ def test_runs_and_explorations_work_in_a_child(context, threads_of_the_parent):
     child = forks.Process(target=explore, args=(answers, envs))
     child.start()
     try:
-        rows, text, outcome, has_metrics, count = answers.get(timeout=LIMIT_S)
+        rows, text, outcome, has_metrics, (vertices, places), count = answers.get(timeout=LIMIT_S)
     finally:
         child.kill()
         child.join()
     run = palpate.Experiment.load("bird", touches=6, initial_touches=4, grid=5).run([own.Middle, "random"], 2)
     assert (rows, text) == (run.rows(), str(run))
-    assert outcome == "contact" and has_metrics
+    assert outcome == "contact" and has_metrics and vertices > 100 and places == 1
     assert count == ([5, 5] if context == "fork" else None)

@@ -15,7 +15,7 @@ const STEEPEST: f64 = 1.2;
 
 /// Values at the corners of cells; NaN where not evaluated.
 struct Grid<F> {
-    value: F,
+    values_at: F,
     low: Point3<f64>,
     cell_m: f64,
     /// Number of corners along each axis.
@@ -23,29 +23,29 @@ struct Grid<F> {
     values: Vec<f32>,
 }
 
-/// Returns vertices and triangles of the zero set of `value`, m, in a box with cells of `cell_m`.
-/// It is closed, since the surface is capped at the box.
+/// Returns vertices and triangles of the zero set of a field in a box with cells of `cell_m`; the
+/// field's values at some points, m, are those of `values_at`. It is closed, since the surface is
+/// capped at the box.
 pub fn zero_set(
     [low, high]: [Point3<f64>; 2],
     cell_m: f64,
-    value: impl FnMut(&Point3<f64>) -> f64,
+    values_at: impl Fn(&[Point3<f64>]) -> Vec<f64>,
 ) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
     // One empty cell on every side, and whole blocks.
     let low = low.map(|x| x - cell_m);
     let blocks = (high - low).map(|x| (x / cell_m).ceil() as usize + 1);
     let count = <[usize; 3]>::from(blocks).map(|cells| cells.div_ceil(COARSEST) * COARSEST + 1);
     let values = vec![f32::NAN; count.iter().product()];
-    let mut grid = Grid { value, low, cell_m, count, values };
+    let mut grid = Grid { values_at, low, cell_m, count, values };
     let mut blocks = grid.coarsest();
     let mut side = COARSEST;
     while side > 1 {
+        grid.evaluate(&blocks, side);
         blocks.retain(|block| grid.may_cross(*block, side));
         side /= 2;
         blocks = blocks.iter().flat_map(|block| corners(*block, side)).collect();
     }
-    for block in &blocks {
-        grid.corner_values(*block, 1);
-    }
+    grid.evaluate(&blocks, 1);
     let shape = RuntimeShape::<u32, 3>::new(count.map(|n| n as u32));
     debug_assert_eq!(shape.size() as usize, grid.values.len());
     let mut buffer = SurfaceNetsBuffer::default();
@@ -60,7 +60,7 @@ fn corners([i, j, k]: [usize; 3], side: usize) -> impl Iterator<Item = [usize; 3
     (0..8).map(move |c| [i + side * (c & 1), j + side * (c >> 1 & 1), k + side * (c >> 2)])
 }
 
-impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
+impl<F: Fn(&[Point3<f64>]) -> Vec<f64>> Grid<F> {
     fn coarsest(&self) -> Vec<[usize; 3]> {
         let [x, y, z] = self.count.map(|n| (0..n - 1).step_by(COARSEST));
         let rows = z.flat_map(|k| y.clone().map(move |j| (j, k)));
@@ -71,25 +71,31 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
         (k * self.count[1] + j) * self.count[0] + i
     }
 
-    /// Returns the value at a corner; never inside on the border of the box.
-    fn evaluate(&mut self, corner: [usize; 3]) -> f32 {
-        let index = self.index(corner);
-        if self.values[index].is_nan() {
-            let steps = Vector3::from(corner.map(|i| i as f64));
-            let value = (self.value)(&(self.low + steps * self.cell_m)) as f32;
-            let is_rim = corner.iter().zip(self.count).any(|(&i, n)| i == 0 || i + 1 == n);
-            let least = if is_rim { 1e-3 * self.cell_m as f32 } else { f32::NEG_INFINITY };
-            self.values[index] = value.max(least);
+    /// Computes the values at the corners of `blocks`; none is inside on the border of the box.
+    fn evaluate(&mut self, blocks: &[[usize; 3]], side: usize) {
+        let (mut places, mut points) = (Vec::new(), Vec::new());
+        for corner in blocks.iter().flat_map(|block| corners(*block, side)) {
+            let index = self.index(corner);
+            if self.values[index].is_nan() {
+                let is_rim = corner.iter().zip(self.count).any(|(&i, n)| i == 0 || i + 1 == n);
+                let least = if is_rim { 1e-3 * self.cell_m as f32 } else { f32::NEG_INFINITY };
+                // Marks the corner as taken.
+                self.values[index] = least;
+                places.push(index);
+                points.push(self.low + Vector3::from(corner.map(|i| i as f64)) * self.cell_m);
+            }
         }
-        self.values[index]
+        for (index, value) in places.into_iter().zip((self.values_at)(&points)) {
+            self.values[index] = (value as f32).max(self.values[index]);
+        }
     }
 
     /// Returns the smallest and largest value at the corners of a block.
-    fn corner_values(&mut self, block: [usize; 3], side: usize) -> [f32; 2] {
+    fn corner_values(&self, block: [usize; 3], side: usize) -> [f32; 2] {
         corners(block, side).fold(
             [f32::INFINITY, f32::NEG_INFINITY],
             |[least, greatest], corner| {
-                let value = self.evaluate(corner);
+                let value = self.values[self.index(corner)];
                 [least.min(value), greatest.max(value)]
             },
         )
@@ -164,7 +170,9 @@ mod tests {
         for centre in [[0.0; 3], [0.05, 0.0, 0.0], [-0.05, 0.02, 0.05], [0.0, 0.05, -0.05]] {
             let centre = Point3::from(centre);
             let corners = [Point3::from([-0.06; 3]), Point3::from([0.06; 3])];
-            let (vertices, triangles) = zero_set(corners, 0.004, |p| (p - centre).norm() - 0.04);
+            let (vertices, triangles) = zero_set(corners, 0.004, |points| {
+                points.iter().map(|p| (p - centre).norm() - 0.04).collect()
+            });
             assert!(triangles.len() > 100);
             let mut edges: HashMap<[u32; 2], i32> = HashMap::new();
             for [a, b, c] in triangles {

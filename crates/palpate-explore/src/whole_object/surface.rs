@@ -10,6 +10,8 @@ use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::extent;
 use palpate_gp::Posterior;
 use palpate_gp::means::MeanField;
+use rayon::iter::ParallelIterator;
+use rayon::slice::{ParallelSlice, ParallelSliceMut};
 
 /// A field over space with its uncertainty: negative inside the object, and approximately the
 /// distance near its surface.
@@ -39,6 +41,10 @@ const FLAT: f64 = 0.3;
 pub fn steepness(gradient: &Vector3<f64>) -> f64 {
     gradient.norm().max(FLAT)
 }
+
+/// Number of points evaluated by one thread.
+// heuristic: some tenths of a millisecond, and whole blocks of a batch of variances.
+const CHUNK: usize = 128;
 
 /// Number of Newton steps that move a vertex onto the surface, each at most one and a half cells; a
 /// heuristic.
@@ -76,7 +82,9 @@ impl Surface {
     pub fn sds_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
         let places: Vec<Vec<f64>> =
             points_w.iter().map(|p_w| p_w.coords.as_slice().into()).collect();
-        let mut variances = self.posterior.variances(&places, &mut []);
+        let variances = places.par_chunks(CHUNK);
+        let variances = variances.map(|places| self.posterior.variances(places, &mut []));
+        let mut variances: Vec<f64> = variances.flatten_iter().collect();
         for mut error in self.pose_errors.iter().cloned() {
             for (variance, place) in variances.iter_mut().zip(&places) {
                 *variance += error.value(place).powi(2);
@@ -99,6 +107,11 @@ impl Surface {
         &self.pose_errors
     }
 
+    /// Returns the posterior alone.
+    pub(super) fn into_posterior(self) -> Posterior {
+        self.posterior
+    }
+
     /// The posterior of the field given the poses of the cameras.
     pub fn posterior(&self) -> &Posterior {
         &self.posterior
@@ -117,21 +130,29 @@ impl Surface {
     pub fn mesh(&self, cells: u32) -> Option<Mesh> {
         let [low, high] = &self.bounds;
         let cell_m = (high - low).max() / f64::from(cells.max(1));
-        let mut field = self.field();
-        let (mut vertices, triangles) = zero_set([*low, *high], cell_m, |p_w| field.value(p_w));
+        let field = self.field();
+        let (mut vertices, triangles) = zero_set([*low, *high], cell_m, |points_w| {
+            let values = points_w.par_chunks(CHUNK).map_with(field.clone(), |field, points_w| {
+                points_w.iter().map(|p_w| field.value(p_w)).collect::<Vec<f64>>()
+            });
+            values.flatten_iter().collect()
+        });
         let triangles = touched_components(&vertices, triangles, &self.contacts);
-        for p_w in &mut vertices {
-            for _ in 0..STEPS {
-                let Field { value, gradient } = field.at(p_w);
-                let step = gradient * (value / gradient.norm_squared().max(FLAT * FLAT));
-                *p_w -= step.cap_magnitude(1.5 * cell_m);
+        vertices.par_chunks_mut(CHUNK).for_each_with(field, |field, vertices| {
+            for p_w in vertices {
+                for _ in 0..STEPS {
+                    let Field { value, gradient } = field.at(p_w);
+                    let step = gradient * (value / gradient.norm_squared().max(FLAT * FLAT));
+                    *p_w -= step.cap_magnitude(1.5 * cell_m);
+                }
             }
-        }
+        });
         Mesh::new(&vertices, &triangles).ok().map(|(mesh, _)| mesh)
     }
 }
 
 /// Evaluator of a surface's field at many points, with its own buffers.
+#[derive(Clone)]
 pub struct SurfaceField<'a> {
     prior: &'a PriorMean,
     mean: MeanField,
