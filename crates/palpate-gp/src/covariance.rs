@@ -126,8 +126,9 @@ fn with_slopes(
 }
 
 /// Number of entries up to which columns of a triangle are processed together: vector loops over
-/// single short columns would be half empty. A heuristic: they stay in the first-level cache.
-const BATCH: usize = 2048;
+/// single short columns would be half empty, and the derivatives of a single batch are kept for the
+/// gradient. A heuristic: they stay in the second-level cache.
+const BATCH: usize = 8192;
 
 /// Returns consecutive ranges of the columns 0..count of a lower triangle with about [`BATCH`]
 /// entries.
@@ -150,6 +151,10 @@ pub(super) struct Correlations {
     length_scales: Vec<f64>,
     entries: Vec<f64>,
     slopes: Vec<f64>,
+    /// Whether `slopes` belong to `entries`.
+    has_slopes: bool,
+    /// Whether a gradient will be requested.
+    pub(super) is_sloped: bool,
     /// Buffers for observations with slopes.
     pub(super) derivatives: DerivativeCovariance,
     pub(super) row: Vec<f64>,
@@ -167,7 +172,10 @@ impl Correlations {
     ) -> &[f64] {
         if self.columns != *columns || self.length_scales != length_scales {
             self.measure(observations, length_scales, columns);
-            kernel.correlate(&mut self.entries);
+            match self.is_sloped && *columns == (0..observations.len()) {
+                true => self.differentiate(kernel),
+                false => kernel.correlate(&mut self.entries),
+            }
         }
         &self.entries
     }
@@ -181,10 +189,19 @@ impl Correlations {
         length_scales: &[f64],
         columns: &Range<usize>,
     ) -> &mut [f64] {
-        self.measure(observations, length_scales, columns);
+        let is_known = self.columns == *columns && self.length_scales == length_scales;
+        if !(is_known && self.has_slopes) {
+            self.measure(observations, length_scales, columns);
+            self.differentiate(kernel);
+        }
+        self.has_slopes = false;
+        &mut self.slopes
+    }
+
+    fn differentiate(&mut self, kernel: &dyn Kernel) {
         self.slopes.resize(self.entries.len(), 0.0);
         kernel.correlate_slope(&mut self.entries, &mut self.slopes);
-        &mut self.slopes
+        self.has_slopes = true;
     }
 
     fn measure(
@@ -194,6 +211,7 @@ impl Correlations {
         columns: &Range<usize>,
     ) {
         self.columns.clone_from(columns);
+        self.has_slopes = false;
         self.length_scales.clear();
         self.length_scales.extend_from_slice(length_scales);
         observations.distances2_below(columns.clone(), length_scales, &mut self.entries);

@@ -172,10 +172,18 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Writes the second and third derivatives.
-    fn curve<'a, R: RadialKernel>(r2: &'a [f64], second: &'a mut [f64], third: &'a mut [f64]) -> () {
-        for (r2, (second, third)) in r2.iter().zip(second.iter_mut().zip(third)) {
+    /// Implements [`Kernel::correlate_derivatives`]; what both functions of a kernel compute is
+    /// computed once.
+    fn correlate_derivatives<'a, R: RadialKernel>(
+        r2: &'a mut [f64],
+        first: &'a mut [f64],
+        second: &'a mut [f64],
+        third: &'a mut [f64],
+    ) -> () {
+        let derivatives = first.iter_mut().zip(second).zip(third);
+        for (r2, ((first, second), third)) in r2.iter_mut().zip(derivatives) {
             (*second, *third) = R::curvatures(*r2);
+            (*r2, *first) = R::correlation_slope(*r2);
         }
     }
 }
@@ -194,8 +202,7 @@ impl<R: RadialKernel> Kernel for R {
     }
 
     fn correlate_derivatives(&self, r2: &mut [f64], [first, second, third]: [&mut [f64]; 3]) {
-        curve::<R>(r2, second, third);
-        self.correlate_slope(r2, first);
+        correlate_derivatives::<R>(r2, first, second, third);
     }
 }
 

@@ -62,6 +62,8 @@ pub mod batch;
 pub mod cholesky;
 pub mod covariance;
 pub mod dense;
+mod extension;
+mod factors;
 pub mod fit;
 pub mod inducing;
 pub mod kernel;

@@ -9,7 +9,8 @@ use super::observations::{NoiseRatio, Observations};
 use super::posterior::Posterior;
 use super::search_box::MeanModel;
 use super::search_box::SignalModel;
-use crate::math::simd::{widest, widest_dot};
+use crate::math::simd::{dot, widest_dot, widest_fn};
+use std::ops::Range;
 
 /// Log marginal likelihood of hyperparameters given fixed observations, with buffers kept between
 /// calls.
@@ -94,6 +95,7 @@ impl<'a> Likelihood<'a> {
     ) -> Result<f64, CovarianceError> {
         let lengths = &at.length_scales;
         let noise = at.noise_ratio();
+        self.correlations.is_sloped = !gradient.is_empty();
         self.factor(lengths, noise)?;
         let fit = self.whiten(at.mean, lengths);
         let value = self.value(at.signal_sd, lengths, fit);
@@ -129,6 +131,7 @@ impl<'a> Likelihood<'a> {
         gradient: Option<&mut [f64]>,
     ) -> Result<ProfiledLikelihood, CovarianceError> {
         let noise = noise_ratio.into();
+        self.correlations.is_sloped = gradient.is_some();
         let (fit, mean) = self.fit(length_scales, noise)?;
         let count = self.observations.order();
         let signal_sd = scale.signal_sd(fit, count, noise);
@@ -217,37 +220,13 @@ impl<'a> Likelihood<'a> {
             return self.gradient_with_slopes(signal2, lengths, noise, (by_length, by_noise));
         }
         let observations = self.observations;
-        let count = observations.len();
+        let Self { kernel, dense, weights, scratch, correlations, .. } = self;
         let mut trace = 0.0;
-        for columns in batches(count) {
-            let mut rest =
-                self.correlations.slopes_of(self.kernel, observations, lengths, &columns);
-            for j in columns {
-                let weight = self.weights[j] / signal2;
-                let [on, inverse @ ..] = self.dense.inverse_column(j) else { return };
-                trace +=
-                    (weight * self.weights[j] - on) * observations.height_noise2(j, 1.0.into());
-                let (slopes, others) = rest.split_at_mut(inverse.len());
-                rest = others;
-                let weights = &self.weights[j + 1..];
-                widest(|| {
-                    for ((slope, other), inverse) in slopes.iter_mut().zip(weights).zip(inverse) {
-                        *slope *= -2.0 * (weight * other - inverse);
-                    }
-                });
-                for (axis, (by_length, length)) in by_length.iter_mut().zip(lengths).enumerate() {
-                    let column = observations.column(axis);
-                    let (at, per_length) = (column[j], 1.0 / length);
-                    self.scratch.resize(slopes.len(), 0.0);
-                    widest(|| {
-                        for (square, x) in self.scratch.iter_mut().zip(&column[j + 1..]) {
-                            let step = (at - x) * per_length;
-                            *square = step * step;
-                        }
-                    });
-                    *by_length += widest_dot(slopes, &self.scratch);
-                }
-            }
+        for columns in batches(observations.len()) {
+            let slopes = correlations.slopes_of(*kernel, observations, lengths, &columns);
+            let buffers = (slopes, &mut *scratch);
+            let known = (&*dense, &weights[..], signal2);
+            trace += add_gradient(observations, lengths, columns, known, buffers, by_length);
         }
         let by_height = noise.height * noise.height * trace;
         by_noise.iter_mut().take(1).for_each(|by_noise| *by_noise = by_height);
@@ -308,5 +287,44 @@ impl<'a> Likelihood<'a> {
                 derivatives.add_length_gradient(observations, lengths, i, pair, by_length);
             }
         }
+    }
+}
+
+widest_fn! {
+    /// Adds ½·tr((w·wᵀ/s² − A⁻¹)·∂A) by the length scales for some columns, and returns that by the
+    /// noises of their heights. It has A⁻¹, w and s², and buffers: the derivatives of the
+    /// correlations by the squared distances, which it overwrites, and one for a column.
+    fn add_gradient<'a>(
+        observations: &'a Observations,
+        lengths: &'a [f64],
+        columns: Range<usize>,
+        known: (&'a DenseMatrix, &'a [f64], f64),
+        buffers: (&'a mut [f64], &'a mut Vec<f64>),
+        by_length: &'a mut [f64],
+    ) -> f64 {
+        let (dense, weights, signal2) = known;
+        let (mut rest, squares) = buffers;
+        let mut trace = 0.0;
+        for j in columns {
+            let weight = weights[j] / signal2;
+            let [on, inverse @ ..] = dense.inverse_column(j) else { return trace };
+            trace += (weight * weights[j] - on) * observations.height_noise2(j, 1.0.into());
+            let (slopes, others) = rest.split_at_mut(inverse.len());
+            rest = others;
+            for ((slope, other), inverse) in slopes.iter_mut().zip(&weights[j + 1..]).zip(inverse) {
+                *slope *= -2.0 * (weight * other - inverse);
+            }
+            squares.resize(slopes.len(), 0.0);
+            for (axis, (by_length, length)) in by_length.iter_mut().zip(lengths).enumerate() {
+                let column = observations.column(axis);
+                let (at, per_length) = (column[j], 1.0 / length);
+                for (square, x) in squares.iter_mut().zip(&column[j + 1..]) {
+                    let step = (at - x) * per_length;
+                    *square = step * step;
+                }
+                *by_length += dot(slopes, squares);
+            }
+        }
+        trace
     }
 }

@@ -1,6 +1,6 @@
 //! Observations: places with heights and, optionally, slopes.
 
-use crate::math::simd::{dot, widest};
+use crate::math::simd::{dot, widest, widest_fn};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -271,16 +271,39 @@ impl Observations {
 
     /// Adds observation `i` of `others`.
     fn push_from(&mut self, others: &Self, i: usize) {
-        let place: Vec<f64> = others.place(i).collect();
-        let noise = others.slope_noise2[i].sqrt();
-        let gradient = others.slope(i);
-        self.push(&Observation {
-            place: &place,
-            height: others.heights[i],
-            noise: others.height_noise2[i].sqrt(),
+        self.push(&others.observation(i, &mut Vec::new()));
+    }
+
+    /// Returns observation `i`, whose place it writes to `place`.
+    pub(super) fn observation<'a>(&'a self, i: usize, place: &'a mut Vec<f64>) -> Observation<'a> {
+        place.clear();
+        place.extend(self.place(i));
+        let (gradient, noise) = (self.slope(i), self.slope_noise2[i].sqrt());
+        Observation {
+            place,
+            height: self.heights[i],
+            noise: self.height_noise2[i].sqrt(),
             slope: (!gradient.is_empty()).then_some(Slope { gradient, noise }),
-            known: others.known(i),
-        });
+            known: self.known(i),
+        }
+    }
+
+    /// Whether observation `i` has a slope, and with the same noise, if observation `at` of
+    /// `others` has one.
+    pub(super) fn has_same_slope(&self, i: usize, others: &Self, at: usize) -> bool {
+        self.slope(i).len() == others.slope(at).len()
+            && self.slope_noise2[i] == others.slope_noise2[at]
+    }
+
+    /// Replaces all heights and slopes by those that `values` returns for their numbers.
+    pub(super) fn revalue<'a>(&mut self, values: impl Fn(usize) -> (f64, &'a [f64])) {
+        for i in 0..self.len() {
+            let (height, slope) = values(i);
+            self.heights[i] = height;
+            let begin = self.start(i) - i;
+            let count = self.slope(i).len();
+            self.slopes[begin..begin + count].copy_from_slice(&slope[..count]);
+        }
     }
 
     /// Returns heights of 0 at the places of the observations `indices`.
@@ -401,12 +424,10 @@ impl Observations {
         length_scales: &[f64],
         r2: &mut Vec<f64>,
     ) {
+        let count = columns.clone().map(|j| self.len() - j - 1).sum();
         r2.clear();
-        for j in columns {
-            let begin = r2.len();
-            r2.resize(begin + self.len() - j - 1, 0.0);
-            self.distances2(self.place(j), length_scales, j + 1, &mut r2[begin..]);
-        }
+        r2.resize(count, 0.0);
+        distances2_below(&self.columns, length_scales, columns, r2);
     }
 
     /// Writes the scaled squared distances Σ_d ((place_d − x_d) / l_d)² of `place` from the
@@ -428,6 +449,30 @@ impl Observations {
                     *r2 += step * step;
                 }
             });
+        }
+    }
+}
+
+widest_fn! {
+    /// Adds the scaled squared distances of [`Observations::distances2_below`].
+    fn distances2_below<'a>(
+        axes: &'a [Vec<f64>],
+        length_scales: &'a [f64],
+        columns: Range<usize>,
+        r2: &'a mut [f64],
+    ) -> () {
+        let mut rest = r2;
+        for j in columns {
+            let below = axes.first().map_or(0, |axis| axis.len() - j - 1);
+            let (column, others) = rest.split_at_mut(below);
+            rest = others;
+            for (axis, length) in axes.iter().zip(length_scales) {
+                let (at, per_length) = (axis[j], 1.0 / length);
+                for (r2, x) in column.iter_mut().zip(&axis[j + 1..]) {
+                    let step = (at - x) * per_length;
+                    *r2 += step * step;
+                }
+            }
         }
     }
 }
