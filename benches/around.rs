@@ -14,7 +14,6 @@ use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
-use palpate::report::style;
 use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
@@ -36,6 +35,7 @@ fn main() -> anyhow::Result<()> {
     if std::env::args().any(|argument| argument == "--test") {
         return Ok(());
     }
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let scene = Scene::load(&root.join("scenes/suite/around/mug.toml"), &[])?;
     let environment = Arc::new(Environment::build(scene)?);

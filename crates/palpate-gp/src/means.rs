@@ -199,7 +199,9 @@ widest_fn! {
         correlations: &'a [f64],
         first: &'a [f64],
     ) -> f64 {
-        lanes(heights.len(), |i| heights[i] * correlations[i] - 2.0 * first[i] * along[i])
+        lanes([heights, along, correlations, first], |[height, along, correlation, first]| {
+            height * correlation - 2.0 * first * along
+        })
     }
 }
 
@@ -212,27 +214,31 @@ widest_fn! {
         along: &'a [f64],
         derivatives: [&'a [f64]; 2],
     ) -> f64 {
-        let count = heights.len();
-        let [slopes, steps, along] = [slopes, steps, along].map(|all| &all[..count]);
-        let [first, second] = derivatives.map(|all| &all[..count]);
-        lanes(count, |i| {
-            let bend = heights[i] * first[i] - 2.0 * second[i] * along[i];
-            2.0 * (steps[i] * bend - first[i] * slopes[i])
+        let [first, second] = derivatives;
+        lanes([heights, slopes, steps, along, first, second], |numbers| {
+            let [height, slope, step, along, first, second] = numbers;
+            let bend = height * first - 2.0 * second * along;
+            2.0 * (step * bend - first * slope)
         })
     }
 }
 
-/// Returns Σ of `term` over 0..count, in parallel sums.
+/// Returns Σ of `term` over the numbers with the same index of all `slices`, which are equally long,
+/// in parallel sums.
 #[inline(always)]
-fn lanes(count: usize, term: impl Fn(usize) -> f64) -> f64 {
+fn lanes<const N: usize>(slices: [&[f64]; N], term: impl Fn([f64; N]) -> f64) -> f64 {
     let mut sums = [0.0; LANES];
-    let whole = count / LANES * LANES;
-    for begin in (0..whole).step_by(LANES) {
+    let slices = slices.map(|slice| slice.as_chunks::<LANES>());
+    let chunks = slices.iter().map(|(chunks, _)| chunks.len()).min().unwrap_or(0);
+    for at in 0..chunks {
+        let chunks: [&[f64; LANES]; N] = slices.map(|(chunks, _)| &chunks[at]);
         for (lane, sum) in sums.iter_mut().enumerate() {
-            *sum += term(begin + lane);
+            *sum += term(chunks.map(|chunk| chunk[lane]));
         }
     }
-    sums.iter().sum::<f64>() + (whole..count).map(term).sum::<f64>()
+    let rests = slices.map(|(_, rest)| rest);
+    let count = rests.iter().map(|rest| rest.len()).min().unwrap_or(0);
+    sums.iter().sum::<f64>() + (0..count).map(|i| term(rests.map(|rest| rest[i]))).sum::<f64>()
 }
 
 #[cfg(test)]
