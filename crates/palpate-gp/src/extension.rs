@@ -17,7 +17,7 @@ impl Posterior {
     /// more, with the same sum of precisions.
     ///
     /// Returns `None` if only a new factorisation serves: with an observation less, a larger
-    /// noise, two observations at one place, errors of known size, or jitter.
+    /// noise, another noise of slopes, errors of known size, or jitter.
     pub fn extended(
         mut self,
         hyperparameters: Hyperparameters,
@@ -29,11 +29,10 @@ impl Posterior {
             return None;
         }
         let key = |all: &Observations, i: usize| all.place(i).map(f64::to_bits).collect::<Vec<_>>();
-        let mut found = HashMap::with_capacity(observations.len());
-        for i in 0..observations.len() {
-            if found.insert(key(observations, i), i).is_some() {
-                return None;
-            }
+        // Observations at one place are interchangeable: all values are replaced.
+        let mut found: HashMap<_, Vec<usize>> = HashMap::with_capacity(observations.len());
+        for i in (0..observations.len()).rev() {
+            found.entry(key(observations, i)).or_default().push(i);
         }
         let signal2 = hyperparameters.signal_sd.powi(2);
         let ratio = hyperparameters.noise_ratio();
@@ -44,12 +43,14 @@ impl Posterior {
                 0.5 * (2.0 * std::f64::consts::PI * signal2 * ratio.height.powi(2) * noise2).ln();
         };
         let mut precisions = vec![0.0; observations.len()];
-        let mut rows = Vec::with_capacity(self.observations().len());
-        for i in 0..self.observations().len() {
-            let at = *found.get(&key(self.observations(), i))?;
+        let mut rows: Vec<usize> = Vec::with_capacity(self.observations().len());
+        for (i, &base) in self.bases.iter().enumerate() {
             let noise2 = self.observations().height_noise2(i, 1.0.into());
-            let is_further = precisions[at] > 0.0;
-            if is_further {
+            let at = match base == i {
+                true => found.get_mut(&key(self.observations(), i))?.pop()?,
+                false => rows[base],
+            };
+            if base != i {
                 halve(noise2 + 1.0 / precisions[at]);
             } else if !self.observations().has_same_slope(i, observations, at) {
                 return None;
@@ -70,7 +71,9 @@ impl Posterior {
             } else if missing > ROUNDING * wanted {
                 halve(1.0 / missing + 1.0 / known);
                 let noise = missing.sqrt().recip();
+                let base = rows.iter().position(|row| row == &at)?;
                 self.append(&Observation { noise, slope: None, ..observation }).ok()?;
+                *self.bases.last_mut()? = base;
             } else {
                 continue;
             }

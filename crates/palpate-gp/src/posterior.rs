@@ -26,6 +26,8 @@ pub struct Posterior {
     kernel: &'static dyn Kernel,
     hyperparameters: Hyperparameters,
     observations: Observations,
+    /// For each observation the earlier one whose noise it makes smaller; otherwise itself.
+    pub(super) bases: Vec<usize>,
     factor: Factor,
     /// L⁻¹·(y − m).
     whitened: Vec<f64>,
@@ -62,8 +64,17 @@ impl Posterior {
     ) -> Self {
         let factor = Factor::from(covariance);
         let (whitened, weights) = (Vec::new(), Vec::new());
-        let mut new =
-            Self { kernel, hyperparameters, observations, factor, whitened, weights, jitter };
+        let bases = (0..observations.len()).collect();
+        let mut new = Self {
+            kernel,
+            hyperparameters,
+            observations,
+            bases,
+            factor,
+            whitened,
+            weights,
+            jitter,
+        };
         new.weigh();
         new
     }
@@ -114,6 +125,7 @@ impl Posterior {
                 return Err(indefinite);
             }
         }
+        self.bases.push(self.observations.len());
         self.observations.push(observation);
         Ok(())
     }
