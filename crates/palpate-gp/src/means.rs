@@ -223,8 +223,8 @@ widest_fn! {
     }
 }
 
-/// Returns Σ of `term` over the numbers with the same index of all `slices`, which are equally long,
-/// in parallel sums.
+/// Returns Σ of `term` over the numbers with the same index of all `slices`, which are equally
+/// long, in parallel sums.
 #[inline(always)]
 fn lanes<const N: usize>(slices: [&[f64]; N], term: impl Fn([f64; N]) -> f64) -> f64 {
     let mut sums = [0.0; LANES];
