@@ -17,9 +17,10 @@ impl Posterior {
     /// more, with the same sum of precisions.
     ///
     /// Returns `None` if only a new factorisation serves: with an observation less, a larger
-    /// noise, another noise of slopes, errors of known size, or jitter.
+    /// noise, another noise of slopes, errors of known size, jitter, or more than `most` new rows.
     pub fn extended(
         mut self,
+        most: usize,
         hyperparameters: Hyperparameters,
         observations: &Observations,
     ) -> Option<(Self, f64)> {
@@ -59,23 +60,32 @@ impl Posterior {
             rows.push(at);
         }
         let mut place = Vec::new();
-        for (at, known) in precisions.iter().enumerate() {
+        let missing = |at: usize, known: f64| {
+            let wanted = 1.0 / observations.height_noise2(at, 1.0.into());
+            ((wanted - known) / wanted, wanted - known)
+        };
+        let is_new = |(at, known): &(usize, &f64)| missing(*at, **known).0.abs() > ROUNDING;
+        let new: Vec<(usize, f64)> =
+            precisions.iter().enumerate().filter(is_new).map(|(at, known)| (at, *known)).collect();
+        let numbers = new
+            .iter()
+            .map(|(at, known)| if *known == 0.0 { 1 + observations.slope(*at).len() } else { 1 });
+        if numbers.sum::<usize>() > most
+            || new.iter().any(|(at, known)| missing(*at, *known).1 < 0.0)
+        {
+            return None;
+        }
+        for (at, known) in new {
             let observation = observations.observation(at, &mut place);
-            let wanted = 1.0 / (observation.noise * observation.noise);
-            let missing = wanted - known;
-            if missing < -ROUNDING * wanted {
-                return None;
-            }
-            if *known == 0.0 {
+            if known == 0.0 {
                 self.append(&observation).ok()?;
-            } else if missing > ROUNDING * wanted {
+            } else {
+                let (_, missing) = missing(at, known);
                 halve(1.0 / missing + 1.0 / known);
                 let noise = missing.sqrt().recip();
-                let base = rows.iter().position(|row| row == &at)?;
+                let base = rows.iter().position(|row| *row == at)?;
                 self.append(&Observation { noise, slope: None, ..observation }).ok()?;
                 *self.bases.last_mut()? = base;
-            } else {
-                continue;
             }
             rows.push(at);
         }

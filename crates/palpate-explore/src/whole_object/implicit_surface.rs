@@ -61,6 +61,11 @@ const TRIED_MAX: f64 = 60.0;
 const KEPT_ROWS: usize = 1000;
 const SEARCH_AGAIN: f64 = 1.05;
 
+/// Largest number of new rows with which a posterior is extended, as a fraction of all.
+// heuristic: one after the other they take as long as a factorisation, which has a third of the
+// operations for each, but many of them at once.
+const NEW: f64 = 0.05;
+
 /// Largest number of rows of the covariance with which hyperparameters are searched; of more, every
 /// second observation is used, or every third, and so on.
 // heuristic: a few hundred touches fix one length and three standard deviations.
@@ -201,7 +206,8 @@ impl ImplicitSurface {
         let at = &last.hyperparameters;
         let is_whole = self.evidence.seen.is_empty();
         let known = self.surface.take().filter(|_| is_whole).map(Surface::into_posterior);
-        let extended = known.and_then(|known| known.extended(at.clone(), observations));
+        let most = (NEW * observations.order() as f64) as usize;
+        let extended = known.and_then(|known| known.extended(most, at.clone(), observations));
         if let Some((posterior, log_likelihood)) = extended {
             return Ok((Fit { log_likelihood, factorisations: 0, ..last }, Some(posterior)));
         }

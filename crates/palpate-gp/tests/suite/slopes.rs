@@ -339,7 +339,7 @@ proptest! {
         prop_assume!(posterior.jitter() == 0.0);
         let mut extended = posterior;
         for observations in [&second, &last] {
-            let (next, log_likelihood) = extended.extended(parameters.clone(), observations).unwrap();
+            let (next, log_likelihood) = extended.extended(100, parameters.clone(), observations).unwrap();
             let anew = Posterior::new(kernel, parameters.clone(), observations.clone()).unwrap();
             let mut likelihood = Likelihood::new(kernel, MeanModel::Zero, observations);
             let twin = likelihood.value_gradient(&parameters, &mut []).unwrap();
@@ -367,14 +367,15 @@ fn what_cannot_be_extended() {
     let begun = [touch(0.0, 1.0), touch(0.5, 1.0)];
     let extended = |touches: &[Touch]| {
         let posterior = Posterior::new(kernel(0), parameters.clone(), all(&begun)).unwrap();
-        posterior.extended(parameters.clone(), &all(touches)).is_some()
+        posterior.extended(2, parameters.clone(), &all(touches)).is_some()
     };
     assert!(extended(&[touch(0.0, 1.0), touch(0.5, 0.9), touch(0.7, 1.0)]));
     let fewer = [touch(0.0, 1.0)];
     let noisier = [touch(0.0, 1.1), touch(0.5, 1.0)];
     assert!(extended(&[touch(0.0, 1.0), touch(0.5, 1.0), touch(0.5, 1.0)]));
     let infinite = [touch(0.0, 1.0), touch(0.5, 1.0), touch(f64::INFINITY, 1.0)];
-    for touches in [&fewer[..], &noisier, &infinite] {
+    let many = [0.0, 0.5, 0.6, 0.7, 0.8].map(|x| touch(x, 1.0));
+    for touches in [&fewer[..], &noisier, &infinite, &many] {
         assert!(!extended(touches), "{touches:?}");
     }
     let sloped = Touch { slope: Some([0.1, 0.2]), ..touch(0.5, 1.0) };
