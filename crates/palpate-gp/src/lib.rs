@@ -63,7 +63,6 @@ pub mod cholesky;
 pub mod covariance;
 pub mod dense;
 mod extension;
-mod factors;
 pub mod fit;
 pub mod inducing;
 pub mod kernel;

@@ -442,13 +442,7 @@ impl Observations {
         r2.fill(0.0);
         for ((column, at), length) in self.columns.iter().zip(place).zip(length_scales) {
             let column = &column[first..first + r2.len()];
-            let per_length = 1.0 / length;
-            widest(|| {
-                for (r2, x) in r2.iter_mut().zip(column) {
-                    let step = (at - x) * per_length;
-                    *r2 += step * step;
-                }
-            });
+            widest(|| add_squares(at, column, 1.0 / length, r2));
         }
     }
 }
@@ -467,12 +461,17 @@ widest_fn! {
             let (column, others) = rest.split_at_mut(below);
             rest = others;
             for (axis, length) in axes.iter().zip(length_scales) {
-                let (at, per_length) = (axis[j], 1.0 / length);
-                for (r2, x) in column.iter_mut().zip(&axis[j + 1..]) {
-                    let step = (at - x) * per_length;
-                    *r2 += step * step;
-                }
+                add_squares(axis[j], &axis[j + 1..], 1.0 / length, column);
             }
         }
+    }
+}
+
+/// Adds ((at − x) / length)² for each x.
+#[inline(always)]
+fn add_squares(at: f64, column: &[f64], per_length: f64, r2: &mut [f64]) {
+    for (r2, x) in r2.iter_mut().zip(column) {
+        let step = (at - x) * per_length;
+        *r2 += step * step;
     }
 }

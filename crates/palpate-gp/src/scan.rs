@@ -4,16 +4,16 @@
 //! The grid is fixed, so that each of its covariances is factored once and extended by a row per
 //! observation: n² operations instead of n³/3 for a new factorisation.
 
-use super::factors::{Factors, SIDE};
+use super::cholesky::Factor;
 use super::kernel::Kernel;
 use super::likelihood;
 use super::likelihood::ProfiledLikelihood;
-use super::observations::{NoiseRatio, Observations};
+use super::observations::Observations;
 use super::search_box::MeanModel;
 use super::search_box::SearchBox;
 use super::search_box::SignalModel;
 use crate::math::optimize::Bounds;
-use crate::math::simd::widest_fn;
+use crate::math::simd::widest_dot;
 
 /// Largest step between two noise levels, as the logarithm of their ratio; climbs find optima in
 /// between. A heuristic: a fitted noise has a range of two decades; a known one leaves six for its
@@ -164,19 +164,19 @@ fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
 pub(super) struct Scan {
     grid: Grid,
     taken: Observations,
-    /// All places in order, eight by eight; the last one is repeated to fill its eight.
-    octets: Vec<Octet>,
+    points: Vec<Point>,
 }
 
-/// Eight places of the grid.
+/// One place of the grid.
 #[derive(Clone, Debug, Default)]
-struct Octet {
-    factors: Factors,
+struct Point {
+    factor: Factor,
     /// L⁻¹·y of the heights y, and of a vector of ones.
-    heights: Vec<[f64; SIDE]>,
-    ones: Vec<[f64; SIDE]>,
-    /// NaN if the covariance cannot be factored without jitter.
-    log_determinants: [f64; SIDE],
+    heights: Vec<f64>,
+    ones: Vec<f64>,
+    log_determinant: f64,
+    /// Whether its covariance cannot be factored without jitter.
+    is_singular: bool,
 }
 
 impl Scan {
@@ -192,144 +192,82 @@ impl Scan {
     ) -> Vec<Option<ProfiledLikelihood>> {
         if self.grid != *grid || !observations.begin_with(&self.taken) {
             self.grid.clone_from(grid);
-            self.octets.resize_with(grid.len().div_ceil(SIDE), Octet::default);
-            self.octets.iter_mut().for_each(Octet::forget);
+            self.points.resize_with(grid.len(), Point::default);
+            self.points.iter_mut().for_each(Point::forget);
         }
-        // The same lengths have the same correlations.
-        let noises = grid.noises(sought.length_scales.len()).max(1);
-        let parameters: Vec<(Vec<f64>, NoiseRatio)> =
-            (0..grid.len()).map(|index| sought.parameters(&grid.place(index))).collect();
-        let at = |octet: usize, lane: usize| (SIDE * octet + lane).min(grid.len() - 1);
-        let (mut correlations, mut row) = (Vec::new(), Vec::new());
-        let begun = self.octets.first().map_or(0, |octet| octet.heights.len());
-        for i in begun..observations.len() {
-            correlations.resize(i * grid.len().div_ceil(noises), 0.0);
-            for (group, row) in correlations.chunks_exact_mut(i.max(1)).enumerate() {
-                let lengths = &parameters[group * noises].0;
-                observations.distances2(observations.place(i), lengths, 0, row);
-            }
-            kernel.correlate(&mut correlations);
-            row.resize(i + 1, [0.0; SIDE]);
-            for (number, octet) in self.octets.iter_mut().enumerate() {
-                for lane in 0..SIDE {
-                    let place = at(number, lane);
-                    let known = &correlations[place / noises * i..][..i];
-                    row.iter_mut().zip(known).for_each(|(row, entry)| row[lane] = *entry);
-                    row[i][lane] = 1.0 + observations.height_noise2(i, parameters[place].1);
+        let (mut row, mut ratios) = (Vec::new(), Vec::new());
+        let mut profiles = Vec::with_capacity(grid.len());
+        let noises = grid.noises(sought.length_scales.len());
+        for (group, points) in self.points.chunks_mut(noises.max(1)).enumerate() {
+            // The same lengths have the same correlations.
+            let (lengths, _) = sought.parameters(&grid.place(group * noises));
+            let places = (0..points.len()).map(|at| grid.place(group * noises + at));
+            ratios.clear();
+            ratios.extend(places.map(|place| sought.parameters(&place).1));
+            for i in points[0].heights.len()..observations.len() {
+                row.resize(i + 1, 0.0);
+                observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);
+                kernel.correlate(&mut row[..i]);
+                for (point, noise) in points.iter_mut().zip(&ratios) {
+                    row[i] = 1.0 + observations.height_noise2(i, *noise);
+                    point.append(&row, observations.heights()[i]);
                 }
-                octet.append(&row, observations.heights()[i]);
+            }
+            for (point, noise) in points.iter().zip(&ratios) {
+                let profile = || point.profile(sought.mean, scale, noise.height, observations);
+                profiles.push((!point.is_singular).then(profile));
             }
         }
         self.taken.clone_from(observations);
-        let mut profiles = Vec::with_capacity(SIDE * self.octets.len());
-        for (number, octet) in self.octets.iter().enumerate() {
-            let noise = |lane: usize| parameters[at(number, lane)].1.height;
-            profiles.extend(octet.profiles(sought.mean, scale, noise, observations));
-        }
-        profiles.truncate(grid.len());
         profiles
     }
 }
 
-impl Octet {
+impl Point {
     /// Removes all observations; keeps its memory for the next ones.
     fn forget(&mut self) {
-        self.factors.clear();
+        self.factor.truncate(0);
         self.heights.clear();
         self.ones.clear();
-        self.log_determinants = [0.0; SIDE];
+        self.log_determinant = 0.0;
+        self.is_singular = false;
     }
 
-    fn append(&mut self, row: &[[f64; SIDE]], height: f64) {
-        let pivots = self.factors.append(row);
-        let row = self.factors.last_row();
-        let [mut heights, mut ones] = [[height; SIDE], [1.0; SIDE]];
-        subtract_sums(row, (&self.heights, &mut heights), (&self.ones, &mut ones));
-        for (lane, pivot) in pivots.iter().enumerate() {
-            self.log_determinants[lane] += 2.0 * pivot.ln();
-            heights[lane] /= pivot;
-            ones[lane] /= pivot;
+    fn append(&mut self, row: &[f64], height: f64) {
+        self.is_singular = self.is_singular || self.factor.append(row).is_err();
+        let count = row.len() - 1;
+        if self.is_singular {
+            self.heights.push(f64::NAN);
+            return;
         }
-        self.heights.push(heights);
-        self.ones.push(ones);
+        let row = self.factor.row(count);
+        let whiten =
+            |known: &[f64], new: f64| (new - widest_dot(&row[..count], known)) / row[count];
+        let (height, one) = (whiten(&self.heights, height), whiten(&self.ones, 1.0));
+        self.log_determinant += 2.0 * row[count].ln();
+        self.heights.push(height);
+        self.ones.push(one);
     }
 
-    /// Returns the profile of each place; `noise` is a lane's.
-    fn profiles(
+    fn profile(
         &self,
         mean: MeanModel,
         scale: &SignalModel,
-        noise: impl Fn(usize) -> f64,
+        noise: f64,
         observations: &Observations,
-    ) -> [Option<ProfiledLikelihood>; SIDE] {
+    ) -> ProfiledLikelihood {
         let count = observations.len();
-        let means = match mean {
-            MeanModel::Zero => [0.0; SIDE],
-            MeanModel::Data => {
-                [observations.heights().iter().sum::<f64>() / count.max(1) as f64; SIDE]
+        let mean = match mean {
+            MeanModel::Zero => 0.0,
+            MeanModel::Data => observations.heights().iter().sum::<f64>() / count.max(1) as f64,
+            MeanModel::Constant => {
+                widest_dot(&self.ones, &self.heights) / widest_dot(&self.ones, &self.ones)
             }
-            MeanModel::Constant => best_means(&self.ones, &self.heights),
         };
-        let fits = fits(&self.ones, &self.heights, means);
-        std::array::from_fn(|lane| {
-            let log_determinant = self.log_determinants[lane];
-            let signal_sd = scale.signal_sd(fits[lane], count, noise(lane));
-            let log_likelihood =
-                likelihood::of_height(fits[lane], signal_sd, count, log_determinant);
-            let profile = ProfiledLikelihood { log_likelihood, signal_sd, mean: means[lane] };
-            (!log_determinant.is_nan()).then_some(profile)
-        })
-    }
-}
-
-/// Numbers of eight places, one row for each observation.
-type Lanes = [[f64; SIDE]];
-
-widest_fn! {
-    /// Subtracts from two rows the sums of earlier ones, weighted by `row`.
-    fn subtract_sums<'a>(
-        row: &'a Lanes,
-        first: (&'a Lanes, &'a mut [f64; SIDE]),
-        second: (&'a Lanes, &'a mut [f64; SIDE]),
-    ) -> () {
-        let [mut a, mut b] = [[0.0; SIDE]; 2];
-        for ((l, x), y) in row.iter().zip(first.0).zip(second.0) {
-            for lane in 0..SIDE {
-                a[lane] = l[lane].mul_add(x[lane], a[lane]);
-                b[lane] = l[lane].mul_add(y[lane], b[lane]);
-            }
-        }
-        for lane in 0..SIDE {
-            first.1[lane] -= a[lane];
-            second.1[lane] -= b[lane];
-        }
-    }
-}
-
-widest_fn! {
-    /// Returns Σ 1·y / Σ 1·1 of each lane, both whitened.
-    fn best_means<'a>(ones: &'a Lanes, heights: &'a Lanes) -> [f64; SIDE] {
-        let [mut along, mut squares] = [[0.0; SIDE]; 2];
-        for (one, y) in ones.iter().zip(heights) {
-            for lane in 0..SIDE {
-                along[lane] = one[lane].mul_add(y[lane], along[lane]);
-                squares[lane] = one[lane].mul_add(one[lane], squares[lane]);
-            }
-        }
-        std::array::from_fn(|lane| along[lane] / squares[lane])
-    }
-}
-
-widest_fn! {
-    /// Returns Σ (y − m·1)² of each lane, whitened.
-    fn fits<'a>(ones: &'a Lanes, heights: &'a Lanes, means: [f64; SIDE]) -> [f64; SIDE] {
-        let mut sums = [0.0; SIDE];
-        for (one, y) in ones.iter().zip(heights) {
-            for lane in 0..SIDE {
-                let rest = means[lane].mul_add(-one[lane], y[lane]);
-                sums[lane] = rest.mul_add(rest, sums[lane]);
-            }
-        }
-        sums
+        let squares = self.heights.iter().zip(&self.ones).map(|(y, one)| (y - mean * one).powi(2));
+        let fit = squares.sum();
+        let signal_sd = scale.signal_sd(fit, count, noise);
+        let log_likelihood = likelihood::of_height(fit, signal_sd, count, self.log_determinant);
+        ProfiledLikelihood { log_likelihood, signal_sd, mean }
     }
 }

@@ -179,19 +179,15 @@ impl ImplicitSurface {
     pub fn refit(&mut self) -> Result<(&Fit, &Surface), CovarianceError> {
         let start = self.fit.as_ref().map(|fit| fit.hyperparameters.clone());
         let (prior, observations) = self.observations(start.as_ref());
+        let step = observations.order().div_ceil(SEARCHED_ROWS);
         let (fit, posterior) = match self.fit.take_if(|last| is_kept(last, &observations)) {
             Some(last) => self.keep(last, &observations)?,
-            None => {
-                let step = observations.order().div_ceil(SEARCHED_ROWS);
-                match step {
-                    0 | 1 => (self.search(start.as_ref(), &observations)?, None),
-                    _ => {
-                        let found = self.search(start.as_ref(), &observations.subsample(step))?;
-                        let found = Fit { scanned_at: observations.len(), ..found };
-                        self.conditioned(found, &observations)?
-                    }
-                }
+            None if step > 1 => {
+                let found = self.search(start.as_ref(), &observations.subsample(step))?;
+                let found = Fit { scanned_at: observations.len(), ..found };
+                self.conditioned(found, &observations)?
             }
+            None => (self.search(start.as_ref(), &observations)?, None),
         };
         self.conclude((prior, observations), start, (fit, posterior))
     }
