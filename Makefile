@@ -5,7 +5,6 @@ DEPS := .deps
 MUJOCO := 3.17.0
 LIBRARY := $(DEPS)/lib/libmujoco.so
 MUJOCO_LICENCES := $(DEPS)/lib/licences
-CMAKE := $(DEPS)/bin/cmake
 # Selects the package file independently of the Python version that fetches it.
 PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementation cp --abi cp312
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
@@ -323,7 +322,7 @@ notebooks: install-python
 
 $(PYTHON_READY): python/requirements.txt
 	python3 -m venv $(DEPS)/python
-	$(PYTHON) -m pip install --quiet --only-binary=:all: -r python/requirements.txt
+	$(PYTHON) -m pip install --quiet --no-compile --only-binary=:all: -r python/requirements.txt
 	touch $@
 
 # Data files of the package, read at run time.
@@ -343,7 +342,7 @@ dist: setup $(MUJOCO_LICENCES)
 	python3 .cargo/licences.py > target/dist/$(DIST)/licences/packages.txt
 	tar -C target/dist -czf target/dist/$(DIST).tar.gz $(DIST)
 
-setup: tools $(LIBRARY) $(CMAKE)
+setup: tools $(LIBRARY)
 
 tools:
 	@command -v cargo >/dev/null || { echo "cargo is missing: install Rust with rustup" >&2; exit 1; }
@@ -360,20 +359,6 @@ $(LIBRARY) $(MUJOCO_LICENCES) &: .cargo/mujoco.txt | tools
 	cp $(DEPS)/mujoco/mujoco-*.dist-info/licenses/* $(MUJOCO_LICENCES)
 	rm -rf $(DEPS)/mujoco
 	ln -sf libmujoco.so.$(MUJOCO) $@
-
-# cmake builds NLopt, which tests compare DIRECT with: the installed cmake, or that of the Python package.
-$(CMAKE): .cargo/cmake.txt | tools
-	mkdir -p $(DEPS)/bin
-	@if command -v cmake >/dev/null; then \
-		tool=$$(command -v cmake); \
-	else \
-		python3 -m pip --version >/dev/null || { echo "pip is missing (Debian: apt-get install python3-pip)" >&2; exit 1; }; \
-		rm -rf $(DEPS)/cmake && mkdir -p $(DEPS)/cmake && \
-		$(FETCH) --platform manylinux2014_x86_64 -r .cargo/cmake.txt -d $(DEPS)/cmake && \
-		cd $(DEPS)/cmake && python3 -m zipfile -e cmake-*.whl . && rm cmake-*.whl && \
-		chmod +x cmake/data/bin/* && cd - >/dev/null && tool='$$(dirname "$$0")/../cmake/cmake/data/bin/cmake'; \
-	fi; \
-	printf '#!/bin/sh\nexec "%s" "$$@"\n' "$$tool" > $@ && chmod +x $@
 
 clean:
 	rm -rf target $(DEPS) runs

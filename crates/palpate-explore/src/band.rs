@@ -71,10 +71,39 @@ impl LearnedBand {
 
     /// Returns the quantile at the probability `p`, m above the datum, within the limits.
     pub fn quantile_m(&self, at: &BandFeatures, p: f64) -> f64 {
-        let [below_m, above_m] = self.half_widths_m(at);
-        let height_m = match p < 0.5 {
-            true => at.mean_m - below_m * tail_share(p, self.tail),
-            false => at.mean_m + above_m * tail_share(1.0 - p, self.tail),
+        self.tail(p).quantile_m(at, self.half_widths_m(at))
+    }
+
+    /// Returns the quantiles at each of `probabilities`, m above the datum, within the limits.
+    pub fn quantiles_m(&self, all: &[BandFeatures], probabilities: &[f64]) -> Vec<Vec<f64>> {
+        let tails: Vec<Tail> = probabilities.iter().map(|p| self.tail(*p)).collect();
+        let row = |at| {
+            let half_widths_m = self.half_widths_m(at);
+            tails.iter().map(|tail| tail.quantile_m(at, half_widths_m)).collect()
+        };
+        all.iter().map(row).collect()
+    }
+
+    fn tail(&self, p: f64) -> Tail {
+        match p < 0.5 {
+            true => Tail { is_upper: false, share: tail_share(p, self.tail) },
+            false => Tail { is_upper: true, share: tail_share(1.0 - p, self.tail) },
+        }
+    }
+}
+
+/// A tail of the distribution of heights, from a probability on.
+struct Tail {
+    is_upper: bool,
+    /// Deviation from the mean at the probability, in units of the half-width.
+    share: f64,
+}
+
+impl Tail {
+    fn quantile_m(&self, at: &BandFeatures, [below_m, above_m]: [f64; 2]) -> f64 {
+        let height_m = match self.is_upper {
+            false => at.mean_m - below_m * self.share,
+            true => at.mean_m + above_m * self.share,
         };
         let [low_m, high_m] = at.limits_m;
         height_m.min(high_m).max(low_m)
@@ -118,14 +147,9 @@ impl BandFeatures {
     pub fn features(&self) -> [[f64; COEFFICIENTS]; 2] {
         let Self { mean_m, sd_m, signal_sd, rise_m, contacts_m: [low_m, high_m], .. } = *self;
         let log = |part_m: f64| (part_m.max(0.0) / signal_sd + LEAST).ln();
-        [mean_m - low_m, high_m - mean_m].map(|away_m| {
-            [
-                1.0,
-                (sd_m / signal_sd).max(f64::MIN_POSITIVE).ln(),
-                (self.contacts as f64 / CONTACTS).max(f64::MIN_POSITIVE).ln(),
-                log(away_m),
-                log(rise_m),
-            ]
-        })
+        let of_sd = (sd_m / signal_sd).max(f64::MIN_POSITIVE).ln();
+        let of_count = (self.contacts as f64 / CONTACTS).max(f64::MIN_POSITIVE).ln();
+        let of_rise = log(rise_m);
+        [mean_m - low_m, high_m - mean_m].map(|away_m| [1.0, of_sd, of_count, log(away_m), of_rise])
     }
 }

@@ -165,8 +165,9 @@ impl Truth {
         let belief = field.surface().filter(|_| self.surface_count() > 0)?;
         let means = belief.means(self.places.iter().map(Vec::as_slice));
         let is_calibrated = |i: &usize| i.is_multiple_of(CALIBRATION_STEP);
-        let places: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATION_STEP).cloned().collect();
-        let predictions = belief.predict(places.iter().map(Vec::as_slice));
+        let places = self.places.iter().step_by(CALIBRATION_STEP);
+        let places: Vec<&[f64]> = places.map(Vec::as_slice).collect();
+        let predictions = belief.predict(places.iter().copied());
         let bands_m = field.predicted_quantiles_m(&places, &predictions, &BAND)?;
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
         let densities = self.errors(&means).filter(|(i, _)| is_calibrated(i));

@@ -32,7 +32,7 @@ impl HeightField {
     /// Returns [`quantiles_m`](Self::quantiles_m) from the predictions of the surface at `places`.
     pub fn predicted_quantiles_m(
         &self,
-        places: &[Vec<f64>],
+        places: &[impl AsRef<[f64]>],
         predictions: &[Prediction],
         probabilities: &[f64],
     ) -> Option<Vec<Vec<f64>>> {
@@ -45,9 +45,7 @@ impl HeightField {
             });
             return Some(row.collect());
         };
-        let features = self.predicted_features(places, predictions)?;
-        let row = |at| probabilities.iter().map(|p| band.quantile_m(at, *p)).collect();
-        Some(features.iter().map(row).collect())
+        Some(band.quantiles_m(&self.predicted_features(places, predictions)?, probabilities))
     }
 
     /// Returns the features of a learned band at each of `places`; `None` before the first fit.
@@ -58,7 +56,7 @@ impl HeightField {
 
     fn predicted_features(
         &self,
-        places: &[Vec<f64>],
+        places: &[impl AsRef<[f64]>],
         predictions: &[Prediction],
     ) -> Option<Vec<BandFeatures>> {
         let surface = self.surface.as_ref()?;
@@ -73,7 +71,7 @@ impl HeightField {
         let upper_m = self.upper_bounds_m(places);
         let lower_m = self.depth_limits_m()[0];
         let at = places.iter().zip(predictions).zip(upper_m).map(|((place, at), upper_m)| {
-            surface.mean_gradient(place, &mut gradient, &mut scratch);
+            surface.mean_gradient(place.as_ref(), &mut gradient, &mut scratch);
             let parts = gradient.iter().zip(&hyperparameters.length_scales);
             BandFeatures {
                 mean_m: at.mean,
@@ -90,12 +88,12 @@ impl HeightField {
 
     /// Returns the largest possible height at each of `places`, m above the datum: below the space
     /// swept by touches with contact, with the noise of a touch, and the nearest depth of the zone.
-    fn upper_bounds_m(&self, places: &[Vec<f64>]) -> Vec<f64> {
+    fn upper_bounds_m(&self, places: &[impl AsRef<[f64]>]) -> Vec<f64> {
         let noise_sd = self.surface.as_ref().map_or(0.0, |it| it.hyperparameters().noise_sd);
         let margin_m = normal::BAND_95 * noise_sd;
         let mut bounds_m = vec![self.depth_limits_m()[1]; places.len()];
         for swept in &self.swept {
-            let ceilings_m = swept.upper_bounds_m(&self.zone, places.iter().map(Vec::as_slice));
+            let ceilings_m = swept.upper_bounds_m(&self.zone, places.iter().map(AsRef::as_ref));
             for (bound_m, ceiling_m) in bounds_m.iter_mut().zip(ceilings_m) {
                 *bound_m =
                     ceiling_m.map_or(*bound_m, |ceiling_m| bound_m.min(ceiling_m + margin_m));

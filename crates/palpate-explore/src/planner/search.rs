@@ -204,17 +204,16 @@ fn clamped(zone: &Zone, place: &[f64]) -> Vec<f64> {
 /// Returns the best places evaluated that have no better neighbour.
 fn hills(zone: &Zone, seen: &[(f64, Vec<f64>)]) -> Vec<Vec<f64>> {
     // Of equal values the first counts.
-    let mut order: Vec<usize> = (0..seen.len()).collect();
-    order.sort_unstable_by(|a, b| seen[*b].0.total_cmp(&seen[*a].0).then(a.cmp(b)));
-    let mut hills: Vec<Vec<f64>> = Vec::new();
-    for (_, place) in order.into_iter().map(|index| &seen[index]) {
-        let is_apart = |hill: &Vec<f64>| zone.distance(hill, place) > SAME_HILL;
-        if hills.iter().all(is_apart) {
-            hills.push(place.clone());
-        }
+    let by_value = |a: &usize, b: &usize| seen[*a].0.total_cmp(&seen[*b].0).then(b.cmp(a));
+    let mut apart: Vec<usize> = (0..seen.len()).collect();
+    let mut hills = Vec::with_capacity(HILLS);
+    while let Some(best) = apart.iter().copied().max_by(by_value) {
+        let (_, place) = &seen[best];
+        hills.push(place.clone());
         if hills.len() == HILLS {
             break;
         }
+        apart.retain(|other| zone.distance(place, &seen[*other].1) > SAME_HILL);
     }
     hills
 }

@@ -175,13 +175,14 @@ impl ImplicitSurface {
     /// observations, after it has grown, and extended in between.
     ///
     /// # Errors
-    /// If the covariance of the touches cannot be factored.
+    /// If the covariance of the touches cannot be factored. The last fit stays, without a surface.
     pub fn refit(&mut self) -> Result<(&Fit, &Surface), CovarianceError> {
+        let surface = self.surface.take();
         let start = self.fit.as_ref().map(|fit| fit.hyperparameters.clone());
         let (prior, observations) = self.observations(start.as_ref());
         let step = observations.order().div_ceil(SEARCHED_ROWS);
-        let (fit, posterior) = match self.fit.take_if(|last| is_kept(last, &observations)) {
-            Some(last) => self.keep(last, &observations)?,
+        let (fit, posterior) = match self.fit.clone().filter(|last| is_kept(last, &observations)) {
+            Some(last) => self.keep(last, surface, &observations)?,
             None if step > 1 => {
                 let found = self.search(start.as_ref(), &observations.subsample(step))?;
                 let found = Fit { scanned_at: observations.len(), ..found };
@@ -195,13 +196,14 @@ impl ImplicitSurface {
     /// Returns the last fit with its likelihood of `observations`, and the posterior, unless errors
     /// of cameras' poses are added to it. The last posterior is extended, if that is possible.
     fn keep(
-        &mut self,
+        &self,
         last: Fit,
+        surface: Option<Surface>,
         observations: &Observations,
     ) -> Result<(Fit, Option<Posterior>), CovarianceError> {
         let at = &last.hyperparameters;
         let is_whole = self.evidence.seen.is_empty();
-        let known = self.surface.take().filter(|_| is_whole).map(Surface::into_posterior);
+        let known = surface.filter(|_| is_whole).map(Surface::into_posterior);
         let most = (NEW * observations.order() as f64) as usize;
         let extended = known.and_then(|known| known.extended(most, at.clone(), observations));
         if let Some((posterior, log_likelihood)) = extended {
