@@ -14,7 +14,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test test-code test-arms check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -45,11 +45,16 @@ paper-planners: setup
 	cargo build --release --locked
 	for experiment in $(PLANNERS); do $(PALPATE) run $$experiment || exit; done
 
+test: test-code test-arms
+
 # Includes ROS 2, to test the topics of an arm without an arm.
-test: setup
+test-code: setup
 	cargo test --locked --features $(FEATURES)
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features $(FEATURES) --example $$example || exit; done
 	tests/clusters/test.sh target/debug/palpate
+
+# Simulated arms that move in real time, a part of all of them; they need an idle machine.
+test-arms: setup
 	$(MAKE) test-faults
 	$(MAKE) test-ros2 TOUCHES=3 UR_TOUCHES=2 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop lab_camera:: lab_ur::a_peer lab_ur::a_ur_of lab_ur::the_container'
 	$(MAKE) test-franka FRANKA_TESTS=franka::a_cylinder FRANKA_TOUCHES=2

@@ -6,7 +6,7 @@
 //!
 //! L = ∫ N(c; 0, I) Πᵢ [(1 − ε) sᵢ N(rᵢ − lᵢ·c; 0, σᵢ²) + ε] dc
 //!
-//! with the range sᵢ over which a point of an unknown surface is uniform, is approximated at the two
+//! with the range sᵢ over which a point of an unknown surface is uniform, is approximated at two
 //! peaks of its integrand (Laplace).
 
 use super::likelihood::{LogLikelihood, NoiseModel, Residual, inflation};
@@ -244,7 +244,8 @@ mod tests {
         sum
     }
 
-    /// Returns the log ratio of a view, and the slow twin's: a sum over a grid of the camera's error.
+    /// Returns the log ratio of a view, and the slow twin's: a sum over a grid of the camera's
+    /// error.
     fn both_logs(heights_m: &[f64], shift_m: f64) -> [f64; 2] {
         let view = view(heights_m, shift_m);
         let fit = view.fit(&cube(), &Isometry3::identity());
@@ -283,7 +284,7 @@ mod tests {
         assert!(median < 2e-3 && most < 0.03 && largest < 1.0, "{median} {most} {largest}");
     }
 
-    /// Points of which the middle of the camera's error explains none are explained by a larger one.
+    /// Points that no small error of the camera explains are explained by a larger one.
     #[test]
     fn an_error_beyond_the_reach_of_its_middle_is_found() {
         let [found, whole] = both_logs(&[6.5e-3; 6], 4e-3);
