@@ -72,15 +72,17 @@ impl SearchBox {
 
     /// Returns lengths and noise ratios from their logarithms.
     pub(super) fn parameters(&self, logs: &[f64]) -> (Vec<f64>, NoiseRatio) {
-        let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
-        let mut noises = lengths.split_off(self.length_scales.len().min(logs.len()));
-        let searched = if self.is_signal_searched() { noises.pop() } else { None };
-        let noise = |i: usize| noises.get(i).copied().unwrap_or(0.0);
+        let (lengths, rest) = logs.split_at(self.length_scales.len().min(logs.len()));
+        let (noises, searched) = match rest {
+            [noises @ .., last] if self.is_signal_searched() => (noises, Some(last.exp())),
+            noises => (noises, None),
+        };
+        let [height, slope] = [0, 1].map(|i| noises.get(i).map_or(0.0, |log: &f64| log.exp()));
         let known = match (self.touch_noise, searched) {
-            (TouchNoise::Known(noise_sd), _) => noise(0) / noise_sd,
+            (TouchNoise::Known(noise_sd), _) => height / noise_sd,
             (_, signal_sd) => signal_sd.map_or(0.0, f64::recip),
         };
-        (lengths, NoiseRatio { height: noise(0), slope: noise(1), known })
+        (lengths.iter().map(|log| log.exp()).collect(), NoiseRatio { height, slope, known })
     }
 
     /// Returns the logarithms of the parameters, the inverse of [`parameters`](Self::parameters).

@@ -95,13 +95,17 @@ impl Search {
         mut score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> (f64, Vec<f64>) {
         let evaluations = self.settings.direct_evaluations;
-        let mut seen: Vec<(f64, Vec<f64>)> = Vec::with_capacity(evaluations as usize);
+        let mut seen = Seen { dimension: zone.dimension(), ..Seen::default() };
+        let mut inside: Vec<Vec<f64>> = Vec::new();
         let (lower, upper) = corners(zone, MARGIN);
         let bounds = Bounds { lower: &lower, upper: &upper };
         direct(bounds, evaluations, |places| {
-            let places: Vec<_> = places.iter().map(|place| clamped(zone, place)).collect();
-            let values = score(&places, &mut []);
-            seen.extend(values.iter().copied().zip(places));
+            inside.resize_with(inside.len().max(places.len()), Vec::new);
+            let inside = &mut inside[..places.len()];
+            inside.iter_mut().zip(places).for_each(|(to, place)| clamp(zone, place, to));
+            let values = score(inside, &mut []);
+            seen.values.extend_from_slice(&values);
+            inside.iter().for_each(|place| seen.places.extend_from_slice(place));
             values
         });
         let (lower, upper) = corners(zone, 0.0);
@@ -197,23 +201,39 @@ fn corners(zone: &Zone, margin: f64) -> (Vec<f64>, Vec<f64>) {
     zone.sides().map(moved).unzip()
 }
 
-fn clamped(zone: &Zone, place: &[f64]) -> Vec<f64> {
-    place.iter().zip(zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
+fn clamp(zone: &Zone, place: &[f64], to: &mut Vec<f64>) {
+    to.clear();
+    to.extend(place.iter().zip(zone.sides()).map(|(at, [low, high])| at.clamp(low, high)));
+}
+
+/// Places evaluated, one after the other, and their values.
+#[derive(Default)]
+struct Seen {
+    dimension: usize,
+    places: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Seen {
+    fn place(&self, index: usize) -> &[f64] {
+        &self.places[index * self.dimension..][..self.dimension]
+    }
 }
 
 /// Returns the best places evaluated that have no better neighbour.
-fn hills(zone: &Zone, seen: &[(f64, Vec<f64>)]) -> Vec<Vec<f64>> {
+fn hills(zone: &Zone, seen: &Seen) -> Vec<Vec<f64>> {
     // Of equal values the first counts.
-    let by_value = |a: &usize, b: &usize| seen[*a].0.total_cmp(&seen[*b].0).then(b.cmp(a));
-    let mut apart: Vec<usize> = (0..seen.len()).collect();
+    let by_value =
+        |a: &usize, b: &usize| seen.values[*a].total_cmp(&seen.values[*b]).then(b.cmp(a));
+    let mut apart: Vec<usize> = (0..seen.values.len()).collect();
     let mut hills = Vec::with_capacity(HILLS);
     while let Some(best) = apart.iter().copied().max_by(by_value) {
-        let (_, place) = &seen[best];
-        hills.push(place.clone());
+        let place = seen.place(best);
+        hills.push(place.to_vec());
         if hills.len() == HILLS {
             break;
         }
-        apart.retain(|other| zone.distance(place, &seen[*other].1) > SAME_HILL);
+        apart.retain(|other| zone.distance(place, seen.place(*other)) > SAME_HILL);
     }
     hills
 }

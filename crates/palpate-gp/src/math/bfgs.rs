@@ -53,6 +53,22 @@ pub struct BfgsClimb<'a> {
     left: f64,
     asked: Vec<f64>,
     is_done: bool,
+    buffers: Buffers,
+}
+
+/// Buffers of a climb's steps.
+#[derive(Clone, Debug, Default)]
+struct Buffers {
+    /// Lowest and highest step along each axis.
+    limits: Vec<[f64; 2]>,
+    is_free: Vec<bool>,
+    /// Indices of the free axes, and the step along them.
+    free: Vec<usize>,
+    way: Vec<f64>,
+    matrix: Vec<f64>,
+    /// Change of the gradient along a step, observed and expected.
+    bend: Vec<f64>,
+    believed: Vec<f64>,
 }
 
 impl<'a> BfgsClimb<'a> {
@@ -90,6 +106,7 @@ impl<'a> BfgsClimb<'a> {
             left: f64::INFINITY,
             asked: Vec::new(),
             is_done: false,
+            buffers: Buffers::default(),
         };
         climb.ask();
         climb.top.x.clone_from(&climb.asked);
@@ -182,8 +199,9 @@ impl<'a> BfgsClimb<'a> {
         }
         let sides = self.sides();
         let bend = self.gradient.iter().zip(gradient.iter().zip(sides));
-        let bend: Vec<f64> = bend.map(|(before, (after, side))| before - after * side).collect();
-        self.learn(&bend);
+        self.buffers.bend.clear();
+        self.buffers.bend.extend(bend.map(|(before, (after, side))| before - after * side));
+        self.learn();
         let won = value - self.top.value;
         if won > ARMIJO * dot(&self.gradient, &self.step) {
             if won > 0.5 * self.predicted_gain && length > 0.9 * self.reach {
@@ -224,13 +242,15 @@ impl<'a> BfgsClimb<'a> {
         }));
     }
 
-    /// Damped BFGS update.
-    fn learn(&mut self, bend: &[f64]) {
+    /// Damped BFGS update with the observed change of the gradient.
+    fn learn(&mut self) {
         let count = self.step.len();
+        let Buffers { bend, believed, .. } = &mut self.buffers;
         let along = dot(bend, &self.step);
-        let believed: Vec<f64> =
-            self.curvature.chunks_exact(count.max(1)).map(|row| dot(row, &self.step)).collect();
-        let was = dot(&believed, &self.step);
+        let rows = self.curvature.chunks_exact(count.max(1));
+        believed.clear();
+        believed.extend(rows.map(|row| dot(row, &self.step)));
+        let was = dot(believed, &self.step);
         if was <= 0.0 {
             return;
         }
@@ -255,31 +275,37 @@ impl<'a> BfgsClimb<'a> {
     fn plan(&mut self, reach: f64) -> f64 {
         let count = self.here.len();
         self.step.fill(0.0);
-        let limits: Vec<[f64; 2]> =
-            (self.here.iter()).map(|here| [(-here).max(-reach), (1.0 - here).min(reach)]).collect();
+        let mut buffers = std::mem::take(&mut self.buffers);
+        let Buffers { limits, is_free, free, way, matrix, .. } = &mut buffers;
+        limits.clear();
+        limits
+            .extend((self.here.iter()).map(|here| [(-here).max(-reach), (1.0 - here).min(reach)]));
         // At a bound, and uphill is beyond it.
         let is_held = |i: usize, step: f64, slope: f64| {
             step <= limits[i][0] && slope <= 0.0 || step >= limits[i][1] && slope >= 0.0
         };
-        let mut is_free: Vec<bool> =
-            (0..count).map(|i| !is_held(i, 0.0, self.gradient[i])).collect();
+        is_free.clear();
+        is_free.extend((0..count).map(|i| !is_held(i, 0.0, self.gradient[i])));
         for _ in 0..=4 * count {
-            let free: Vec<usize> = (0..count).filter(|i| is_free[*i]).collect();
-            let mut way: Vec<f64> = free.iter().map(|i| self.slope(*i)).collect();
-            let entry =
-                |row: usize, column: usize| self.curvature[free[row] * count + free[column]];
-            solve(free.len(), entry, &mut way);
+            free.clear();
+            free.extend((0..count).filter(|i| is_free[*i]));
+            way.clear();
+            way.extend(free.iter().map(|i| self.slope(*i)));
+            let rows = free.iter().map(|row| &self.curvature[row * count..][..count]);
+            matrix.clear();
+            matrix.extend(rows.flat_map(|row| free.iter().map(|column| row[*column])));
+            solve(matrix, way);
             // Fraction of the step up to the first bound.
             let mut share = 1.0;
             let mut first = None;
-            for (&i, way) in free.iter().zip(&way) {
+            for (&i, way) in free.iter().zip(way.iter()) {
                 let limit = limits[i][usize::from(*way > 0.0)];
                 let room = (limit - self.step[i]) / way;
                 if room < share {
                     (share, first) = (room.max(0.0), Some((i, limit)));
                 }
             }
-            free.iter().zip(&way).for_each(|(&i, way)| self.step[i] += share * way);
+            free.iter().zip(way.iter()).for_each(|(&i, way)| self.step[i] += share * way);
             if let Some((i, limit)) = first {
                 self.step[i] = limit;
                 is_free[i] = false;
@@ -293,6 +319,7 @@ impl<'a> BfgsClimb<'a> {
                 None => break,
             }
         }
+        self.buffers = buffers;
         self.predicted_gain()
     }
 
@@ -328,9 +355,9 @@ pub fn climb(
     climb.finish()
 }
 
-/// Replaces b by M⁻¹·b for a symmetric positive definite M.
-fn solve(count: usize, entry: impl Fn(usize, usize) -> f64, b: &mut [f64]) {
-    let mut matrix: Vec<f64> = (0..count * count).map(|k| entry(k / count, k % count)).collect();
+/// Replaces b by M⁻¹·b for a symmetric positive definite M, stored row by row, which it overwrites.
+fn solve(matrix: &mut [f64], b: &mut [f64]) {
+    let count = b.len();
     for pivot in 0..count {
         for row in pivot + 1..count {
             let factor = matrix[row * count + pivot] / matrix[pivot * count + pivot];
