@@ -278,8 +278,8 @@ impl<'a> BfgsClimb<'a> {
         let mut buffers = std::mem::take(&mut self.buffers);
         let Buffers { limits, is_free, free, way, matrix, .. } = &mut buffers;
         limits.clear();
-        limits
-            .extend((self.here.iter()).map(|here| [(-here).max(-reach), (1.0 - here).min(reach)]));
+        let within = |here: &f64| [(-here).max(-reach), (1.0 - here).min(reach)];
+        limits.extend(self.here.iter().map(within));
         // At a bound, and uphill is beyond it.
         let is_held = |i: usize, step: f64, slope: f64| {
             step <= limits[i][0] && slope <= 0.0 || step >= limits[i][1] && slope >= 0.0

@@ -262,7 +262,7 @@ mod tests {
     }
 
     /// The ratio is the integral over the camera's error, to within what two peaks leave of an
-    /// integrand of another shape: a hundredth of nearly all cases, the largest found was 0.8.
+    /// integrand of another shape.
     #[test]
     fn the_ratio_is_an_integral_over_the_error() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -281,7 +281,7 @@ mod tests {
         errors.sort_by(f64::total_cmp);
         let [median, most, largest] = [1000, 1980, 1999].map(|i| errors[i]);
         println!("errors of the log ratio: {median:.4} {most:.4} {largest:.4}");
-        assert!(median < 2e-3 && most < 0.03 && largest < 1.0, "{median} {most} {largest}");
+        assert!(median < 2e-3 && most < 0.03 && largest < 0.5, "{median} {most} {largest}");
     }
 
     /// Points that no small error of the camera explains are explained by a larger one.
