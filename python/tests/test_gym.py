@@ -47,6 +47,7 @@ def test_the_name_of_the_module_registers_the_environment(tmp_path):
 def test_a_picture_shows_the_belief(scene):
     env = gymnasium.make(ID, scene=scene, touches=7, initial_touches=6, grid=4, render_mode="rgb_array")
     env.reset(seed=2)
+    env.action_space.seed(1)
     first = env.render()
     height, width = first.shape[:2]
     assert first.dtype == np.uint8 and first.shape[2] == 3 and width > height > 100
@@ -69,6 +70,7 @@ def test_a_window_is_drawn_after_each_touch(monkeypatch):
     monkeypatch.setattr(pyplot, "pause", lambda s: shown.append((s, pyplot.gcf()._suptitle.get_text())))
     env = gymnasium.make(ID, scene="toy", touches=7, initial_touches=5, render_mode="human")
     env.reset(seed=0)
+    env.action_space.seed(0)
     env.step(env.action_space.sample())
     assert [title.split(",")[0] for _, title in shown] == ["5 touches", "6 touches"]
     assert shown[0][0] == 1 / env.metadata["render_fps"]
@@ -96,6 +98,7 @@ def test_the_vector_environment_keeps_to_the_rules():
     assert (each["touches"][0] == each["touches"][2]).all()
     assert (each["touches"][0] != each["touches"][1]).any()
     over = []
+    envs.action_space.seed(3)
     for _ in range(5):
         seen, reward, terminated, truncated, info = envs.step(envs.action_space.sample())
         over.append(terminated.all())
@@ -124,6 +127,7 @@ def test_it_is_the_same_for_any_number_of_threads_and_alone():
 def test_rewards_add_up_to_what_was_gained(reward):
     env = gymnasium.make(ID, scene="bird", touches=12, reward=reward).unwrapped
     seen, first = env.reset(seed=1)
+    env.action_space.seed(1)
     gained, over = 0.0, False
     begin = seen
     while not over:

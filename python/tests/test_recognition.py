@@ -24,6 +24,7 @@ def test_hypotheses_name_the_object():
     right, objects = 0, set()
     for seed in range(4):
         seen, info = env.reset(seed=seed)
+        env.action_space.seed(seed)
         assert np.allclose(seen["hypotheses"][:2], 0.475)
         over, losses = False, []
         while not over:

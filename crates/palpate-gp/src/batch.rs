@@ -80,7 +80,8 @@ impl Posterior {
         let mut lanes = Lanes::<MANY>::default();
         for block in places.chunks(MANY) {
             lanes.correlate(self, block, false);
-            let explained = self.factor().solve_lower_lanes(&mut lanes.correlations);
+            let lanes_used = &mut lanes.correlations;
+            let explained = self.factor().solve_lower_lanes(lanes_used, block.len());
             tell(&lanes.correlations, explained, block.len());
         }
     }
@@ -118,8 +119,9 @@ impl<const N: usize> Lanes<N> {
             predictions.iter_mut().zip(sums).for_each(|(at, sum)| at.mean = mean + sum);
         }
         if !matches!(asked, Requested::Means) {
-            self.solved.clone_from(&self.correlations);
-            let explained = posterior.factor().solve_lower_lanes(&mut self.solved);
+            // Correlations are not needed later.
+            std::mem::swap(&mut self.solved, &mut self.correlations);
+            let explained = posterior.factor().solve_lower_lanes(&mut self.solved, places.len());
             for (at, explained) in predictions.iter_mut().zip(explained) {
                 at.variance = posterior.remaining(explained);
             }

@@ -55,11 +55,24 @@ impl Factor {
     /// If the enlarged matrix is not positive definite to within rounding; the factor is then
     /// left as it was.
     pub fn append(&mut self, row: &[f64]) -> Result<(), NotPositiveDefinite> {
+        self.append_solved(row, 0)
+    }
+
+    /// Appends a row like [`append`](Self::append), of which the first `solved` entries are already
+    /// those of L.
+    ///
+    /// # Errors
+    /// The same as [`append`](Self::append).
+    pub(super) fn append_solved(
+        &mut self,
+        row: &[f64],
+        solved: usize,
+    ) -> Result<(), NotPositiveDefinite> {
         let n = self.order;
         let begin = self.rows.len();
         self.rows.extend_from_slice(&row[..=n]);
         let (done, new) = self.rows.split_at_mut(begin);
-        let pivot = new[n] - solve_lower(done, &mut new[..n]);
+        let pivot = new[n] - solve_lower(done, &mut new[..n], solved);
         let is_kept = pivot > f64::EPSILON * row[n] && pivot.is_finite();
         if !is_kept {
             self.rows.truncate(begin);
@@ -88,7 +101,7 @@ impl Factor {
 
     /// Replaces b by L⁻¹·b and returns bᵀ·A⁻¹·b.
     pub fn solve_lower(&self, b: &mut [f64]) -> f64 {
-        solve_lower(&self.rows, b)
+        solve_lower(&self.rows, b, 0)
     }
 
     /// Replaces b by L⁻ᵀ·b.
@@ -97,15 +110,67 @@ impl Factor {
     }
 }
 
+/// Number of rows of the factor that a single right-hand side goes through at once: their sums hide
+/// each other's latency.
+const ROWS: usize = 4;
+
 widest_fn! {
-    /// Implements [`Factor::solve_lower`].
-    fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64]) -> f64 {
-        for i in 0..b.len() {
-            let row = row(rows, i);
-            b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
+    /// Replaces b by L⁻¹·b, of which the first `solved` entries are known, and returns its square.
+    fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64], solved: usize) -> f64 {
+        let mut i = solved;
+        while i < b.len() {
+            if i % ROWS == 0 && i + ROWS <= b.len() {
+                solve_rows::<ROWS>(rows, b, i);
+                i += ROWS;
+            } else {
+                solve_rows::<1>(rows, b, i);
+                i += 1;
+            }
         }
         dot(b, b)
     }
+}
+
+/// Solves `COUNT` rows from `first` on. Each has the same bits with every count.
+#[inline(always)]
+fn solve_rows<const COUNT: usize>(rows: &[f64], b: &mut [f64], first: usize) {
+    let begin = first - first % ROWS;
+    let (done, rest) = b.split_at_mut(begin);
+    let block: [&[f64]; COUNT] = std::array::from_fn(|r| row(rows, first + r));
+    let sums = dots(block.map(|row| &row[..begin]), done);
+    let scales: [f64; COUNT] = std::array::from_fn(|r| 1.0 / block[r][first + r]);
+    for r in 0..COUNT {
+        let mut sum = rest[first - begin + r] - sums[r];
+        for k in 0..first - begin + r {
+            sum -= block[r][begin + k] * rest[k];
+        }
+        rest[first - begin + r] = sum * scales[r];
+    }
+}
+
+/// Returns the products of rows with b, which are equally long: a multiple of four.
+#[inline(always)]
+fn dots<const COUNT: usize>(rows: [&[f64]; COUNT], b: &[f64]) -> [f64; COUNT] {
+    let mut sums = [[0.0; 8]; COUNT];
+    let (blocks, rest) = b.as_chunks::<8>();
+    let rows_blocks = rows.map(|row| &row.as_chunks::<8>().0[..blocks.len()]);
+    for (k, b) in blocks.iter().enumerate() {
+        for r in 0..COUNT {
+            for lane in 0..8 {
+                sums[r][lane] = rows_blocks[r][k][lane].mul_add(b[lane], sums[r][lane]);
+            }
+        }
+    }
+    if let Some(b) = rest.first_chunk::<4>() {
+        let at = 8 * blocks.len();
+        let rows = rows.map(|row| &row[at..at + 4]);
+        for r in 0..COUNT {
+            for lane in 0..4 {
+                sums[r][lane] = rows[r][lane].mul_add(b[lane], sums[r][lane]);
+            }
+        }
+    }
+    sums.map(|[a, b, c, d, e, f, g, h]| ((a + e) + (b + f)) + ((c + g) + (d + h)))
 }
 
 widest_fn! {
@@ -123,9 +188,14 @@ widest_fn! {
 }
 
 impl Factor {
-    /// Replaces each lane b by L⁻¹·b and returns bᵀ·A⁻¹·b of each.
-    pub(super) fn solve_lower_lanes<const N: usize>(&self, lanes: &mut [[f64; N]]) -> [f64; N] {
-        solve_lower_lanes(self, lanes)
+    /// Replaces each of the first `count` lanes b, and perhaps others, by L⁻¹·b and returns
+    /// bᵀ·A⁻¹·b of each.
+    pub(super) fn solve_lower_lanes<const N: usize>(
+        &self,
+        lanes: &mut [[f64; N]],
+        count: usize,
+    ) -> [f64; N] {
+        solve_lower_lanes(self, lanes, count)
     }
 
     /// Replaces each lane b by L⁻ᵀ·b.
@@ -139,14 +209,15 @@ vectorised_fn! {
     fn solve_lower_lanes<'a, V: Vector, const N: usize>(
         factor: &'a Factor,
         lanes: &'a mut [[f64; N]],
+        count: usize,
     ) -> [f64; N] {
         let mut squares = [0.0; N];
-        // Lanes beyond the register width are processed one after the other.
+        // Lanes beyond two registers are processed later.
         let mut lane = 0;
-        while lane < N {
-            if V::LANES == 8 && N - lane >= 16 {
+        while lane < count.min(N) {
+            if count - lane > V::LANES && N - lane >= 2 * V::LANES {
                 lower::<V, N, 2, 4>(factor, lanes, lane, &mut squares);
-                lane += 16;
+                lane += 2 * V::LANES;
             } else {
                 lower::<V, N, 1, 8>(factor, lanes, lane, &mut squares);
                 lane += V::LANES;
@@ -165,38 +236,53 @@ fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
     squares: &mut [f64; N],
 ) {
     let mut begin = 0;
-    while begin < lanes.len() {
-        let count = ROWS.min(lanes.len() - begin);
-        let (done, rest) = lanes.split_at_mut(begin);
-        // Beyond the last row the last one is repeated, and not written.
-        let rows: [&[f64]; ROWS] = std::array::from_fn(|r| factor.row(begin + r.min(count - 1)));
-        let mut sums: [[V; WIDE]; ROWS] = std::array::from_fn(|r| {
-            std::array::from_fn(|v| V::load(&rest[r.min(count - 1)][lane + v * V::LANES..]))
-        });
-        let before = rows.map(|row| &row[..begin]);
-        for (k, x) in done.iter().enumerate() {
-            let x: [V; WIDE] = std::array::from_fn(|v| V::load(&x[lane + v * V::LANES..]));
-            for r in 0..ROWS {
-                let l = V::splat(-before[r][k]);
-                for v in 0..WIDE {
-                    sums[r][v] = l.mul_add(x[v], sums[r][v]);
-                }
-            }
-        }
-        for r in 0..count {
-            for k in 0..r {
-                let l = V::splat(-rows[r][begin + k]);
-                sums[r] = std::array::from_fn(|v| l.mul_add(sums[k][v], sums[r][v]));
-            }
-            let scale = V::splat(1.0 / rows[r][begin + r]);
+    // A constant number of rows, whose sums stay in registers; then the rest.
+    while begin + ROWS <= lanes.len() {
+        lower_rows::<V, N, WIDE, ROWS, true>(factor, lanes, (begin, lane), squares);
+        begin += ROWS;
+    }
+    if begin < lanes.len() {
+        lower_rows::<V, N, WIDE, ROWS, false>(factor, lanes, (begin, lane), squares);
+    }
+}
+
+/// Solves `ROWS` rows from `begin` on, or, unless they are all there, the last ones.
+#[inline(always)]
+fn lower_rows<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize, const ALL: bool>(
+    factor: &Factor,
+    lanes: &mut [[f64; N]],
+    (begin, lane): (usize, usize),
+    squares: &mut [f64; N],
+) {
+    let count = if ALL { ROWS } else { lanes.len() - begin };
+    let (done, rest) = lanes.split_at_mut(begin);
+    // Beyond the last row the last one is repeated, and not written.
+    let rows: [&[f64]; ROWS] = std::array::from_fn(|r| factor.row(begin + r.min(count - 1)));
+    let mut sums: [[V; WIDE]; ROWS] = std::array::from_fn(|r| {
+        std::array::from_fn(|v| V::load(&rest[r.min(count - 1)][lane + v * V::LANES..]))
+    });
+    let before = rows.map(|row| &row[..begin]);
+    for (k, x) in done.iter().enumerate() {
+        let x: [V; WIDE] = std::array::from_fn(|v| V::load(&x[lane + v * V::LANES..]));
+        for r in 0..ROWS {
+            let l = V::splat(-before[r][k]);
             for v in 0..WIDE {
-                sums[r][v] = sums[r][v].mul(scale);
-                sums[r][v].store(&mut rest[r][lane + v * V::LANES..]);
-                let here = &mut squares[lane + v * V::LANES..];
-                sums[r][v].mul_add(sums[r][v], V::load(here)).store(here);
+                sums[r][v] = l.mul_add(x[v], sums[r][v]);
             }
         }
-        begin += count;
+    }
+    for r in 0..count {
+        for k in 0..r {
+            let l = V::splat(-rows[r][begin + k]);
+            sums[r] = std::array::from_fn(|v| l.mul_add(sums[k][v], sums[r][v]));
+        }
+        let scale = V::splat(1.0 / rows[r][begin + r]);
+        for v in 0..WIDE {
+            sums[r][v] = sums[r][v].mul(scale);
+            sums[r][v].store(&mut rest[r][lane + v * V::LANES..]);
+            let here = &mut squares[lane + v * V::LANES..];
+            sums[r][v].mul_add(sums[r][v], V::load(here)).store(here);
+        }
     }
 }
 

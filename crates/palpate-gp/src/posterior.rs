@@ -152,13 +152,37 @@ impl Posterior {
         places: impl Iterator<Item = &'a [f64]> + Clone,
     ) -> Result<Self, CovarianceError> {
         let mut fantasy = self.clone();
-        let imagine = |place| fantasy.append(&Observation::height(place, 0.0));
-        if places.clone().try_for_each(imagine).is_ok() {
+        if fantasy.imagine(&places.clone().collect::<Vec<_>>()).is_ok() {
             return Ok(fantasy);
         }
         let mut observations = self.observations.clone();
         places.for_each(|place| observations.push_height(place, 0.0));
         Self::new(self.kernel, self.hyperparameters.clone(), observations)
+    }
+
+    /// Adds heights of zero at `places`, whose covariances with the observations are solved side by
+    /// side; the weights are then those without them. After an error the factor has some of them.
+    fn imagine(&mut self, places: &[&[f64]]) -> Result<(), NotPositiveDefinite> {
+        let order = self.observations.order();
+        let noise = self.hyperparameters.noise_ratio();
+        let mut rows: Vec<Vec<f64>> = Vec::with_capacity(places.len());
+        self.whitened(places, |lanes, _, count| {
+            rows.extend((0..count).map(|lane| lanes.iter().map(|lanes| lanes[lane]).collect()));
+        });
+        let mut imagined = Observations::new(self.observations.dimension());
+        for (row, place) in rows.iter_mut().zip(places) {
+            row.resize(order + imagined.len(), 0.0);
+            let (at, lengths) = (place.iter().copied(), &self.hyperparameters.length_scales);
+            imagined.distances2(at, lengths, 0, &mut row[order..]);
+            self.kernel.correlate(&mut row[order..]);
+            let height = Observation::height(place, 0.0);
+            row.push(1.0 + height.height_noise2(noise) + self.jitter);
+            self.factor.append_solved(row, order)?;
+            imagined.push(&height);
+        }
+        self.bases.extend(self.observations.len()..self.observations.len() + places.len());
+        places.iter().for_each(|place| self.observations.push_height(place, 0.0));
+        Ok(())
     }
 
     /// Replaces all heights and slopes by those that `values` returns for their numbers, and the

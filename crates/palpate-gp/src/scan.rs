@@ -72,7 +72,7 @@ impl Grid {
         let beside = beside(&spread);
         let mut levels = if is_spread { vec![SPREAD] } else { vec![per_length; lengths] };
         for (lower, upper) in bounds.lower.iter().zip(bounds.upper).skip(lengths) {
-            levels.push(((upper - lower) / NOISE_STEP).ceil().max(1.0) as usize + 1);
+            levels.push(((upper - lower) / NOISE_STEP).ceil() as usize + 1);
         }
         let (lower, upper) = (bounds.lower.to_vec(), bounds.upper.to_vec());
         Self { lower, upper, levels, spread, beside }

@@ -11,6 +11,8 @@ use std::ops::Range;
 /// Relative difference below which sides count as equal.
 const EQUAL_SIDES: f64 = 5e-2;
 const THIRD: f64 = 1.0 / 3.0;
+/// Number of rectangles of one radius for which memory is reserved.
+const GROUP: usize = 32;
 
 /// A part of the unit cube; its centre and sides are stored in the arrays of all rectangles.
 struct Rectangle {
@@ -29,8 +31,9 @@ struct RadiusGroup {
     keys: Vec<Key>,
 }
 
-/// Cost as an integer for comparison, age and index of a rectangle.
-type Key = (u64, u32, usize);
+/// Cost of a rectangle as an integer for comparison, its age and its index, in this order from the
+/// highest bits.
+type Key = u128;
 
 /// A rectangle on the lower hull of costs over radii, before this round's divisions.
 #[derive(Clone, Copy)]
@@ -92,7 +95,8 @@ pub fn direct(bounds: Bounds, evaluations: u32, values: impl FnMut(&[Vec<f64>]) 
     };
     let cost = division.costs(1);
     division.least = cost[0];
-    division.add(cost[0]);
+    let group = division.group(division.radius(0), 0);
+    division.add(cost[0], group);
     while division.left > 0 {
         division.round();
     }
@@ -149,33 +153,41 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         let Rectangle { cost, age, .. } = self.rectangles[index];
         let bits = cost.to_bits();
         let ordered = if cost < 0.0 { !bits } else { bits | 1 << 63 };
-        (ordered, age, index)
+        Key::from(ordered) << 64 | Key::from(age) << 32 | index as Key
     }
 
-    /// Adds the rectangle whose centre and sides were added last.
-    fn add(&mut self, cost: f64) {
-        let index = self.rectangles.len();
-        let radius = self.radius(index);
-        self.rectangles.push(Rectangle { cost, age: self.age, radius });
+    /// Adds the rectangle whose centre and sides were added last to the group of its radius.
+    fn add(&mut self, cost: f64, group: usize) {
+        let (age, radius) = (self.age, self.sorted[group].radius);
         self.age += 1;
-        self.file(index);
+        self.rectangles.push(Rectangle { cost, age, radius });
+        self.file(self.rectangles.len() - 1, group);
     }
 
-    fn file(&mut self, index: usize) {
-        let (radius, key) = (self.rectangles[index].radius, self.key(index));
-        let at = self.sorted.partition_point(|equals| equals.radius < radius);
+    /// Returns the group of a radius, after creating it if there was none; `above` is a group of a
+    /// larger radius, or the number of groups. Divided rectangles are little smaller than before.
+    fn group(&mut self, radius: f32, above: usize) -> usize {
+        let smaller = self.sorted[..above].iter().rposition(|equals| equals.radius < radius);
+        let at = smaller.map_or(0, |smaller| smaller + 1);
         if self.sorted.get(at).is_none_or(|equals| equals.radius != radius) {
-            self.sorted.insert(at, RadiusGroup { radius, keys: Vec::new() });
+            let keys = Vec::with_capacity(GROUP);
+            self.sorted.insert(at, RadiusGroup { radius, keys });
         }
-        let keys = &mut self.sorted[at].keys;
-        keys.insert(keys.partition_point(|other| *other > key), key);
+        at
     }
 
-    fn unfile(&mut self, index: usize) {
-        let (radius, key) = (self.rectangles[index].radius, self.key(index));
-        let at = self.sorted.partition_point(|equals| equals.radius < radius);
-        if let Some(RadiusGroup { keys, .. }) = self.sorted.get_mut(at) {
-            let at = keys.partition_point(|other| *other > key);
+    fn file(&mut self, index: usize, group: usize) {
+        let key = self.key(index);
+        let keys = &mut self.sorted[group].keys;
+        // Most new rectangles are among the lowest.
+        let higher = keys.iter().rposition(|other| *other > key);
+        keys.insert(higher.map_or(0, |higher| higher + 1), key);
+    }
+
+    fn unfile(&mut self, index: usize, group: usize) {
+        let key = self.key(index);
+        let keys = &mut self.sorted[group].keys;
+        if let Some(at) = keys.iter().rposition(|other| *other == key) {
             keys.remove(at);
         }
     }
@@ -240,20 +252,24 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         pairs.sort_by(|a, b| lower(&a.1).total_cmp(&lower(&b.1)));
         let begin = index * self.dimension();
         let own = begin..begin + self.dimension();
+        let mut group = self.group(self.rectangles[index].radius, self.sorted.len());
         for (axis, pair) in &pairs {
-            self.unfile(index);
+            self.unfile(index, group);
             self.sides[begin + axis] *= THIRD;
-            self.rectangles[index].radius = self.radius(index);
+            // The three parts have the same sides.
+            let radius = self.radius(index);
+            group = self.group(radius, group + 1);
+            self.rectangles[index].radius = radius;
             self.rectangles[index].age = self.age;
             self.age += 1;
-            self.file(index);
+            self.file(index, group);
             let step = self.sides[begin + axis];
             for (side, cost) in [-1.0, 1.0].into_iter().zip(pair) {
                 let new = self.middles.len();
                 self.middles.extend_from_within(own.clone());
                 self.middles[new + axis] += side * step;
                 self.sides.extend_from_within(own.clone());
-                self.add(*cost);
+                self.add(*cost, group);
             }
         }
         self.pairs = pairs;
@@ -265,7 +281,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         hull.clear();
         // The rectangles of lowest cost for each radius; the first one represents all.
         let lowest = |equals: &RadiusGroup| {
-            let (_, _, index) = *equals.keys.last()?;
+            let index = equals.lowest().next()?;
             Some((equals.radius.into(), self.rectangles[index].cost))
         };
         let numbered = self.sorted.iter().enumerate();
@@ -321,8 +337,8 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
 impl RadiusGroup {
     /// Returns all rectangles of lowest cost, by increasing age.
     fn lowest(&self) -> impl Iterator<Item = usize> {
-        let least = self.keys.last().map(|key| key.0);
-        let is_least = move |key: &&Key| Some(key.0) == least;
-        self.keys.iter().rev().take_while(is_least).map(|key| key.2)
+        let least = self.keys.last().map(|key| key >> 64);
+        let is_least = move |key: &&Key| Some(*key >> 64) == least;
+        self.keys.iter().rev().take_while(is_least).map(|key| *key as u32 as usize)
     }
 }
