@@ -97,7 +97,7 @@ impl RefitSequence {
     /// Runs [`SearchBox::fit`] on at least the observations of the last call.
     ///
     /// The last optimum is an additional start, or, unless the box must be scanned again, the only
-    /// one besides shorter lengths.
+    /// one besides shorter lengths. Climbs from the same starts as in the last call are continued.
     pub fn fit(&mut self, sought: &SearchBox, observations: &Observations) -> Fit {
         let TouchNoise::AtLeast(least) = sought.touch_noise else {
             return self.free.fit(sought, self.kernel, observations);
@@ -375,7 +375,7 @@ impl<'a> Search<'a> {
             (*low, *high) =
                 ((*low / ROUNDED).floor() * ROUNDED, (*high / ROUNDED).ceil() * ROUNDED);
         }
-        // Without kept factors each place is a factorisation: after a climb, its slope noise serves.
+        // Without kept factors each place is a factorisation: a climb's slope noise serves.
         if let Some(best) = self.best.as_ref().filter(|_| scan.is_none()) {
             let slopes = noises.start + 1..noises.end;
             lower[slopes.clone()].copy_from_slice(&best.x[slopes.clone()]);
