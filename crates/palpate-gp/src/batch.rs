@@ -80,9 +80,9 @@ impl Posterior {
         let mut lanes = Lanes::<MANY>::default();
         for block in places.chunks(MANY) {
             lanes.correlate(self, block, false);
-            let lanes_used = &mut lanes.correlations;
-            let explained = self.factor().solve_lower_lanes(lanes_used, block.len());
-            tell(&lanes.correlations, explained, block.len());
+            let solved = &mut lanes.correlations;
+            let explained = self.factor().solve_lower_lanes(solved, block.len());
+            tell(solved, explained, block.len());
         }
     }
 
@@ -119,7 +119,7 @@ impl<const N: usize> Lanes<N> {
             predictions.iter_mut().zip(sums).for_each(|(at, sum)| at.mean = mean + sum);
         }
         if !matches!(asked, Requested::Means) {
-            // Correlations are not needed later.
+            // The correlations themselves are not needed later.
             std::mem::swap(&mut self.solved, &mut self.correlations);
             let explained = posterior.factor().solve_lower_lanes(&mut self.solved, places.len());
             for (at, explained) in predictions.iter_mut().zip(explained) {

@@ -112,16 +112,16 @@ impl Factor {
 
 /// Number of rows of the factor that a single right-hand side goes through at once: their sums hide
 /// each other's latency.
-const ROWS: usize = 4;
+const TOGETHER: usize = 4;
 
 widest_fn! {
     /// Replaces b by L⁻¹·b, of which the first `solved` entries are known, and returns its square.
     fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64], solved: usize) -> f64 {
         let mut i = solved;
         while i < b.len() {
-            if i % ROWS == 0 && i + ROWS <= b.len() {
-                solve_rows::<ROWS>(rows, b, i);
-                i += ROWS;
+            if i % TOGETHER == 0 && i + TOGETHER <= b.len() {
+                solve_rows::<TOGETHER>(rows, b, i);
+                i += TOGETHER;
             } else {
                 solve_rows::<1>(rows, b, i);
                 i += 1;
@@ -134,7 +134,7 @@ widest_fn! {
 /// Solves `COUNT` rows from `first` on. Each has the same bits with every count.
 #[inline(always)]
 fn solve_rows<const COUNT: usize>(rows: &[f64], b: &mut [f64], first: usize) {
-    let begin = first - first % ROWS;
+    let begin = first - first % TOGETHER;
     let (done, rest) = b.split_at_mut(begin);
     let block: [&[f64]; COUNT] = std::array::from_fn(|r| row(rows, first + r));
     let sums = dots(block.map(|row| &row[..begin]), done);
@@ -205,7 +205,7 @@ impl Factor {
 }
 
 vectorised_fn! {
-    /// Replaces each lane b by L⁻¹·b; eight sums in registers hide each other's latency.
+    /// Implements [`Factor::solve_lower_lanes`]; eight sums in registers hide each other's latency.
     fn solve_lower_lanes<'a, V: Vector, const N: usize>(
         factor: &'a Factor,
         lanes: &'a mut [[f64; N]],

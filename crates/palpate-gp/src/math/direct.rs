@@ -164,10 +164,10 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         self.file(self.rectangles.len() - 1, group);
     }
 
-    /// Returns the group of a radius, after creating it if there was none; `above` is a group of a
-    /// larger radius, or the number of groups. Divided rectangles are little smaller than before.
-    fn group(&mut self, radius: f32, above: usize) -> usize {
-        let smaller = self.sorted[..above].iter().rposition(|equals| equals.radius < radius);
+    /// Returns the group of a radius, after creating it if there was none. Groups from `end` on
+    /// have larger radii; one close to it is found soon, as after a division.
+    fn group(&mut self, radius: f32, end: usize) -> usize {
+        let smaller = self.sorted[..end].iter().rposition(|equals| equals.radius < radius);
         let at = smaller.map_or(0, |smaller| smaller + 1);
         if self.sorted.get(at).is_none_or(|equals| equals.radius != radius) {
             let keys = Vec::with_capacity(GROUP);

@@ -320,6 +320,18 @@ proptest! {
             }
             last = now;
         }
+        // Several fantasies at once are as good as one by one.
+        for known in [0, touches.len() / 2] {
+            let mut begun = posterior(at.clone(), Observations::new(2));
+            for (touched, height) in &touches[..known] {
+                begun.add(touched, *height).unwrap();
+            }
+            let places = touches[known..].iter().map(|(touched, _)| &touched[..]);
+            let imagined = begun.fantasize(places).unwrap().variance(&place, &mut scratch);
+            let difference = (imagined - last).abs();
+            let allowed = Rounding::of(&grown).variance(&place);
+            prop_assert!(difference <= allowed, "{known}: {difference:e} of {allowed:e}");
+        }
         // The variance at a touched place is at most that of its touch.
         for (touched, _) in &touches {
             let known = grown.variance(touched, &mut scratch);
