@@ -5,7 +5,6 @@ use palpate_gp::likelihood::Likelihood;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::{MeanModel, NoiseRatio, Observation, Observations, Posterior, SignalModel, Slope};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 /// A place with its height and, for every second one, slopes.
 #[derive(Clone, Debug)]
@@ -104,7 +103,7 @@ fn the_mean_has_the_slope_that_was_observed() {
 }
 
 /// Half the distance of two nearby heights that replace a slope.
-const HALF: f64 = 1e-3;
+const HALF: f64 = 1e-4;
 
 /// Returns every touch as four heights around it. With errors of n each, their mean has an error of
 /// n / 2, and a difference over their distance, a slope, one of n·√2 / distance, independent of it.
@@ -134,19 +133,13 @@ fn crosses(touches: &[Touch]) -> Observations {
 }
 
 proptest! {
-    // The cases are fixed: nearby heights replace a slope up to the square of their distance, and
-    // one case in many thousands exceeds the bounds here.
-    #![proptest_config(ProptestConfig {
-        rng_seed: RngSeed::Fixed(2016), ..ProptestConfig::default()
-    })]
-
     #[test]
     fn slopes_are_heights_very_near_each_other(
         at in any_parameters(), touches in any_touches(), choice in 0..2usize,
         place in [-1.0..1.0f64, -1.0..1.0f64],
     ) {
         let touches: Vec<Touch> = touches.into_iter().map(|t| Touch { noise: 1.0, ..t }).collect();
-        let noise_sd = 1e-3 * at.signal_sd;
+        let noise_sd = HALF * at.signal_sd;
         let slope_noise_sd = 2.0 * noise_sd * 2f64.sqrt() / (2.0 * HALF);
         let length_scales = at.length_scales.iter().map(|length| length + 0.4).collect();
         let at = Hyperparameters { noise_sd, slope_noise_sd, length_scales, ..at };
@@ -171,7 +164,7 @@ proptest! {
         let [ours, twin] = [all(&touches), crosses(&touches)].map(|observations| {
             let mut likelihood = Likelihood::new(kernel(choice), MeanModel::Zero, &observations);
             let [here, there] = [[1.0, 1.0], lengths].map(|lengths| {
-                let (signal_sd, noise_sd) = (1.0, 1e-2);
+                let (signal_sd, noise_sd) = (1.0, HALF);
                 let at = Hyperparameters {
                     signal_sd,
                     length_scales: lengths.into(),
@@ -226,7 +219,7 @@ proptest! {
                 likelihood.value_gradient(&at, &mut []).unwrap()
             };
             let twin = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            prop_assert!((ours - twin).abs() < 1e-4 * (1.0 + twin.abs()), "{i}: {ours} {twin}");
+            prop_assert!((ours - twin).abs() < 1e-3 * (1.0 + twin.abs()), "{i}: {ours} {twin}");
         }
         let belief = posterior(choice, &at, &touches);
         let mut scratch = Scratch::default();
@@ -245,7 +238,7 @@ proptest! {
             let variances = moved.map(|place| belief.variance(&place, &mut scratch));
             for (ours, [above, below]) in [(by_mean[axis], means), (by_variance[axis], variances)] {
                 let twin = (above - below) / 2e-5;
-                prop_assert!((ours - twin).abs() < 1e-4 * (1.0 + twin.abs()), "{ours} {twin}");
+                prop_assert!((ours - twin).abs() < 1e-3 * (1.0 + twin.abs()), "{ours} {twin}");
             }
         }
     }
