@@ -73,11 +73,10 @@ fn a_sphere_is_found() {
         let mesh = surface.mesh(64).unwrap();
         let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();
         assert!(report.is_closed());
-        let mut field = surface.field();
-        assert!(field.value(&Point3::origin()) < -0.01);
+        assert!(surface.value(&Point3::origin()) < -0.01);
         // On its surface the field grows like a distance.
         for away in [Vector3::x(), Vector3::new(1.0, -1.0, 1.0).normalize()] {
-            let gradient = field.at(&Point3::from(away * 0.04)).gradient;
+            let gradient = surface.field(&Point3::from(away * 0.04)).gradient;
             assert!((gradient - away).norm() < 0.1, "{name}: {gradient}");
         }
     }
@@ -199,7 +198,7 @@ fn a_large_belief_is_searched_again_when_it_has_grown() {
         let mut drawn = known.clone();
         drawn.condition(before.as_ref(), &fit).unwrap();
         for p_w in [Point3::new(0.01, 0.02, 0.03), Point3::new(-0.05, 0.0, 0.01)] {
-            let value = |belief: &ImplicitSurface| belief.surface().unwrap().field().value(&p_w);
+            let value = |belief: &ImplicitSurface| belief.surface().unwrap().value(&p_w);
             assert_eq!(value(&known).to_bits(), value(&drawn).to_bits());
         }
     }

@@ -99,6 +99,14 @@ pub struct Field {
     pub gradient: Vector3<f64>,
 }
 
+impl std::ops::Add for Field {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { value: self.value + other.value, gradient: self.gradient + other.gradient }
+    }
+}
+
 impl Field {
     /// Half-space below the plane through `on` with the unit normal `normal`.
     pub fn plane(p: Point3<f64>, on: Point3<f64>, normal: Vector3<f64>) -> Self {

@@ -1,5 +1,6 @@
 //! Batch evaluation of mean, variance and its gradient: the factor is read once per sixteen places.
 
+use super::means::MeanField;
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest_fn;
 
@@ -20,7 +21,6 @@ const FEW: usize = 8;
 
 /// Quantities computed at the places of one block.
 enum Requested<'a> {
-    Means,
     Variances,
     Both,
     Gradients(&'a mut [Vec<f64>]),
@@ -47,9 +47,7 @@ impl Posterior {
     /// Returns [`mean`](Self::mean) at each of `places`.
     pub fn means<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
         let places: Vec<&[f64]> = places.into_iter().collect();
-        let mut means = Vec::with_capacity(places.len());
-        self.in_blocks(&places, |_| Requested::Means, |prediction| means.push(prediction.mean));
-        means
+        MeanField::from(self).values(&places, &mut [])
     }
 
     /// Returns [`variance`](Self::variance) at each of `places`, and writes the gradients unless
@@ -112,25 +110,23 @@ impl<const N: usize> Lanes<N> {
         tell: &mut impl FnMut(Prediction),
     ) {
         self.correlate(posterior, places, matches!(asked, Requested::Gradients(_)));
-        let mut predictions = [Prediction { mean: f64::NAN, variance: f64::NAN }; N];
-        if matches!(asked, Requested::Means | Requested::Both) {
+        let mut means = [f64::NAN; N];
+        if matches!(asked, Requested::Both) {
             let mean = posterior.hyperparameters().mean;
-            let sums = weighted(&self.correlations, posterior.weights());
-            predictions.iter_mut().zip(sums).for_each(|(at, sum)| at.mean = mean + sum);
+            means = [0.0; N];
+            add_weighted(&mut means, &self.correlations, posterior.weights());
+            means.iter_mut().for_each(|sum| *sum += mean);
         }
-        if !matches!(asked, Requested::Means) {
-            // The correlations themselves are not needed later.
-            std::mem::swap(&mut self.solved, &mut self.correlations);
-            let explained = posterior.factor().solve_lower_lanes(&mut self.solved, places.len());
-            for (at, explained) in predictions.iter_mut().zip(explained) {
-                at.variance = posterior.remaining(explained);
-            }
-        }
+        // The correlations themselves are not needed later.
+        std::mem::swap(&mut self.solved, &mut self.correlations);
+        let explained = posterior.factor().solve_lower_lanes(&mut self.solved, places.len());
+        let variances = explained.map(|explained| posterior.remaining(explained));
         if let Requested::Gradients(gradients) = asked {
             posterior.factor().solve_upper_lanes(&mut self.solved);
             self.differentiate(posterior, places, gradients);
         }
-        predictions[..places.len()].iter().for_each(|prediction| tell(*prediction));
+        let predictions = means.into_iter().zip(variances).take(places.len());
+        predictions.for_each(|(mean, variance)| tell(Prediction { mean, variance }));
     }
 
     /// Computes the correlations of the places with the observations, and their slopes if
@@ -211,15 +207,19 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Returns Σ_i w_i·c_i for each lane.
-    fn weighted<'a, const N: usize>(correlations: &'a [[f64; N]], weights: &'a [f64]) -> [f64; N] {
-        let mut sums = [0.0; N];
+    /// Adds Σ_i w_i·c_i to each lane.
+    pub(super) fn add_weighted<'a, const N: usize>(
+        sums: &'a mut [f64; N],
+        correlations: &'a [[f64; N]],
+        weights: &'a [f64],
+    ) -> () {
+        let mut all = *sums;
         for (correlations, weight) in correlations.iter().zip(weights) {
             for lane in 0..N {
-                sums[lane] = weight.mul_add(correlations[lane], sums[lane]);
+                all[lane] = weight.mul_add(correlations[lane], all[lane]);
             }
         }
-        sums
+        *sums = all;
     }
 }
 

@@ -65,70 +65,75 @@ pub struct SquaredExponential;
 
 impl RadialKernel for SquaredExponential {
     #[inline(always)]
-    fn correlation_slope(r2: f64) -> (f64, f64) {
-        let correlation = exp_of_negative(-0.5 * r2);
-        (correlation, -0.5 * correlation)
+    fn exponent(r2: f64) -> f64 {
+        0.5 * r2
+    }
+
+    #[inline(always)]
+    fn correlation_slope(_: f64, decay: f64) -> (f64, f64) {
+        (decay, -0.5 * decay)
     }
 
     const HAS_SLOPES: bool = true;
 
     #[inline(always)]
-    fn curvatures(r2: f64) -> (f64, f64) {
-        let correlation = exp_of_negative(-0.5 * r2);
-        (0.25 * correlation, -0.125 * correlation)
+    fn curvatures(_: f64, decay: f64) -> (f64, f64) {
+        (0.25 * decay, -0.125 * decay)
     }
 }
 
-/// Matérn kernel (1 + √3·r)·exp(−√3·r) (Rasmussen & Williams 2006, Eq. 4.17): surfaces with one
-/// derivative.
+/// Matérn kernel (1 + s)·exp(−s) with s = √3·r (Rasmussen & Williams 2006, Eq. 4.17): surfaces with
+/// one derivative.
 #[derive(Clone, Copy, Debug)]
 pub struct Matern32;
 
 impl RadialKernel for Matern32 {
     #[inline(always)]
-    fn correlation_slope(r2: f64) -> (f64, f64) {
-        let s = (3.0 * r2).sqrt();
-        let decay = exp_of_negative(-s);
-        (bounded((1.0 + s) * decay), -1.5 * decay)
+    fn exponent(r2: f64) -> f64 {
+        (3.0 * r2).sqrt()
+    }
+
+    #[inline(always)]
+    fn correlation_slope(s: f64, decay: f64) -> (f64, f64) {
+        ((1.0 + s) * decay, -1.5 * decay)
     }
 }
 
-/// Matérn kernel (1 + √5·r + 5r²/3)·exp(−√5·r): surfaces with two derivatives.
+/// Matérn kernel (1 + s + s²/3)·exp(−s) with s = √5·r: surfaces with two derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Matern52;
 
 impl RadialKernel for Matern52 {
     #[inline(always)]
-    fn correlation_slope(r2: f64) -> (f64, f64) {
-        let s = (5.0 * r2).sqrt();
-        let decay = exp_of_negative(-s);
-        let correlation = bounded((1.0 + s + s * s / 3.0) * decay);
-        (correlation, bounded(-5.0 / 6.0 * (1.0 + s) * decay))
+    fn exponent(r2: f64) -> f64 {
+        (5.0 * r2).sqrt()
+    }
+
+    #[inline(always)]
+    fn correlation_slope(s: f64, decay: f64) -> (f64, f64) {
+        let line = 1.0 + s;
+        (s.mul_add(s * (1.0 / 3.0), line) * decay, -5.0 / 6.0 * line * decay)
     }
 
     const HAS_SLOPES: bool = true;
 
     #[inline(always)]
-    fn curvatures(r2: f64) -> (f64, f64) {
-        let s = (5.0 * r2).sqrt();
-        let decay = exp_of_negative(-s);
+    fn curvatures(s: f64, decay: f64) -> (f64, f64) {
         (25.0 / 12.0 * decay, -125.0 / 24.0 * decay / s.max(f64::MIN_POSITIVE.sqrt()))
     }
 }
 
-/// Replaces NaN from ∞·0 by 0, at distances whose square overflows.
-#[inline(always)]
-fn bounded(value: f64) -> f64 {
-    if value.is_nan() { 0.0 } else { value }
-}
-
-/// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
+/// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)² by way
+/// of exp(−s) with an exponent s ≥ 0.
 ///
-/// A new kernel is a type with this trait and one line in [`KERNELS`].
+/// A new kernel is a type with this trait and one line in [`KERNELS`]. Its functions are
+/// branch-free and `#[inline(always)]`, so that loops over them are vectorised.
 pub trait RadialKernel: Send + Sync {
-    /// Correlation c(r²), with c(0) = 1, and its derivative dc/d(r²). Branch-free and
-    /// `#[inline(always)]`, so that loops over it are vectorised.
-    fn correlation_slope(r2: f64) -> (f64, f64);
+    /// Exponent s(r²), with s(0) = 0.
+    fn exponent(r2: f64) -> f64;
+
+    /// Correlation c, 1 at s = 0, and its derivative dc/d(r²), from s and exp(−s).
+    fn correlation_slope(s: f64, decay: f64) -> (f64, f64);
 
     /// Whether the kernel's surfaces have continuous slopes, so that one slope is informative
     /// about others nearby. If so, it must define [`curvatures`](Self::curvatures).
@@ -137,10 +142,13 @@ pub trait RadialKernel: Send + Sync {
     /// Returns the second and third derivative of c with respect to r². The third may be any number
     /// at 0, since it is multiplied by r⁴.
     #[inline(always)]
-    fn curvatures(_r2: f64) -> (f64, f64) {
+    fn curvatures(_s: f64, _decay: f64) -> (f64, f64) {
         (0.0, 0.0)
     }
 }
+
+/// Largest exponent: its decay is 0, and no product with it overflows.
+const FARTHEST: f64 = 1e3;
 
 /// A kernel, evaluated for many distances at a time.
 pub trait Kernel: Send + Sync {
@@ -157,23 +165,35 @@ pub trait Kernel: Send + Sync {
     fn correlate_derivatives(&self, r2: &mut [f64], derivatives: [&mut [f64]; 3]);
 }
 
+/// Returns the exponent at r² and its decay.
+#[inline(always)]
+fn decay<R: RadialKernel>(r2: f64) -> (f64, f64) {
+    let s = R::exponent(r2);
+    // NaN stays.
+    let s = if FARTHEST < s { FARTHEST } else { s };
+    (s, exp_of_negative(-s))
+}
+
 widest_fn! {
     fn correlate<'a, R: RadialKernel>(r2: &'a mut [f64]) -> () {
-        r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0);
+        for r2 in r2 {
+            let (s, decay) = decay::<R>(*r2);
+            *r2 = R::correlation_slope(s, decay).0;
+        }
     }
 }
 
 widest_fn! {
     fn correlate_slope<'a, R: RadialKernel>(r2: &'a mut [f64], slopes: &'a mut [f64]) -> () {
         for (r2, slope) in r2.iter_mut().zip(slopes) {
-            (*r2, *slope) = R::correlation_slope(*r2);
+            let (s, decay) = decay::<R>(*r2);
+            (*r2, *slope) = R::correlation_slope(s, decay);
         }
     }
 }
 
 widest_fn! {
-    /// Implements [`Kernel::correlate_derivatives`]; what both functions of a kernel compute is
-    /// computed once.
+    /// Implements [`Kernel::correlate_derivatives`].
     fn correlate_derivatives<'a, R: RadialKernel>(
         r2: &'a mut [f64],
         first: &'a mut [f64],
@@ -182,8 +202,9 @@ widest_fn! {
     ) -> () {
         let derivatives = first.iter_mut().zip(second).zip(third);
         for (r2, ((first, second), third)) in r2.iter_mut().zip(derivatives) {
-            (*second, *third) = R::curvatures(*r2);
-            (*r2, *first) = R::correlation_slope(*r2);
+            let (s, decay) = decay::<R>(*r2);
+            (*r2, *first) = R::correlation_slope(s, decay);
+            (*second, *third) = R::curvatures(s, decay);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Posterior means at very many places: at fixed places while observations are added, or at
 //! arbitrary ones for a search of zeros.
 
+use super::batch::add_weighted;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
@@ -66,27 +67,32 @@ impl FixedPlaceMeans {
     }
 }
 
-/// Evaluator of a posterior's mean as weighted sums over the observations, with its own buffers.
+/// A posterior's mean as weighted sums over the observations, for very many places.
 ///
-/// With u = (x − x_i) / l for each observation, the weight w of its height and the weights v of its
-/// slopes per length scale, the mean is m + Σ w·c − 2c′·(u·v), and its gradient per length scale Σ
-/// 2u·(w·c′ − 2c″·(u·v)) − 2c′·v.
+/// With u = (x − x_i) / l for each observation, the weight w of its height and m = −2v for the weights
+/// v of its slopes per length scale, the mean is Σ w·c + c′·(u·m) above the prior's, and its gradient
+/// per length scale Σ 2u·(w·c′ + c″·(u·m)) + c′·m.
 #[derive(Clone)]
 pub struct MeanField {
     kernel: &'static dyn Kernel,
     mean: f64,
     lengths: Vec<f64>,
-    /// Coordinates of the observations per length scale, axis by axis.
-    columns: Vec<Vec<f64>>,
-    /// Weights of the heights, and of the slopes axis by axis; zeros where none was observed.
+    /// Coordinates of the observations per length scale, observation by observation; those with
+    /// observed slopes come first.
+    observed: Vec<f64>,
+    /// Weights of the heights.
     heights: Vec<f64>,
-    slopes: Vec<Vec<f64>>,
-    steps: Vec<Vec<f64>>,
-    correlations: Vec<f64>,
-    derivatives: [Vec<f64>; 3],
-    /// u·v of each observation.
-    along: Vec<f64>,
+    /// Weights m of the slopes, observation by observation.
+    slopes: Vec<f64>,
 }
+
+/// Numbers of places and observations of which all pairs are computed together: their correlations
+/// stay in the nearest cache.
+const PLACES: usize = 16;
+const ROWS: usize = 16;
+
+/// Number of places computed together for the remainder.
+const FEW: usize = 8;
 
 impl From<&Posterior> for MeanField {
     fn from(posterior: &Posterior) -> Self {
@@ -104,141 +110,219 @@ impl MeanField {
     /// Returns the field with this mean and these weights of all observed numbers.
     fn of(posterior: &Posterior, mean: f64, all: &[f64]) -> Self {
         let observations = posterior.observations();
-        let (count, dimension) = (observations.len(), observations.dimension());
-        let lengths = posterior.hyperparameters().length_scales.clone();
-        let weight = |i: usize, number: usize| {
-            let at = observations.start(i) + number;
-            if at < observations.start(i + 1) { all[at] } else { 0.0 }
-        };
-        let column = |axis: usize| {
-            observations.column(axis).iter().map(|x| x / lengths[axis]).collect::<Vec<f64>>()
-        };
-        let zeros = || vec![0.0; count];
+        let lengths = &posterior.hyperparameters().length_scales;
+        let numbers = |i: usize| &all[observations.start(i)..observations.start(i + 1)];
+        let (sloped, plain): (Vec<usize>, Vec<usize>) =
+            (0..observations.len()).partition(|&i| numbers(i).len() > 1);
+        let order = || sloped.iter().chain(&plain).copied();
+        let scaled = |i: usize| observations.place(i).zip(lengths).map(|(x, l)| x / l);
+        let slopes = sloped.iter().flat_map(|&i| &numbers(i)[1..]);
         Self {
             kernel: posterior.kernel(),
             mean,
-            columns: (0..dimension).map(column).collect(),
-            heights: (0..count).map(|i| weight(i, 0)).collect(),
-            slopes: (0..dimension)
-                .map(|axis| (0..count).map(|i| weight(i, 1 + axis)).collect())
-                .collect(),
-            steps: (0..dimension).map(|_| zeros()).collect(),
-            correlations: zeros(),
-            derivatives: [zeros(), zeros(), zeros()],
-            along: zeros(),
-            lengths,
+            lengths: lengths.clone(),
+            observed: order().flat_map(scaled).collect(),
+            heights: order().map(|i| numbers(i)[0]).collect(),
+            slopes: slopes.map(|v| -2.0 * v).collect(),
         }
     }
 
     /// Returns the mean at `place`.
-    pub fn value(&mut self, place: &[f64]) -> f64 {
-        self.walk(place);
-        self.kernel.correlate_slope(&mut self.correlations, &mut self.derivatives[0]);
-        self.mean + self.sum()
+    pub fn value(&self, place: &[f64]) -> f64 {
+        self.lanes::<1>(&[place], &mut [])[0]
     }
 
     /// Returns the mean and writes its gradient with respect to the place.
-    pub fn gradient(&mut self, place: &[f64], gradient: &mut [f64]) -> f64 {
-        self.walk(place);
-        let derivatives = self.derivatives.each_mut().map(Vec::as_mut_slice);
-        self.kernel.correlate_derivatives(&mut self.correlations, derivatives);
-        let [first, second, _] = &self.derivatives;
-        for (axis, slope) in gradient.iter_mut().enumerate() {
-            let (slopes, steps) = (&self.slopes[axis], &self.steps[axis]);
-            let sum = slope_sum(&self.heights, slopes, steps, &self.along, [first, second]);
-            *slope = sum / self.lengths[axis];
-        }
-        self.mean + self.sum()
+    pub fn gradient(&self, place: &[f64], gradient: &mut [f64]) -> f64 {
+        self.lanes::<1>(&[place], gradient.as_chunks_mut().0)[0]
     }
 
-    /// Writes the differences of `place` from every observation, their squared lengths, and u·v.
-    fn walk(&mut self, place: &[f64]) {
-        let Self { lengths, columns, slopes, steps, correlations, along, .. } = self;
-        correlations.fill(0.0);
-        along.fill(0.0);
-        for (axis, (at, length)) in place.iter().zip(lengths.iter()).enumerate() {
-            let observed = (&columns[axis][..], &slopes[axis][..]);
-            walk(at / length, observed, &mut steps[axis], correlations, along);
+    /// Returns the mean at each of `places`, and writes the gradients, place by place, unless
+    /// `gradients` is empty: the same numbers as one by one.
+    pub fn values(&self, places: &[&[f64]], gradients: &mut [f64]) -> Vec<f64> {
+        let mut values = Vec::with_capacity(places.len());
+        let mut gradients = gradients.chunks_mut(PLACES * self.lengths.len().max(1));
+        for places in places.chunks(PLACES) {
+            let gradients = gradients.next().unwrap_or_default();
+            match places.len() <= FEW {
+                true => self.block::<FEW>(places, &mut values, gradients),
+                false => self.block::<PLACES>(places, &mut values, gradients),
+            }
+        }
+        values
+    }
+
+    /// Implements [`values`](Self::values) for up to N places.
+    fn block<const N: usize>(
+        &self,
+        places: &[&[f64]],
+        values: &mut Vec<f64>,
+        gradients: &mut [f64],
+    ) {
+        let dimension = self.lengths.len();
+        let mut lanes = vec![[0.0; N]; if gradients.is_empty() { 0 } else { dimension }];
+        values.extend(&self.lanes(places, &mut lanes)[..places.len()]);
+        for (lane, gradient) in gradients.chunks_mut(dimension.max(1)).enumerate() {
+            gradient.iter_mut().zip(&lanes).for_each(|(slope, lanes)| *slope = lanes[lane]);
         }
     }
 
-    fn sum(&self) -> f64 {
-        height_sum(&self.heights, &self.along, &self.correlations, &self.derivatives[0])
+    /// Returns the means at up to N places, one per lane, and writes their gradients, axis by axis,
+    /// unless `gradients` is empty; lanes without a place repeat the last.
+    fn lanes<const N: usize>(&self, places: &[&[f64]], gradients: &mut [[f64; N]]) -> [f64; N] {
+        let dimension = self.lengths.len();
+        let place = |lane: usize| places[lane.min(places.len() - 1)];
+        let at = self
+            .lengths
+            .iter()
+            .enumerate()
+            .map(|(axis, length)| std::array::from_fn(|lane| place(lane)[axis] / length));
+        let at: Vec<[f64; N]> = at.collect();
+        let (count, sloped) = (self.heights.len(), self.slopes.len() / dimension.max(1));
+        let mut sums = [0.0; N];
+        gradients.fill([0.0; N]);
+        let mut buffers = [[[0.0; N]; ROWS]; 5];
+        let mut begin = 0;
+        while begin < count {
+            let is_sloped = begin < sloped;
+            let end = (begin + ROWS).min(if is_sloped { sloped } else { count });
+            let numbers = begin * dimension..end * dimension;
+            let (observed, heights) = (&self.observed[numbers.clone()], &self.heights[begin..end]);
+            let slopes = if is_sloped { &self.slopes[numbers] } else { &[] };
+            let [correlations, along, first, second, third] =
+                buffers.each_mut().map(|buffer| &mut buffer[..end - begin]);
+            begin = end;
+            squares(correlations, &at, observed);
+            steps(along, &at, observed, slopes);
+            let r2 = correlations.as_flattened_mut();
+            let derivative = first.as_flattened_mut();
+            match (is_sloped, gradients.is_empty()) {
+                (false, true) => self.kernel.correlate(r2),
+                (true, false) => {
+                    let higher = [&mut *second, third].map(|it| it.as_flattened_mut());
+                    let [second, third] = higher;
+                    self.kernel.correlate_derivatives(r2, [derivative, second, third]);
+                }
+                _ => self.kernel.correlate_slope(r2, derivative),
+            }
+            add_weighted(&mut sums, correlations, heights);
+            if is_sloped {
+                add_products(&mut sums, first, along);
+            }
+            if gradients.is_empty() {
+                continue;
+            }
+            bend(second, first, heights, along);
+            add_moments(gradients, &at, (observed, slopes), (second, first));
+        }
+        for (gradient, length) in gradients.iter_mut().zip(&self.lengths) {
+            gradient.iter_mut().for_each(|slope| *slope /= length);
+        }
+        sums.map(|sum| self.mean + sum)
     }
 }
 
-/// Number of parallel sums.
-const LANES: usize = 8;
-
 widest_fn! {
-    /// Implements [`MeanField::walk`] for one axis; `observed` is a column and the weights of its
-    /// slopes.
-    fn walk<'a>(
-        at: f64,
-        observed: (&'a [f64], &'a [f64]),
-        steps: &'a mut [f64],
-        r2: &'a mut [f64],
-        along: &'a mut [f64],
+    /// Writes u·u of every pair.
+    fn squares<'a, const N: usize>(
+        r2: &'a mut [[f64; N]],
+        at: &'a [[f64; N]],
+        observed: &'a [f64],
     ) -> () {
-        let observed = observed.0.iter().zip(observed.1);
-        let found = steps.iter_mut().zip(r2.iter_mut().zip(along.iter_mut()));
-        for ((x, weight), (step, (r2, along))) in observed.zip(found) {
-            let u = at - x;
-            *step = u;
-            *r2 += u * u;
-            *along += u * weight;
+        for (r2, place) in r2.iter_mut().zip(observed.chunks_exact(at.len())) {
+            let mut sums = [0.0; N];
+            for (at, x) in at.iter().zip(place) {
+                for lane in 0..N {
+                    let u = at[lane] - x;
+                    sums[lane] = u.mul_add(u, sums[lane]);
+                }
+            }
+            *r2 = sums;
         }
     }
 }
 
 widest_fn! {
-    /// Returns Σ w·c − 2c′·(u·v).
-    fn height_sum<'a>(
-        heights: &'a [f64],
-        along: &'a [f64],
-        correlations: &'a [f64],
-        first: &'a [f64],
-    ) -> f64 {
-        lanes([heights, along, correlations, first], |[height, along, correlation, first]| {
-            height * correlation - 2.0 * first * along
-        })
-    }
-}
-
-widest_fn! {
-    /// Returns Σ 2u·(w·c′ − 2c″·(u·v)) − 2c′·v along one axis.
-    fn slope_sum<'a>(
-        heights: &'a [f64],
+    /// Writes u·m of every pair, or 0 for observations without slopes.
+    fn steps<'a, const N: usize>(
+        along: &'a mut [[f64; N]],
+        at: &'a [[f64; N]],
+        observed: &'a [f64],
         slopes: &'a [f64],
-        steps: &'a [f64],
-        along: &'a [f64],
-        derivatives: [&'a [f64]; 2],
-    ) -> f64 {
-        let [first, second] = derivatives;
-        lanes([heights, slopes, steps, along, first, second], |numbers| {
-            let [height, slope, step, along, first, second] = numbers;
-            let bend = height * first - 2.0 * second * along;
-            2.0 * (step * bend - first * slope)
-        })
+    ) -> () {
+        along.fill([0.0; N]);
+        let observed = observed.chunks_exact(at.len()).zip(slopes.chunks_exact(at.len()));
+        for (along, (place, slopes)) in along.iter_mut().zip(observed) {
+            let mut sums = [0.0; N];
+            for (at, (x, slope)) in at.iter().zip(place.iter().zip(slopes)) {
+                for lane in 0..N {
+                    sums[lane] = (at[lane] - x).mul_add(*slope, sums[lane]);
+                }
+            }
+            *along = sums;
+        }
     }
 }
 
-/// Returns Σ of `term` over the numbers with the same index of all `slices`, which are equally
-/// long, in parallel sums.
-#[inline(always)]
-fn lanes<const N: usize>(slices: [&[f64]; N], term: impl Fn([f64; N]) -> f64) -> f64 {
-    let mut sums = [0.0; LANES];
-    let slices = slices.map(|slice| slice.as_chunks::<LANES>());
-    let chunks = slices.iter().map(|(chunks, _)| chunks.len()).min().unwrap_or(0);
-    for at in 0..chunks {
-        let chunks: [&[f64; LANES]; N] = slices.map(|(chunks, _)| &chunks[at]);
-        for (lane, sum) in sums.iter_mut().enumerate() {
-            *sum += term(chunks.map(|chunk| chunk[lane]));
+widest_fn! {
+    /// Adds Σ c′·(u·m).
+    fn add_products<'a, const N: usize>(
+        sums: &'a mut [f64; N],
+        first: &'a [[f64; N]],
+        along: &'a [[f64; N]],
+    ) -> () {
+        let mut all = *sums;
+        for (first, along) in first.iter().zip(along) {
+            for lane in 0..N {
+                all[lane] = first[lane].mul_add(along[lane], all[lane]);
+            }
+        }
+        *sums = all;
+    }
+}
+
+widest_fn! {
+    /// Replaces c″ by 2(w·c′ + c″·(u·m)).
+    fn bend<'a, const N: usize>(
+        second: &'a mut [[f64; N]],
+        first: &'a [[f64; N]],
+        heights: &'a [f64],
+        along: &'a [[f64; N]],
+    ) -> () {
+        for ((second, first), (height, along)) in
+            second.iter_mut().zip(first).zip(heights.iter().zip(along))
+        {
+            for lane in 0..N {
+                second[lane] = 2.0 * height.mul_add(first[lane], second[lane] * along[lane]);
+            }
         }
     }
-    let rests = slices.map(|(_, rest)| rest);
-    let count = rests.iter().map(|rest| rest.len()).min().unwrap_or(0);
-    sums.iter().sum::<f64>() + (0..count).map(|i| term(rests.map(|rest| rest[i]))).sum::<f64>()
+}
+
+widest_fn! {
+    /// Adds Σ u·b + c′·m along every axis.
+    fn add_moments<'a, const N: usize>(
+        gradients: &'a mut [[f64; N]],
+        at: &'a [[f64; N]],
+        observed: (&'a [f64], &'a [f64]),
+        bends: (&'a [[f64; N]], &'a [[f64; N]]),
+    ) -> () {
+        let ((observed, slopes), (bends, first), dimension) = (observed, bends, at.len());
+        for (axis, (gradient, at)) in gradients.iter_mut().zip(at).enumerate() {
+            let mut sums = *gradient;
+            for (bend, place) in bends.iter().zip(observed.chunks_exact(dimension)) {
+                for lane in 0..N {
+                    sums[lane] = bend[lane].mul_add(at[lane] - place[axis], sums[lane]);
+                }
+            }
+            for (first, slopes) in first.iter().zip(slopes.chunks_exact(dimension)) {
+                for lane in 0..N {
+                    sums[lane] = first[lane].mul_add(slopes[axis], sums[lane]);
+                }
+            }
+            *gradient = sums;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -283,7 +367,7 @@ mod tests {
         }
     }
 
-    /// Compares with the posterior itself, place by place, some with slopes.
+    /// Compares with the posterior itself, place by place, some with slopes; and together with alone.
     #[test]
     fn it_is_the_posteriors_mean() {
         let mut rng = stream(3, 0, "field");
@@ -307,14 +391,20 @@ mod tests {
             let noise = NoiseRatio { height: 0.05, slope: 0.3, known: 0.0 };
             let parameters = Hyperparameters::new(0.7, vec![0.4, 0.6, 0.5], noise, 0.1);
             let posterior = Posterior::new(kernel, parameters, observations.clone()).unwrap();
-            let mut field = MeanField::from(&posterior);
+            let field = MeanField::from(&posterior);
             let mut scratch = Scratch::default();
-            for _ in 0..50 {
-                let place = [number(), number(), number()];
+            let places: Vec<[f64; 3]> = (0..53).map(|_| [number(), number(), number()]).collect();
+            let all: Vec<&[f64]> = places.iter().map(<[f64; 3]>::as_slice).collect();
+            let mut gradients = vec![f64::NAN; 3 * all.len()];
+            let values = field.values(&all, &mut gradients);
+            assert_eq!(values, field.values(&all, &mut []));
+            let rows = places.iter().zip(values.iter().zip(gradients.as_chunks::<3>().0));
+            for (place, (value, row)) in rows {
                 let (mut slow, mut fast) = ([0.0; 3], [0.0; 3]);
-                let mean = posterior.mean_gradient(&place, &mut slow, &mut scratch);
-                assert!((field.value(&place) - mean).abs() < 1e-10);
-                assert!((field.gradient(&place, &mut fast) - mean).abs() < 1e-10);
+                let mean = posterior.mean_gradient(place, &mut slow, &mut scratch);
+                assert!((value - mean).abs() < 1e-10);
+                assert_eq!([field.value(place), field.gradient(place, &mut fast)], [*value; 2]);
+                assert_eq!(fast, *row);
                 for (slow, fast) in slow.iter().zip(fast) {
                     assert!((slow - fast).abs() < 1e-9, "{slow} {fast}");
                 }

@@ -48,7 +48,7 @@ impl<'a> VarianceReduction<'a> {
     pub fn with_common(mut self, fields: impl IntoIterator<Item = MeanField>) -> Self {
         let dimension = self.references.dimension();
         let mut place = vec![0.0; dimension];
-        for mut field in fields {
+        for field in fields {
             let values = (0..self.references.len()).map(|i| {
                 (0..dimension).for_each(|axis| place[axis] = self.references.column(axis)[i]);
                 field.value(&place)
@@ -121,16 +121,15 @@ impl<'a> VarianceReduction<'a> {
         let signal2 = hyperparameters.signal_sd.powi(2);
         let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();
         let scale = signal2 / self.references.len().max(1) as f64;
-        let mut common = self.common.clone();
         let mut covariances = vec![[0.0; MANY]; self.references.len()];
         let mut reductions = Vec::with_capacity(places.len());
         self.posterior.whitened(places, |solved, explained, count| {
             let block = &places[reductions.len()..][..count];
             self.covary((block, solved), (&self.references, &self.whitened), &mut covariances);
             let mut shared2 = [0.0; MANY];
-            for (field, at_references) in &mut common {
-                let at: [f64; MANY] =
-                    std::array::from_fn(|lane| field.value(block[lane.min(count - 1)]));
+            for (field, at_references) in &self.common {
+                let mut at = [0.0; MANY];
+                at[..count].copy_from_slice(&field.values(block, &mut []));
                 for (covariances, reference) in covariances.iter_mut().zip(at_references.iter()) {
                     for lane in 0..MANY {
                         covariances[lane] += reference * at[lane] / signal2;
@@ -277,8 +276,7 @@ mod tests {
                 let lengths = &hyperparameters.length_scales;
                 let mut prior = [(0..2).map(|i| ((a[i] - b[i]) / lengths[i]).powi(2)).sum()];
                 Matern52.correlate(&mut prior);
-                let mut shared = field.clone();
-                4.0 * (prior[0] - explained) + shared.value(a) * shared.value(b)
+                                4.0 * (prior[0] - explained) + field.value(a) * field.value(b)
             };
             let asked: Vec<&[f64]> = places.iter().map(<[f64; 2]>::as_slice).collect();
             let reduction =

@@ -57,10 +57,10 @@ impl GroundTruth {
         match belief.surface() {
             SurfaceBelief::HeightField(field) => self.truth.rmse_m(field.surface()?),
             SurfaceBelief::ImplicitSurface(surface) => {
-                let mut field = surface.surface()?.field();
+                let surface = surface.surface()?;
                 let spots = self.shape.as_ref()?.samples().iter().step_by(LOOKED_AT);
                 let offset_m = |spot: &SurfacePoint| {
-                    let field = field.at(&spot.point);
+                    let field = surface.field(&spot.point);
                     field.value.abs() / steepness(&field.gradient)
                 };
                 Some(mean(&spots.map(offset_m).collect::<Vec<f64>>()))
@@ -134,11 +134,10 @@ impl Oracle {
         let rng = &mut self.search.rng;
         let mut aims = Vec::new();
         if let Some(candidates) = Candidates::new(surface, rng) {
-            let mut field = candidates.surface().field();
             for _ in 0..tried {
                 let at = rng.random_range(0..candidates.all.len());
                 let place = (&candidates.all[at].p_w, &candidates.all[at].normal_w);
-                aims.extend(free_aim(surface, &mut field, place));
+                aims.extend(free_aim(surface, place));
             }
         }
         while aims.len() < tried as usize {

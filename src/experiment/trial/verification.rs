@@ -97,7 +97,7 @@ fn signed_distance(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
             let surface = surface.surface()?;
             let sd = surface.sds_m(&[*p_w]).first().copied()?;
             let noise_sd = surface.posterior().hyperparameters().noise_sd;
-            let field = surface.field().at(p_w);
+            let field = surface.field(p_w);
             let per_m = steepness(&field.gradient);
             Some((field.value / per_m, sd.hypot(noise_sd) / per_m))
         }
@@ -112,10 +112,10 @@ fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
         SurfaceBelief::HeightField(field) => height(field, target.place()?),
         SurfaceBelief::ImplicitSurface(surface) => {
             let (aim, ball) = (target.aim()?, &surface.scope().ball);
-            let mut field = surface.surface()?.field();
+            let surface = surface.surface()?;
             let at = |along_m: f64| aim.p_w + aim.direction_w.scale(along_m);
             let [from_m, to_m] = ball.chord_m(aim);
-            let along_m = first_zero([from_m, to_m], |along_m| field.value(&at(along_m)));
+            let along_m = first_zero([from_m, to_m], |along_m| surface.value(&at(along_m)));
             Some(match along_m {
                 Some(along_m) => (-along_m, signed_distance(belief, &at(along_m))?.1),
                 None => (0.0, ball.radius_m),

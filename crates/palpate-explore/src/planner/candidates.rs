@@ -5,7 +5,7 @@ use super::plan::{Fallback, Plan};
 use super::sample::{in_ball, random_aim};
 use crate::task::{Aim, any_orthogonal};
 use crate::whole_object::ImplicitSurface;
-use crate::whole_object::surface::{Surface, SurfaceField, steepness};
+use crate::whole_object::surface::{Surface, steepness};
 use nalgebra::{Point3, UnitVector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -39,16 +39,10 @@ impl<'a> Candidates<'a> {
     /// the first fit, or if the belief has no surface.
     pub fn new(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
         let surface = belief.surface()?;
-        let mesh = surface.mesh(CELLS)?;
-        let vertices = mesh.vertices();
-        let step = vertices.len().div_ceil(MOST).max(1);
-        let first = rng.random_range(0..step.min(vertices.len()));
-        let points_w: Vec<Point3<f64>> =
-            vertices.iter().skip(first).step_by(step).copied().collect();
-        let mut field = surface.field();
-        let sds_m = surface.sds_m(&points_w);
-        let all = points_w.into_iter().zip(sds_m).filter_map(|(p_w, sd_m)| {
-            let gradient = field.at(&p_w).gradient;
+        let points_w = surface.points(CELLS, MOST, |step| rng.random_range(0..step))?;
+        let beliefs = surface.sds_m(&points_w).into_iter().zip(surface.fields(&points_w));
+        let all = points_w.into_iter().zip(beliefs).filter_map(|(p_w, (sd_m, field))| {
+            let gradient = field.gradient;
             let normal_w = UnitVector3::try_new(gradient, 1e-9)?;
             Some(Candidate { p_w, normal_w, offset_m: sd_m / steepness(&gradient) })
         });
@@ -82,10 +76,9 @@ impl<'a> Candidates<'a> {
     pub fn best(&self, scores: impl Iterator<Item = f64>, anywhere: &Aim) -> Plan {
         let mut order: Vec<(f64, &Candidate)> = scores.zip(&self.all).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut field = self.surface.field();
         let free = order.into_iter().find_map(|(_, candidate)| {
             let place = (&candidate.p_w, &candidate.normal_w);
-            let aim = free_aim(self.belief, &mut field, place)?;
+            let aim = free_aim(self.belief, place)?;
             Some(Plan { sd_m: Some(candidate.offset_m), ..Plan::at(aim) })
         });
         free.unwrap_or_else(|| Plan {
@@ -111,7 +104,6 @@ const ALONG: f64 = 0.97;
 /// there is none that differs from all earlier targets.
 pub fn free_aim(
     belief: &ImplicitSurface,
-    surface: &mut SurfaceField,
     (p_w, normal_w): (&Point3<f64>, &UnitVector3<f64>),
 ) -> Option<Aim> {
     let ball = &belief.scope().ball;
@@ -133,7 +125,7 @@ pub fn free_aim(
         .find(|aim| {
             ball.contains(aim)
                 && is_new(belief, aim)
-                && belief.has_room(surface, aim)
+                && belief.has_room(aim)
                 && belief.scope().reaches(aim)
         })
 }
@@ -168,7 +160,7 @@ pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option
     if is_known || !belief.aims().len().is_multiple_of(EVERY) {
         return None;
     }
-    let mut surface = belief.surface()?.field();
+    let surface = belief.surface()?;
     let mut holes: Vec<(f64, Point3<f64>)> = (0..PLACES)
         .map(|_| in_ball(whole, rng))
         .filter(|p_w| surface.value(p_w) > 0.0)
@@ -178,5 +170,5 @@ pub fn explore_unknown(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option
     holes.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut from = |p_w| Aim::against(p_w, &(in_ball(whole, rng) - whole.centre_w));
     let aims = holes.iter().take(EMPTIEST).flat_map(|(_, p_w)| [*p_w; SIDES]);
-    aims.map(&mut from).find(|aim| belief.has_room(&mut surface, aim) && scope.reaches(aim))
+    aims.map(&mut from).find(|aim| belief.has_room(aim) && scope.reaches(aim))
 }

@@ -57,7 +57,7 @@ fn in_zone(field: &HeightField, offers: &[Offer], place: &[f64]) -> Option<Gains
 
 fn around(surface: &ImplicitSurface, offers: &[Offer], p_w: &Point3<f64>) -> Option<Gains> {
     let (believed, fit) = (surface.surface()?, surface.fit()?);
-    let points = believed.points(CELLS, PLACES)?;
+    let points = believed.points(CELLS, PLACES, |_| 0)?;
     let places = points.iter().map(|point| point.coords.as_slice());
     let common = believed.pose_errors().iter().cloned();
     let reduction = VarianceReduction::new(believed.posterior(), places).with_common(common);
@@ -66,9 +66,9 @@ fn around(surface: &ImplicitSurface, offers: &[Offer], p_w: &Point3<f64>) -> Opt
         Some(mean(&sds_m.iter().map(|sd_m| sd_m * sd_m).collect::<Vec<_>>()))
     };
     let before = variance(surface)?;
-    let mut field = believed.field();
+    let fields = believed.fields(&points).into_iter();
     let normals: Vec<UnitVector3<f64>> =
-        points.iter().map(|point| UnitVector3::new_normalize(field.at(point).gradient)).collect();
+        fields.map(|field| UnitVector3::new_normalize(field.gradient)).collect();
     let gain = |offer: &Offer| {
         let seen = surface.imagined(offer, points.iter().copied().zip(normals.iter().copied()));
         let seen = seen.filter(|seen| !seen.is_empty())?;

@@ -5,7 +5,7 @@ use crate::belief::{Belief, HeightField, SurfaceBelief};
 use crate::task::stroke::STEEPEST;
 use crate::task::{Aim, Ball, Region, Target, Zone};
 use crate::whole_object::ImplicitSurface;
-use crate::whole_object::surface::SurfaceField;
+use crate::whole_object::surface::Surface;
 use nalgebra::{Point3, Vector3};
 use palpate_gp::reduction::VarianceReduction;
 
@@ -149,18 +149,17 @@ pub fn best(field: &HeightField, offer: &StrokeOffer, places: &[Vec<f64>]) -> Op
 /// if the estimated surface is not on the way of `aim`.
 fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<Target> {
     let (scope, believed) = (surface.scope(), surface.surface()?);
-    let references = believed.points(CELLS, PLACES as usize)?;
+    let references = believed.points(CELLS, PLACES as usize, |_| 0)?;
     let places = references.iter().map(|point| point.coords.as_slice());
     let reduction = VarianceReduction::new(believed.posterior(), places);
     let region = Region::from(scope.ball);
-    let mut field = believed.field();
-    let start_w = first_point(&scope.ball, &mut field, aim)?;
+    let start_w = first_point(&scope.ball, believed, aim)?;
     let length_m = offer.longest_m.min(WIDEST * surface.estimated_ball().radius_m);
     let step_m = length_m / POINTS as f64;
     let mut candidates = Vec::new();
     for heading in 0..HEADINGS {
         let across_w = aim.across_w(std::f64::consts::TAU * heading as f64 / HEADINGS as f64);
-        let line = line_along(&mut field, (start_w, across_w), aim, step_m);
+        let line = line_along(believed, (start_w, across_w), aim, step_m);
         let points: Vec<&[f64]> = line.iter().map(|p_w| p_w.coords.as_slice()).collect();
         let gains = reduction.along(&points);
         let mut consider = |target: Target, gain: f64| {
@@ -174,20 +173,20 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
             consider(Target::StrokeAround { aim: there, way_w: -way_w }, *gain);
         }
     }
-    let mut is_free = |target: &Target| {
+    let is_free = |target: &Target| {
         let other = target.aim().filter(|it| it.p_w != aim.p_w);
-        other.is_none_or(|aim| surface.has_room(&mut field, aim)) && scope.contains(target)
+        other.is_none_or(|aim| surface.has_room(aim)) && scope.contains(target)
     };
     ranked(candidates).take(TRIED).find(|target| is_free(target))
 }
 
 /// Returns the first point of the estimated surface on the way of `aim` into the ball.
-fn first_point(ball: &Ball, field: &mut SurfaceField, aim: &Aim) -> Option<Point3<f64>> {
+fn first_point(ball: &Ball, surface: &Surface, aim: &Aim) -> Option<Point3<f64>> {
     let [mut at_m, far_m] = ball.chord_m(aim);
     let step_m = ball.radius_m / FINEST;
     while at_m <= far_m {
         let p_w = aim.p_w + aim.direction_w.scale(at_m);
-        let away_m = field.value(&p_w);
+        let away_m = surface.value(&p_w);
         if away_m <= 0.0 {
             return Some(p_w);
         }
@@ -199,7 +198,7 @@ fn first_point(ball: &Ball, field: &mut SurfaceField, aim: &Aim) -> Option<Point
 /// Returns the points of the estimated surface from `start_w` on, at steps across the approach, up
 /// to where it is too steep.
 fn line_along(
-    field: &mut SurfaceField,
+    surface: &Surface,
     (start_w, across_w): (Point3<f64>, Vector3<f64>),
     aim: &Aim,
     step_m: f64,
@@ -209,7 +208,7 @@ fn line_along(
     for _ in 0..POINTS {
         p_w += (across_w + ahead_w * slope) * step_m;
         for _ in 0..NEWTON {
-            let found = field.at(&p_w);
+            let found = surface.field(&p_w);
             let facing = -found.gradient.dot(&ahead_w);
             slope = found.gradient.dot(&across_w) / facing;
             // Also false if it faces away, or nothing is finite.

@@ -11,7 +11,10 @@ const COARSEST: usize = 4;
 
 /// Upper bound of the gradient's length relative to that of a distance; blocks whose corner values
 /// exclude a zero under this bound are skipped; a heuristic.
-const STEEPEST: f64 = 1.2;
+const STEEPEST: f64 = 1.4;
+
+/// Cubic block of cells: the indices of its lowest corner, and the number of cells per side.
+type Block = ([usize; 3], usize);
 
 /// Values at the corners of cells; NaN where not evaluated.
 struct Grid<F> {
@@ -37,15 +40,18 @@ pub fn zero_set(
     let count = <[usize; 3]>::from(blocks).map(|cells| cells.div_ceil(COARSEST) * COARSEST + 1);
     let values = vec![f32::NAN; count.iter().product()];
     let mut grid = Grid { values_at, low, cell_m, count, values };
-    let mut blocks = grid.coarsest();
-    let mut side = COARSEST;
-    while side > 1 {
-        grid.evaluate(&blocks, side);
-        blocks.retain(|block| grid.may_cross(*block, side));
-        side /= 2;
-        blocks = blocks.iter().flat_map(|block| corners(*block, side)).collect();
+    let (mut blocks, mut skipped) = (grid.coarsest(), Vec::new());
+    grid.evaluate(&blocks);
+    while blocks.first().is_some_and(|(_, side)| *side > 1) {
+        blocks.retain(|block| grid.may_cross(block, 0.5, corners(*block), &mut skipped));
+        let parts = blocks.iter().flat_map(|block| corners(*block).zip(parts(*block)));
+        let parts = parts.filter(|(known, part)| {
+            grid.may_cross(part, 1.0, std::iter::once(*known), &mut skipped)
+        });
+        blocks = parts.map(|(_, part)| part).collect();
+        grid.evaluate(&blocks);
     }
-    grid.evaluate(&blocks, 1);
+    skipped.into_iter().for_each(|(block, value)| grid.fill(block, value));
     let shape = RuntimeShape::<u32, 3>::new(count.map(|n| n as u32));
     debug_assert_eq!(shape.size() as usize, grid.values.len());
     let mut buffer = SurfaceNetsBuffer::default();
@@ -54,17 +60,21 @@ pub fn zero_set(
     (buffer.positions.iter().map(at).collect(), buffer.indices.as_chunks().0.to_vec())
 }
 
-/// Returns the eight corners of a block of `side` cells, or the sub-blocks of that side in one of
-/// twice the side.
-fn corners([i, j, k]: [usize; 3], side: usize) -> impl Iterator<Item = [usize; 3]> {
-    (0..8).map(move |c| [i + side * (c & 1), j + side * (c >> 1 & 1), k + side * (c >> 2)])
+/// Returns the eight corners of a block.
+fn corners((corner, side): Block) -> impl Iterator<Item = [usize; 3]> {
+    (0..8).map(move |c| std::array::from_fn(|axis| corner[axis] + side * (c >> axis & 1)))
+}
+
+/// Returns the blocks of half the side in a block; each has the corner of the same number.
+fn parts((corner, side): Block) -> impl Iterator<Item = Block> {
+    corners((corner, side / 2)).map(move |corner| (corner, side / 2))
 }
 
 impl<F: Fn(&[Point3<f64>]) -> Vec<f64>> Grid<F> {
-    fn coarsest(&self) -> Vec<[usize; 3]> {
+    fn coarsest(&self) -> Vec<Block> {
         let [x, y, z] = self.count.map(|n| (0..n - 1).step_by(COARSEST));
         let rows = z.flat_map(|k| y.clone().map(move |j| (j, k)));
-        rows.flat_map(|(j, k)| x.clone().map(move |i| [i, j, k])).collect()
+        rows.flat_map(|(j, k)| x.clone().map(move |i| ([i, j, k], COARSEST))).collect()
     }
 
     fn index(&self, [i, j, k]: [usize; 3]) -> usize {
@@ -72,9 +82,9 @@ impl<F: Fn(&[Point3<f64>]) -> Vec<f64>> Grid<F> {
     }
 
     /// Computes the values at the corners of `blocks`; none is inside on the border of the box.
-    fn evaluate(&mut self, blocks: &[[usize; 3]], side: usize) {
+    fn evaluate(&mut self, blocks: &[Block]) {
         let (mut places, mut points) = (Vec::new(), Vec::new());
-        for corner in blocks.iter().flat_map(|block| corners(*block, side)) {
+        for corner in blocks.iter().flat_map(|block| corners(*block)) {
             let index = self.index(corner);
             if self.values[index].is_nan() {
                 let is_rim = corner.iter().zip(self.count).any(|(&i, n)| i == 0 || i + 1 == n);
@@ -90,36 +100,40 @@ impl<F: Fn(&[Point3<f64>]) -> Vec<f64>> Grid<F> {
         }
     }
 
-    /// Returns the smallest and largest value at the corners of a block.
-    fn corner_values(&self, block: [usize; 3], side: usize) -> [f32; 2] {
-        corners(block, side).fold(
-            [f32::INFINITY, f32::NEG_INFINITY],
-            |[least, greatest], corner| {
+    /// Whether the surface may cross a block in which no point is farther from one of the corners
+    /// `known` than this part of its diagonal; if not, adds it to `skipped` with a value of its sign.
+    fn may_cross(
+        &self,
+        block: &Block,
+        part: f64,
+        known: impl Iterator<Item = [usize; 3]>,
+        skipped: &mut Vec<(Block, f32)>,
+    ) -> bool {
+        let [least, greatest] =
+            known.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, greatest], corner| {
                 let value = self.values[self.index(corner)];
                 [least.min(value), greatest.max(value)]
-            },
-        )
+            });
+        let reach = (STEEPEST * part * 3f64.sqrt() * block.1 as f64 * self.cell_m) as f32;
+        let may_cross = least < reach && greatest > -reach;
+        if !may_cross {
+            skipped.push((*block, if least > 0.0 { least } else { greatest }));
+        }
+        may_cross
     }
 
-    /// Whether the surface may cross a block; if not, fills it with its corners' sign.
-    fn may_cross(&mut self, block @ [i, j, k]: [usize; 3], side: usize) -> bool {
-        let [least, greatest] = self.corner_values(block, side);
-        let reach = (STEEPEST * side as f64 * self.cell_m) as f32;
-        if least < reach && greatest > -reach {
-            return true;
-        }
-        let far = if least > 0.0 { least } else { greatest };
+    /// Fills what was not evaluated of a block.
+    fn fill(&mut self, ([i, j, k], side): Block, value: f32) {
         for c in k..=k + side {
             for b in j..=j + side {
                 for a in i..=i + side {
                     let index = self.index([a, b, c]);
                     if self.values[index].is_nan() {
-                        self.values[index] = far;
+                        self.values[index] = value;
                     }
                 }
             }
         }
-        false
     }
 }
 

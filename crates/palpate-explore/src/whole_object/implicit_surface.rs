@@ -4,7 +4,7 @@
 use super::evidence::{CameraPose, PriorMean, TouchEvidence};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
-use super::surface::{Surface, SurfaceField};
+use super::surface::Surface;
 use crate::probe::{SweptVolume, Touch};
 use crate::task::{Aim, Approach, Ball};
 use crate::view::{Offer, RigidError, SeenSurface, View};
@@ -145,8 +145,8 @@ impl ImplicitSurface {
         offer: &Offer,
         points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
     ) -> Option<SeenSurface> {
-        let mut field = self.surface()?.field();
-        let hides = (2.0 * self.scope.ball.radius_m, |p_w: &Point3<f64>| field.value(p_w) > 0.0);
+        let surface = self.surface()?;
+        let hides = (2.0 * self.scope.ball.radius_m, |p_w: &Point3<f64>| surface.value(p_w) > 0.0);
         Some(SeenSurface::imagined(offer, points, hides, |normal_w| normal_w.into_inner()))
     }
 
@@ -381,13 +381,15 @@ impl ImplicitSurface {
         })
     }
 
-    /// Whether the approach of `aim` outside the object is clear of the estimated surface.
-    pub fn has_room(&self, field: &mut SurfaceField, aim: &Aim) -> bool {
+    /// Whether the approach of `aim` outside the object is clear of the estimated surface, if there
+    /// is one.
+    pub fn has_room(&self, aim: &Aim) -> bool {
+        let Some(surface) = self.surface() else { return true };
         let (ball, radius_m) = (&self.scope.ball, self.scope.radius_m);
         let back = |radii: f64| aim.p_w - aim.direction_w.scale(radii * radius_m);
         let mut radii = FIRST;
         while (back(radii) - ball.centre_w).norm() < ball.radius_m {
-            if field.value(&back(radii)) < ROOM * radius_m {
+            if surface.value(&back(radii)) < ROOM * radius_m {
                 return false;
             }
             radii += STEP;

@@ -11,13 +11,15 @@ use palpate_geometry::primitives::extent;
 use palpate_gp::Posterior;
 use palpate_gp::means::MeanField;
 use rayon::iter::ParallelIterator;
-use rayon::slice::{ParallelSlice, ParallelSliceMut};
+use rayon::slice::ParallelSlice;
 
 /// A field over space with its uncertainty: negative inside the object, and approximately the
 /// distance near its surface.
 #[derive(Clone)]
 pub struct Surface {
     prior: PriorMean,
+    /// Mean of the posterior, which is relative to `prior`.
+    mean: MeanField,
     posterior: Posterior,
     /// Fields that the errors of the cameras' poses add to the mean, each with a standard normal
     /// factor.
@@ -70,12 +72,43 @@ impl Surface {
                 ]
             }
         };
-        Self { prior, posterior, pose_errors, contacts, offset_m, bounds }
+        let mean = MeanField::from(&posterior);
+        Self { prior, mean, posterior, pose_errors, contacts, offset_m, bounds }
     }
 
-    /// Returns an evaluator of its mean at many points.
-    pub fn field(&self) -> SurfaceField<'_> {
-        SurfaceField { prior: &self.prior, mean: MeanField::from(&self.posterior) }
+    /// Returns the mean at `p_w`, m: negative inside.
+    pub fn value(&self, p_w: &Point3<f64>) -> f64 {
+        self.prior.field(p_w).value + self.mean.value(p_w.coords.as_slice())
+    }
+
+    /// Returns the mean at `p_w` with its gradient.
+    pub fn field(&self, p_w: &Point3<f64>) -> Field {
+        let mut gradient = [0.0; 3];
+        let value = self.mean.gradient(p_w.coords.as_slice(), &mut gradient);
+        self.prior.field(p_w) + Field { value, gradient: gradient.into() }
+    }
+
+    /// Returns [`value`](Self::value) at each of `points_w`.
+    pub fn values(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
+        let values = points_w.par_chunks(CHUNK).map(|points_w| {
+            let mut values = self.mean.values(&places(points_w), &mut []);
+            let prior = points_w.iter().map(|p_w| self.prior.field(p_w).value);
+            values.iter_mut().zip(prior).for_each(|(value, prior)| *value += prior);
+            values
+        });
+        values.flatten_iter().collect()
+    }
+
+    /// Returns [`field`](Self::field) at each of `points_w`.
+    pub fn fields(&self, points_w: &[Point3<f64>]) -> Vec<Field> {
+        let fields = points_w.par_chunks(CHUNK).map(|points_w| {
+            let mut gradients = vec![0.0; 3 * points_w.len()];
+            let values = self.mean.values(&places(points_w), &mut gradients);
+            let means = values.into_iter().zip(gradients.as_chunks::<3>().0.to_vec());
+            let means = means.map(|(value, slope)| Field { value, gradient: slope.into() });
+            means.zip(points_w).map(|(mean, p_w)| self.prior.field(p_w) + mean).collect::<Vec<_>>()
+        });
+        fields.flatten_iter().collect()
     }
 
     /// Standard deviation of the field at each of `points_w`, m.
@@ -85,7 +118,7 @@ impl Surface {
         let variances = places.par_chunks(CHUNK);
         let variances = variances.map(|places| self.posterior.variances(places, &mut []));
         let mut variances: Vec<f64> = variances.flatten_iter().collect();
-        for mut error in self.pose_errors.iter().cloned() {
+        for error in &self.pose_errors {
             for (variance, place) in variances.iter_mut().zip(&places) {
                 *variance += error.value(place).powi(2);
             }
@@ -96,9 +129,8 @@ impl Surface {
 
     /// Standard deviation of the surface along its normal at each of `points_w` on it: σ / |∇f|.
     pub fn offsets_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
-        let mut field = self.field();
-        let sds_m = self.sds_m(points_w).into_iter().zip(points_w);
-        sds_m.map(|(sd_m, p_w)| sd_m / steepness(&field.at(p_w).gradient)).collect()
+        let sds_m = self.sds_m(points_w).into_iter().zip(self.fields(points_w));
+        sds_m.map(|(sd_m, field)| sd_m / steepness(&field.gradient)).collect()
     }
 
     /// Returns the fields that the errors of the cameras' poses add to the mean, each with an
@@ -117,58 +149,56 @@ impl Surface {
         &self.posterior
     }
 
-    /// Returns about `most` vertices of the [mesh](Self::mesh), spread over it.
-    pub fn points(&self, cells: u32, most: usize) -> Option<Vec<Point3<f64>>> {
-        let mesh = self.mesh(cells)?;
-        let step = mesh.vertices().len().div_ceil(most).max(1);
-        Some(mesh.vertices().iter().step_by(step).copied().collect())
+    /// Returns about `most` points spread over the surface: every n-th vertex of its
+    /// [mesh](Self::mesh), from the one that `first` selects of n on. Returns `None` if the field
+    /// has no zeros.
+    pub fn points(
+        &self,
+        cells: u32,
+        most: usize,
+        first: impl FnOnce(usize) -> usize,
+    ) -> Option<Vec<Point3<f64>>> {
+        let (vertices, triangles, cell_m) = self.crude(cells);
+        let (crude, _) = Mesh::new(&vertices, &triangles).ok()?;
+        let step = crude.vertices().len().div_ceil(most).max(1);
+        let chosen = crude.vertices().iter().skip(first(step)).step_by(step);
+        let mut points_w: Vec<Point3<f64>> = chosen.copied().collect();
+        self.approach(&mut points_w, cell_m);
+        Some(points_w)
     }
 
     /// Returns the surface as closed triangles, from a grid of `cells` along the longest side of
     /// the box around the contacts: the components that were touched. Returns `None` if the field
     /// has no zeros there.
     pub fn mesh(&self, cells: u32) -> Option<Mesh> {
-        let [low, high] = &self.bounds;
-        let cell_m = (high - low).max() / f64::from(cells.max(1));
-        let field = self.field();
-        let (mut vertices, triangles) = zero_set([*low, *high], cell_m, |points_w| {
-            let values = points_w.par_chunks(CHUNK).map_with(field.clone(), |field, points_w| {
-                points_w.iter().map(|p_w| field.value(p_w)).collect::<Vec<f64>>()
-            });
-            values.flatten_iter().collect()
-        });
-        let triangles = touched_components(&vertices, triangles, &self.contacts);
-        vertices.par_chunks_mut(CHUNK).for_each_with(field, |field, vertices| {
-            for p_w in vertices {
-                for _ in 0..STEPS {
-                    let Field { value, gradient } = field.at(p_w);
-                    let step = gradient * (value / gradient.norm_squared().max(FLAT * FLAT));
-                    *p_w -= step.cap_magnitude(1.5 * cell_m);
-                }
-            }
-        });
+        let (mut vertices, triangles, cell_m) = self.crude(cells);
+        self.approach(&mut vertices, cell_m);
         Mesh::new(&vertices, &triangles).ok().map(|(mesh, _)| mesh)
     }
-}
 
-/// Evaluator of a surface's field at many points, with its own buffers.
-#[derive(Clone)]
-pub struct SurfaceField<'a> {
-    prior: &'a PriorMean,
-    mean: MeanField,
-}
-
-impl SurfaceField<'_> {
-    /// Returns the mean at `p_w`, m: negative inside.
-    pub fn value(&mut self, p_w: &Point3<f64>) -> f64 {
-        self.prior.field(p_w).value + self.mean.value(p_w.coords.as_slice())
+    /// Returns vertices where the field's interpolated values are zero, the triangles between them
+    /// that were touched, and the side of a cell.
+    fn crude(&self, cells: u32) -> (Vec<Point3<f64>>, Vec<[u32; 3]>, f64) {
+        let [low, high] = &self.bounds;
+        let cell_m = (high - low).max() / f64::from(cells.max(1));
+        let (vertices, triangles) = zero_set([*low, *high], cell_m, |points| self.values(points));
+        let triangles = touched_components(&vertices, triangles, &self.contacts);
+        (vertices, triangles, cell_m)
     }
 
-    /// Returns the mean with its gradient.
-    pub fn at(&mut self, p_w: &Point3<f64>) -> Field {
-        let mut gradient = [0.0; 3];
-        let prior = self.prior.field(p_w);
-        let mean = self.mean.gradient(p_w.coords.as_slice(), &mut gradient);
-        Field { value: prior.value + mean, gradient: prior.gradient + Vector3::from(gradient) }
+    /// Moves points near the surface onto it.
+    fn approach(&self, points_w: &mut [Point3<f64>], cell_m: f64) {
+        for _ in 0..STEPS {
+            let fields = self.fields(points_w);
+            for (p_w, Field { value, gradient }) in points_w.iter_mut().zip(fields) {
+                let step = gradient * (value / gradient.norm_squared().max(FLAT * FLAT));
+                *p_w -= step.cap_magnitude(1.5 * cell_m);
+            }
+        }
     }
+}
+
+/// Returns points as places of a Gaussian process.
+fn places(points_w: &[Point3<f64>]) -> Vec<&[f64]> {
+    points_w.iter().map(|p_w| p_w.coords.as_slice()).collect()
 }

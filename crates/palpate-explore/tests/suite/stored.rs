@@ -90,8 +90,7 @@ fn a_stored_implicit_surface_has_the_same_field() {
             .collect();
         let values = |it: &ImplicitSurface| {
             it.surface().map(|surface| {
-                let mut field = surface.field();
-                let means: Vec<f64> = points_w.iter().map(|p_w| field.value(p_w)).collect();
+                let means: Vec<f64> = points_w.iter().map(|p_w| surface.value(p_w)).collect();
                 (means, surface.sds_m(&points_w), surface.mesh(16))
             })
         };

@@ -126,8 +126,9 @@ pub fn cross(a: &Quad, b: &Quad) -> Quad {
 /// and NaN for NaN.
 ///
 /// Branch-free, so that a loop over it is vectorised, and the same bits on every machine:
-/// x = k·ln 2 + r with |r| ≤ ln 2 / 2, and e^r by its Taylor series to r¹³ / 13!, whose
-/// remainder is below 5e-18.
+/// x = k·ln 2 + r with |r| ≤ ln 2 / 2, and e^r = 1 + r + r²·q(r) with the polynomial q of degree 9
+/// that has the least relative error, 3.7e-18 (Remez exchange in 60 digits). The sums over its even
+/// and odd powers are independent, so that the processor computes both at once.
 #[inline(always)]
 pub fn exp_of_negative(x: f64) -> f64 {
     /// Constant whose addition leaves the nearest integer in the low bits of the sum.
@@ -135,29 +136,31 @@ pub fn exp_of_negative(x: f64) -> f64 {
     /// ln 2 in two parts; the first has trailing zeros, so that its multiples are exact.
     const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    const TAYLOR: [f64; 14] = [
-        1.0,
-        1.0,
-        1.0 / 2.0,
-        1.0 / 6.0,
-        1.0 / 24.0,
-        1.0 / 120.0,
-        1.0 / 720.0,
-        1.0 / 5_040.0,
-        1.0 / 40_320.0,
-        1.0 / 362_880.0,
-        1.0 / 3_628_800.0,
-        1.0 / 39_916_800.0,
-        1.0 / 479_001_600.0,
-        1.0 / 6_227_020_800.0,
+    /// Coefficients of q.
+    const EVEN: [f64; 5] = [
+        0.500_000_000_000_001_1,
+        0.041_666_666_666_530_155,
+        0.001_388_888_894_363_011_4,
+        2.480_149_309_890_655e-5,
+        2.763_024_837_921_144e-7,
+    ];
+    const ODD: [f64; 5] = [
+        0.166_666_666_666_664_13,
+        0.008_333_333_333_494_461,
+        0.000_198_412_695_065_786_88,
+        2.755_758_637_384_016_5e-6,
+        2.500_006_160_283_566_8e-8,
     ];
     let shifted = x.mul_add(std::f64::consts::LOG2_E, ROUND);
     let k = shifted - ROUND;
     let r = k.mul_add(-LN_2_LOW, k.mul_add(-LN_2_HIGH, x));
-    let mut series = TAYLOR[13];
-    for coefficient in TAYLOR[..13].iter().rev() {
-        series = series.mul_add(r, *coefficient);
+    let r2 = r * r;
+    let (mut even, mut odd) = (EVEN[4], ODD[4]);
+    for i in (0..4).rev() {
+        even = even.mul_add(r2, EVEN[i]);
+        odd = odd.mul_add(r2, ODD[i]);
     }
+    let series = odd.mul_add(r, even).mul_add(r2, r) + 1.0;
     let power = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
     let value = series * power;
     if x < -708.0 { 0.0 } else { value }

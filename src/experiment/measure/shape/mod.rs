@@ -183,9 +183,8 @@ impl TrueShape {
     pub fn evaluate(&self, surface: &Surface, cells: u32) -> ShapeMetrics {
         let looked_at = self.samples.iter().step_by(COVERAGE_STEP).map(|spot| spot.point);
         let points_w: Vec<Point3<f64>> = looked_at.collect();
-        let mut field = surface.field();
-        let ratios = surface.sds_m(&points_w).into_iter().zip(&points_w);
-        let ratios = ratios.map(|(sd_m, p_w)| field.value(p_w) / sd_m);
+        let values = surface.values(&points_w).into_iter().zip(surface.sds_m(&points_w));
+        let ratios = values.map(|(value, sd_m)| value / sd_m);
         let metrics = match surface.mesh(cells) {
             Some(mesh) => self.compare(&mesh),
             None => self.compare_nothing(),
