@@ -52,6 +52,10 @@ const CHUNK: usize = 128;
 /// heuristic.
 const STEPS: usize = 2;
 
+/// Step that is the last one, in cells: the error after it is about its square over twice the
+/// radius of curvature, below a hundredth of a cell; a heuristic.
+const SETTLED: f64 = 0.1;
+
 impl Surface {
     pub(super) fn new<'a>(
         scope: &ExplorationSetup,
@@ -188,12 +192,17 @@ impl Surface {
 
     /// Moves points near the surface onto it.
     fn approach(&self, points_w: &mut [Point3<f64>], cell_m: f64) {
+        let mut moving: Vec<&mut Point3<f64>> = points_w.iter_mut().collect();
         for _ in 0..STEPS {
-            let fields = self.fields(points_w);
-            for (p_w, Field { value, gradient }) in points_w.iter_mut().zip(fields) {
+            let places_w: Vec<Point3<f64>> = moving.iter().map(|p_w| **p_w).collect();
+            let fields = self.fields(&places_w);
+            let moved = moving.into_iter().zip(fields).filter_map(|(p_w, field)| {
+                let Field { value, gradient } = field;
                 let step = gradient * (value / gradient.norm_squared().max(FLAT * FLAT));
                 *p_w -= step.cap_magnitude(1.5 * cell_m);
-            }
+                (step.norm() > SETTLED * cell_m).then_some(p_w)
+            });
+            moving = moved.collect();
         }
     }
 }
