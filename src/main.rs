@@ -6,6 +6,9 @@ use palpate_input::shipped::HOME;
 use std::path::Path;
 use std::process::ExitCode;
 
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() -> ExitCode {
     #[cfg(feature = "ros1")]
     palpate_ros::disable_tls_certificates();

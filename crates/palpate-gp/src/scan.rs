@@ -91,19 +91,18 @@ impl Grid {
 
     /// Returns place `index`; the last parameter varies fastest.
     pub(super) fn place(&self, index: usize) -> Vec<f64> {
-        let mut shares = Vec::with_capacity(self.lower.len());
+        let mut place = Vec::with_capacity(self.lower.len());
+        let mut push = |steps: f64, all: f64| {
+            let (lower, upper) = (self.lower[place.len()], self.upper[place.len()]);
+            place.push(lower + (upper - lower) * steps / all);
+        };
         for (entry, (digit, &levels)) in digits(index, &self.levels).zip(&self.levels).enumerate() {
             match self.spread.get(digit).filter(|_| entry == 0) {
-                Some(place) => shares.extend(place.iter().map(|share| (*share, 1.0))),
-                None => shares.push((digit as f64, (levels.max(2) - 1) as f64)),
+                Some(shares) => shares.iter().for_each(|share| push(*share, 1.0)),
+                None => push(digit as f64, (levels.max(2) - 1) as f64),
             }
         }
-        let sides = self.lower.iter().zip(&self.upper);
-        shares
-            .into_iter()
-            .zip(sides)
-            .map(|((steps, all), (lower, upper))| lower + (upper - lower) * steps / all)
-            .collect()
+        place
     }
 
     /// Returns the places that no neighbour along any parameter exceeds, the highest first, with an
@@ -203,7 +202,7 @@ impl Scan {
             let (lengths, _) = sought.parameters(&grid.place(group * noises));
             let places = (0..points.len()).map(|at| grid.place(group * noises + at));
             ratios.clear();
-            ratios.extend(places.map(|place| sought.parameters(&place).1));
+            ratios.extend(places.map(|place| sought.noise(&place)));
             for i in points[0].heights.len()..observations.len() {
                 row.resize(i + 1, 0.0);
                 observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);

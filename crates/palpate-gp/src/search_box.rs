@@ -72,8 +72,13 @@ impl SearchBox {
 
     /// Returns lengths and noise ratios from their logarithms.
     pub(super) fn parameters(&self, logs: &[f64]) -> (Vec<f64>, NoiseRatio) {
-        let (lengths, rest) = logs.split_at(self.length_scales.len().min(logs.len()));
-        let (noises, searched) = match rest {
+        let lengths = &logs[..self.length_scales.len().min(logs.len())];
+        (lengths.iter().map(|log| log.exp()).collect(), self.noise(logs))
+    }
+
+    /// Returns the noise ratios among [`parameters`](Self::parameters).
+    pub(super) fn noise(&self, logs: &[f64]) -> NoiseRatio {
+        let (noises, searched) = match &logs[self.length_scales.len().min(logs.len())..] {
             [noises @ .., last] if self.is_signal_searched() => (noises, Some(last.exp())),
             noises => (noises, None),
         };
@@ -82,7 +87,7 @@ impl SearchBox {
             (TouchNoise::Known(noise_sd), _) => height / noise_sd,
             (_, signal_sd) => signal_sd.map_or(0.0, f64::recip),
         };
-        (lengths.iter().map(|log| log.exp()).collect(), NoiseRatio { height, slope, known })
+        NoiseRatio { height, slope, known }
     }
 
     /// Returns the logarithms of the parameters, the inverse of [`parameters`](Self::parameters).
