@@ -1,6 +1,6 @@
 //! Batch evaluation of mean, variance and its gradient: the factor is read once per sixteen places.
 
-use super::means::MeanField;
+use super::means::{MeanField, add_weighted};
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest_fn;
 
@@ -203,23 +203,6 @@ widest_fn! {
                 *r2 = step.mul_add(step, *r2);
             }
         }
-    }
-}
-
-widest_fn! {
-    /// Adds Σ_i w_i·c_i to each lane.
-    pub(super) fn add_weighted<'a, const N: usize>(
-        sums: &'a mut [f64; N],
-        correlations: &'a [[f64; N]],
-        weights: &'a [f64],
-    ) -> () {
-        let mut all = *sums;
-        for (correlations, weight) in correlations.iter().zip(weights) {
-            for lane in 0..N {
-                all[lane] = weight.mul_add(correlations[lane], all[lane]);
-            }
-        }
-        *sums = all;
     }
 }
 

@@ -1,7 +1,6 @@
 //! Posterior means at very many places: at fixed places while observations are added, or at
 //! arbitrary ones for a search of zeros.
 
-use super::batch::add_weighted;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
@@ -69,9 +68,9 @@ impl FixedPlaceMeans {
 
 /// A posterior's mean as weighted sums over the observations, for very many places.
 ///
-/// With u = (x − x_i) / l for each observation, the weight w of its height and m = −2v for the weights
-/// v of its slopes per length scale, the mean is Σ w·c + c′·(u·m) above the prior's, and its gradient
-/// per length scale Σ 2u·(w·c′ + c″·(u·m)) + c′·m.
+/// With u = (x − x_i) / l for each observation, the weight w of its height and m = −2v for the
+/// weights v of its slopes per length scale, the mean is the prior's plus Σ w·c + c′·(u·m), and its
+/// gradient per length scale Σ 2u·(w·c′ + c″·(u·m)) + c′·m.
 #[derive(Clone)]
 pub struct MeanField {
     kernel: &'static dyn Kernel,
@@ -261,6 +260,23 @@ widest_fn! {
             }
             *along = sums;
         }
+    }
+}
+
+widest_fn! {
+    /// Adds Σ_i w_i·c_i to each lane.
+    pub(super) fn add_weighted<'a, const N: usize>(
+        sums: &'a mut [f64; N],
+        correlations: &'a [[f64; N]],
+        weights: &'a [f64],
+    ) -> () {
+        let mut all = *sums;
+        for (correlations, weight) in correlations.iter().zip(weights) {
+            for lane in 0..N {
+                all[lane] = weight.mul_add(correlations[lane], all[lane]);
+            }
+        }
+        *sums = all;
     }
 }
 
