@@ -93,6 +93,9 @@ const ROWS: usize = 16;
 /// Number of places computed together for the remainder.
 const FEW: usize = 8;
 
+/// Numbers of all pairs of up to N places: c, u·m, c′, c″ and c‴.
+type Buffers<const N: usize> = [[[f64; N]; ROWS]; 5];
+
 impl From<&Posterior> for MeanField {
     fn from(posterior: &Posterior) -> Self {
         Self::of(posterior, posterior.hyperparameters().mean, posterior.weights())
@@ -128,47 +131,58 @@ impl MeanField {
 
     /// Returns the mean at `place`.
     pub fn value(&self, place: &[f64]) -> f64 {
-        self.lanes::<1>(&[place], &mut [])[0]
+        self.lanes(&[place], &mut [], &mut [[[0.0; 1]; ROWS]; 5])[0]
     }
 
     /// Returns the mean and writes its gradient with respect to the place.
     pub fn gradient(&self, place: &[f64], gradient: &mut [f64]) -> f64 {
-        self.lanes::<1>(&[place], gradient.as_chunks_mut().0)[0]
+        self.lanes(&[place], gradient.as_chunks_mut().0, &mut [[[0.0; 1]; ROWS]; 5])[0]
     }
 
     /// Returns the mean at each of `places`, and writes the gradients, place by place, unless
     /// `gradients` is empty: the same numbers as one by one.
     pub fn values(&self, places: &[&[f64]], gradients: &mut [f64]) -> Vec<f64> {
         let mut values = Vec::with_capacity(places.len());
-        let mut gradients = gradients.chunks_mut(PLACES * self.lengths.len().max(1));
-        for places in places.chunks(PLACES) {
-            let gradients = gradients.next().unwrap_or_default();
-            match places.len() <= FEW {
-                true => self.block::<FEW>(places, &mut values, gradients),
-                false => self.block::<PLACES>(places, &mut values, gradients),
-            }
-        }
+        let few = Some(places.len() % PLACES).filter(|few| *few <= FEW).unwrap_or(0);
+        let (many, few) = places.split_at(places.len() - few);
+        let dimension = if gradients.is_empty() { 0 } else { self.lengths.len() };
+        let (of_many, of_few) = gradients.split_at_mut(many.len() * dimension);
+        self.blocks::<PLACES>(many, &mut values, of_many);
+        self.blocks::<FEW>(few, &mut values, of_few);
         values
     }
 
-    /// Implements [`values`](Self::values) for up to N places.
-    fn block<const N: usize>(
+    /// Implements [`values`](Self::values), N places at a time.
+    fn blocks<const N: usize>(
         &self,
         places: &[&[f64]],
         values: &mut Vec<f64>,
         gradients: &mut [f64],
     ) {
+        if places.is_empty() {
+            return;
+        }
         let dimension = self.lengths.len();
         let mut lanes = vec![[0.0; N]; if gradients.is_empty() { 0 } else { dimension }];
-        values.extend(&self.lanes(places, &mut lanes)[..places.len()]);
-        for (lane, gradient) in gradients.chunks_mut(dimension.max(1)).enumerate() {
-            gradient.iter_mut().zip(&lanes).for_each(|(slope, lanes)| *slope = lanes[lane]);
+        let mut buffers = [[[0.0; N]; ROWS]; 5];
+        let mut gradients = gradients.chunks_mut((N * dimension).max(1));
+        for places in places.chunks(N) {
+            values.extend(&self.lanes(places, &mut lanes, &mut buffers)[..places.len()]);
+            let gradients = gradients.next().into_iter().flat_map(|it| it.chunks_mut(dimension));
+            for (lane, gradient) in gradients.enumerate() {
+                gradient.iter_mut().zip(&lanes).for_each(|(slope, lanes)| *slope = lanes[lane]);
+            }
         }
     }
 
     /// Returns the means at up to N places, one per lane, and writes their gradients, axis by axis,
     /// unless `gradients` is empty; lanes without a place repeat the last.
-    fn lanes<const N: usize>(&self, places: &[&[f64]], gradients: &mut [[f64; N]]) -> [f64; N] {
+    fn lanes<const N: usize>(
+        &self,
+        places: &[&[f64]],
+        gradients: &mut [[f64; N]],
+        buffers: &mut Buffers<N>,
+    ) -> [f64; N] {
         let dimension = self.lengths.len();
         let place = |lane: usize| places[lane.min(places.len() - 1)];
         let at = self
@@ -180,7 +194,6 @@ impl MeanField {
         let (count, sloped) = (self.heights.len(), self.slopes.len() / dimension.max(1));
         let mut sums = [0.0; N];
         gradients.fill([0.0; N]);
-        let mut buffers = [[[0.0; N]; ROWS]; 5];
         let mut begin = 0;
         while begin < count {
             let is_sloped = begin < sloped;
@@ -192,7 +205,9 @@ impl MeanField {
                 buffers.each_mut().map(|buffer| &mut buffer[..end - begin]);
             begin = end;
             squares(correlations, &at, observed);
-            steps(along, &at, observed, slopes);
+            if is_sloped || !gradients.is_empty() {
+                steps(along, &at, observed, slopes);
+            }
             let r2 = correlations.as_flattened_mut();
             let derivative = first.as_flattened_mut();
             match (is_sloped, gradients.is_empty()) {
@@ -383,7 +398,7 @@ mod tests {
         }
     }
 
-    /// Compares with the posterior itself, place by place, some with slopes; and together with alone.
+    /// Compares with the posterior itself, some observations with slopes; and many places with one.
     #[test]
     fn it_is_the_posteriors_mean() {
         let mut rng = stream(3, 0, "field");

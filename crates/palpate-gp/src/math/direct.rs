@@ -41,6 +41,8 @@ struct Corner {
     radius: f64,
     cost: f64,
     index: usize,
+    /// Number of the first corner of this radius on the hull, and of the first of a larger one.
+    equals: (usize, usize),
 }
 
 struct Division<'a, F> {
@@ -199,25 +201,27 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         let mut chosen = std::mem::take(&mut self.chosen);
         self.find_hull(&mut hull, &mut kept);
         chosen.clear();
-        chosen.extend((0..hull.len()).filter(|at| self.may_hold_least(&hull, *at)));
+        chosen.extend((0..hull.len()).filter(|at| self.may_hold_least(&hull, *at, None)));
         let count = chosen.iter().fold(0, |count, at| self.hand_out(hull[*at].index, count));
         let before = self.left;
         let costs = self.costs(count);
         self.left = before;
         let mut costs = costs.as_slice();
+        let mut divided = None;
         for at in &chosen {
             let index = hull[*at].index;
             let axes = self.axes(index);
             let needed = 2 * axes.len();
             let (own, later) = costs.split_at(needed.min(costs.len()));
             costs = later;
-            if self.may_hold_least(&hull, *at) {
+            if self.may_hold_least(&hull, *at, divided) {
                 self.left = self.left.saturating_sub(own.len() as u32);
                 if own.len() < needed || self.left == 0 {
                     self.left = 0;
                     break;
                 }
                 self.divide(index, axes, own);
+                divided = Some(*at);
             }
         }
         (self.hull, self.kept, self.chosen) = (hull, kept, chosen);
@@ -316,21 +320,28 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         }
         for ((radius, cost), group) in kept.iter().copied().chain(last) {
             let lowest = self.sorted[group].lowest();
-            hull.extend(lowest.map(|index| Corner { radius, cost, index }));
+            let begin = hull.len();
+            let corner = |index| Corner { radius, cost, index, equals: (begin, begin) };
+            hull.extend(lowest.map(corner));
+            let end = hull.len();
+            hull[begin..].iter_mut().for_each(|corner| corner.equals.1 = end);
         }
     }
 
-    /// Whether the line through the corner and a neighbour reaches the lowest cost at radius 0. The
-    /// preceding neighbour may have been divided meanwhile: its current radius is used.
-    fn may_hold_least(&self, hull: &[Corner], at: usize) -> bool {
-        let radius = |corner: &Corner| f64::from(self.rectangles[corner.index].radius);
+    /// Whether the line through corner `at` and a neighbour of another radius reaches the lowest
+    /// cost at radius 0; `divided` is the last corner divided. If that precedes this one among
+    /// those of one radius, it is a neighbour, and smaller now.
+    fn may_hold_least(&self, hull: &[Corner], at: usize, divided: Option<usize>) -> bool {
         let here = &hull[at];
-        let slope = |other: &Corner| (here.cost - other.cost) / (here.radius - radius(other));
-        let before = hull[..at].iter().rev().find(|corner| radius(corner) != here.radius);
-        let after = hull[at + 1..].iter().find(|corner| radius(corner) != here.radius);
-        let Some(after) = after else { return true };
-        let steepest = before.map_or(f64::NEG_INFINITY, slope).max(slope(after));
-        here.cost - steepest * here.radius <= self.least
+        let (first, larger) = here.equals;
+        let slope = |other: &Corner| {
+            let radius = f64::from(self.rectangles[other.index].radius);
+            (here.cost - other.cost) / (here.radius - radius)
+        };
+        let before = divided.filter(|divided| *divided >= first).or(first.checked_sub(1));
+        let Some(after) = hull.get(larger) else { return true };
+        let before = before.map_or(f64::NEG_INFINITY, |before| slope(&hull[before]));
+        here.cost - before.max(slope(after)) * here.radius <= self.least
     }
 }
 
