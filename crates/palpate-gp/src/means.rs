@@ -185,12 +185,10 @@ impl MeanField {
     ) -> [f64; N] {
         let dimension = self.lengths.len();
         let place = |lane: usize| places[lane.min(places.len() - 1)];
-        let at = self
-            .lengths
-            .iter()
-            .enumerate()
-            .map(|(axis, length)| std::array::from_fn(|lane| place(lane)[axis] / length));
-        let at: Vec<[f64; N]> = at.collect();
+        let lengths = self.lengths.iter().enumerate();
+        let scaled =
+            |(axis, length): (usize, &f64)| std::array::from_fn(|lane| place(lane)[axis] / length);
+        let at: Vec<[f64; N]> = lengths.map(scaled).collect();
         let (count, sloped) = (self.heights.len(), self.slopes.len() / dimension.max(1));
         let mut sums = [0.0; N];
         gradients.fill([0.0; N]);
@@ -205,9 +203,7 @@ impl MeanField {
                 buffers.each_mut().map(|buffer| &mut buffer[..end - begin]);
             begin = end;
             squares(correlations, &at, observed);
-            if is_sloped || !gradients.is_empty() {
-                steps(along, &at, observed, slopes);
-            }
+            steps(along, &at, observed, slopes);
             let r2 = correlations.as_flattened_mut();
             let derivative = first.as_flattened_mut();
             match (is_sloped, gradients.is_empty()) {
@@ -225,6 +221,9 @@ impl MeanField {
             }
             if gradients.is_empty() {
                 continue;
+            }
+            if !is_sloped {
+                [&mut *second, along].into_iter().for_each(|unused| unused.fill([0.0; N]));
             }
             bend(second, first, heights, along);
             add_moments(gradients, &at, (observed, slopes), (second, first));
@@ -257,14 +256,13 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Writes u·m of every pair, or 0 for observations without slopes.
+    /// Writes u·m of every pair of a place and an observation with slopes.
     fn steps<'a, const N: usize>(
         along: &'a mut [[f64; N]],
         at: &'a [[f64; N]],
         observed: &'a [f64],
         slopes: &'a [f64],
     ) -> () {
-        along.fill([0.0; N]);
         let observed = observed.chunks_exact(at.len()).zip(slopes.chunks_exact(at.len()));
         for (along, (place, slopes)) in along.iter_mut().zip(observed) {
             let mut sums = [0.0; N];
@@ -429,6 +427,13 @@ mod tests {
             let mut gradients = vec![f64::NAN; 3 * all.len()];
             let values = field.values(&all, &mut gradients);
             assert_eq!(values, field.values(&all, &mut []));
+            // A place that is no number leaves the others as they are.
+            let (mut with_nan, mut beside) = (all.clone(), gradients.clone());
+            with_nan[5] = &[f64::NAN; 3];
+            let near_nan = field.values(&with_nan, &mut beside);
+            assert!(near_nan[5].is_nan());
+            assert_eq!((&near_nan[..5], &near_nan[6..]), (&values[..5], &values[6..]));
+            assert_eq!((&beside[..15], &beside[18..]), (&gradients[..15], &gradients[18..]));
             let rows = places.iter().zip(values.iter().zip(gradients.as_chunks::<3>().0));
             for (place, (value, row)) in rows {
                 let (mut slow, mut fast) = ([0.0; 3], [0.0; 3]);

@@ -108,8 +108,8 @@ impl Surface {
         let fields = points_w.par_chunks(CHUNK).map(|points_w| {
             let mut gradients = vec![0.0; 3 * points_w.len()];
             let values = self.mean.values(&places(points_w), &mut gradients);
-            let means = values.into_iter().zip(gradients.as_chunks::<3>().0.to_vec());
-            let means = means.map(|(value, slope)| Field { value, gradient: slope.into() });
+            let means = values.into_iter().zip(gradients.as_chunks::<3>().0);
+            let means = means.map(|(value, slope)| Field { value, gradient: (*slope).into() });
             means.zip(points_w).map(|(mean, p_w)| self.prior.field(p_w) + mean).collect::<Vec<_>>()
         });
         fields.flatten_iter().collect()
