@@ -52,7 +52,7 @@ PARTS = [
     ("camera", r"palpate_explore::(view|registration)"),
     ("planner", r"palpate_explore::planner"),
     ("belief", r"palpate_explore"),
-    ("measures and files", r"palpate::|serde|^libc\.|\balloc\b|\[kernel"),
+    ("measures and files", r"palpate::|serde|^libc\.|\balloc\b|\b_?mi_|\[kernel"),
 ]
 
 

@@ -265,10 +265,7 @@ impl Belief {
         let points_w: Vec<Point3<f64>> =
             places.each.iter().map(|place| Point3::from_slice(place)).collect();
         let (means_m, sds_m) = fork::detach(points.py(), || match surface {
-            Some(surface) => {
-                let mut field = surface.field();
-                (points_w.iter().map(|p_w| field.value(p_w)).collect(), surface.sds_m(&points_w))
-            }
+            Some(surface) => (surface.values(&points_w), surface.sds_m(&points_w)),
             None => (vec![f64::NAN; points_w.len()], vec![f64::NAN; points_w.len()]),
         })?;
         Ok((places.reshape(points.py(), means_m)?, places.reshape(points.py(), sds_m)?))

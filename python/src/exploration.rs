@@ -389,9 +389,8 @@ fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
         SurfaceBelief::ImplicitSurface(belief) => {
             let Some(surface) = belief.surface() else { return Vec::new() };
             let points_w: Vec<Point3<f64>> = grid.iter().map(|at| Point3::from_slice(at)).collect();
-            let mut field = surface.field();
+            let means_m = surface.values(&points_w).into_iter();
             let sds_m = surface.sds_m(&points_w);
-            let means_m = points_w.iter().map(|p_w| field.value(p_w));
             means_m.zip(sds_m).map(|(mean_m, sd_m)| (mean_m, sd_m * sd_m)).collect()
         }
     }

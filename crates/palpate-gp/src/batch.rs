@@ -1,6 +1,6 @@
 //! Batch evaluation of mean, variance and its gradient: the factor is read once per sixteen places.
 
-use super::means::{MeanField, add_weighted};
+use super::means::{FEW, MANY, MeanField, add_weighted};
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest_fn;
 
@@ -12,12 +12,6 @@ pub struct Prediction {
     /// Variance of the surface, without touch noise.
     pub variance: f64,
 }
-
-/// Number of places solved together: with four rows of the factor, eight vectors of the widest
-/// kind.
-pub(super) const MANY: usize = 16;
-/// Number of places solved together for the remainder.
-const FEW: usize = 8;
 
 /// Quantities computed at the places of one block.
 enum Requested<'a> {

@@ -169,8 +169,8 @@ pub trait Kernel: Send + Sync {
 #[inline(always)]
 fn decay<R: RadialKernel>(r2: f64) -> (f64, f64) {
     let s = R::exponent(r2);
-    // NaN stays.
-    let s = if FARTHEST < s { FARTHEST } else { s };
+    // A place that is no number is as far as can be.
+    let s = if s < FARTHEST { s } else { FARTHEST };
     (s, exp_of_negative(-s))
 }
 

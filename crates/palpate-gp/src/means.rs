@@ -76,6 +76,8 @@ pub struct MeanField {
     kernel: &'static dyn Kernel,
     mean: f64,
     lengths: Vec<f64>,
+    /// Place of an observation, from which coordinates are measured: no digits are lost far from 0.
+    origin: Vec<f64>,
     /// Coordinates of the observations per length scale, observation by observation; those with
     /// observed slopes come first.
     observed: Vec<f64>,
@@ -85,15 +87,18 @@ pub struct MeanField {
     slopes: Vec<f64>,
 }
 
-/// Numbers of places and observations of which all pairs are computed together: their correlations
-/// stay in the nearest cache.
-const PLACES: usize = 16;
-const ROWS: usize = 16;
+/// Number of places computed together: with four rows of a factor, eight vectors of the widest
+/// kind.
+pub(super) const MANY: usize = 16;
 
 /// Number of places computed together for the remainder.
-const FEW: usize = 8;
+pub(super) const FEW: usize = 8;
 
-/// Numbers of all pairs of up to N places: c, u·m, c′, c″ and c‴.
+/// Number of observations computed together: their correlations with all places of a block stay in
+/// the nearest cache.
+const ROWS: usize = 16;
+
+/// Numbers of the pairs of N places and `ROWS` observations: c, u·m, c′, c″ and c‴.
 type Buffers<const N: usize> = [[[f64; N]; ROWS]; 5];
 
 impl From<&Posterior> for MeanField {
@@ -117,13 +122,20 @@ impl MeanField {
         let (sloped, plain): (Vec<usize>, Vec<usize>) =
             (0..observations.len()).partition(|&i| numbers(i).len() > 1);
         let order = || sloped.iter().chain(&plain).copied();
-        let scaled = |i: usize| observations.place(i).zip(lengths).map(|(x, l)| x / l);
+        let origin: Vec<f64> = (0..lengths.len())
+            .map(|axis| observations.column(axis).first().copied().unwrap_or(0.0))
+            .collect();
+        let scaled = |i: usize| {
+            let place = observations.place(i).zip(&origin).zip(lengths);
+            place.map(|((x, origin), length)| (x - origin) / length)
+        };
         let slopes = sloped.iter().flat_map(|&i| &numbers(i)[1..]);
         Self {
             kernel: posterior.kernel(),
             mean,
             lengths: lengths.clone(),
             observed: order().flat_map(scaled).collect(),
+            origin: origin.clone(),
             heights: order().map(|i| numbers(i)[0]).collect(),
             slopes: slopes.map(|v| -2.0 * v).collect(),
         }
@@ -143,11 +155,11 @@ impl MeanField {
     /// `gradients` is empty: the same numbers as one by one.
     pub fn values(&self, places: &[&[f64]], gradients: &mut [f64]) -> Vec<f64> {
         let mut values = Vec::with_capacity(places.len());
-        let few = Some(places.len() % PLACES).filter(|few| *few <= FEW).unwrap_or(0);
-        let (many, few) = places.split_at(places.len() - few);
+        let rest = places.len() % MANY;
+        let (many, few) = places.split_at(places.len() - if rest <= FEW { rest } else { 0 });
         let dimension = if gradients.is_empty() { 0 } else { self.lengths.len() };
         let (of_many, of_few) = gradients.split_at_mut(many.len() * dimension);
-        self.blocks::<PLACES>(many, &mut values, of_many);
+        self.blocks::<MANY>(many, &mut values, of_many);
         self.blocks::<FEW>(few, &mut values, of_few);
         values
     }
@@ -185,10 +197,11 @@ impl MeanField {
     ) -> [f64; N] {
         let dimension = self.lengths.len();
         let place = |lane: usize| places[lane.min(places.len() - 1)];
-        let lengths = self.lengths.iter().enumerate();
-        let scaled =
-            |(axis, length): (usize, &f64)| std::array::from_fn(|lane| place(lane)[axis] / length);
-        let at: Vec<[f64; N]> = lengths.map(scaled).collect();
+        let axes = self.origin.iter().zip(&self.lengths).enumerate();
+        let scaled = |(axis, (origin, length)): (usize, (&f64, &f64))| {
+            std::array::from_fn(|lane| (place(lane)[axis] - origin) / length)
+        };
+        let at: Vec<[f64; N]> = axes.map(scaled).collect();
         let (count, sloped) = (self.heights.len(), self.slopes.len() / dimension.max(1));
         let mut sums = [0.0; N];
         gradients.fill([0.0; N]);
@@ -203,7 +216,9 @@ impl MeanField {
                 buffers.each_mut().map(|buffer| &mut buffer[..end - begin]);
             begin = end;
             squares(correlations, &at, observed);
-            steps(along, &at, observed, slopes);
+            if is_sloped {
+                steps(along, &at, observed, slopes);
+            }
             let r2 = correlations.as_flattened_mut();
             let derivative = first.as_flattened_mut();
             match (is_sloped, gradients.is_empty()) {
@@ -242,7 +257,9 @@ widest_fn! {
         at: &'a [[f64; N]],
         observed: &'a [f64],
     ) -> () {
-        for (r2, place) in r2.iter_mut().zip(observed.chunks_exact(at.len())) {
+        // Without coordinates all places are the same.
+        r2.fill([0.0; N]);
+        for (r2, place) in r2.iter_mut().zip(observed.chunks_exact(at.len().max(1))) {
             let mut sums = [0.0; N];
             for (at, x) in at.iter().zip(place) {
                 for lane in 0..N {
@@ -329,7 +346,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Adds Σ u·b + c′·m along every axis.
+    /// Adds Σ u·b + c′·m along every axis, for b from [`bend`] and m = `observed.1`.
     fn add_moments<'a, const N: usize>(
         gradients: &'a mut [[f64; N]],
         at: &'a [[f64; N]],
@@ -431,7 +448,6 @@ mod tests {
             let (mut with_nan, mut beside) = (all.clone(), gradients.clone());
             with_nan[5] = &[f64::NAN; 3];
             let near_nan = field.values(&with_nan, &mut beside);
-            assert!(near_nan[5].is_nan());
             assert_eq!((&near_nan[..5], &near_nan[6..]), (&values[..5], &values[6..]));
             assert_eq!((&beside[..15], &beside[18..]), (&gradients[..15], &gradients[18..]));
             let rows = places.iter().zip(values.iter().zip(gradients.as_chunks::<3>().0));
@@ -446,5 +462,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The distance from the origin of the coordinates costs no digits; without coordinates all
+    /// places are one.
+    #[test]
+    fn means_are_the_same_everywhere() {
+        let means = |far: f64, dimension: usize| {
+            let mut observations = Observations::new(dimension);
+            for i in 0..20 {
+                let place = [far + 0.25 * f64::from(i), far - 0.5 * f64::from(i % 3)];
+                observations.push_height(&place[..dimension], f64::from(i % 5));
+            }
+            let noise = NoiseRatio { height: 0.1, slope: 0.0, known: 0.0 };
+            let at = Hyperparameters::new(1.0, vec![0.5; dimension], noise, 0.0);
+            let belief = Posterior::new(&Matern52, at, observations).unwrap();
+            let places: Vec<[f64; 2]> =
+                (0..20).map(|i| [far + 0.125 * f64::from(i), far]).collect();
+            belief.means(places.iter().map(|place| &place[..dimension]))
+        };
+        assert_eq!(means(0.0, 2), means(f64::from(1 << 20), 2));
+        let (same, nowhere) = (means(0.0, 0), means(0.0, 0)[0]);
+        assert!(nowhere > 1.0 && same.iter().all(|mean| *mean == nowhere), "{same:?}");
     }
 }

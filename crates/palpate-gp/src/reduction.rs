@@ -3,9 +3,9 @@
 //! Sixteen places are computed together: the factor and the references are then read once for all
 //! of them, and each number read serves sixteen operations.
 
-use super::batch::{MANY, add_squares};
+use super::batch::add_squares;
 use super::cholesky::{Factor, subtract_products};
-use super::means::MeanField;
+use super::means::{MANY, MeanField};
 use super::observations::Observations;
 use super::posterior::Posterior;
 use crate::math::simd::widest_fn;
@@ -276,7 +276,7 @@ mod tests {
                 let lengths = &hyperparameters.length_scales;
                 let mut prior = [(0..2).map(|i| ((a[i] - b[i]) / lengths[i]).powi(2)).sum()];
                 Matern52.correlate(&mut prior);
-                                4.0 * (prior[0] - explained) + field.value(a) * field.value(b)
+                4.0 * (prior[0] - explained) + field.value(a) * field.value(b)
             };
             let asked: Vec<&[f64]> = places.iter().map(<[f64; 2]>::as_slice).collect();
             let reduction =

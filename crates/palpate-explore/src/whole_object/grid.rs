@@ -100,9 +100,9 @@ impl<F: Fn(&[Point3<f64>]) -> Vec<f64>> Grid<F> {
         }
     }
 
-    /// Whether the surface may cross a block in which no point is farther from one of the corners
-    /// `known` than this part of its diagonal; if not, adds it to `skipped` with a value of its
-    /// sign.
+    /// Whether the surface may cross a block in which no point is farther from the nearest of
+    /// `known` corners than this part of its diagonal; if not, adds it to `skipped` with a value of
+    /// its sign.
     fn may_cross(
         &self,
         block: &Block,

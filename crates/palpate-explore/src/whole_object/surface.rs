@@ -52,8 +52,8 @@ const CHUNK: usize = 128;
 /// heuristic.
 const STEPS: usize = 2;
 
-/// Step that is the last one, in cells: the error after it is about its square over twice the
-/// radius of curvature, below a hundredth of a cell; a heuristic.
+/// Step that is the last one, in cells; a heuristic: the error after it is about its square over
+/// twice the radius of curvature, below a hundredth of a cell where that is half a cell or more.
 const SETTLED: f64 = 0.1;
 
 impl Surface {
@@ -122,10 +122,13 @@ impl Surface {
         let variances = places.par_chunks(CHUNK);
         let variances = variances.map(|places| self.posterior.variances(places, &mut []));
         let mut variances: Vec<f64> = variances.flatten_iter().collect();
+        let places: Vec<&[f64]> = places.iter().map(Vec::as_slice).collect();
         for error in &self.pose_errors {
-            for (variance, place) in variances.iter_mut().zip(&places) {
-                *variance += error.value(place).powi(2);
-            }
+            let values = error.values(&places, &mut []).into_iter();
+            variances
+                .iter_mut()
+                .zip(values)
+                .for_each(|(variance, value)| *variance += value * value);
         }
         let offset2 = self.offset_m * self.offset_m;
         variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
@@ -154,7 +157,7 @@ impl Surface {
     }
 
     /// Returns about `most` points spread over the surface: every n-th vertex of its
-    /// [mesh](Self::mesh), from the one that `first` selects of n on. Returns `None` if the field
+    /// [mesh](Self::mesh) from vertex `first(n)` on, which is below n. Returns `None` if the field
     /// has no zeros.
     pub fn points(
         &self,

@@ -329,8 +329,8 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
     }
 
     /// Whether the line through corner `at` and a neighbour of another radius reaches the lowest
-    /// cost at radius 0; `divided` is the last corner divided. If that precedes this one among
-    /// those of one radius, it is a neighbour, and smaller now.
+    /// cost at radius 0; `divided` is the last corner divided, which is smaller now. If it was of
+    /// the same radius, it is a neighbour.
     fn may_hold_least(&self, hull: &[Corner], at: usize, divided: Option<usize>) -> bool {
         let here = &hull[at];
         let (first, larger) = here.equals;

@@ -127,8 +127,9 @@ pub fn cross(a: &Quad, b: &Quad) -> Quad {
 ///
 /// Branch-free, so that a loop over it is vectorised, and the same bits on every machine:
 /// x = k·ln 2 + r with |r| ≤ ln 2 / 2, and e^r = 1 + r + r²·q(r) with the polynomial q of degree 9
-/// that has the least relative error, 3.7e-18 (Remez exchange in 60 digits). The sums over its even
-/// and odd powers are independent, so that the processor computes both at once.
+/// that has the least relative error, 3.7e-18 before its coefficients are rounded (Remez exchange
+/// in 60 digits). The sums over its even and odd powers are independent, so that the processor
+/// computes both at once.
 #[inline(always)]
 pub fn exp_of_negative(x: f64) -> f64 {
     /// Constant whose addition leaves the nearest integer in the low bits of the sum.
