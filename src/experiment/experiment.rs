@@ -198,7 +198,6 @@ impl Experiment {
         others.iter().try_for_each(|set| loader.set(set))?;
         loader.read_former_keys("", &FORMER_KEYS)?;
         let legacy_keys = Scene::resolve(&mut loader, "scene.")?;
-        loader.resolve_path("truth.scan");
         if loader.has_value("scene.whole_object") {
             // Version 0.1 also wrote the settings of a zone's belief here, all of them.
             let is_of_zone = ["gp.mean", "gp.signal", "gp.free_space"];

@@ -5,6 +5,7 @@ use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
 use crate::experiment::real_arm::RealArm;
 use crate::experiment::real_robot;
+use crate::experiment::trial::looks;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{self, GroundTruth, OracleFactory, TrialObserver};
 use crate::experiment::truth::Truth;
@@ -63,6 +64,7 @@ impl Simulation {
         let library = library.transpose()?;
         if let Some(library) = &library {
             library.complete(&mut experiment.scene);
+            library.check_poses(&experiment.scene)?;
         }
         real_robot::check(&experiment, false)?;
         if experiment.backend.kind != BackendKind::Simulated {
@@ -98,6 +100,9 @@ impl Simulation {
             Some(_) => Truth::sample(&environment, experiment.grid as usize, &|_| ()),
             None => Truth::unknown(environment.task().zone(), experiment.grid as usize),
         };
+        if trial.is_none() {
+            looks::check(&experiment, &environment)?;
+        }
         let (library, object) = (Some(Arc::clone(library)), Some(object));
         let mut made = Self::made(
             experiment,
@@ -111,6 +116,11 @@ impl Simulation {
     /// Returns the objects of hypotheses.
     pub fn library(&self) -> Option<&Arc<Library>> {
         self.truth.library.as_ref().map(|library| &library.known)
+    }
+
+    /// Returns the library of the scene with its unknown objects.
+    pub fn loaded_library(&self) -> Option<&LoadedLibrary> {
+        self.truth.library.as_deref()
     }
 
     /// Returns the object of the trial that this simulation was [drawn](Self::drawn) for.
@@ -163,6 +173,7 @@ impl Simulation {
                 "no surface in the zone along the approach; check scene.zone and object.position_m",
             ));
         }
+        looks::check(&experiment, &environment)?;
         let shape = TrueShape::from_environment(&environment);
         tell("compiling the model");
         let truth = GroundTruth { environment, truth, shape, library, object: None };

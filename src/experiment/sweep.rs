@@ -2,18 +2,24 @@
 //! `[sweep]`.
 
 use crate::experiment::experiment::{Experiment, SWEEP, is_name_character};
-use palpate_explore::robot::arm::settings::FILE_ENDINGS;
 use palpate_input::config::{ConfigError, Loader};
-use palpate_input::shipped;
+use palpate_input::{paths, shipped};
 use std::path::Path;
-use toml::Value;
+use toml::{Table, Value};
 
 /// Maximum number of combinations.
 // heuristic: more are probably a mistake.
 const CASES_MAX: usize = 10_000;
 
-/// Settings whose values are file names, relative to the experiment's file.
-const FILES: [&str; 4] = ["scene", "backend", "scene.object.mesh", "truth.scan"];
+/// Settings that a file replaces before they are read.
+const REPLACED: [&str; 6] = [
+    "scene",
+    "gp",
+    "backend",
+    "scene.effects.sensor",
+    "scene.camera.model",
+    "scene.camera.intrinsics",
+];
 
 /// Whether `name` is a plain name without a file in `folder`.
 fn is_shipped(folder: &Path, name: &str) -> bool {
@@ -29,11 +35,14 @@ pub struct SweepCase {
     pub sets: Vec<String>,
 }
 
-/// Whether `value` of `key` is a file's name; an arm's model may be one.
-fn is_file(key: &str, value: &str) -> bool {
-    FILES.contains(&key)
-        || (key == "scene.effects.sensor" && value.ends_with(".toml"))
-        || (key == "scene.arm.model" && FILE_ENDINGS.iter().any(|ending| value.ends_with(ending)))
+/// Whether `value` of `key` is the path of a file or folder.
+fn is_path(key: &str, value: &str) -> bool {
+    let text = Value::String(value.into());
+    let nested = |inner: Value, step: &str| Value::Table(Table::from_iter([(step.into(), inner)]));
+    let Value::Table(mut table) = key.rsplit('.').fold(text, nested) else { return false };
+    let mut is_path = REPLACED.contains(&key) && Path::new(value).extension().is_some();
+    paths::visit::<Experiment>(&mut table, &mut |_, _| is_path = true);
+    is_path
 }
 
 /// Returns the combinations of the file at `path`, the last key varying fastest; empty without a
@@ -57,7 +66,7 @@ pub fn sweep_cases(path: &Path) -> Result<Vec<SweepCase>, ConfigError> {
         let longer = |case: &SweepCase| -> Vec<SweepCase> {
             let with = |(i, value): (usize, &Value)| {
                 let set = match value {
-                    Value::String(name) if is_file(key, name) && !is_shipped(folder, name) => {
+                    Value::String(name) if is_path(key, name) && !is_shipped(folder, name) => {
                         format!(
                             "{key}={}",
                             Value::String(folder.join(name).to_string_lossy().into())

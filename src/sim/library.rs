@@ -3,12 +3,14 @@
 use super::library_settings::LibrarySettings;
 use super::scene::{ObjectSettings, Scene, Unit};
 use nalgebra::{Isometry3, Vector3};
-use palpate_explore::recognition::{Library, LibraryObject, PosePrior};
+use palpate_explore::recognition::{Library, LibraryObject, PosePrior, Turn};
 use palpate_geometry::import::{import, is_mesh_file};
 use palpate_gp::math::pose::parts;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
+use palpate_input::format::hex;
 use rand::{Rng, RngExt};
+use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,6 +28,8 @@ pub struct LoadedLibrary {
     /// Objects of the trials: those of the hypotheses, then the unknown ones.
     all: Vec<(PathBuf, Arc<LibraryObject>)>,
     unit: Unit,
+    /// SHA-256 of the names and meshes of all objects.
+    sha256: String,
 }
 
 /// Object of a trial, as drawn.
@@ -73,20 +77,28 @@ impl LoadedLibrary {
         let is_known = |name: &String| {
             !unknown.contains(name) && (objects.is_empty() || objects.contains(name))
         };
-        let read = |(name, path): &(String, PathBuf)| {
-            let (mesh, _) = import(path, unit.metres_per_unit())?;
+        let mut content = Sha256::new();
+        let mut read = |(name, path): &(String, PathBuf)| {
+            let (mesh, report) = import(path, unit.metres_per_unit())?;
+            content.update(format!("{name} {}\n", report.sha256));
             let class = name.split('-').next().filter(|_| *has_classes).unwrap_or(name);
             Ok((path.clone(), Arc::new(LibraryObject::new(name, &mesh).of_class(class))))
         };
-        let chosen = |is_chosen: &dyn Fn(&String) -> bool| {
-            files.iter().filter(|(name, _)| is_chosen(name)).map(read).collect()
+        let mut chosen = |is_chosen: &dyn Fn(&String) -> bool| {
+            files.iter().filter(|(name, _)| is_chosen(name)).map(&mut read).collect()
         };
         let mut all: Vec<(PathBuf, Arc<LibraryObject>)> = chosen(&is_known)?;
         let known = all.iter().map(|(_, object)| Arc::clone(object)).collect();
         let known = Library::new(known).map_err(|error| error.at("library"))?;
         let others: Result<Vec<_>, InputError> = chosen(&|name| unknown.contains(name));
         all.extend(others?);
-        Ok(Self { known: Arc::new(known), all, unit: *unit })
+        let sha256 = hex(content.finalize());
+        Ok(Self { known: Arc::new(known), all, unit: *unit, sha256 })
+    }
+
+    /// Returns the SHA-256 of the names and meshes of all objects.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
     }
 
     /// Fills in the ball of a scene around all objects at all poses.
@@ -106,6 +118,31 @@ impl LoadedLibrary {
         });
         let radius_m = ROOMIER * (farthest_m.fold(0.0, f64::max) + widest_m);
         around.radius_m.get_or_insert(radius_m);
+    }
+
+    /// Checks that no object can be below the table at a pose of the scene's prior.
+    ///
+    /// # Errors
+    /// If one that can turn freely reaches below it.
+    pub fn check_poses(&self, scene: &Scene) -> Result<(), InputError> {
+        let prior = scene.pose.clone().unwrap_or_default();
+        let lowest_m = scene.whole_object.as_ref().and_then(|around| around.lowest_m);
+        let (Turn::Free, Some(lowest_m)) = (prior.turn, lowest_m) else { return Ok(()) };
+        let radius_m = self.all.iter().map(|(_, object)| object.radius_m()).fold(0.0, f64::max);
+        let ([_, _, z_m], [_, _, half_m]) = (prior.position_m, prior.half_width_m);
+        let least_m = lowest_m + radius_m + half_m;
+        match z_m < least_m - 1e-9 {
+            false => Ok(()),
+            true => Err(InputError::new("turn")
+                .at("scene.pose")
+                .value("\"free\"")
+                .allowed("\"none\" or \"yaw\"")
+                .remedy(format!(
+                    "an object of {radius_m:.3} m about z = {z_m} m would reach below \
+                     whole_object.lowest_m = {lowest_m} m: set pose.position_m[2] to at least \
+                     {least_m:.3}, or leave lowest_m out"
+                ))),
+        }
     }
 
     /// Returns a scene with an object of the library, for what needs no trial.
@@ -132,7 +169,7 @@ impl LoadedLibrary {
         let object = found.map(|(mesh, object)| {
             let (position_m, rotation_deg) = parts(&(drawn.x_wo * object.x_om()));
             ObjectSettings {
-                mesh: mesh.clone(),
+                mesh: mesh.clone().into(),
                 allow_external_buffers: false,
                 unit: self.unit,
                 scale: 1.0,

@@ -2,16 +2,16 @@
 
 use super::unit::Unit;
 use palpate_input::config::{Rules, Validate, is_default};
+use palpate_input::paths::InputPath;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 
 /// Table `[library]`: meshes of a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LibrarySettings {
     /// Folder with mesh files, relative to the scene file. Their z axis points up.
-    pub folder: PathBuf,
+    pub folder: InputPath,
     /// Unit of the mesh files.
     #[serde(default)]
     pub unit: Unit,

@@ -9,7 +9,6 @@ use crate::sim::finger::effects::sensor;
 use nalgebra::Isometry3;
 use palpate_explore::recognition::PosePrior;
 use palpate_explore::robot::arm::ArmSettings;
-use palpate_explore::robot::arm::settings::FILE_ENDINGS;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_explore::robot::sensor::{SensorKind, SensorSettings};
@@ -19,12 +18,13 @@ use palpate_explore::task::zone::Zone;
 use palpate_geometry::surfaces;
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
+use palpate_input::paths::InputPath;
 use palpate_input::tables;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Settings of a scene: the file that determines the result of every touch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -168,7 +168,7 @@ impl AnalyticCurve {
 #[serde(deny_unknown_fields)]
 pub struct ObjectSettings {
     /// Mesh file: .obj, .gltf, .glb, .stl or .ply, relative to the scene file.
-    pub mesh: PathBuf,
+    pub mesh: InputPath,
     /// Whether a .gltf file may name buffers outside its own folder.
     #[serde(default, skip_serializing_if = "is_default")]
     pub allow_external_buffers: bool,
@@ -263,6 +263,10 @@ impl Validate for Scene {
         let allowed = "none: strokes are along a zone with x_m and z_m, or around a whole object";
         let is_curve = self.whole_object.is_none() && !is_flat;
         given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
+        let has_pad = self.effects.gel.is_some() || self.sensor.kind == SensorKind::DepthPatch;
+        let allowed = "no stroke with [effects.gel] or sensor.kind = \"depth_patch\": the points of the \
+                       pad's patch and of the stroke's path are not told apart";
+        given(rules, "touch.stroke", self.touch.stroke.is_some() && has_pad, allowed);
         let body = self.simulator.name();
         if self.simulator == SimulatorKind::Analytic {
             let allowed = "\"toy\", because simulator = \"analytic\"";
@@ -497,20 +501,14 @@ impl Scene {
         .unwrap_or_default()
     }
 
-    /// Makes the paths of a scene under `prefix` absolute, and copies the constants of its sensor
-    /// into its effects. Returns the keys of sensor constants that are set in the effects
-    /// themselves.
+    /// Copies the constants of the camera's model and of the sensor into the scene under `prefix`.
+    /// Returns the keys of sensor constants that are set in the effects themselves.
     ///
     /// # Errors
     /// If the sensor file cannot be read, or holds a value that is not allowed.
     pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
         loader.read_former_keys(prefix, &FORMER_KEYS)?;
         loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
-        loader.resolve_path(&format!("{prefix}object.mesh"));
-        loader.resolve_path(&format!("{prefix}library.folder"));
-        for ending in FILE_ENDINGS {
-            loader.resolve_path_ending(&format!("{prefix}arm.model"), ending);
-        }
         CameraSettings::resolve(loader, &format!("{prefix}camera"))?;
         sensor::load(loader, &format!("{prefix}effects"))
     }

@@ -121,7 +121,10 @@ fn an_experiment_finds_a_shipped_scene_by_name() {
     let shipped = home.path().join("scenes/pebble.toml");
     fs::rename(home.path().join("scenes/scene.toml"), &shipped).unwrap();
     let found = load(&by_name, &[]).unwrap();
-    assert_eq!(found.scene.object.as_ref().unwrap().mesh, home.path().join("scenes/mesh.obj"));
+    assert_eq!(
+        found.scene.object.as_ref().unwrap().mesh,
+        home.path().join("scenes/mesh.obj").into()
+    );
     assert_eq!(load(&text, &["scene=pebble"]).unwrap(), found);
     let edited = load(&by_name, &["scene.finger.radius_m=0.004"]).unwrap();
     assert_eq!(edited.scene.finger.radius_m, 0.004);
@@ -132,7 +135,7 @@ fn an_experiment_finds_a_shipped_scene_by_name() {
     // The file beside the experiment is preferred.
     fs::copy(folder.path().join("scene.toml"), folder.path().join("pebble")).unwrap();
     let beside = load(&by_name, &[]).unwrap();
-    assert_eq!(beside.scene.object.unwrap().mesh, folder.path().join("mesh.obj"));
+    assert_eq!(beside.scene.object.unwrap().mesh, folder.path().join("mesh.obj").into());
 }
 
 /// Deprecated command names still work, with a note of the new name.

@@ -51,6 +51,7 @@ mod geometry;
 mod guides;
 mod hard;
 mod information;
+mod inputs;
 #[cfg(feature = "mujoco")]
 mod installed;
 mod interlocks;

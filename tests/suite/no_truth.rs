@@ -115,7 +115,7 @@ fn a_run_without_truth_is_told() {
         let visible = page.split("<script").next().unwrap();
         assert!(!visible.contains("NaN") && !visible.contains("mean R (Eq. 5) is"), "{visible}");
         assert_eq!(page.contains("At held-out verification touches"), !with.is_empty());
-        let text = report::tables::summary::text(&run);
+        let text = report::tables::summary::text(&run, true);
         assert!(text.contains("no ground truth"), "{text}");
         assert_eq!(text.contains("verification rmse"), !with.is_empty(), "{text}");
         let csv = fs::read_to_string(folder.path().join("summary.csv")).unwrap();
@@ -139,7 +139,7 @@ fn a_scan_is_a_truth() {
     }
     fs::write(&scan, text).unwrap();
     let zone = Zone { datum_y_m: Some(0.002), ..Zone::new([-0.05, 0.02], Some([-0.02, 0.02])) };
-    let truth = ScanTruth { scan: scan.clone(), contacts_min: 4, search_radius_m: None };
+    let truth = ScanTruth { scan: scan.clone().into(), contacts_min: 4, search_radius_m: None };
     let (truth, contacts, rmse_m) = truth.sample(&zone, 15).unwrap();
     let (mut known, mut unknown) = (0, 0);
     for (place, told_m) in truth.places.iter().zip(&truth.heights_m) {
@@ -155,10 +155,13 @@ fn a_scan_is_a_truth() {
     assert!(known > 50 && unknown > 50);
     assert_eq!(contacts, 441);
     assert!(rmse_m.unwrap() < 1e-9);
-    let gone =
-        ScanTruth { scan: folder.path().join("none.csv"), contacts_min: 4, search_radius_m: None };
+    let gone = ScanTruth {
+        scan: folder.path().join("none.csv").into(),
+        contacts_min: 4,
+        search_radius_m: None,
+    };
     assert!(gone.sample(&zone, 5).unwrap_err().to_string().contains("none.csv"));
     fs::write(&scan, "x_m,y_m\n1,2\n").unwrap();
-    let bad = ScanTruth { scan, contacts_min: 4, search_radius_m: None };
+    let bad = ScanTruth { scan: scan.into(), contacts_min: 4, search_radius_m: None };
     assert!(bad.sample(&zone, 5).unwrap_err().to_string().contains("z_m"));
 }

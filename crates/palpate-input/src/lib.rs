@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`files`] | reads and replaces files named by users |
 //! | [`config`] | settings from a TOML file and `key=value` overrides |
+//! | [`paths`] | paths among settings, found by their type |
 //! | [`tables`] | settings from TOML tables and back |
 //! | [`error`] | error of invalid input: place, value, allowed values |
 //! | [`shipped`] | lookup of shipped files by name |
@@ -11,9 +12,10 @@
 //!
 //! ```
 //! use palpate_input::config::{Loader, Rules, Validate};
+//! use schemars::JsonSchema;
 //! use serde::Deserialize;
 //!
-//! #[derive(Deserialize)]
+//! #[derive(Deserialize, JsonSchema)]
 //! struct Touch {
 //!     force_n: f64,
 //! }
@@ -35,5 +37,6 @@ pub mod config;
 pub mod error;
 pub mod files;
 pub mod format;
+pub mod paths;
 pub mod shipped;
 pub mod tables;

@@ -23,6 +23,12 @@ pub fn find(name: &Path, folder: &str, home: Option<&Path>) -> Option<PathBuf> {
     folders(folder, home).map(|folder| folder.join(&file)).find(|path| path.is_file())
 }
 
+/// Returns the file or folder at the relative `path` in the working directory, beside the program,
+/// or in `home`, by default that of [`HOME`].
+pub fn locate(path: &Path, home: Option<&Path>) -> Option<PathBuf> {
+    folders("", home).map(|folder| folder.join(path)).find(|path| path.exists())
+}
+
 /// Returns the sorted names of the files that [`find`] finds.
 pub fn names(folder: &str, home: Option<&Path>) -> Vec<String> {
     let files = folders(folder, home).filter_map(|folder| std::fs::read_dir(folder).ok());

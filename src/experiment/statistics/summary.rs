@@ -147,7 +147,7 @@ pub fn events(rows: &[TrialRow], planner: &str) -> EventCounts {
         };
         events.trials += 1;
         events.failures += usize::from(row.failure.is_some());
-        events.misses += count(|touch| touch.contact.is_none() && !touch.overload);
+        events.misses += count(TouchRow::is_miss);
         events.overloads += count(|touch| touch.overload);
         for doubt in row.touches.iter().filter_map(|touch| touch.doubt) {
             *events.doubts.entry(doubt).or_default() += 1;

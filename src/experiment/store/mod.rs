@@ -10,7 +10,8 @@
 //! are run. Rows that are no longer listed stay in `trials.jsonl`, so a change loses no trial.
 //!
 //! `resolved.toml` marks a run's folder: it is written first and never removed. A folder with it
-//! and without a row, or with only the partial files of a crash, is started again.
+//! and without a touch, since all its trials failed before, or with only the partial files of a
+//! crash, is started again.
 
 mod io;
 mod journal;
@@ -76,7 +77,7 @@ pub struct Run {
 
 impl RunFolder {
     /// Opens `path` for the rows of `simulation`, run by a program built from `commit`. It creates
-    /// the folder or continues an existing run; with `fresh`, or if the run has no row yet, it
+    /// the folder or continues an existing run; with `fresh`, or if no trial has made a touch, it
     /// starts again.
     ///
     /// Returns the finished trials that the experiment lists. A last line cut short by a crash is
@@ -108,7 +109,7 @@ impl RunFolder {
         let trials = palpate_input::files::append(&file).map_err(io_error(&file))?;
         lock(&trials, path)?;
         let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
-        if fresh || !(has_touches || rows::has_some(&trials).map_err(io_error(&file))?) {
+        if fresh || !(has_touches || rows::has_touches(&trials).map_err(io_error(&file))?) {
             trials.set_len(0).map_err(io_error(&file))?;
             // Written first, as the mark of a run's folder.
             resolved::write(path, experiment)?;

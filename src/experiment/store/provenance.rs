@@ -4,13 +4,13 @@
 use super::io::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
 use crate::sim::environment::ObjectShape;
-use palpate_input::files;
 use palpate_input::format::hex;
+use palpate_input::{files, paths};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// File with the hashes of a run's input files and external planners.
 pub(super) const CONTENT: &str = "content.json";
@@ -18,14 +18,14 @@ pub(super) const CONTENT: &str = "content.json";
 /// File that lists the programs that wrote a run.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Maximum size of a scan that is hashed.
-const SCAN_MAX: u64 = 1 << 30;
+/// Maximum size of a file that is hashed.
+const FILE_MAX: u64 = 1 << 30;
 
 /// Prefix of the keys of planners; the name follows.
 const PLANNER: &str = "planner ";
 
-/// SHA-256 of a run's input files and external planners by key: `scene.object.mesh`,
-/// `scene.arm.model`, `truth.scan`, `planner MODULE:NAME`.
+/// SHA-256 of a run's input files and external planners, by the key of each path in the settings,
+/// such as `scene.object.mesh`, and by `planner MODULE:NAME`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct InputHashes {
     hashes: BTreeMap<String, String>,
@@ -41,20 +41,13 @@ impl InputHashes {
     pub(super) fn of(simulation: &Simulation) -> Result<Self, RunError> {
         let mut content = Self::default();
         let experiment = simulation.experiment();
-        if let (ObjectShape::Mesh { report, .. }, Some(object)) =
-            (simulation.environment().shape(), &experiment.scene.object)
-        {
-            content.add("scene.object.mesh", report.sha256.clone(), Some(&object.mesh));
-        }
-        if let Some(truth) = &experiment.truth {
-            let bytes = files::bytes(&truth.scan, SCAN_MAX).map_err(io_error(&truth.scan))?;
-            content.add("truth.scan", sha256(&bytes), Some(&truth.scan));
-        }
-        if let Some(arm) = experiment.scene.arm.as_ref().filter(|arm| arm.is_file()) {
-            let path = Path::new(&arm.model);
-            let mut bytes = files::bytes(path, files::TEXT_MAX).map_err(io_error(path))?;
-            bytes.extend(simulation.environment().arm_mjcf().unwrap_or_default().as_bytes());
-            content.add("scene.arm.model", sha256(&bytes), Some(path));
+        let contents = parsed_contents(simulation)?;
+        for (key, path) in paths::list(experiment) {
+            let hash = match contents.iter().find(|(read, _)| *read == path) {
+                Some((_, content)) => content.clone(),
+                None => sha256(&files::bytes(&path, FILE_MAX).map_err(io_error(&path))?),
+            };
+            content.add(&key, hash, Some(&path));
         }
         for name in &experiment.planners {
             if let Some(source) = simulation.planner(name).and_then(|planner| planner.source()) {
@@ -121,6 +114,26 @@ impl InputHashes {
         );
         Err(RunError::at(folder, problem))
     }
+}
+
+/// Returns the paths of inputs that refer to other files or contain them, each with the SHA-256 of
+/// what was read.
+fn parsed_contents(simulation: &Simulation) -> Result<Vec<(PathBuf, String)>, RunError> {
+    let (scene, environment) = (&simulation.experiment().scene, simulation.environment());
+    let mut contents = Vec::new();
+    if let (ObjectShape::Mesh { report, .. }, Some(object)) = (environment.shape(), &scene.object) {
+        contents.push((object.mesh.to_path_buf(), report.sha256.clone()));
+    }
+    if let (Some(library), Some(settings)) = (simulation.loaded_library(), &scene.library) {
+        contents.push((settings.folder.to_path_buf(), library.sha256().to_owned()));
+    }
+    if let Some(arm) = scene.arm.as_ref().filter(|arm| arm.is_file()) {
+        let path = PathBuf::from(&arm.model);
+        let mut bytes = files::bytes(&path, files::TEXT_MAX).map_err(io_error(&path))?;
+        bytes.extend(environment.arm_mjcf().unwrap_or_default().as_bytes());
+        contents.push((path, sha256(&bytes)));
+    }
+    Ok(contents)
 }
 
 fn sha256(bytes: &[u8]) -> String {

@@ -3,7 +3,7 @@
 use super::io::{RunError, check_equal, write_changed};
 use crate::experiment::experiment::Experiment;
 use palpate_input::error::InputError;
-use palpate_input::{files, tables};
+use palpate_input::{files, paths, tables};
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
 
@@ -67,30 +67,21 @@ pub(super) fn check_report_setting(set: &str) -> Result<(), RunError> {
     }
 }
 
-/// Returns [`resolved`] text with the mesh's path relative to the folder of the file `path`.
+/// Returns [`resolved`] text with all paths relative to the folder of the file `path`.
 pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
     relative_resolved(experiment, path.parent().unwrap_or(Path::new("")))
 }
 
-/// Returns [`resolved`] text with the paths of mesh and scan relative to the run's folder, so that
-/// both can be moved together.
+/// Returns [`resolved`] text with all paths relative to the run's folder, so that both can be moved
+/// together.
 fn relative_resolved(experiment: &Experiment, folder: &Path) -> String {
-    let mut experiment = experiment.clone();
-    if let Ok(folder) = folder.canonicalize() {
-        let moved = |path: &Path| {
-            relative(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), &folder)
-        };
-        if let Some(object) = &mut experiment.scene.object {
-            object.mesh = moved(&object.mesh);
-        }
-        if let Some(arm) = experiment.scene.arm.as_mut().filter(|arm| arm.is_file()) {
-            arm.model = moved(arm.model.as_ref()).to_string_lossy().into_owned();
-        }
-        if let Some(truth) = &mut experiment.truth {
-            truth.scan = moved(&truth.scan);
-        }
-    }
-    resolved(&experiment)
+    let Ok(folder) = folder.canonicalize() else { return resolved(experiment) };
+    let moved = |path: &str| {
+        let path = Path::new(path);
+        relative(&path.canonicalize().unwrap_or_else(|_| path.into()), &folder)
+    };
+    let moved = paths::map(experiment, |path| moved(path).to_string_lossy().into_owned());
+    moved.as_ref().map_or_else(|| resolved(experiment), resolved)
 }
 
 /// Returns `path` relative to `folder`, both absolute.

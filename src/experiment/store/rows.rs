@@ -13,11 +13,21 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::Path;
 
-/// Whether a results file has a complete line.
-pub(super) fn has_some(trials: &File) -> io::Result<bool> {
-    let mut line = Vec::new();
-    BufReader::new(trials).read_until(b'\n', &mut line)?;
-    Ok(line.ends_with(b"\n"))
+/// Whether a results file has a row of a trial that made a touch; one that cannot be read counts as
+/// such.
+pub(super) fn has_touches(trials: &File) -> io::Result<bool> {
+    let (mut lines, mut line) = (BufReader::new(trials), Vec::new());
+    loop {
+        line.clear();
+        lines.read_until(b'\n', &mut line)?;
+        if !line.ends_with(b"\n") {
+            return Ok(false);
+        }
+        let row = serde_json::from_slice::<TrialRow>(&line);
+        if row.map_or(true, |row| !row.touches.is_empty() || row.failure.is_none()) {
+            return Ok(true);
+        }
+    }
 }
 
 /// Reads a results file row by row and passes each row with its byte range to `each`, without

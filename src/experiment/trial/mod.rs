@@ -1,7 +1,7 @@
 //! A trial, Algorithm 1 of Yi et al. 2016: touch, fit and plan in a loop; and its row.
 
 mod belief_shape;
-mod looks;
+pub(super) mod looks;
 mod oracle;
 pub mod planner_names;
 pub mod recorded_trial;

@@ -181,6 +181,11 @@ impl TrialRow {
 }
 
 impl TouchRow {
+    /// Whether the finger met nothing, and was not stopped by the force limit.
+    pub fn is_miss(&self) -> bool {
+        self.contact.is_none() && !self.overload
+    }
+
     /// Returns the touch as it was observed; a contact without a written normal points `against_w`,
     /// opposite to the approach.
     pub fn touch(&self, against_w: Vector3<f64>) -> Touch {

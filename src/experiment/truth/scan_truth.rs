@@ -8,16 +8,17 @@ use palpate_geometry::import::ply::points;
 use palpate_input::config::{Rules, Validate};
 use palpate_input::error::InputError;
 use palpate_input::files;
+use palpate_input::paths::InputPath;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Table `[truth]`: scan used as ground truth, in place of the object's own surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanTruth {
     /// cloud.csv or cloud.ply of `palpate export`, relative to the experiment's file; in `W`.
-    pub scan: PathBuf,
+    pub scan: InputPath,
     /// Minimum number of contacts within `search_radius_m` for a test point to have a height.
     #[serde(default = "neighbours")]
     pub contacts_min: usize,

@@ -3,9 +3,10 @@
 use super::measures::CHECK_MEASURES;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
+use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
-use palpate_input::files;
 use palpate_input::format::hex;
+use palpate_input::{files, paths};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -97,16 +98,21 @@ fn hash(row: &TrialRow) -> String {
 }
 
 /// Returns the SHA-256 of the settings that decide the rows of `experiment`. Paths of files do not
-/// count; the contents of the object's file do.
+/// count; the contents of the files do, and those of the meshes in a folder.
 pub fn settings_hash(experiment: &Experiment) -> String {
-    let mut identity = experiment.row_settings();
-    let mut object = Vec::new();
-    if let Some(it) = &mut identity.scene.object {
-        object = std::fs::read(&it.mesh).unwrap_or_default();
-        it.mesh = PathBuf::new();
+    let settings = experiment.row_settings();
+    let without_paths = paths::map(&settings, |_| String::new());
+    let text = serde_json::to_vec(without_paths.as_ref().unwrap_or(&settings)).unwrap_or_default();
+    let mut hash = Sha256::new().chain_update(text);
+    for (_, path) in paths::list(&settings) {
+        let entries = std::fs::read_dir(&path).into_iter().flatten().flatten();
+        let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+        files.retain(|file| is_mesh_file(file));
+        files.sort();
+        files.push(path);
+        files.iter().for_each(|file| hash.update(std::fs::read(file).unwrap_or_default()));
     }
-    let text = serde_json::to_vec(&identity).unwrap_or_default();
-    hex(Sha256::new().chain_update(text).chain_update(object).finalize())
+    hex(hash.finalize())
 }
 
 impl StoredBaseline {

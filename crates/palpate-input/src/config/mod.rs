@@ -7,7 +7,8 @@ mod rules;
 pub use error::{ConfigError, Origin};
 pub use rules::{Rules, Validate};
 
-use crate::{files, format, shipped, tables};
+use crate::{files, format, paths, shipped, tables};
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -206,7 +207,7 @@ impl Loader {
     /// If the file cannot be read or is not TOML.
     pub fn include(&mut self, key: &str, folder: Option<&str>) -> Result<(), ConfigError> {
         let Some(Value::String(name)) = self.table.get(key) else { return Ok(()) };
-        let mut path = self.beside(key, Path::new(name));
+        let mut path = self.located(key, Path::new(name));
         let folder = folder.filter(|_| shipped::is_plain(Path::new(name)) && !path.is_file());
         if let Some(folder) = folder {
             path = shipped::find(Path::new(name), folder, self.home.as_deref()).unwrap_or(path);
@@ -263,14 +264,28 @@ impl Loader {
         }
     }
 
-    /// Makes the file name under the dotted `key` absolute: one from a file is relative to that
-    /// file's folder, one from `--set` to the current folder.
+    /// Makes the path under the dotted `key` absolute: one from a file is relative to that file's
+    /// folder, one from `--set` to the current folder; where there is none, to the shipped files.
     pub fn resolve_path(&mut self, key: &str) {
         let Some(Value::String(name)) = self.value(key) else { return };
-        let path = self.beside(key, Path::new(name));
-        let path = std::path::absolute(&path).unwrap_or(path);
-        let text = tidy(&path).to_string_lossy().into_owned();
+        let text = self.resolved(key, name);
         self.insert(key, Value::String(text));
+    }
+
+    /// Makes all paths among the settings of a `T` absolute, as [`resolve_path`] does.
+    ///
+    /// [`resolve_path`]: Self::resolve_path
+    fn resolve_paths<T: JsonSchema>(&mut self) {
+        let mut table = std::mem::take(&mut self.table);
+        paths::visit::<T>(&mut table, &mut |key, text| *text = self.resolved(key, text));
+        self.table = table;
+    }
+
+    /// Returns the absolute path `name` under `key`.
+    fn resolved(&self, key: &str, name: &str) -> String {
+        let path = self.located(key, Path::new(name));
+        let path = std::path::absolute(&path).unwrap_or(path);
+        tidy(&path).to_string_lossy().into_owned()
     }
 
     /// Returns the table under the dotted `key`, the outermost if it is empty.
@@ -279,11 +294,12 @@ impl Loader {
         parts.try_fold(&mut self.table, |table, part| table.get_mut(part)?.as_table_mut())
     }
 
-    /// Fills in defaults and validates everything.
+    /// Fills in defaults, makes all paths absolute and validates everything.
     ///
     /// # Errors
     /// The first invalid value, with its origin.
-    pub fn finish<T: DeserializeOwned + Validate>(self) -> Result<T, ConfigError> {
+    pub fn finish<T: DeserializeOwned + JsonSchema + Validate>(mut self) -> Result<T, ConfigError> {
+        self.resolve_paths::<T>();
         let config: T = tables::read(self.table.clone())
             .map_err(|error| self.explain::<T>(&error.key, &error.message))?;
         let mut rules = Rules::default();
@@ -389,13 +405,18 @@ impl Loader {
         Some(value)
     }
 
-    /// Resolves `name` relative to the origin of `key`.
-    fn beside(&self, key: &str, name: &Path) -> PathBuf {
-        match self.origin(key) {
+    /// Returns the path `name` relative to the origin of `key`, or that of a shipped file if there
+    /// is no other.
+    fn located(&self, key: &str, name: &Path) -> PathBuf {
+        let beside = match self.origin(key) {
             Origin::File { path, .. } => {
                 path.parent().map_or_else(|| name.into(), |folder| folder.join(name))
             }
             Origin::Set(_) => name.into(),
+        };
+        match beside.exists() {
+            true => beside,
+            false => shipped::locate(name, self.home.as_deref()).unwrap_or(beside),
         }
     }
 

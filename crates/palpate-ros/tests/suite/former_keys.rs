@@ -2,10 +2,11 @@
 
 use palpate_input::config::{ConfigError, Loader, Rules, Validate};
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct File {
     backend: BackendSettings,

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{Rules, Validate};
 use palpate_input::error::InputError;
+use palpate_input::paths::PATH_OR_NAME;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -20,6 +21,7 @@ pub struct ArmSettings {
     /// Arm model: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), `"ur5e"`, `"fr3"`, `"iiwa14"`,
     /// or a file: an arm model (`.toml`), a URDF or an MJCF (`.xml`).
     #[serde(alias = "links", deserialize_with = "model")]
+    #[schemars(extend("format" = PATH_OR_NAME))]
     pub model: String,
     /// Link (URDF), body or site (MJCF) that carries the tool along its +z; default: the only end
     /// of the file's robot.
