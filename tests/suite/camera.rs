@@ -420,10 +420,8 @@ fn views_are_read_from_files() {
     let mut experiment =
         Experiment::with_defaults(&scene("container.toml", &[&camera]), &["active"], 1, 2);
     experiment.views = 1;
-    let simulation = Simulation::new(experiment).unwrap();
-    let row = simulation.trial(simulation.planner("active").unwrap(), 0);
-    let failure = row.failure.unwrap();
-    assert!(failure.contains("check camera.position_m, unit and frame"), "{failure}");
+    let refused = Simulation::new(experiment).err().unwrap().to_string();
+    assert!(refused.contains("check camera.position_m, unit and frame"), "{refused}");
     // An image of depths in tenths of a millimetre.
     let path = folder.path().join("depths.png");
     let mut depths = vec![0_u16; 240 * 135];

@@ -1,6 +1,6 @@
 //! Tests of recognition: which object of a library is touched, and where it is.
 
-use crate::common::program::{fails, palpate, run_to_end, succeeds};
+use crate::common::program::{fails, palpate, run_to_end, stderr, succeeds};
 use palpate::experiment::Simulation;
 use palpate::experiment::experiment::Experiment;
 use palpate::experiment::measure::recognition::{NONE, RecognitionMetrics};
@@ -135,6 +135,25 @@ fn a_pose_in_space_is_found() {
         let error = last(&row).error.as_ref().unwrap();
         assert!(error.distance_m.unwrap() < 2e-3, "{error:?}");
     }
+}
+
+/// An object that turns freely about a point of the table would be below it in part.
+#[test]
+fn a_free_turn_below_the_table_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let identify = |turn: &str, z: &str| {
+        let (turn, z) = (format!("pose.turn={turn}"), format!("pose.position_m=[0,-0.65,{z}]"));
+        let scene = ["identify", "models/lookalikes", "scenes/lookalikes.toml", "--touches", "1"];
+        palpate(folder.path(), &[&scene[..], &["--set", &turn, "--set", &z]].concat())
+    };
+    let refused = identify("free", "0.4");
+    assert_eq!(refused.status.code(), Some(2));
+    let message = stderr(&refused);
+    for part in ["scene.pose: turn = \"free\"", "whole_object.lowest_m = 0.4", "position_m[2]"] {
+        assert!(message.contains(part), "no {part} in {message}");
+    }
+    assert_eq!(identify("free", "0.6").status.code(), Some(3));
+    assert_eq!(identify("yaw", "0.4").status.code(), Some(3));
 }
 
 fn shipped(path: &str) -> String {

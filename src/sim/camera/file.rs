@@ -29,7 +29,7 @@ pub(super) fn points(
     let bytes = files::bytes(path, LARGEST).map_err(unreadable)?;
     let is_image = bytes.starts_with(&[0x89, b'P', b'N', b'G']);
     let unit = camera.unit.unwrap_or(if is_image { Unit::Mm } else { Unit::M });
-    let scale = unit.metres_per_unit();
+    let scale = camera.unit_m.unwrap_or(unit.metres_per_unit());
     if is_image {
         return depths(camera, &bytes, scale).map_err(at);
     }
@@ -65,7 +65,18 @@ fn depths(
     let mut data = vec![0; reader.output_buffer_size()];
     reader.next_frame(&mut data).map_err(invalid)?;
     let (width, height) = (info.0 as usize, info.1 as usize);
-    let camera = CameraSettings { pixels: [width, height], ..camera.clone() };
+    let size = [width, height];
+    if let (Some(stated), Some(_)) = (camera.pixels, camera.intrinsics_px)
+        && stated != size
+    {
+        let (stated, size) =
+            (format!("{} x {}", stated[0], stated[1]), format!("{width} x {height}"));
+        return Err(InputError::new(format!(
+            "an image of {size} pixels, and intrinsics of one of {stated}"
+        ))
+        .remedy("give the intrinsics of this image, and their size as camera.pixels"));
+    }
+    let camera = CameraSettings { pixels: Some(size), ..camera.clone() };
     let point = |(i, bytes): (usize, &[u8; 2])| {
         let depth = u16::from_be_bytes(*bytes);
         (depth > 0).then(|| Point3::from(camera.ray(i) * (f64::from(depth) * scale)))

@@ -78,13 +78,13 @@ impl CameraSettings {
         let seen = image.depths_m.iter().enumerate().filter(|(_, depth_m)| depth_m.is_finite());
         let points_c = seen.map(|(i, depth_m)| (self.ray(i) * *depth_m).into()).collect();
         let corner = |i| [self.ray(i).x, self.ray(i).y];
-        let image = Some([0, self.pixels[0] * self.pixels[1] - 1].map(corner));
+        let image = Some([0, self.pixels()[0] * self.pixels()[1] - 1].map(corner));
         Ok(View { x_wc: stated, points_c, image, pivot_w, accuracy })
     }
 
     /// Returns the offer of view `number` from here; a touch takes `touch_s`.
     pub fn offer(&self, number: u32, middle_w: &Point3<f64>, touch_s: f64) -> Offer {
-        let [width, height] = self.pixels.map(|count| count as f64);
+        let [width, height] = self.pixels().map(|count| count as f64);
         let [fx, fy, cx, cy] = self.intrinsics();
         let ends = |focal: f64, centre: f64, size: f64| {
             [-centre, size - 1.0 - centre].map(|px| px / focal)
@@ -99,9 +99,14 @@ impl CameraSettings {
         }
     }
 
+    /// Returns the numbers of pixels along width and height.
+    fn pixels(&self) -> [usize; 2] {
+        self.pixels.unwrap_or(settings::PIXELS)
+    }
+
     /// Returns focal lengths and principal point, pixels.
     fn intrinsics(&self) -> [f64; 4] {
-        let [width, height] = self.pixels.map(|count| count as f64);
+        let [width, height] = self.pixels().map(|count| count as f64);
         let focal = 0.5 * width / (0.5 * self.fov_deg).to_radians().tan();
         // The middle of the image is between its pixels.
         let centred = [focal, focal, 0.5 * (width - 1.0), 0.5 * (height - 1.0)];
@@ -110,7 +115,8 @@ impl CameraSettings {
 
     /// Returns the vector (x/z, y/z, 1) along pixel `i`.
     fn ray(&self, i: usize) -> Vector3<f64> {
-        let [column, row] = [i % self.pixels[0], i / self.pixels[0]].map(|at| at as f64);
+        let columns = self.pixels()[0];
+        let [column, row] = [i % columns, i / columns].map(|at| at as f64);
         let [fx, fy, cx, cy] = self.intrinsics();
         Vector3::new((column - cx) / fx, (row - cy) / fy, 1.0)
     }
@@ -156,9 +162,10 @@ impl CameraSettings {
             let is_hidden = scene.capsules_w.iter().any(is_before);
             (!is_hole && !is_hidden).then(|| hit.distance_m / ray_c.norm())
         };
-        let count = self.pixels[0] * self.pixels[1];
+        let pixels = self.pixels();
+        let count = pixels[0] * pixels[1];
         let depths_m = (0..count).map(|i| depth_m(i).unwrap_or(f64::NAN)).collect();
-        Image { pixels: self.pixels, depths_m }
+        Image { pixels, depths_m }
     }
 }
 

@@ -25,7 +25,7 @@ pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
     let Layout { points, axes, step, columns, encoding } = &layout;
     let decoded;
     let (data, is_by_axis) = match encoding.as_str() {
-        "ascii" => return written(data, columns),
+        "ascii" => return written(data, *points, columns),
         "binary" => (data, false),
         "binary_compressed" => {
             decoded = decompressed(data)?;
@@ -62,11 +62,20 @@ fn value(bytes: &[u8], kind: char) -> f64 {
     }
 }
 
-/// Returns the points of lines of text.
-fn written(data: &[u8], columns: &[usize; 3]) -> Result<Vec<Point3<f64>>, InputError> {
+/// Returns the points of `stated` lines of text.
+fn written(
+    data: &[u8],
+    stated: usize,
+    columns: &[usize; 3],
+) -> Result<Vec<Point3<f64>>, InputError> {
     let mut all = Vec::new();
-    let lines = String::from_utf8_lossy(data);
-    for line in lines.lines().filter(|line| !line.trim().is_empty()) {
+    let text = String::from_utf8_lossy(data);
+    let lines = || text.lines().filter(|line| !line.trim().is_empty());
+    let found = lines().count();
+    if found != stated {
+        return Err(InputError::new(format!("PCD: POINTS {stated}, and {found} lines of points")));
+    }
+    for line in lines() {
         let values: Vec<&str> = line.split_whitespace().collect();
         let number = |column: usize| values.get(column)?.parse::<f64>().ok();
         let [x, y, z] = columns.map(number);
@@ -93,6 +102,7 @@ fn header(bytes: &[u8]) -> Result<(Layout, &[u8]), InputError> {
             "SIZE" => sizes = words.collect(),
             "TYPE" => kinds = words.collect(),
             "COUNT" => counts = words.collect(),
+            "VIEWPOINT" => check_viewpoint(words)?,
             "POINTS" => points = words.next().and_then(|count| count.parse().ok()),
             "DATA" => {
                 let layout = layout([&names, &sizes, &kinds, &counts], points);
@@ -103,6 +113,23 @@ fn header(bytes: &[u8]) -> Result<(Layout, &[u8]), InputError> {
         }
     }
     Err(InputError::new("PCD: no line DATA"))
+}
+
+/// Refuses a viewpoint other than the identity (translation, then quaternion w, x, y, z): PCL's
+/// viewer takes it for the pose of the points' frame, `pointcloud_to_pcd` of pcl_ros writes with it
+/// points that are in the world already.
+fn check_viewpoint(words: impl Iterator<Item = String>) -> Result<(), InputError> {
+    let words: Vec<String> = words.collect();
+    let numbers = words.iter().map(|word| word.parse::<f64>().ok());
+    let identity = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0].map(Some);
+    match numbers.eq(identity) {
+        true => Ok(()),
+        false => Err(InputError::new(format!("PCD: VIEWPOINT {}", words.join(" ")))
+            .allowed("VIEWPOINT 0 0 0 1 0 0 0, since programs disagree on the frame of other files")
+            .remedy(
+                "move the points into the frame that camera.frame states, then write this line",
+            )),
+    }
 }
 
 /// Returns where the coordinates are, from the header's lines FIELDS, SIZE, TYPE and COUNT.

@@ -9,12 +9,13 @@ use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use palpate_input::error::InputError;
 use palpate_input::files;
+use palpate_input::paths::InputPath;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use toml::Value;
+use std::path::Path;
+use toml::{Table, Value};
 
 /// Cameras included in Palpate: names and files.
 pub const CAMERAS: [(&str, &str); 2] = [
@@ -39,10 +40,13 @@ pub struct CameraSettings {
     /// File with the view of a real camera, a cloud (PLY, PCD) or a 16-bit PNG of depths, relative
     /// to the scene file; without it the view is simulated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub file: Option<PathBuf>,
+    pub file: Option<InputPath>,
     /// Unit of the file; default: `m` for a cloud, `mm` for depths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// Length of one unit of the file, in place of `unit`: 1e-4 for the raw depths of a D405.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_m: Option<f64>,
     /// Frame of a cloud's points.
     #[serde(default, skip_serializing_if = "is_default")]
     pub frame: Frame,
@@ -50,13 +54,13 @@ pub struct CameraSettings {
     /// default: by `fov_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics_px: Option<[f64; 4]>,
-    /// Pixels along width and height.
-    #[serde(default = "pixels")]
-    pub pixels: [usize; 2],
+    /// Pixels along width and height; default: `[640, 360]`, or those of a PNG.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixels: Option<[usize; 2]>,
     /// Horizontal field of view.
     #[serde(default = "fov_deg")]
     pub fov_deg: f64,
-    /// Noise of each pixel.
+    /// Noise of each pixel; default: none if simulated, that of the model or of a D405 for a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<PixelNoise>,
     /// Error of the stated pose, common to a view.
@@ -97,7 +101,7 @@ pub struct CameraPlace {
     pub rotation_deg: Option<[f64; 3]>,
     /// File with the view from here.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub file: Option<PathBuf>,
+    pub file: Option<InputPath>,
 }
 
 impl Validate for CameraPlace {
@@ -133,9 +137,8 @@ fn look_s() -> f64 {
     1.0
 }
 
-fn pixels() -> [usize; 2] {
-    [640, 360]
-}
+/// Pixels of a camera that states none: those of a D405.
+pub(super) const PIXELS: [usize; 2] = [640, 360];
 
 fn fov_deg() -> f64 {
     87.0
@@ -230,10 +233,17 @@ impl CameraSettings {
         Isometry3::from_parts(Translation3::from(position_w), turn)
     }
 
+    /// Whether it reads a view from a file, at any of its places.
+    fn has_file(&self) -> bool {
+        self.file.is_some() || self.further.values().any(|place| place.file.is_some())
+    }
+
     /// Returns what is known of the camera's errors.
     pub fn accuracy(&self) -> CameraAccuracy {
+        // A simulated camera has the errors that a scene calls for, a real one always has noise.
+        let unstated = if self.has_file() { PixelNoise::default() } else { PixelNoise::NONE };
         CameraAccuracy {
-            noise: self.noise.clone().unwrap_or(PixelNoise::NONE),
+            noise: self.noise.clone().unwrap_or(unstated),
             pose_error: self.pose_error.clone().unwrap_or(PoseError::NONE),
         }
     }
@@ -244,11 +254,6 @@ impl CameraSettings {
     /// # Errors
     /// If the model is unknown or its file cannot be read.
     pub fn resolve(loader: &mut Loader, camera: &str) -> Result<(), ConfigError> {
-        loader.resolve_path(&format!("{camera}.file"));
-        let further = format!("{camera}.further");
-        let places: Vec<String> =
-            loader.table_mut(&further).into_iter().flat_map(|t| t.keys().cloned()).collect();
-        places.iter().for_each(|name| loader.resolve_path(&format!("{further}.{name}.file")));
         Self::resolve_intrinsics(loader, camera)?;
         let key = format!("{camera}.model");
         loader.resolve_path_ending(&key, ".toml");
@@ -257,9 +262,18 @@ impl CameraSettings {
         };
         let (text, _) = model_file::text(loader, &key, &name, &CAMERAS)?;
         let mut file = Loader::from_text(Path::new(&name), text.into_owned())?;
-        let model = file.table_mut("").map(std::mem::take).unwrap_or_default();
+        let mut model = file.table_mut("").map(std::mem::take).unwrap_or_default();
         if let Some(table) = loader.table_mut(camera) {
             table.remove("model");
+            // The size of the model's image is not that of stated intrinsics.
+            if table.contains_key("intrinsics_px") {
+                model.remove("pixels");
+            }
+            let is_file = |place: &Value| place.get("file").is_some();
+            let places = table.get("further").and_then(Value::as_table);
+            if table.contains_key("file") || places.is_some_and(|all| all.values().any(is_file)) {
+                table.entry("noise").or_insert_with(|| Value::Table(Table::new()));
+            }
             model_file::overlay(table, &model);
         }
         Ok(())
@@ -300,9 +314,15 @@ impl Validate for CameraSettings {
         for (name, place) in &self.further {
             rules.table(&format!("further.{name}"), place);
         }
-        let is_allowed = self.pixels.iter().all(|count| (16..=4096).contains(count));
-        rules.require("pixels", format!("{:?}", self.pixels), is_allowed, || {
+        let pixels = self.pixels.unwrap_or(PIXELS);
+        let is_allowed = pixels.iter().all(|count| (16..=4096).contains(count));
+        rules.require("pixels", format!("{pixels:?}"), is_allowed, || {
             "two numbers from 16 to 4096".into()
+        });
+        rules.optional_number("unit_m", self.unit_m, 1e-9..=1.0);
+        let is_stated_once = self.unit.is_none() || self.unit_m.is_none();
+        rules.require("unit_m", "(given)", is_stated_once, || {
+            "either this or unit, not both".into()
         });
         rules.number("look_s", self.look_s, 0.0..=3600.0);
         rules.number("fov_deg", self.fov_deg, 1.0..=170.0);

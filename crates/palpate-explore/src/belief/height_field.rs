@@ -23,10 +23,6 @@ use serde::{Deserialize, Serialize};
 // heuristic: a steeper wall's height is uncertain by four times the error of its place.
 const SEEN_NORMAL_Y_MIN: f64 = 0.25;
 
-/// Distance beside the zone, in standard deviations of the camera's position, up to which points
-/// are kept: a corrected pose may move them into it.
-const MARGIN_SIGMAS: f64 = 3.0;
-
 /// Largest signal's standard deviation with a view, over the heights' root mean square. Many
 /// heights of a smooth surface make ever larger ones more likely, and with them rounding errors of
 /// the camera's pose.
@@ -126,18 +122,8 @@ impl HeightField {
     /// Returns what it shows of the zone.
     pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
         let zone = &self.zone;
-        let sds_m = view.accuracy.pose_error.position_sd_m;
-        let margin_m = MARGIN_SIGMAS * sds_m.into_iter().fold(0.0, f64::max);
-        let wanted = |p_w: &Point3<f64>| {
-            let place = zone.place(p_w);
-            let y_m = zone.x_wz().inverse_transform_point(p_w).y;
-            let is_beside = |([low, high], at): ([f64; 2], &f64)| {
-                (low - margin_m..=high + margin_m).contains(at)
-            };
-            let is_deep =
-                |[near_m, far_m]: [f64; 2]| (-far_m - margin_m..=-near_m + margin_m).contains(&y_m);
-            zone.sides().zip(&place).all(is_beside) && zone.depth_m.is_none_or(is_deep)
-        };
+        let margin_m = view.margin_m();
+        let wanted = |p_w: &Point3<f64>| zone.is_near(p_w, margin_m);
         let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
         let mut seen = SeenSurface::new(view, (wanted, SEEN), gradient);
         seen.presence = seen_presence(zone, view);

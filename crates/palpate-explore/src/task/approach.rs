@@ -156,6 +156,13 @@ impl Ball {
         (aim.p_w - self.centre_w).norm() <= self.radius_m * (1.0 + 1e-9)
     }
 
+    /// Whether a point of `W` lies in the ball, and above its lowest z by more than `margin_m`:
+    /// a table is seen with what stands on it.
+    pub fn is_near(&self, p_w: &Point3<f64>, margin_m: f64) -> bool {
+        let is_above = self.lowest_m.is_none_or(|lowest_m| p_w.z > lowest_m + margin_m);
+        is_above && (p_w - self.centre_w).norm() < self.radius_m
+    }
+
     /// Distances along an aim's direction, from its point, at which its line enters and leaves the
     /// ball; both are those of the nearest point if the line misses the ball.
     pub fn chord_m(&self, aim: &Aim) -> [f64; 2] {

@@ -5,7 +5,7 @@ use super::target::{Aim, Target};
 use super::touch::TouchSettings;
 use super::zone::Zone;
 use crate::robot::Finger;
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_geometry::low_discrepancy::directions;
 use palpate_input::error::InputError;
 use std::fmt;
@@ -34,6 +34,14 @@ impl Region {
         match self {
             Self::Zone(_) => None,
             Self::Ball(ball) => Some(ball),
+        }
+    }
+
+    /// Whether a point of `W` belongs to the region, or may do so if it is off by `margin_m`.
+    pub fn is_near(&self, p_w: &Point3<f64>, margin_m: f64) -> bool {
+        match self {
+            Self::Zone(zone) => zone.is_near(p_w, margin_m),
+            Self::Ball(ball) => ball.is_near(p_w, margin_m),
         }
     }
 

@@ -102,6 +102,15 @@ impl Zone {
             && self.sides().zip(place).all(|([low, high], at)| (low..=high).contains(at))
     }
 
+    /// Whether a point of `W` lies within the sides and the depth, or at most `margin_m` outside.
+    pub fn is_near(&self, p_w: &Point3<f64>, margin_m: f64) -> bool {
+        let is_within =
+            |[low, high]: [f64; 2], at: f64| (low - margin_m..=high + margin_m).contains(&at);
+        let y_m = self.x_wz().inverse_transform_point(p_w).y;
+        self.sides().zip(self.place(p_w)).all(|(side, at)| is_within(side, at))
+            && self.depth_m.is_none_or(|[near_m, far_m]| is_within([-far_m, -near_m], y_m))
+    }
+
     /// Returns the place at fractions 0..1 of the sides.
     pub fn at(&self, fractions: &[f64]) -> Vec<f64> {
         self.sides().zip(fractions).map(|([low, high], t)| low + (high - low) * t).collect()

@@ -37,6 +37,17 @@ pub struct View {
     pub accuracy: CameraAccuracy,
 }
 
+/// Standard deviations of the camera's position by which a seen point may be off.
+const MARGIN_SIGMAS: f64 = 3.0;
+
+impl View {
+    /// Distance by which a seen point may be off: a point beside the zone may be in it once the
+    /// pose is corrected, and one above the table may be the table's.
+    pub fn margin_m(&self) -> f64 {
+        MARGIN_SIGMAS * self.accuracy.pose_error.position_sd_m.into_iter().fold(0.0, f64::max)
+    }
+}
+
 /// Accuracy of a depth camera and of its stated pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraAccuracy {

@@ -5,7 +5,7 @@
 //! outliers, explains the depths in each cell. Cells that show an edge to the last, or too few
 //! points, are left out.
 
-use super::View;
+use super::{PixelNoise, View};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::math::quadratic_surface::QuadraticSurface;
 use schemars::JsonSchema;
@@ -55,6 +55,11 @@ const ROUNDS: usize = 4;
 /// Standard deviations per median absolute deviation of a normal distribution.
 const SD_PER_MAD: f64 = 1.4826;
 
+/// Mean number of points of the small cells that show the noise, and largest number of these cells.
+// heuristic: six times the surface's coefficients; the median of as many cells varies by a hundredth.
+const SMALL: usize = 3 * LEAST;
+const SAMPLED: usize = 256;
+
 /// Misfit of a cell's surface, as a fraction of its pixels' noise, above which the cell is divided.
 const MISFIT: f64 = 0.5;
 
@@ -95,8 +100,9 @@ pub fn thin(
 
 /// Points of the image, sorted by their smallest cells along a Z-order curve, so that each cell of
 /// each level is a range.
-struct Image<'a> {
-    view: &'a View,
+struct Image {
+    /// Noise of the points: the stated one, or more if most of the image shows more.
+    noise: PixelNoise,
     /// Smallest cell and (u, v, z) of each point.
     points: Vec<(u32, [f64; 3])>,
     fitted: Vec<[f64; 3]>,
@@ -112,6 +118,12 @@ struct Leaf {
     urgency: f64,
 }
 
+/// Returns the median; `None` of an empty list.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// Returns the number along a Z-order curve of the cell in this column and row.
 fn z_order(column: u32, row: u32) -> u32 {
     (0..LEVELS)
@@ -119,8 +131,8 @@ fn z_order(column: u32, row: u32) -> u32 {
         .sum()
 }
 
-impl<'a> Image<'a> {
-    fn new(view: &'a View, wanted: impl Fn(&Point3<f64>) -> bool) -> Self {
+impl Image {
+    fn new(view: &View, wanted: impl Fn(&Point3<f64>) -> bool) -> Self {
         let is_point = |p_c: &&Point3<f64>| {
             p_c.coords.iter().all(|x| x.is_finite()) && p_c.z > 0.0 && wanted(&(view.x_wc * **p_c))
         };
@@ -141,24 +153,58 @@ impl<'a> Image<'a> {
         let mut points: Vec<(u32, [f64; 3])> =
             seen.iter().map(|place| (z_order(cell(place, 0), cell(place, 1)), *place)).collect();
         points.sort_by_key(|(cell, _)| *cell);
-        Self { view, points, fitted: Vec::new(), residuals_m: Vec::new() }
+        let noise = view.accuracy.noise.clone();
+        let mut image = Self { noise, points, fitted: Vec::new(), residuals_m: Vec::new() };
+        image.raise_noise();
+        image
+    }
+
+    /// Adds the scatter that the stated noise does not explain in half of the small cells, if it
+    /// would leave them without an element.
+    fn raise_noise(&mut self) {
+        let stated = &self.noise;
+        let level = (0..LEVELS).rev().find(|level| self.points.len() >> (2 * level) >= SMALL);
+        let excess = |cell: u32| {
+            let points = self.cell(level?, cell);
+            let places: Vec<[f64; 3]> = points.iter().map(|(_, place)| *place).collect();
+            let surface = QuadraticSurface::fit(places.iter().copied())?;
+            let off = |[u, v, z]: &[f64; 3]| (z - surface.height([*u, *v]).0).abs();
+            let scatter_m = SD_PER_MAD * median(places.iter().map(off).collect())?;
+            let noise_m = stated.sd_m(places[places.len() / 2][2]);
+            Some([scatter_m * scatter_m - noise_m * noise_m, noise_m])
+        };
+        let cells = 1_u32 << (2 * level.unwrap_or(0));
+        let step = (cells as usize).div_ceil(SAMPLED);
+        let found: Vec<[f64; 2]> = (0..cells).step_by(step).filter_map(excess).collect();
+        let middle = |i: usize| median(found.iter().map(|cell| cell[i]).collect());
+        if let (Some(excess_m2), Some(noise_m)) = (middle(0), middle(1))
+            && excess_m2 > (MISFIT * noise_m).powi(2)
+        {
+            self.noise.noise_m = self.noise.noise_m.hypot(excess_m2.sqrt());
+        }
+    }
+
+    /// Returns the points of a cell.
+    fn cell(&self, level: u32, cell: u32) -> &[(u32, [f64; 3])] {
+        let shift = 2 * (LEVELS - level);
+        let [start, end] = [cell, cell + 1].map(|cell| {
+            self.points
+                .partition_point(|(smallest, _)| u64::from(*smallest) < u64::from(cell) << shift)
+        });
+        &self.points[start..end]
     }
 
     /// Returns a cell with its surface element; `None` if it has too few points.
     fn leaf(&mut self, level: u32, cell: u32) -> Option<Leaf> {
-        let shift = 2 * (LEVELS - level);
-        let ends = [cell, cell + 1].map(|cell| {
-            self.points
-                .partition_point(|(smallest, _)| u64::from(*smallest) < u64::from(cell) << shift)
-        });
-        let count = ends[1] - ends[0];
+        let count = self.cell(level, cell).len();
         if count < LEAST {
             return None;
         }
         let step = count.div_ceil(FITTED);
-        self.fitted.clear();
-        self.fitted
-            .extend(self.points[ends[0]..ends[1]].iter().step_by(step).map(|(_, place)| *place));
+        let mut fitted = std::mem::take(&mut self.fitted);
+        fitted.clear();
+        fitted.extend(self.cell(level, cell).iter().step_by(step).map(|(_, place)| *place));
+        self.fitted = fitted;
         let found = self.element(count);
         // A cell of which even the smallest part has an edge is left out.
         let can_divide = level < LEVELS && count >= 2 * LEAST;
@@ -180,7 +226,7 @@ impl<'a> Image<'a> {
     /// Returns the element of the fitted points of a cell with `count` points, and the misfit of
     /// its surface; `None` at an edge.
     fn element(&mut self, count: usize) -> Option<(SurfaceElement, f64)> {
-        let noise = &self.view.accuracy.noise;
+        let noise = &self.noise;
         let whole = self.fitted.len();
         let mut limit_m = f64::INFINITY;
         let mut kept: Vec<[f64; 3]> = self.fitted.clone();

@@ -91,10 +91,6 @@ const STROKE_STEP: f64 = 0.12;
 // heuristic: as many as dozens of touches with their normals, whose cost the belief can bear.
 const SEEN: usize = 120;
 
-/// Distance from the ball's lowest height, in standard deviations of the camera's position, within
-/// which a view shows what the object stands on.
-const MARGIN_SIGMAS: f64 = 3.0;
-
 impl ImplicitSurface {
     /// Creates a belief without data.
     pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
@@ -127,14 +123,8 @@ impl ImplicitSurface {
     /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
     /// it shows of the ball.
     pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        let Ball { centre_w, radius_m, lowest_m } = self.scope.ball;
-        let sds_m = view.accuracy.pose_error.position_sd_m;
-        let margin_m = MARGIN_SIGMAS * sds_m.into_iter().fold(0.0, f64::max);
-        let wanted = |p_w: &Point3<f64>| {
-            // What stands on a table is seen with it.
-            let is_above = lowest_m.is_none_or(|lowest_m| p_w.z > lowest_m + margin_m);
-            is_above && (p_w - centre_w).norm() < radius_m
-        };
+        let (ball, margin_m) = (&self.scope.ball, view.margin_m());
+        let wanted = |p_w: &Point3<f64>| ball.is_near(p_w, margin_m);
         self.observe_seen(SeenSurface::new(view, (wanted, SEEN), |normal_w| normal_w.into_inner()))
     }
 
