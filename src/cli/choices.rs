@@ -94,10 +94,10 @@ fn sizes(extent: f64, units: impl IntoIterator<Item = Unit>) -> String {
     sizes.collect::<Vec<_>>().join(", ")
 }
 
-/// Returns the unit of a mesh and the factor that makes it explorable. `extent` is the largest in
-/// the file's numbers.
+/// Returns the unit of a mesh, and the factor that makes it explorable if no unit does. `extent` is
+/// the largest in the file's numbers; `is_stl` for a format in which millimetres are usual.
 pub(super) fn unit(
-    extent: f64,
+    (extent, is_stl): (f64, bool),
     given: Option<Unit>,
     stated: &FileStatements,
     asker: Asker,
@@ -114,17 +114,17 @@ pub(super) fn unit(
         let scale = placement::explorable_scale(size_m);
         if scale != 1.0 {
             asker.talk.note(format!(
-                "in {} ({evidence}) the object measures {}, but a finger explores {}: it is scaled by \
-                 {scale}; if the unit is wrong, use another --unit: {}",
+                "in {} ({evidence}) the object measures {}, and a finger explores {}: use another --unit \
+                 ({}), or set object.scale = {scale} in the scene for a model of it",
                 label(unit),
                 length(size_m),
                 explorable(),
                 all()
             ));
         }
-        return Choice { value: (unit, scale), evidence };
+        return Choice { value: (unit, 1.0), evidence };
     }
-    let plausible = placement::plausible_units(extent);
+    let plausible = placement::plausible_units(extent, is_stl);
     match plausible[..] {
         [] => {
             let unit = Unit::M;
@@ -138,10 +138,15 @@ pub(super) fn unit(
             ));
             Choice { value: (unit, scale), evidence: "unknown, scaled".into() }
         }
-        [unit] => Choice {
-            value: (unit, 1.0),
-            evidence: format!("the only usual one for an object of {} ({})", explorable(), all()),
-        },
+        [unit] => {
+            let evidence = match is_stl && unit == Unit::Mm {
+                true => format!("usual in STL files ({})", all()),
+                false => {
+                    format!("the only usual one for an object of {} ({})", explorable(), all())
+                }
+            };
+            Choice { value: (unit, 1.0), evidence }
+        }
         [unit, other, ..] => {
             let both = sizes(extent, plausible.iter().copied());
             let why = format!(

@@ -1,7 +1,7 @@
 //! Command `palpate new`.
 
 use super::choices::{self, Asker, Choice, label, name};
-use super::find::{find_mesh, is_experiment};
+use super::find::{find_input, is_experiment};
 use super::output::{Overwrite, make_folder, sealed};
 use super::picture::picture;
 use super::prepare::prepare_environment;
@@ -34,13 +34,14 @@ Reads the mesh and writes an experiment, NAME.toml, its scene, NAME-scene.toml, 
 The experiment runs unchanged. Each choice is printed with its evidence and is a setting of the scene that you can change. A second \
 call replaces the files unless you edited them.
 
-Unit: glTF is in metres by its standard. Other files may state a unit in a comment. Otherwise it is the one of mm, cm, m and inch that \
-gives a size that a finger can explore, 30 to 400 mm; if none does, the mesh is scaled to 150 mm. Up: y for glTF by its standard, then a \
+Unit: glTF is in metres by its standard. Other files may state a unit in a comment. Otherwise it is mm for STL, and else the one of mm, \
+cm and m that gives a size that a finger can explore, 30 to 400 mm; if none does, the mesh is scaled to 150 mm. A stated unit is never \
+scaled. Up: y for glTF by its standard, then a \
 comment, then a flat base, then y for OBJ and z for others. If the evidence is ambiguous, palpate asks; without a terminal, or with --yes, \
 it takes the most plausible value and says so.")]
 pub(super) struct Args {
     /// Mesh file; a shipped one, such as models/suite/mug.glb, is found in every folder.
-    #[arg(value_parser = find_mesh)]
+    #[arg(value_parser = find_input)]
     mesh: PathBuf,
     /// Explore the whole object from all sides, instead of a zone on one side.
     #[arg(long)]
@@ -292,7 +293,12 @@ impl MeshPlacement {
             let (low, high) = mesh.bounds();
             high - low
         };
-        let unit = choices::unit(extent(&mesh).max() / read_m, args.unit, &stated, asker);
+        let unit = choices::unit(
+            (extent(&mesh).max() / read_m, extension == "stl"),
+            args.unit,
+            &stated,
+            asker,
+        );
         let up = choices::up(&mesh, args.up, &stated, extension == "obj", asker);
         let (metres_per_unit, scale) = (unit.value.0.metres_per_unit(), unit.value.1);
         let mesh = mesh.with_patches(&report.holes).scaled(metres_per_unit * scale / read_m);

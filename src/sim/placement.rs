@@ -72,25 +72,36 @@ pub const EXPLORABLE_M: [f64; 2] = [0.03, 0.4];
 // heuristic: largest extent that an object of another size is scaled to.
 const SIZE_M: f64 = 0.15;
 
-/// Units that mesh files without a stated unit use.
-pub const USUAL_UNITS: [Unit; 4] = [Unit::Mm, Unit::Cm, Unit::M, Unit::In];
+/// Smallest extent of a part in millimetres; of one in an STL file, whose usual unit they are.
+// heuristic: a screw, and a model for a 3D printer.
+const SMALLEST_M: [f64; 2] = [0.005, 0.001];
+
+/// Units that mesh files without a stated unit use. An inch is one only if it is stated.
+pub const USUAL_UNITS: [Unit; 3] = [Unit::Mm, Unit::Cm, Unit::M];
 
 fn is_explorable(size_m: f64) -> bool {
     (EXPLORABLE_M[0]..=EXPLORABLE_M[1]).contains(&size_m)
 }
 
-/// Returns the usual units in which an object has a size that a finger can explore, the most
-/// plausible first: millimetres, then by the ratio to the size of a hand. `extent` is the largest
-/// in the file's numbers.
-pub fn plausible_units(extent: f64) -> Vec<Unit> {
+/// Returns the usual units in which an object has a size that a finger can explore, and millimetres
+/// if it is a small part in them, the most plausible first: millimetres in an STL file, then units
+/// of an explorable size, then by the ratio to the size of a hand. `extent` is the largest in the
+/// file's numbers.
+pub fn plausible_units(extent: f64, is_stl: bool) -> Vec<Unit> {
     let size_m = |unit: &Unit| extent * unit.metres_per_unit();
-    let mut units: Vec<Unit> =
-        USUAL_UNITS.into_iter().filter(|unit| is_explorable(size_m(unit))).collect();
-    let off = |unit: &Unit| match unit {
-        Unit::Mm => 0.0,
-        unit => (size_m(unit) / SIZE_M).ln().abs(),
+    let smallest_m = SMALLEST_M[usize::from(is_stl)];
+    let is_plausible = |unit: &Unit| {
+        let is_part = *unit == Unit::Mm && (smallest_m..=EXPLORABLE_M[1]).contains(&size_m(unit));
+        is_part || is_explorable(size_m(unit))
     };
-    units.sort_by(|a, b| off(a).total_cmp(&off(b)));
+    let mut units: Vec<Unit> = USUAL_UNITS.into_iter().filter(is_plausible).collect();
+    let rank = |unit: &Unit| match *unit {
+        Unit::Mm if is_stl => -1.0,
+        Unit::Mm if is_explorable(size_m(unit)) => 0.0,
+        Unit::Mm => f64::INFINITY,
+        _ => (size_m(unit) / SIZE_M).ln().abs(),
+    };
+    units.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     units
 }
 

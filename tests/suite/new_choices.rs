@@ -25,6 +25,19 @@ fn obj(comment: &str, mesh: &Mesh, map: impl Fn(Vector3<f64>) -> Vector3<f64>) -
     text
 }
 
+/// Writes triangles as text STL.
+fn stl(mesh: &Mesh) -> String {
+    let mut text = String::from("solid part\n");
+    for corners in mesh.iter_corners() {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for p in corners {
+            writeln!(text, "vertex {} {} {}", p.x, p.y, p.z).unwrap();
+        }
+        text += "endloop\nendfacet\n";
+    }
+    text + "endsolid part\n"
+}
+
 /// An egg of 0.12 x 0.08 x 0.1 m, without the triangles that `is_removed` selects by their middle.
 fn egg(is_removed: impl Fn(Point3<f64>) -> bool) -> Mesh {
     let whole = sphere_mesh(Point3::origin(), 0.05, 40);
@@ -103,18 +116,19 @@ fn the_scene_does_not_depend_on_the_unit_of_the_file() {
 
 #[test]
 fn plausible_units_are_those_of_a_size_that_a_finger_explores() {
-    for (extent, units) in [
-        (200.0, vec![Unit::Mm]),
-        (0.2, vec![Unit::M]),
-        (20.0, vec![Unit::Cm]),
-        (2.0, vec![Unit::In]),
-        (5.0, vec![Unit::In, Unit::Cm]),
-        (12.0, vec![Unit::Cm, Unit::In]),
-        (35.0, vec![Unit::Mm, Unit::Cm]),
-        (4000.0, vec![]),
-        (1e-5, vec![]),
+    for (extent, units, of_stl) in [
+        (200.0, vec![Unit::Mm], vec![Unit::Mm]),
+        (0.2, vec![Unit::M], vec![Unit::M]),
+        (25.0, vec![Unit::Cm, Unit::Mm], vec![Unit::Mm, Unit::Cm]),
+        (2.0, vec![], vec![Unit::Mm]),
+        (5.0, vec![Unit::Cm, Unit::Mm], vec![Unit::Mm, Unit::Cm]),
+        (35.0, vec![Unit::Mm, Unit::Cm], vec![Unit::Mm, Unit::Cm]),
+        (1.0, vec![], vec![Unit::Mm]),
+        (4000.0, vec![], vec![]),
+        (1e-5, vec![], vec![]),
     ] {
-        assert_eq!(plausible_units(extent), units, "{extent}");
+        assert_eq!(plausible_units(extent, false), units, "{extent}");
+        assert_eq!(plausible_units(extent, true), of_stl, "{extent}");
     }
     // Other sizes are scaled to that of a hand, in readable numbers.
     assert_eq!([0.03, 0.2, 0.4].map(explorable_scale), [1.0; 3]);
@@ -132,12 +146,11 @@ fn a_unit_is_taken_with_its_evidence_or_named_as_a_guess() {
     write(&folder, "bracket.obj", obj("", &bracket, |p| p));
     for arguments in [&["bracket.obj"][..], &["bracket.obj", "--yes"]] {
         let said = new(&folder, arguments);
-        for part in
-            ["note: the unit is a guess", "as inch 127 mm, as cm 50 mm", "--unit cm", "--up z"]
+        for part in ["note: the unit is a guess", "as cm 50 mm, as mm 5 mm", "--unit mm", "--up z"]
         {
             assert!(said.contains(part), "no {part:?} in {said}");
         }
-        assert_eq!(scene(&folder, "bracket").object.unwrap().unit, Unit::In);
+        assert_eq!(scene(&folder, "bracket").object.unwrap().unit, Unit::Cm);
     }
     let said = new(&folder, &["bracket.obj", "--unit", "cm", "--up", "z"]);
     assert!(!said.contains("note:") && said.contains("unit cm: --unit cm"), "{said}");
@@ -148,11 +161,21 @@ fn a_unit_is_taken_with_its_evidence_or_named_as_a_guess() {
     for unit in ["m", "um"] {
         let said = new(&folder, &["egg.obj", "--up", "y", "--unit", unit]);
         assert!(said.contains("note: in ") && said.contains("as mm 120 mm"), "{said}");
+        assert_eq!(scene(&folder, "egg").object.unwrap().scale, 1.0);
     }
     write(&folder, "egg.obj", obj("unit: m", &egg(|_| false), |p| 1e3 * p));
     let said = new(&folder, &["egg.obj", "--up", "y"]);
     assert!(said.contains("note: in m (its comment \"unit: m\")"), "{said}");
     assert!(said.contains("measures 120 m"), "{said}");
+    // A small part of 25 x 12 x 8 mm, and one of which the unit is stated.
+    write(&folder, "part.stl", stl(&box_mesh(Point3::origin(), point(25.0, 12.0, 8.0))));
+    let said = new(&folder, &["part.stl", "--up", "z"]);
+    assert!(said.contains("25.0 x 12.0 x 8.0 mm") && said.contains("--unit cm"), "{said}");
+    assert!(said.contains("note: the unit is a guess"), "{said}");
+    let said = new(&folder, &["part.stl", "--up", "z", "--unit", "mm"]);
+    assert!(said.contains("25.0 x 12.0 x 8.0 mm") && !said.contains("scaled"), "{said}");
+    let object = scene(&folder, "part").object.unwrap();
+    assert_eq!((object.unit, object.scale), (Unit::Mm, 1.0));
     // No usual unit.
     write(&folder, "egg.obj", obj("", &egg(|_| false), |p| 1e5 * p));
     let said = new(&folder, &["egg.obj", "--up", "y"]);
