@@ -205,7 +205,7 @@ impl Run {
     }
 
     fn __str__(&self) -> PyResult<String> {
-        fork::install(|| tables::summary::text(&self.0))
+        fork::install(|| tables::summary::text(&self.0, false))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Command `palpate calibrate`.
 
 use super::columns::{aligned, cell};
+use super::find::find_input;
 use super::terminal::{Outcome, print};
 use crate::sim::finger::calibration::constants::FingerConstants;
 use crate::sim::finger::calibration::fit::{Fit, FreeParameters, fit};
@@ -24,21 +25,22 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  palpate calibrate tests/data/biotac_flat_plate.json
-  palpate calibrate tests/data/biotac_flat_plate.json --out sensor.toml
-  palpate calibrate tests/data/biotac_flat_plate.json --attitude-only
-  palpate calibrate tests/data/biotac_flat_plate.json --shear tests/data/biotac_shear.json
-  palpate calibrate tests/data/biotac_flat_plate.json --model shell")]
+  palpate calibrate models/biotac/flat_plate.json
+  palpate calibrate models/biotac/flat_plate.json --out sensor.toml
+  palpate calibrate models/biotac/flat_plate.json --attitude-only
+  palpate calibrate models/biotac/flat_plate.json --shear models/biotac/shear.json
+  palpate calibrate models/biotac/flat_plate.json --model shell")]
 pub struct Args {
-    /// Recordings; the format is that of tests/data/biotac_flat_plate.json.
+    /// Recordings; the format is that of models/biotac/flat_plate.json.
+    #[arg(value_parser = find_input)]
     recordings: PathBuf,
     /// Test the default constants: fit only the offset, gain and attitude (the finger's orientation
     /// on the plate) of each session.
     #[arg(long)]
     attitude_only: bool,
     /// Compare the response to tangential force with the slopes in this file, in the format of
-    /// tests/data/biotac_shear.json; uses the default constants.
-    #[arg(long, value_name = "FILE", conflicts_with = "attitude_only")]
+    /// models/biotac/shear.json; uses the default constants.
+    #[arg(long, value_name = "FILE", conflicts_with = "attitude_only", value_parser = find_input)]
     shear: Option<PathBuf>,
     /// Skin model.
     #[arg(long, value_enum, default_value_t)]

@@ -1,6 +1,6 @@
 //! Command `palpate check`.
 
-use super::find::{EXPERIMENTS, find};
+use super::find::{EXPERIMENTS, find, located};
 use super::host::Host;
 use super::output::Overwrite;
 use super::prepare::{planners_setting, prepare_simulation, set_thread_count};
@@ -91,12 +91,13 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     let old = match &args.accept {
         Some(_) if !args.baseline.exists() => None,
         _ => {
-            if !args.baseline.exists() {
+            let path = located(&args.baseline);
+            if !path.exists() {
                 let file = args.baseline.display();
                 bail!("{file}: no such baseline; write it with --accept REASON");
             }
-            let old = StoredBaseline::read(&args.baseline)?;
-            old.check_pairs(&args.baseline, &experiment)?;
+            let old = StoredBaseline::read(&path)?;
+            old.check_pairs(&path, &experiment)?;
             Some(old)
         }
     };

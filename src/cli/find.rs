@@ -40,11 +40,15 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     bail!("{word}: no such file, and no {folder}/{file}{remedy}")
 }
 
-/// Returns the path of a mesh: as it is, or that of a shipped file if there is no other.
-pub(super) fn find_mesh(path: &str) -> Result<PathBuf, Infallible> {
-    let path = Path::new(path);
-    let found = path.extension().and_then(|_| shipped::find(path, "", None));
-    Ok(found.unwrap_or_else(|| path.into()))
+/// Returns the path of an input file or folder: as it is, or that of a shipped one if there is no
+/// other.
+pub(super) fn find_input(path: &str) -> Result<PathBuf, Infallible> {
+    Ok(located(Path::new(path)))
+}
+
+/// Returns the path as [`find_input`] does.
+pub(super) fn located(path: &Path) -> PathBuf {
+    shipped::locate(path, None).unwrap_or_else(|| path.into())
 }
 
 /// Whether the file is an experiment: experiments have `planners` or `scene`, scenes do not. An

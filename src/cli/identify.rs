@@ -1,6 +1,6 @@
 //! Command `palpate identify`.
 
-use super::find::{SCENES, find, is_experiment};
+use super::find::{SCENES, find, find_input, is_experiment};
 use super::prepare::{prepare_arm, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::terminal::{Outcome, Verbosity, print};
@@ -30,6 +30,7 @@ probability --sure. Over ROS 2 the estimated pose is published on /tf as the fra
 Exit codes: 0 sure, 3 undecided after --touches.")]
 pub(super) struct Args {
     /// Folder with the meshes of the objects that may be there.
+    #[arg(value_parser = find_input)]
     library: PathBuf,
     /// Scene with a table [pose], or an experiment with such a scene and a [backend].
     scene: PathBuf,

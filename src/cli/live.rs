@@ -1,6 +1,6 @@
 //! Command `palpate live`.
 
-use super::find::{EXPERIMENTS, SCENES, find, find_mesh, is_experiment};
+use super::find::{EXPERIMENTS, SCENES, find, find_input, is_experiment};
 use super::host::Host as Program;
 use super::new::{self, Written};
 use super::prepare::{connect_arm, load_experiment, planners_setting, prepare_simulation};
@@ -145,7 +145,7 @@ fn work(args: &Args, path: &Path, page: &Page) -> anyhow::Result<Work> {
         return Ok(Work::Run(path.into()));
     }
     let path = match is_mesh_file(path) {
-        true => find_mesh(&path.to_string_lossy())?,
+        true => find_input(&path.to_string_lossy())?,
         false => find(path, EXPERIMENTS).or_else(|error| find(path, SCENES).map_err(|_| error))?,
     };
     if path.extension().is_some_and(|extension| extension == "toml") {

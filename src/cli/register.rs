@@ -1,6 +1,6 @@
 //! Command `palpate register`.
 
-use super::find::{SCENES, find, is_experiment};
+use super::find::{SCENES, find, find_input, is_experiment};
 use super::known_body::KnownBodyArgs;
 use super::output::Overwrite;
 use super::prepare::{prepare_arm, prepare_simulator};
@@ -35,6 +35,7 @@ object.rotation_deg for a scene, and their uncertainty.")]
 pub(super) struct Args {
     /// Scene with an arm (.toml, or its name), or experiment with a [backend]; with --cloud the
     /// object's mesh (.obj, .gltf, .glb, .stl, .ply).
+    #[arg(value_parser = find_input)]
     file: PathBuf,
     /// Touched body and its position, known to about 1 cm.
     #[command(flatten)]

@@ -1,7 +1,7 @@
 //! Command `palpate report`.
 
 use super::host::Host;
-use super::terminal::{Outcome, print};
+use super::terminal::{Outcome, print, print_fitted};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;
@@ -27,6 +27,9 @@ pub(super) struct Args {
     /// repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Print all measures instead of those that decide between planners.
+    #[arg(long)]
+    wide: bool,
 }
 
 pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
@@ -41,9 +44,9 @@ pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
     let analysis = Analysis::new(&run);
     report::write_tables(&run, &analysis, &args.folder)?;
     report::write(&run, &analysis, &args.folder)?;
-    print(&format!(
+    print_fitted(&format!(
         "{}\nreport: {}",
-        report::tables::summary::text(&run),
+        report::tables::summary::text(&run, args.wide),
         args.folder.join("report.html").display()
     ))?;
     Ok(Outcome::Done)

@@ -7,7 +7,7 @@ use super::plan::plan;
 use super::prepare::{connect_arm, planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::step::{Stepper, is_unregistered};
-use super::terminal::{Outcome, Verbosity, command_line, error, print};
+use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
@@ -94,6 +94,9 @@ pub(super) struct Args {
     /// Print the summary as JSON instead of a table.
     #[arg(long, conflicts_with = "shard")]
     json: bool,
+    /// Print all measures instead of those that decide between planners.
+    #[arg(long, conflicts_with_all = ["shard", "json"])]
+    wide: bool,
 }
 
 impl Args {
@@ -136,6 +139,7 @@ impl Args {
             ("no-step", self.no_step),
             ("no-report", self.no_report),
             ("json", self.json),
+            ("wide", self.wide),
             ("clear-fault", true),
         ];
         command_line(&["palpate", "run", &self.experiment.to_string_lossy()], &valued, &flags)
@@ -377,7 +381,7 @@ fn run_one(
     }
 
     let run = Run::read(path)?;
-    let mut text = format!("{}\n{words}", report::tables::summary::text(&run));
+    let mut text = format!("{}\n{words}", report::tables::summary::text(&run, args.wide));
     let analysis = Analysis::new(&run);
     let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
     if let Some(conclusion) = report::findings::conclusion(&run, &analysis) {
@@ -399,7 +403,7 @@ fn run_one(
     }
     match args.json {
         true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
-        false => print(&text)?,
+        false => print_fitted(&text)?,
     }
     if let Some(halt) = halt {
         if !is_asked {

@@ -1,7 +1,7 @@
 //! Command `palpate show`.
 
 use super::camera;
-use super::find::{SCENES, find, is_experiment};
+use super::find::{SCENES, find, find_input, is_experiment};
 use super::output::Overwrite;
 use super::picture::picture;
 use super::prepare::{check_applicable, prepare_environment, prepare_simulator};
@@ -45,6 +45,7 @@ the keys; Control+Q or closing the window ends the trial. It needs X11 or Waylan
 pub(super) struct Args {
     /// Mesh (.obj, .gltf, .glb, .stl, .ply), scene or experiment (.toml), name of a scene in
     /// scenes/, or a run's folder.
+    #[arg(value_parser = find_input)]
     path: PathBuf,
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]
@@ -135,7 +136,7 @@ const GRID: usize = 41;
 fn run_folder(run: &Run, json: bool) -> String {
     match json {
         true => format!("{:#}", report::tables::summary::json(run)),
-        false => report::tables::summary::text(run),
+        false => report::tables::summary::text(run, false),
     }
 }
 

@@ -3,7 +3,8 @@
 use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
+use terminal_size::{Width, terminal_size_of};
 
 /// Outcome of a command that did not fail with an error.
 pub(super) enum Outcome {
@@ -54,6 +55,43 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
+/// Prints to stdout as [`print`] does; on a terminal, sentences that are longer than a line are
+/// continued below, indented.
+pub(super) fn print_fitted(text: &str) -> anyhow::Result<()> {
+    match terminal_size_of(io::stdout()).filter(|_| io::stdout().is_terminal()) {
+        Some((Width(columns), _)) => print(&fitted(text, columns.into())),
+        None => print(text),
+    }
+}
+
+/// Breaks lines of single-spaced words that are longer than `columns`; a table has wider gaps, and
+/// a path no space.
+fn fitted(text: &str, columns: usize) -> String {
+    let mut fitted = String::new();
+    for line in text.lines() {
+        let is_sentence = !line.contains("  ");
+        let mut length = 0;
+        for (i, word) in line.split(' ').enumerate() {
+            let width = word.chars().count();
+            match i {
+                0 => {}
+                _ if is_sentence && length + 1 + width > columns => {
+                    fitted += "\n  ";
+                    length = 2;
+                }
+                _ => {
+                    fitted.push(' ');
+                    length += 1;
+                }
+            }
+            fitted += word;
+            length += width;
+        }
+        fitted.push('\n');
+    }
+    fitted.trim_end_matches('\n').into()
+}
+
 /// Quotes a word for a shell, if it needs quotes.
 pub(super) fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./,:=+@%".contains(c);
@@ -85,7 +123,16 @@ pub(super) fn print_stderr(text: &str) {
 
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use super::{fitted, quoted};
+
+    #[test]
+    fn long_sentences_are_continued_and_tables_are_not() {
+        let text = "one two three four\na  table   of   cells\nshort";
+        assert_eq!(fitted(text, 9), "one two\n  three\n  four\na  table   of   cells\nshort");
+        assert_eq!(fitted(text, 80), text);
+        let path = "report: runs/a/very/long/path/report.html";
+        assert_eq!(fitted(path, 12), "report:\n  runs/a/very/long/path/report.html");
+    }
 
     #[test]
     fn only_words_with_special_characters_are_quoted() {

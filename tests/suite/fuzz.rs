@@ -303,7 +303,7 @@ fn damage(files: &[(PathBuf, Vec<u8>)], file: usize, edits: &[Edit]) {
 fn results(path: &Path, draw: bool) -> Result<(), String> {
     let run = Run::read(path).map_err(|error| error.to_string())?;
     let analysis = Analysis::new(&run);
-    drop((tables::summary::text(&run), analysis));
+    drop((tables::summary::text(&run, true), analysis));
     for planner in &run.experiment.planners {
         let replay = BeliefReplay::new(&run, planner, run.experiment.touches);
         replay.map(drop).map_err(|error| format!("{error:#}"))?;

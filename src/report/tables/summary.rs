@@ -1,9 +1,11 @@
 //! Curves of a run as tables for the page, the terminal and files; and the claims of a publication
 //! next to the results.
 
-use crate::experiment::measure::{self, MEASURES, Measure};
+use crate::experiment::measure::{self, MEASURES, Measure, RECOGNISED, VERIFICATION_RMSE};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
+use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
+use crate::experiment::statistics::{mean, mean_interval};
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::planner_rows;
 use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
@@ -57,9 +59,75 @@ pub fn note(run: &Run) -> String {
     format!("n = {trials}; ± is one standard error of the mean.")
 }
 
-/// Returns the table for the terminal, followed by the events of the trials and the notices.
-pub fn text(run: &Run) -> String {
-    let mut text = format!("{}\n{}", run.experiment.name, table(run).text());
+/// Returns the numbers that decide between planners after each tabled touch count: the error with
+/// its 95 % interval, its ratio to the smallest, and touches without contact; with hypotheses, the
+/// share of trials with the right object.
+pub fn brief(run: &Run) -> Table {
+    let experiment = &run.experiment;
+    // Without a ground truth, held-out touches show the error.
+    let has = |measure: &Measure| {
+        run.rows.iter().any(|row| measure.value(row, row.touches.len() as u32).is_some())
+    };
+    let error = match has(experiment.error_measure()) {
+        true => experiment.error_measure(),
+        false => &VERIFICATION_RMSE,
+    };
+    let heads = [
+        Column::new("touches"),
+        Column::new("planner"),
+        Column::new(format!("mean {}", error.title)).unit(
+            error.unit.symbol,
+            error.unit.per_si,
+            error.unit.decimals,
+        ),
+        Column::new("to the best").unit("", 1.0, 2),
+        Column::new(RECOGNISED.title).unit(
+            RECOGNISED.unit.symbol,
+            RECOGNISED.unit.per_si,
+            RECOGNISED.unit.decimals,
+        ),
+        Column::new("misses a trial").unit("", 1.0, 1),
+    ];
+    let mut table = Table::new(heads);
+    for count in experiment.table_touch_counts() {
+        let of = |planner: &str, measure: &Measure| -> Option<IntervalEstimate> {
+            let rows = planner_rows(&run.rows, planner);
+            let values: Vec<f64> = rows.filter_map(|row| measure.value(row, count)).collect();
+            let interval = mean_interval(&values, experiment.seed);
+            (!values.is_empty()).then(|| IntervalEstimate { value: mean(&values), interval })
+        };
+        let errors: Vec<_> = experiment.planners.iter().map(|name| of(name, error)).collect();
+        let best = errors.iter().flatten().map(|error| error.value).reduce(f64::min);
+        for (planner, error) in experiment.planners.iter().zip(&errors) {
+            let rows: Vec<_> = planner_rows(&run.rows, planner)
+                .filter(|row| row.touches.len() >= count as usize)
+                .collect();
+            if rows.is_empty() {
+                continue;
+            }
+            let touches = rows.iter().flat_map(|row| &row.touches[..count as usize]);
+            let misses = touches.filter(|touch| touch.is_miss()).count();
+            let misses = (misses > 0).then_some(misses as f64 / rows.len() as f64);
+            let ratio = error.as_ref().zip(best).map(|(error, best)| error.value / best);
+            let recognised = of(planner, &RECOGNISED).map(|share| share.value);
+            table.rows.push(vec![
+                (count as usize).into(),
+                planner.as_str().into(),
+                Cell::estimate(*error),
+                ratio.into(),
+                recognised.into(),
+                misses.into(),
+            ]);
+        }
+    }
+    table.without_empty()
+}
+
+/// Returns a table for the terminal, of the numbers that decide or, if `is_wide`, of all, followed
+/// by the events of the trials and the notices.
+pub fn text(run: &Run, is_wide: bool) -> String {
+    let table = if is_wide { table(run) } else { brief(run) };
+    let mut text = format!("{}\n{}", run.experiment.name, table.text());
     event_lines(run).iter().for_each(|line| text += &format!("{line}\n"));
     run.notices().iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
