@@ -10,7 +10,7 @@ use palpate::sim::finger::effects::electrodes::{counts, impedance_ohm};
 use palpate::sim::finger::recording::{PlateRecording, Recordings};
 
 fn recordings() -> Recordings {
-    serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap()
+    serde_json::from_str(include_str!("../../models/biotac/flat_plate.json")).unwrap()
 }
 
 /// Model with fewer skin points than in a scene: the fit is faster, and counts differ slightly.

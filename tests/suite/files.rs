@@ -18,7 +18,7 @@ fn marked(text: &str) -> Vec<u8> {
 fn a_byte_order_mark_changes_nothing() {
     let folder = folder();
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
-    let recordings = include_str!("../data/biotac_flat_plate.json");
+    let recordings = include_str!("../../models/biotac/flat_plate.json");
     write("plain.json", recordings.as_bytes());
     write("marked.json", &marked(recordings));
     let calibrate = |name| succeeds(folder.path(), &["calibrate", name, "--attitude-only"]);

@@ -5,7 +5,7 @@ use crate::common::shapes::sphere_mesh;
 use nalgebra::Point3;
 use std::fmt::Write;
 use std::fs;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
@@ -101,18 +101,24 @@ fn runs_elsewhere(command: &str) -> bool {
         || ELSEWHERE_PARTS.iter().any(|(part, _)| command.contains(part))
 }
 
-/// A folder like a checkout, with the reduced program in `bin`.
-fn checkout() -> TempDir {
+/// A folder with nothing but the reduced program in `bin`, as after an installation.
+fn empty_folder() -> TempDir {
     let folder = TempDir::new().unwrap();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for name in ["experiments", "scenes", "models", "tests", "examples"] {
-        symlink(root.join(name), folder.path().join(name)).unwrap();
-    }
     fs::create_dir(folder.path().join("bin")).unwrap();
     let program = folder.path().join("bin/palpate");
     fs::write(&program, REDUCED).unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
     folder
+}
+
+/// A page that lists planners lists all of them.
+#[test]
+fn every_planner_is_in_the_guide() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/your-planner.md");
+    let page = fs::read_to_string(page).unwrap();
+    for entry in palpate::explore::planner::PLANNERS {
+        assert!(page.contains(&format!("`{}`", entry.name)), "{}", entry.name);
+    }
 }
 
 #[test]
@@ -134,7 +140,7 @@ fn command_lines_of_the_guides_run() {
         if here.is_empty() {
             continue;
         }
-        let folder = checkout();
+        let folder = empty_folder();
         let stl = fs::write(folder.path().join("my-part.stl"), egg());
         stl.and_then(|()| {
             fs::copy(root.join("models/suite/mug.glb"), folder.path().join("my-part.glb"))
@@ -159,6 +165,7 @@ fn command_lines_of_the_guides_run() {
             .current_dir(folder.path())
             .env("PATH", path)
             .env("HOME", folder.path())
+            .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
             .env("PROGRAM", env!("CARGO_BIN_EXE_palpate"))
             .output()
             .unwrap();

@@ -252,6 +252,10 @@ fn no_files_import_each_other_in_a_circle() {
     }
 }
 
+/// Modules of palpate-explore that planners import.
+const PLANNERS_IMPORT: [&str; 6] =
+    ["planner", "belief", "whole_object", "recognition", "task", "view"];
+
 /// Planners see beliefs and the looks that a camera offers. They cannot access the object,
 /// so they cannot use the ground truth.
 #[test]
@@ -263,7 +267,7 @@ fn planners_see_the_belief_and_nothing_else() {
         if !module_path.starts_with("palpate_explore/planner") {
             continue;
         }
-        let beliefs = ["planner", "belief", "whole_object", "recognition", "task", "view"];
+        let beliefs = PLANNERS_IMPORT;
         let beliefs = beliefs.map(|module| format!("palpate_explore/{module}"));
         let below = ["palpate_gp", "palpate_input"].map(String::from);
         let allowed = beliefs.iter().chain(&below);
@@ -275,6 +279,9 @@ fn planners_see_the_belief_and_nothing_else() {
         }
     }
     assert!(seen > 20, "the test found only {seen} imports");
+    let rule = format!("planners import {}, `palpate-gp`", PLANNERS_IMPORT.join(", "));
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md");
+    assert!(fs::read_to_string(page).unwrap().contains(&rule), "ARCHITECTURE.md: no \"{rule}\"");
 }
 
 /// A report is generated from a run's folder and builds no scene.

@@ -123,7 +123,7 @@ fn sensors_vary_as_much_as_is_said() {
 /// Compares the baselines of two real sensors.
 #[test]
 fn resistances_vary_as_those_of_real_sensors() {
-    let text = include_str!("../data/biotac_flat_plate.json");
+    let text = include_str!("../../models/biotac/flat_plate.json");
     let sensors = serde_json::from_str::<Recordings>(text).unwrap().sensors;
     let [one, other] = [0, 1].map(|i: usize| sensors[i].no_contact_median_counts);
     let ratios = one.iter().zip(other).map(|(a, b)| impedance_ohm(*a) / impedance_ohm(b));

@@ -49,9 +49,9 @@ const STILL: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 
 fn agreements() -> Vec<(String, SlopeComparison, SlopeComparison)> {
     let flat: Recordings =
-        serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap();
+        serde_json::from_str(include_str!("../../models/biotac/flat_plate.json")).unwrap();
     let slopes: ShearRecordings =
-        serde_json::from_str(include_str!("../data/biotac_shear.json")).unwrap();
+        serde_json::from_str(include_str!("../../models/biotac/shear.json")).unwrap();
     flat.check().unwrap();
     slopes.check().unwrap();
     let mut model = FingerConstants::default();
