@@ -184,6 +184,9 @@ impl Args {
     }
 }
 
+/// Smallest size of an object; a heuristic, a seventh of the finger's radius.
+const SMALLEST_M: f64 = 1e-3;
+
 /// Files that were written for a mesh.
 pub(super) struct Written {
     /// Choices with their evidence.
@@ -301,6 +304,14 @@ impl MeshPlacement {
         );
         let up = choices::up(&mesh, args.up, &stated, extension == "obj", asker);
         let (metres_per_unit, scale) = (unit.value.0.metres_per_unit(), unit.value.1);
+        let size_m = extent(&mesh).max() / read_m * metres_per_unit * scale;
+        ensure!(
+            size_m >= SMALLEST_M,
+            "{}: in {} the object measures {:.1e} m; allowed is at least {SMALLEST_M} m: use another --unit",
+            args.mesh.display(),
+            label(unit.value.0),
+            size_m
+        );
         let mesh = mesh.with_patches(&report.holes).scaled(metres_per_unit * scale / read_m);
         let size_mm = (extent(&mesh) * 1e3).into();
         let axes = if is_gltf { ObjectAxes::of_gltf(up.value) } else { ObjectAxes::of(up.value) };

@@ -5,8 +5,11 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
+use std::any::TypeId;
+use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use toml::{Table, Value};
 
 /// Path of an input file or folder in settings. In a file it is relative to that file's folder.
@@ -64,11 +67,8 @@ const ALL: &str = "*";
 const DEPTH_MAX: usize = 16;
 
 /// Calls `each` with the dotted key and the text of each path in `table`, the settings of a `T`.
-pub fn visit<T: JsonSchema>(table: &mut Table, each: &mut dyn FnMut(&str, &mut String)) {
-    let schema = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
-    let mut keys = Vec::new();
-    collect(&schema, &schema, &mut Vec::new(), &mut keys);
-    for Key { steps, may_be_name } in &keys {
+pub fn visit<T: JsonSchema + 'static>(table: &mut Table, each: &mut dyn FnMut(&str, &mut String)) {
+    for Key { steps, may_be_name } in keys::<T>().iter() {
         let Some((first, rest)) = steps.split_first() else { continue };
         let mut each = |key: &str, text: &mut String| {
             if !may_be_name || Path::new(text).extension().is_some() {
@@ -82,7 +82,7 @@ pub fn visit<T: JsonSchema>(table: &mut Table, each: &mut dyn FnMut(&str, &mut S
 }
 
 /// Returns a copy of `settings` with each path replaced; `None` if TOML has no form for them.
-pub fn map<T: Serialize + DeserializeOwned + JsonSchema>(
+pub fn map<T: Serialize + DeserializeOwned + JsonSchema + 'static>(
     settings: &T,
     mut replace: impl FnMut(&str) -> String,
 ) -> Option<T> {
@@ -92,7 +92,7 @@ pub fn map<T: Serialize + DeserializeOwned + JsonSchema>(
 }
 
 /// Returns the paths of `settings` with their dotted keys.
-pub fn list<T: Serialize + JsonSchema>(settings: &T) -> Vec<(String, PathBuf)> {
+pub fn list<T: Serialize + JsonSchema + 'static>(settings: &T) -> Vec<(String, PathBuf)> {
     let Ok(Value::Table(mut table)) = tables::value(settings) else { return Vec::new() };
     let mut paths = Vec::new();
     visit::<T>(&mut table, &mut |key, path| paths.push((key.into(), PathBuf::from(&*path))));
@@ -103,6 +103,20 @@ pub fn list<T: Serialize + JsonSchema>(settings: &T) -> Vec<(String, PathBuf)> {
 struct Key {
     steps: Vec<String>,
     may_be_name: bool,
+}
+
+/// Returns the keys of the paths among the settings of a `T`.
+fn keys<T: JsonSchema + 'static>() -> Arc<[Key]> {
+    // Kept, because they depend on the type alone and a schema takes half a megabyte.
+    static KEYS: Mutex<BTreeMap<TypeId, Arc<[Key]>>> = Mutex::new(BTreeMap::new());
+    let find = || {
+        let schema = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
+        let mut keys = Vec::new();
+        collect(&schema, &schema, &mut Vec::new(), &mut keys);
+        keys.into()
+    };
+    let mut known = KEYS.lock().unwrap_or_else(PoisonError::into_inner);
+    Arc::clone(known.entry(TypeId::of::<T>()).or_insert_with(find))
 }
 
 /// Adds the paths of `schema`, which is part of `root` and is found under `steps`.
@@ -161,7 +175,6 @@ fn descend(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeMap;
 
     #[derive(JsonSchema)]
     #[expect(dead_code, reason = "only its schema is used")]

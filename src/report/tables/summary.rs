@@ -75,24 +75,18 @@ pub fn brief(run: &Run) -> Table {
     let heads = [
         Column::new("touches"),
         Column::new("planner"),
-        Column::new(format!("mean {}", error.title)).unit(
-            error.unit.symbol,
-            error.unit.per_si,
-            error.unit.decimals,
-        ),
+        Column::new(format!("mean {} {}", error.title, error.unit.symbol)),
         Column::new("to the best").unit("", 1.0, 2),
-        Column::new(RECOGNISED.title).unit(
-            RECOGNISED.unit.symbol,
-            RECOGNISED.unit.per_si,
-            RECOGNISED.unit.decimals,
-        ),
+        Column::new(RECOGNISED.title).unit("", 1.0, 2),
         Column::new("misses a trial").unit("", 1.0, 1),
     ];
     let mut table = Table::new(heads);
     for count in experiment.table_touch_counts() {
         let of = |planner: &str, measure: &Measure| -> Option<IntervalEstimate> {
             let rows = planner_rows(&run.rows, planner);
-            let values: Vec<f64> = rows.filter_map(|row| measure.value(row, count)).collect();
+            let shown = |value| measure.unit.per_si * value;
+            let values: Vec<f64> =
+                rows.filter_map(|row| measure.value(row, count).map(shown)).collect();
             let interval = mean_interval(&values, experiment.seed);
             (!values.is_empty()).then(|| IntervalEstimate { value: mean(&values), interval })
         };

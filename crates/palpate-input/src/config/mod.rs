@@ -275,7 +275,7 @@ impl Loader {
     /// Makes all paths among the settings of a `T` absolute, as [`resolve_path`] does.
     ///
     /// [`resolve_path`]: Self::resolve_path
-    fn resolve_paths<T: JsonSchema>(&mut self) {
+    fn resolve_paths<T: JsonSchema + 'static>(&mut self) {
         let mut table = std::mem::take(&mut self.table);
         paths::visit::<T>(&mut table, &mut |key, text| *text = self.resolved(key, text));
         self.table = table;
@@ -298,7 +298,9 @@ impl Loader {
     ///
     /// # Errors
     /// The first invalid value, with its origin.
-    pub fn finish<T: DeserializeOwned + JsonSchema + Validate>(mut self) -> Result<T, ConfigError> {
+    pub fn finish<T: DeserializeOwned + JsonSchema + Validate + 'static>(
+        mut self,
+    ) -> Result<T, ConfigError> {
         self.resolve_paths::<T>();
         let config: T = tables::read(self.table.clone())
             .map_err(|error| self.explain::<T>(&error.key, &error.message))?;
