@@ -9,6 +9,7 @@ use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 use nalgebra::{Point3, Vector3};
 
 use super::mesh::Mesh;
+use super::polygon;
 use super::primitives::nearest_on_segment;
 
 /// Smallest mean cosine between the patch and the triangles along its border.
@@ -136,11 +137,8 @@ fn hole(mesh: &Mesh, border: &[BorderEdge]) -> Option<Hole> {
     let corners: Vec<u32> = border.iter().rev().map(|edge| edge.from).collect();
     let points: Vec<Point3<f64>> =
         corners.iter().map(|&vertex| mesh.vertices()[vertex as usize]).collect();
-    let sum: Vector3<f64> = points.iter().map(|point| point.coords).sum();
-    let centre = Point3::from(sum / points.len() as f64);
-    let pairs = || points.iter().zip(points.iter().cycle().skip(1));
-    let doubled: Vector3<f64> = pairs().map(|(a, b)| (a - centre).cross(&(b - centre))).sum();
-    let normal = doubled.try_normalize(0.0)?;
+    let centre = polygon::centre(&points);
+    let normal = polygon::normal(&points, centre)?;
     let (mut along, mut length_m) = (0.0, 0.0);
     for edge in border {
         let [a, b, c] = mesh.corners(edge.triangle as usize);
@@ -174,21 +172,13 @@ fn flat_patch(
     centre: Point3<f64>,
     normal: Vector3<f64>,
 ) -> Vec<[u32; 3]> {
-    let across = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
-    let up = normal.cross(&across);
-    let flat = points.iter().map(|p| [(p - centre).dot(&across), (p - centre).dot(&up)]);
-    let mut found: Vec<u32> = Vec::new();
-    earcut::Earcut::new().earcut(flat, &[], &mut found);
-    let (triangles, _) = found.as_chunks::<3>();
-    let wound = triangles.iter().filter_map(|&[a, b, c]| {
+    let has_area = |&[a, b, c]: &[u32; 3]| {
         let [p, q, r] = [a, b, c].map(|i| points[i as usize]);
-        let doubled = (q - p).cross(&(r - p));
         let longest_m = (q - p).norm().max((r - q).norm()).max((p - r).norm());
-        let [b, c] = if doubled.dot(&normal) < 0.0 { [c, b] } else { [b, c] };
-        (doubled.norm() > MIN_ASPECT * longest_m * longest_m)
-            .then_some([a, b, c].map(|i| corners[i as usize]))
-    });
-    wound.collect()
+        (q - p).cross(&(r - p)).norm() > MIN_ASPECT * longest_m * longest_m
+    };
+    let triangles = polygon::ears(points, centre, normal).into_iter().filter(has_area);
+    triangles.map(|triangle| triangle.map(|i| corners[i as usize])).collect()
 }
 
 /// Whether other borders run along most of a border: its parts touch there without shared vertices.

@@ -46,6 +46,7 @@ pub mod import;
 pub mod low_discrepancy;
 pub mod mesh;
 pub mod point_in_mesh;
+mod polygon;
 pub mod primitives;
 pub mod raw;
 pub mod repair;

@@ -1,5 +1,5 @@
-//! Exact queries in f64 for points and single triangles: bounding box, line intersection, nearest
-//! point.
+//! Exact queries in f64 for points and single triangles: bounding box, area, line intersection,
+//! nearest point.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
@@ -8,6 +8,27 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 pub fn extent<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<[Point3<f64>; 2]> {
     let grown = |[low, high]: [Point3<f64>; 2], p: &Point3<f64>| [low.inf(p), high.sup(p)];
     points.into_iter().fold(None, |ends, p| Some(grown(ends.unwrap_or([*p; 2]), p)))
+}
+
+/// Largest ratio of height to longest side at which a triangle is degenerate.
+const MIN_ASPECT: f64 = 1e-12;
+
+/// Returns the area vector of a triangle times two, in m²; it follows the right-hand rule.
+pub(super) fn doubled_area([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {
+    (b - a).cross(&(c - a))
+}
+
+/// Returns an upper bound of the rounding of coordinates as large as those of `points`, in metres.
+pub(super) fn rounding_m(points: &[Point3<f64>]) -> f64 {
+    4.0 * f64::EPSILON * points.iter().map(|point| point.coords.amax()).fold(0.0, f64::max)
+}
+
+/// Whether a triangle has no area: its height is negligible relative to its longest side, or to the
+/// rounding of its coordinates.
+pub(super) fn is_degenerate([a, b, c]: [Point3<f64>; 3], rounding_m: f64) -> bool {
+    let longest_m = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+    let twice_area_m2 = doubled_area([a, b, c]).norm();
+    twice_area_m2 <= longest_m * rounding_m.max(MIN_ASPECT * longest_m)
 }
 
 /// A line prepared for watertight triangle tests.

@@ -5,6 +5,7 @@ use nalgebra::Point3;
 
 use super::holes::find_holes;
 use super::mesh::Mesh;
+use super::primitives::{is_degenerate, rounding_m};
 use super::raw::{Element, RawMesh};
 use super::report::{DefectCount, MeshReport};
 use super::topology::orient;
@@ -12,9 +13,6 @@ use palpate_input::error::InputError;
 
 /// Largest coordinate, in metres; a larger one indicates a wrong unit.
 pub const MAX_COORDINATE_M: f64 = 1e4;
-
-/// Largest ratio of height to longest side at which a triangle is degenerate.
-const MIN_ASPECT: f64 = 1e-12;
 
 /// Repairs `raw` into a valid mesh and reports the repairs.
 ///
@@ -139,15 +137,14 @@ fn remove_invalid(
     canonical: &[u32],
     report: &mut MeshReport,
 ) -> (Vec<[u32; 3]>, Vec<u32>) {
-    let rounding_m =
-        4.0 * f64::EPSILON * vertices.iter().map(|v| v.coords.amax()).fold(0.0, f64::max);
+    let rounding_m = rounding_m(vertices);
     let mut seen = HashSet::with_capacity(raw.triangles.len());
     let mut kept = Vec::with_capacity(raw.triangles.len());
     let mut sources = Vec::with_capacity(raw.triangles.len());
     for (number, triangle) in raw.triangles.iter().enumerate() {
         let triangle = triangle.map(|vertex| canonical[vertex as usize]);
         let element = || raw.triangle_element(number);
-        if is_degenerate(triangle, vertices, rounding_m) {
+        if is_degenerate(triangle.map(|vertex| vertices[vertex as usize]), rounding_m) {
             report.degenerate_removed.add(element);
             continue;
         }
@@ -161,13 +158,6 @@ fn remove_invalid(
         }
     }
     (kept, sources)
-}
-
-fn is_degenerate(triangle: [u32; 3], vertices: &[Point3<f64>], rounding_m: f64) -> bool {
-    let [a, b, c] = triangle.map(|vertex| vertices[vertex as usize]);
-    let longest_m = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-    let twice_area_m2 = (b - a).cross(&(c - a)).norm();
-    twice_area_m2 <= longest_m * rounding_m.max(MIN_ASPECT * longest_m)
 }
 
 /// Removes unused vertices, keeping the order of the others.

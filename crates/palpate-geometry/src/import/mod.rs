@@ -14,6 +14,7 @@ mod accessor;
 mod gltf;
 mod obj;
 pub mod ply;
+mod ply_data;
 mod source;
 mod statement;
 mod stl;

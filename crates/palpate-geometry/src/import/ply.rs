@@ -1,12 +1,13 @@
-//! PLY import, text or binary of either byte order. Polygons become triangle fans, as for OBJ;
-//! everything except positions and faces is ignored.
+//! PLY import, text or binary of either byte order: the elements `vertex`, `face` and `tristrips`;
+//! everything else is ignored.
 
 use nalgebra::Point3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::PropertyAccessResult::{Ignored, Set, UnsupportedType};
-use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header};
 
-use super::source::{Source, bad_line};
+use super::ply_data::{Data, index};
+use super::source::{Source, bad_line, text};
+use crate::polygon::{strip, triangulate};
 use crate::raw::RawMesh;
 use palpate_input::error::InputError;
 use palpate_input::files::without_bom;
@@ -18,19 +19,23 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Reads a PLY file.
 pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
-    let (vertices, faces) = elements(source.bytes)?;
-    if faces.is_empty() && !vertices.is_empty() {
+    let Elements { header, vertices, faces, strips } = elements(source.bytes)?;
+    if faces.is_empty() && strips.is_empty() && !vertices.is_empty() {
+        let list = header.elements.values().map(|element| (&element.name, element.count));
+        let list: Vec<_> = list.map(|(name, count)| format!("{name} {count}")).collect();
         return Err(InputError::new(format!(
-            "holds {} points and no faces (a point cloud); a mesh with faces is required",
-            vertices.len()
+            "holds {} points and no faces (elements: {}), like a point cloud; a mesh has \
+             element \"face\" or \"tristrips\"",
+            vertices.len(),
+            list.join(", ")
         )));
     }
     let mut raw = RawMesh::default();
-    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
-    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
-    let triangles =
-        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
-    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
+    raw.skipped_primitives = faces.iter().filter(|face| face.len() < 3).count();
+    let mut triangles = Vec::with_capacity(faces.len());
+    faces.iter().for_each(|face| triangulate(face, &vertices, &mut triangles));
+    triangles.extend(strips.iter().flat_map(|corners| strip(corners)));
+    raw.add_part("PLY", vertices.into_iter(), triangles)?;
     Ok(raw)
 }
 
@@ -55,15 +60,33 @@ pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
 /// # Errors
 /// If it is invalid.
 pub fn vertices(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
-    Ok(elements(bytes)?.0.into_iter().map(|vertex| Point3::from(vertex.0)).collect())
+    Ok(elements(bytes)?.vertices)
 }
 
-fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), InputError> {
-    let bytes = without_bom(bytes);
-    let mut reader = Reader::new(bytes);
-    let header = Parser::<Other>::new().read_header(&mut reader);
-    let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
-    let (mut vertices, mut faces) = (Vec::<Vertex>::new(), Vec::<Face>::new());
+/// Elements of a PLY file.
+struct Elements {
+    header: Header,
+    vertices: Vec<Point3<f64>>,
+    /// Vertex indices of each polygon.
+    faces: Vec<Vec<u32>>,
+    /// Vertex indices of each strip of triangles.
+    strips: Vec<Vec<u32>>,
+}
+
+fn elements(bytes: &[u8]) -> Result<Elements, InputError> {
+    let (header_text, rest) = split_header(without_bom(bytes));
+    let mut reader = Reader::new(header_text.as_bytes());
+    let header = Parser::<DefaultElement>::new().read_header(&mut reader);
+    let header = header.map_err(|error| header_fault(&error, &header_text))?;
+    let payload_text;
+    let mut data = match header.encoding {
+        Encoding::Ascii => {
+            payload_text = text(rest);
+            Data::text(&payload_text, header_text.lines().count())
+        }
+        binary => Data::binary(rest, binary),
+    };
+    let (mut vertices, mut faces, mut strips) = (Vec::new(), Vec::new(), Vec::new());
     for (name, element) in &header.elements {
         // Each element takes at least one byte, unless it has no properties.
         if element.count > bytes.len() {
@@ -72,115 +95,91 @@ fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), InputError> {
                 "PLY: declares {count} of element \"{name}\", more than the file has bytes"
             )));
         }
-        let has = |property: &str| element.properties.contains_key(property);
-        let place = |error: ParseError| fault(&error, bytes, &header.encoding);
         match name.as_str() {
-            "vertex" => {
-                require(element, AXES.iter().all(|axis| has(axis)), "x, y and z")?;
-                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
-                vertices = read.map_err(place)?;
-            }
-            "face" => {
-                require(element, CORNERS.iter().any(|list| has(list)), CORNERS[0])?;
-                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
-                faces = read.map_err(place)?;
-            }
-            _ => {
-                let others = Parser::<Other>::new();
-                others.read_payload_for_element(&mut reader, element, &header).map_err(place)?;
-            }
+            "vertex" => vertices = positions(element, &mut data)?,
+            "face" => faces = lists(element, &mut data, None)?,
+            // A negative index ends a strip.
+            "tristrips" => strips = lists(element, &mut data, Some(|index| index < 0.0))?,
+            _ => data.read(element, "numbers", |_| Some(()))?,
         }
     }
-    let left = reader.into_inner().trim_ascii().len();
-    if left > 0 {
-        return Err(InputError::new(format!(
-            "PLY: holds {left} bytes more than its header declares"
-        )));
-    }
-    Ok((vertices, faces))
-}
-
-/// Checks that an element has the required properties.
-fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), InputError> {
-    match has {
-        true => Ok(()),
-        false => {
-            let name = &element.name;
-            Err(InputError::new(format!("PLY: element \"{name}\" must have {needed}")))
+    match data.bytes_left() {
+        0 => Ok(Elements { header, vertices, faces, strips }),
+        left => {
+            Err(InputError::new(format!("PLY: holds {left} bytes more than its header declares")))
         }
     }
 }
 
-/// Returns the error with its line number, if it is in text.
-fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> InputError {
-    match error.line().filter(|_| *encoding == Encoding::Ascii) {
-        Some(line) => {
-            let found = bytes.split(|&byte| byte == b'\n').nth(line.saturating_sub(1));
-            let found = String::from_utf8_lossy(found.unwrap_or_default());
-            bad_line(line, "data as declared in the PLY header", &found)
+/// Splits a file after its header, which is returned with line feeds and without the words of its
+/// comments: these may be in any encoding.
+fn split_header(bytes: &[u8]) -> (String, &[u8]) {
+    let end = match bytes.iter().position(|byte| b"\r\n".contains(byte)) {
+        Some(end) if bytes[end] == b'\r' && bytes.get(end + 1) != Some(&b'\n') => b'\r',
+        _ => b'\n',
+    };
+    let mut header = String::new();
+    let mut rest = bytes;
+    for line in bytes.split_inclusive(|&byte| byte == end) {
+        rest = &rest[line.len()..];
+        let line = String::from_utf8_lossy(line.trim_ascii_end());
+        let comment = ["comment", "obj_info"].into_iter().find(|it| line.starts_with(it));
+        header.extend([comment.unwrap_or(&line), "\n"]);
+        if line == "end_header" {
+            break;
         }
+    }
+    (header, rest)
+}
+
+/// Returns the error of a header, with its line.
+fn header_fault(error: &ParseError, header: &str) -> InputError {
+    // Errors count the line of the header that is being read from 1.
+    match error.line().and_then(|line| Some((line, header.lines().nth(line.checked_sub(1)?)?))) {
+        Some((line, found)) => bad_line(line, "a PLY header", found),
         None => {
-            // Removes the prefix "Line 7: ": binary data has no lines.
             let words = error.to_string();
-            let message = words.split_once(": ").filter(|_| error.line().is_some());
-            let message = message.map_or(words.as_str(), |(_, message)| message);
-            InputError::new(format!("PLY: {}", message.lines().next().unwrap_or_default()))
+            InputError::new(format!("PLY: {}", words.lines().next().unwrap_or_default()))
         }
     }
 }
 
-/// A position.
-struct Vertex([f64; 3]);
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self([f64::NAN; 3])
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(axis) = AXES.iter().position(|axis| *axis == name) else { return Ignored };
-        self.0[axis] = match property {
-            Property::Char(number) => number.into(),
-            Property::UChar(number) => number.into(),
-            Property::Short(number) => number.into(),
-            Property::UShort(number) => number.into(),
-            Property::Int(number) => number.into(),
-            Property::UInt(number) => number.into(),
-            Property::Float(number) => number.into(),
-            Property::Double(number) => number,
-            _ => return UnsupportedType,
-        };
-        Set
-    }
+fn positions(element: &ElementDef, data: &mut Data) -> Result<Vec<Point3<f64>>, InputError> {
+    let [x, y, z] = AXES.map(|axis| place(element, &[axis]));
+    let (Some(x), Some(y), Some(z)) = (x, y, z) else { return Err(lacks(element, "x, y and z")) };
+    let mut positions = Vec::new();
+    data.read(element, "a position", |properties| {
+        let [x, y, z] = [x, y, z].map(|axis| properties[axis].first().copied());
+        positions.push(Point3::new(x?, y?, z?));
+        Some(())
+    })?;
+    Ok(positions)
 }
 
-/// Vertex indices of a polygon.
-struct Face(Vec<u32>);
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self(Vec::new())
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if !CORNERS.contains(&name) {
-            return Ignored;
+/// Returns the vertex indices of faces or strips. The list of one element is split where an index
+/// `is_end`.
+fn lists(
+    element: &ElementDef,
+    data: &mut Data,
+    is_end: Option<fn(f64) -> bool>,
+) -> Result<Vec<Vec<u32>>, InputError> {
+    let corners = place(element, &CORNERS).ok_or_else(|| lacks(element, CORNERS[0]))?;
+    let mut lists = Vec::new();
+    data.read(element, "vertex indices from 0", |properties| {
+        let parts = properties[corners].split(|&corner| is_end.is_some_and(|it| it(corner)));
+        for part in parts {
+            lists.push(part.iter().map(|&corner| index(corner)).collect::<Option<_>>()?);
         }
-        let Some(corners) = property.to_u32_list() else { return UnsupportedType };
-        self.0 = corners;
-        Set
-    }
+        Some(())
+    })?;
+    Ok(lists)
 }
 
-/// An element that is skipped.
-struct Other;
+/// Returns the place of the first property that has one of `names`.
+fn place(element: &ElementDef, names: &[&str]) -> Option<usize> {
+    element.properties.keys().position(|name| names.contains(&name.as_str()))
+}
 
-impl PropertyAccess for Other {
-    fn new() -> Self {
-        Self
-    }
-
-    fn set_property(&mut self, _: &str, _: Property) -> PropertyAccessResult {
-        Ignored
-    }
+fn lacks(element: &ElementDef, needed: &str) -> InputError {
+    InputError::new(format!("PLY: element \"{}\" must have {needed}", element.name))
 }

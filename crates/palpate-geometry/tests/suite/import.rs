@@ -10,7 +10,7 @@ use palpate_input::error::InputError;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-type Outcome = Result<(Mesh, MeshReport), InputError>;
+pub type Outcome = Result<(Mesh, MeshReport), InputError>;
 
 /// Imports a file; checks that an error names the file.
 fn import(path: &Path, metres_per_unit: f64) -> Outcome {
@@ -29,19 +29,19 @@ fn write(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-fn import_bytes(name: &str, bytes: &[u8]) -> Outcome {
+pub fn import_bytes(name: &str, bytes: &[u8]) -> Outcome {
     let (_folder, path) = write(name, bytes);
     import(&path, 1.0)
 }
 
 #[track_caller]
-fn refused(case: &str, outcome: Outcome, says: &str) {
+pub fn refused(case: &str, outcome: Outcome, says: &str) {
     let text = outcome.expect_err(case).to_string();
     assert!(text.contains(says), "{case}: \"{text}\" does not say \"{says}\"");
 }
 
 #[track_caller]
-fn is_tetrahedron(outcome: Outcome, count: usize) -> MeshReport {
+pub fn is_tetrahedron(outcome: Outcome, count: usize) -> MeshReport {
     let (mesh, report) = outcome.unwrap();
     assert_eq!((mesh.vertices().len(), mesh.triangles().len()), (4 * count, 4 * count), "{report}");
     assert!(report.is_closed(), "{report}");
@@ -50,7 +50,7 @@ fn is_tetrahedron(outcome: Outcome, count: usize) -> MeshReport {
 }
 
 /// Imports the tetrahedron after a change of its document and its bytes.
-fn changed(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Outcome {
+pub fn changed(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Outcome {
     let (mut document, mut bytes) = tetrahedron();
     change(&mut document, &mut bytes);
     import_bytes("mesh.glb", &glb(&document, &bytes))
@@ -335,7 +335,7 @@ fn broken_obj_files_are_refused() {
             "v 0.1 0.1 0.1\nv 0.2 0.2 0.2\nv 0.3 0.3 0.3\nf 1 2 3\n",
             "all 1 triangles",
         ),
-        ("a face continued", &format!("{v}f 1 2 \\\n3\n"), "line 4: expected f"),
+        ("a face continued nowhere", &format!("{v}f 1 2 x\\"), "line 4: expected f"),
     ];
     for (case, text, says) in cases {
         refused(case, import_bytes("mesh.obj", text.as_bytes()), says);

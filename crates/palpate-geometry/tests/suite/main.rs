@@ -2,3 +2,4 @@
 
 mod gltf_sample;
 mod import;
+mod polygons;
