@@ -34,8 +34,12 @@ const FORMATS: &[(&str, Read)] = &[
     ("ply", ply::read),
 ];
 
-/// Whether the extension of a path is that of a mesh format.
+/// Whether the extension of a path is that of a mesh format, and its file is not hidden: macOS
+/// writes a file `._NAME` beside each file on other systems' disks.
 pub fn is_mesh_file(path: &Path) -> bool {
+    if path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b".")) {
+        return false;
+    }
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     FORMATS.iter().any(|(known, _)| *known == extension)
 }

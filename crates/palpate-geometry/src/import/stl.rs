@@ -1,11 +1,11 @@
 //! STL import, binary or text. Normals, colours and names are ignored; all solids become one mesh.
 
-use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::io::Cursor;
 
 use nalgebra::Point3;
-use stl_io::{Triangle, create_stl_reader};
+use stl_io::create_stl_reader;
 
-use super::source::{Source, bad_line};
+use super::source::{Source, bad_line, text};
 use crate::raw::RawMesh;
 use palpate_input::error::InputError;
 use palpate_input::files::without_bom;
@@ -14,109 +14,128 @@ use palpate_input::files::without_bom;
 const HEADER: usize = 84;
 /// Bytes per binary triangle.
 const TRIANGLE: u64 = 50;
+/// Bytes that some programs append to a file: zero, the end mark of DOS, and all bits set.
+const PADDING: [u8; 3] = [0, 0x1a, 0xff];
 
+/// First words of the statements of a facet, in order.
+const FACET: [&[&str]; 7] = [
+    &["facet"],
+    &["outer", "loop"],
+    &["vertex"],
+    &["vertex"],
+    &["vertex"],
+    &["endloop"],
+    &["endfacet"],
+];
 /// Expected syntax of a text file.
 const STATEMENTS: &str = "solid, then facets (facet normal, outer loop, three times vertex and \
                           three finite numbers, endloop, endfacet), then endsolid";
 
 /// Reads an STL file.
 pub(super) fn read(source: &Source) -> Result<RawMesh, InputError> {
+    let bytes = trim_padding(source.bytes);
+    let needed = bytes_needed(source.bytes);
+    // The header of a binary file may begin with "solid" like a text file.
+    let is_binary = needed == source.bytes.len() as u64 || not_a_text(bytes).is_some();
+    let corners = if is_binary { binary(source.bytes)? } else { corners(&text(bytes))? };
+    let triangles = (0..corners.len() as u32).step_by(3);
+    let triangles = triangles.map(|first| [first, first + 1, first + 2]);
     let mut raw = RawMesh::default();
-    if is_binary(source.bytes)? {
-        // The header of a binary file may begin with "solid" like a text file.
-        let bytes = [&[0; HEADER - 4], &source.bytes[HEADER - 4..]].concat();
-        let triangles = create_stl_reader(&mut Cursor::new(bytes)).and_then(Iterator::collect);
-        add(triangles.map_err(|error| InputError::new(format!("STL: {error}")))?, &mut raw)?;
-        return Ok(raw);
-    }
-    let text = plain(&String::from_utf8_lossy(without_bom(source.bytes)));
-    let mut lines_before = 0;
-    for solid in solids(&text) {
-        let start = solid.len() - solid.trim_start().len();
-        let mut lines = Lines { text: &solid[start..], at: 0 };
-        let triangles = create_stl_reader(&mut lines).and_then(Iterator::collect);
-        let triangles = triangles.map_err(|_| {
-            let read = &solid[..start + lines.at];
-            let found = read.lines().last().filter(|line| !line.is_empty());
-            let found = found.unwrap_or("the end of the file");
-            let line = lines_before + read.lines().count();
-            bad_line(line, STATEMENTS, found)
-        })?;
-        add(triangles, &mut raw)?;
-        lines_before += solid.lines().count();
-    }
+    raw.add_part("solid", corners.into_iter(), triangles)?;
     Ok(raw)
 }
 
-/// Whether a file is binary. A file whose length matches its number of triangles is; others are
-/// distinguished by the first word of a text; if it is not a text, it is truncated or padded.
-fn is_binary(bytes: &[u8]) -> Result<bool, InputError> {
-    let is_text = without_bom(bytes).trim_ascii_start().to_ascii_lowercase().starts_with(b"solid");
+/// Returns a file up to its last byte that is no padding, and the blanks after it.
+fn trim_padding(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|byte| !is_padding(byte)).map_or(0, |last| last + 1);
+    let blanks = bytes[end..].iter().take_while(|byte| byte.is_ascii_whitespace());
+    &bytes[..end + blanks.count()]
+}
+
+fn is_padding(byte: &u8) -> bool {
+    PADDING.contains(byte) || byte.is_ascii_whitespace()
+}
+
+/// Returns the number of triangles that the header of a binary file declares.
+fn count(bytes: &[u8]) -> u32 {
     let count = bytes.get(HEADER - 4..HEADER).and_then(<[u8]>::first_chunk);
-    let count = count.map(|&bytes| u32::from_le_bytes(bytes));
-    let count = count.unwrap_or(0);
-    let needed = HEADER as u64 + TRIANGLE * u64::from(count);
-    let actual = bytes.len();
-    match needed == actual as u64 {
-        true => Ok(true),
-        false if is_text => Ok(false),
-        false => Err(InputError::new(format!(
-            "STL: not a text that begins with \"solid\", and a binary file of {count} triangles has \
-             {needed} bytes, not {actual}"
-        ))),
-    }
+    count.map_or(0, |&bytes| u32::from_le_bytes(bytes))
 }
 
-/// Returns the text line by line, without names and normals, which may be anything: a bare `solid`
-/// and `facet normal nan nan nan` are common.
-fn plain(text: &str) -> String {
-    let line = |line: &str| {
-        let line = line.to_lowercase();
-        match line.split_whitespace().next() {
-            Some("solid") => "solid \n".into(),
-            Some("endsolid") => "endsolid\n".into(),
-            Some("facet") => "facet normal 0 0 0\n".into(),
-            _ => line + "\n",
-        }
+/// Returns the length of a binary file with the declared number of triangles.
+fn bytes_needed(bytes: &[u8]) -> u64 {
+    HEADER as u64 + TRIANGLE * u64::from(count(bytes))
+}
+
+/// Returns why a file is no text; `None` if it is one.
+fn not_a_text(bytes: &[u8]) -> Option<String> {
+    let start = without_bom(bytes).trim_ascii_start();
+    if !start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) {
+        return Some("not a text that begins with \"solid\"".into());
+    }
+    let is_control = |byte: &u8| byte.is_ascii_control() && !(0x09..=0x0d).contains(byte);
+    let place = bytes.iter().position(is_control)?;
+    Some(format!("not a text, byte {place} is {:#04x}", bytes[place]))
+}
+
+/// Returns the corners of the triangles of a binary file, which padding may follow.
+fn binary(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
+    let (needed, actual) = (bytes_needed(bytes), bytes.len());
+    let sizes = || {
+        let reason = not_a_text(bytes).unwrap_or_default();
+        let count = count(bytes);
+        format!(
+            "STL: {reason}, and a binary file of {count} triangles has {needed} bytes, not {actual}"
+        )
     };
-    text.lines().map(line).collect()
-}
-
-/// Splits the text into pieces that end with `endsolid`, without trailing blanks.
-fn solids(text: &str) -> impl Iterator<Item = &str> {
-    text.split_inclusive("endsolid\n").filter(|solid| !solid.trim().is_empty())
-}
-
-/// A text that is read line by line, so that the position of an error is known.
-struct Lines<'a> {
-    text: &'a str,
-    at: usize,
-}
-
-impl Read for Lines<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let rest = &self.text.as_bytes()[self.at..];
-        let line = rest.split_inclusive(|&byte| byte == b'\n').next().unwrap_or_default();
-        let count = line.len().min(buffer.len());
-        buffer[..count].copy_from_slice(&line[..count]);
-        self.at += count;
-        Ok(count)
+    let parts = usize::try_from(needed).ok().and_then(|needed| bytes.split_at_checked(needed));
+    let (data, rest) = parts.ok_or_else(|| InputError::new(sizes()))?;
+    if !rest.iter().all(is_padding) {
+        let sizes = sizes();
+        return Err(InputError::new(format!("{sizes}; what follows is no padding")));
     }
+    let data = [&[0; HEADER - 4], &data[HEADER - 4..]].concat();
+    let triangles: Result<Vec<_>, _> =
+        create_stl_reader(&mut Cursor::new(data)).and_then(Iterator::collect);
+    let triangles = triangles.map_err(|error| InputError::new(format!("STL: {error}")))?;
+    let corners = triangles.iter().flat_map(|triangle| triangle.vertices);
+    Ok(corners.map(|corner| Point3::from(corner.0.map(f64::from))).collect())
 }
 
-impl Seek for Lines<'_> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        match to {
-            SeekFrom::Start(0) => self.at = 0,
-            _ => return Err(io::ErrorKind::Unsupported.into()),
+/// Returns the corners of the triangles of a text. Names and normals may be anything: a bare
+/// `solid` and `facet normal nan nan nan` are common.
+fn corners(text: &str) -> Result<Vec<Point3<f64>>, InputError> {
+    let mut corners = Vec::new();
+    let (mut is_open, mut next) = (false, 0);
+    for (number, line) in (1..).zip(text.lines()) {
+        let wrong = || bad_line(number, STATEMENTS, line);
+        let mut words = line.split_whitespace();
+        let is = |known: &[&str]| {
+            let mut words = line.split_whitespace();
+            known.iter().all(|it| words.next().is_some_and(|word| word.eq_ignore_ascii_case(it)))
+        };
+        if is(FACET[next]) && is_open {
+            if FACET[next] == ["vertex"] {
+                words.next();
+                corners.push(corner(words).ok_or_else(wrong)?);
+            }
+            next = (next + 1) % FACET.len();
+        } else if next == 0 && is(if is_open { &["endsolid"] } else { &["solid"] }) {
+            is_open = !is_open;
+        } else if words.next().is_some() {
+            return Err(wrong());
         }
-        Ok(0)
+    }
+    match is_open {
+        true => Err(bad_line(text.lines().count(), STATEMENTS, "the end of the file")),
+        false => Ok(corners),
     }
 }
 
-fn add(triangles: Vec<Triangle>, raw: &mut RawMesh) -> Result<(), InputError> {
-    let corners: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices).collect();
-    let positions = corners.iter().map(|corner| Point3::from(corner.0.map(f64::from)));
-    let corners = (0..corners.len() as u32).step_by(3);
-    raw.add_part("solid", positions, corners.map(|first| [first, first + 1, first + 2]))
+/// Returns a corner from three finite numbers.
+fn corner<'a>(words: impl Iterator<Item = &'a str>) -> Option<Point3<f64>> {
+    let numbers: Option<Vec<f32>> = words.map(|word| word.parse().ok()).collect();
+    let numbers: [f32; 3] = numbers?.try_into().ok()?;
+    let is_finite = numbers.iter().all(|number| number.is_finite());
+    is_finite.then(|| Point3::from(numbers.map(f64::from)))
 }

@@ -3,3 +3,4 @@
 mod gltf_sample;
 mod import;
 mod polygons;
+mod variants;
