@@ -10,7 +10,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
+use gltf::json::{Buffer, Index, Root};
 
 use super::source::{BYTES_MAX, Source};
 use palpate_input::error::InputError;
@@ -21,6 +21,21 @@ pub(super) struct Document {
     pub root: Root,
     buffers: Vec<Vec<u8>>,
 }
+
+/// Type that the elements of an accessor must have.
+pub(super) struct Expected {
+    pub words: &'static str,
+    pub kind: Type,
+    /// Whether a type of the components is accepted, normalized or not.
+    pub accepts: fn(ComponentType, bool) -> bool,
+}
+
+/// Type of vertex indices.
+const INDICES: Expected = Expected {
+    words: "unsigned SCALAR",
+    kind: Type::Scalar,
+    accepts: |component, is_normalized| unsigned_size(component).is_some() && !is_normalized,
+};
 
 /// Elements of an accessor in memory.
 struct Elements<'a> {
@@ -49,7 +64,7 @@ impl Document {
         for (number, buffer) in root.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
                 Some(uri) => fetch(source, uri, left),
-                None => chunk.take().ok_or_else(|| InputError::new("the file has no binary chunk")),
+                None => chunk.take().ok_or_else(|| without_data(buffer)),
             };
             let declared = buffer.byte_length.0;
             let checked = bytes.and_then(|bytes| match bytes.len() {
@@ -67,21 +82,31 @@ impl Document {
         Ok(Self { root, buffers })
     }
 
-    /// Returns vertex positions.
-    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, InputError> {
-        let is_vec3 = |component, kind| component == ComponentType::F32 && kind == Type::Vec3;
-        let values = self.values(index, "float VEC3", is_vec3)?;
-        let (floats, _) = values.as_chunks::<4>();
-        let floats: Vec<f32> = floats.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
-        Ok(floats.as_chunks().0.to_vec())
+    /// Returns the elements of an accessor, each of `N` numbers.
+    pub fn numbers<const N: usize>(
+        &self,
+        index: Index<Accessor>,
+        expected: &Expected,
+    ) -> Result<Vec<[f64; N]>, InputError> {
+        let values = self.values(index, expected)?;
+        let component = self.component(index)?;
+        let is_normalized = find(&self.root.accessors, "accessor", index)?.normalized;
+        let numbers = values.chunks_exact(component.size());
+        let numbers: Vec<f64> = numbers.map(|it| number(it, component, is_normalized)).collect();
+        Ok(numbers.as_chunks().0.to_vec())
     }
 
     /// Returns vertex indices.
     pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, InputError> {
-        let is_index = |component, kind| unsigned_size(component).is_some() && kind == Type::Scalar;
-        let values = self.values(index, "unsigned SCALAR", is_index)?;
+        let values = self.values(index, &INDICES)?;
         let size = self.component(index)?.size();
         Ok(values.chunks_exact(size).map(unsigned).collect())
+    }
+
+    /// Whether an accessor refers to data; without them all its elements are zero.
+    pub fn has_data(&self, index: Index<Accessor>) -> Result<bool, InputError> {
+        let accessor = find(&self.root.accessors, "accessor", index)?;
+        Ok(accessor.buffer_view.is_some() || accessor.sparse.is_some())
     }
 
     fn component(&self, index: Index<Accessor>) -> Result<ComponentType, InputError> {
@@ -93,18 +118,13 @@ impl Document {
     }
 
     /// Returns all elements of an accessor, tightly packed, with sparse values in place.
-    fn values(
-        &self,
-        index: Index<Accessor>,
-        expected: &str,
-        accepts: impl Fn(ComponentType, Type) -> bool,
-    ) -> Result<Vec<u8>, InputError> {
+    fn values(&self, index: Index<Accessor>, expected: &Expected) -> Result<Vec<u8>, InputError> {
         let number = index.value();
-        let wrong_type = || wrong_type(number, expected);
+        let wrong_type = || wrong_type(number, expected.words);
         let accessor = find(&self.root.accessors, "accessor", index)?;
         let component = self.component(index)?;
         let Checked::Valid(kind) = accessor.type_ else { return Err(wrong_type()) };
-        if !accepts(component, kind) || accessor.normalized {
+        if kind != expected.kind || !(expected.accepts)(component, accessor.normalized) {
             return Err(wrong_type());
         }
         let size = component.size() * kind.multiplicity();
@@ -200,6 +220,16 @@ impl Document {
     }
 }
 
+/// Returns the error of a buffer without data: an extension compresses them, or they are missing.
+fn without_data(buffer: &Buffer) -> InputError {
+    match buffer.extensions.as_ref().and_then(|all| all.others.keys().next()) {
+        Some(name) => {
+            InputError::new(format!("has no data: the extension \"{name}\" is not supported"))
+        }
+        None => InputError::new("the file has no binary chunk"),
+    }
+}
+
 /// Returns the object at a document's index.
 pub(super) fn find<'a, T, K>(
     objects: &'a [T],
@@ -224,6 +254,21 @@ fn unsigned_size(component: ComponentType) -> Option<usize> {
 /// Decodes a little-endian number of one to four bytes.
 fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u32::from(byte))
+}
+
+/// Decodes a component. A normalized integer is divided by its largest value, as section 3.6.2.2 of
+/// the specification of glTF 2.0 says.
+fn number(bytes: &[u8], component: ComponentType, is_normalized: bool) -> f64 {
+    let bits = unsigned(bytes);
+    let (number, largest): (f64, f64) = match component {
+        ComponentType::I8 => (f64::from(bits as i8), i8::MAX.into()),
+        ComponentType::U8 => (f64::from(bits as u8), u8::MAX.into()),
+        ComponentType::I16 => (f64::from(bits as i16), i16::MAX.into()),
+        ComponentType::U16 => (f64::from(bits as u16), u16::MAX.into()),
+        ComponentType::U32 => (f64::from(bits), u32::MAX.into()),
+        ComponentType::F32 => return f32::from_bits(bits).into(),
+    };
+    if is_normalized { f64::max(number / largest, -1.0) } else { number }
 }
 
 fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, InputError> {

@@ -11,6 +11,7 @@ use palpate_input::error::InputError;
 use palpate_input::files;
 
 mod accessor;
+mod deform;
 mod gltf;
 mod obj;
 pub mod ply;
@@ -48,7 +49,8 @@ pub fn is_mesh_file(path: &Path) -> bool {
 /// refers to must lie in its folder or below.
 ///
 /// The extension determines the format: OBJ, glTF (`.gltf` or `.glb`), STL, PLY. A glTF file is in
-/// metres by its specification; the scale is applied nevertheless.
+/// metres by its specification; the scale is applied nevertheless. Its model is turned upright:
+/// (x, y, z) becomes (-x, z, y).
 ///
 /// # Errors
 /// If the file cannot be read or repaired; the place is the file.
@@ -66,14 +68,26 @@ pub fn import_with(
     metres_per_unit: f64,
     allow_external_buffers: bool,
 ) -> Result<(Mesh, MeshReport), InputError> {
-    read_and_repair(path, metres_per_unit, allow_external_buffers)
+    read_and_repair(path, metres_per_unit, allow_external_buffers, true)
         .map_err(|fault| fault.at(path.display()))
+}
+
+/// Runs [`import`], and keeps the frame of the file also for glTF.
+///
+/// # Errors
+/// The errors of [`import`].
+pub fn import_in_file_frame(
+    path: &Path,
+    metres_per_unit: f64,
+) -> Result<(Mesh, MeshReport), InputError> {
+    read_and_repair(path, metres_per_unit, false, false).map_err(|fault| fault.at(path.display()))
 }
 
 fn read_and_repair(
     path: &Path,
     metres_per_unit: f64,
     allow_external_buffers: bool,
+    upright: bool,
 ) -> Result<(Mesh, MeshReport), InputError> {
     if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
         return Err(InputError::new(format!(
@@ -90,7 +104,7 @@ fn read_and_repair(
         return Err(InputError::new(format!("is a \".{extension}\" file; supported: {supported}")));
     };
     let bytes = files::bytes(path, BYTES_MAX).map_err(unreadable)?;
-    let mut raw = read(&Source { path, bytes: &bytes, allow_external_buffers })?;
+    let mut raw = read(&Source { path, bytes: &bytes, allow_external_buffers, upright })?;
     raw.scale(metres_per_unit);
     let (mesh, report) = repair(raw)?;
     let sha256 = mesh.sha256();

@@ -11,6 +11,8 @@ pub(super) struct Source<'a> {
     /// Whether the buffers of a glTF document may lie outside its folder; if not, a mesh of unknown
     /// origin cannot open other files.
     pub allow_external_buffers: bool,
+    /// Whether a glTF model is turned upright; if not, it keeps the frame of its file.
+    pub upright: bool,
 }
 
 /// Largest size of a mesh file, and of all buffers it refers to; a heuristic: the largest number of
