@@ -3,3 +3,4 @@
 mod planners;
 mod reach;
 mod stored;
+mod urdf_meshes;
