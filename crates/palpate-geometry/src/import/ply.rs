@@ -1,6 +1,7 @@
 //! PLY import, text or binary of either byte order: the elements `vertex`, `face` and `tristrips`;
 //! everything else is ignored.
 
+use foldhash::{HashSet, HashSetExt};
 use nalgebra::Point3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header};
@@ -111,25 +112,48 @@ fn elements(bytes: &[u8]) -> Result<Elements, InputError> {
     }
 }
 
-/// Splits a file after its header, which is returned with line feeds and without the words of its
-/// comments: these may be in any encoding.
+/// Splits a file after its header, whose lines are returned with line feeds.
 fn split_header(bytes: &[u8]) -> (String, &[u8]) {
     let end = match bytes.iter().position(|byte| b"\r\n".contains(byte)) {
         Some(end) if bytes[end] == b'\r' && bytes.get(end + 1) != Some(&b'\n') => b'\r',
         _ => b'\n',
     };
-    let mut header = String::new();
+    let (mut header, mut names) = (String::new(), HashSet::new());
     let mut rest = bytes;
     for line in bytes.split_inclusive(|&byte| byte == end) {
         rest = &rest[line.len()..];
-        let line = String::from_utf8_lossy(line.trim_ascii_end());
-        let comment = ["comment", "obj_info"].into_iter().find(|it| line.starts_with(it));
-        header.extend([comment.unwrap_or(&line), "\n"]);
+        let line = header_line(&String::from_utf8_lossy(line.trim_ascii()), &mut names);
+        header.extend([&line, "\n"]);
         if line == "end_header" {
             break;
         }
     }
     (header, rest)
+}
+
+/// Returns a line of a header as the parser needs it. The words of a comment, in any encoding, are
+/// left out; a blank line becomes a comment. Properties of an element, whose `names` so far are
+/// given, get different names: the parser would merge two paddings called `gap`.
+fn header_line(line: &str, names: &mut HashSet<String>) -> String {
+    let mut words = line.split_whitespace();
+    match words.next() {
+        None | Some("comment") => "comment".into(),
+        Some("obj_info") => "obj_info".into(),
+        Some("property") => {
+            if names.insert(words.next_back().unwrap_or_default().to_owned()) {
+                return line.to_owned();
+            }
+            let line = format!("{line}--{}", names.len());
+            names.insert(line.clone());
+            line
+        }
+        Some(first) => {
+            if first == "element" {
+                names.clear();
+            }
+            line.to_owned()
+        }
+    }
 }
 
 /// Returns the error of a header, with its line.

@@ -264,6 +264,26 @@ fn ply_texts_may_have_blank_lines_and_other_elements() {
     refused("binary cut", import_bytes("mesh.ply", &binary), says);
 }
 
+#[test]
+fn ply_headers_may_have_blanks_and_repeated_names() {
+    let header = ply_header("ascii", LIST);
+    let spaced = header.replace("\nelement", " \t\n\n \t element").replace("float", " float\t");
+    is_cube("mesh.ply", ply_text(LIST).replace(&header, &spaced).as_bytes());
+    let padded = ply_header(LITTLE, LIST)
+        .replace("property float", "property uchar gap\nproperty uchar gap\nproperty float")
+        .replace("property list", "property uchar gap\nproperty list");
+    let mut bytes = padded.into_bytes();
+    for x in CORNERS.as_flattened() {
+        bytes.extend([7, 8]);
+        bytes.extend(x.to_le_bytes());
+    }
+    for face in FACES {
+        bytes.extend([9, 4]);
+        bytes.extend(face.iter().flat_map(|&corner| i32::from(corner).to_le_bytes()));
+    }
+    is_cube("mesh.ply", &bytes);
+}
+
 /// Strips of triangles, separated by -1, as in scans of the Stanford repository.
 #[test]
 fn ply_strips_are_read() {
@@ -300,6 +320,14 @@ fn point_clouds_are_named_with_their_elements() {
     let polygons = text.replace("element face", "element polygon");
     let says = "elements: vertex 8, polygon 6), like a point cloud; a mesh has element \"face\"";
     refused("other name", import_bytes("mesh.ply", polygons.as_bytes()), says);
+}
+
+#[test]
+fn pointers_to_stored_files_are_named() {
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    for name in ["mesh.obj", "mesh.stl", "mesh.ply", "mesh.gltf", "mesh.glb"] {
+        refused(name, import_bytes(name, pointer), "is a pointer of Git LFS, not the mesh");
+    }
 }
 
 #[test]
