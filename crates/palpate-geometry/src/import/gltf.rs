@@ -12,6 +12,7 @@ use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::deserialize::from_slice;
 use gltf::json::mesh::{Mode, Primitive};
 use gltf::json::scene::Node;
+use gltf::json::serialize::to_vec;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh, Root, Value};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
@@ -113,16 +114,30 @@ fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), InputError> {
 }
 
 fn root(json: &[u8]) -> Result<Root, InputError> {
-    Root::from_slice(json).map_err(|error| {
-        // Documents of glTF 1.0 have another structure.
+    Root::from_slice(json).or_else(|error| {
         let document: Option<Value> = from_slice(json).ok();
+        // Documents of glTF 1.0 have another structure.
         let version = document.as_ref().and_then(|it| it.get("asset")?.get("version")?.as_str());
         if let Some(version) = version.filter(|version| !version.starts_with('2')) {
-            return wrong_version(version);
+            return Err(wrong_version(version));
         }
         let (line, column) = (error.line(), error.column());
-        InputError::new(format!("JSON: line {line}, column {column}: {}", format::json(&error)))
+        let words = format!("JSON: line {line}, column {column}: {}", format::json(&error));
+        document.and_then(geometry_only).ok_or_else(|| InputError::new(words))
     })
+}
+
+/// Returns a document without the parts that hold no geometry: of these the crate requires
+/// properties that are optional, like the target of an animation, and of scenes their nodes.
+fn geometry_only(mut document: Value) -> Option<Root> {
+    let parts = document.as_object_mut()?;
+    for part in ["animations", "cameras", "images", "materials", "samplers", "textures"] {
+        parts.remove(part);
+    }
+    for scene in parts.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        scene.as_object_mut()?.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    }
+    Root::from_slice(&to_vec(&document).ok()?).ok()
 }
 
 fn wrong_version(version: &str) -> InputError {

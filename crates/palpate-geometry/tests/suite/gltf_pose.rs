@@ -319,6 +319,26 @@ fn hidden_nodes_and_coarser_levels_are_left_out() {
     is_tetrahedron(levels, 1);
 }
 
+/// Animations, materials and cameras do not matter, nor do scenes without nodes.
+#[test]
+fn parts_without_geometry_may_lack_properties() {
+    let outcome = changed(|document, _| {
+        document["animations"] = json!([{
+            "channels": [{"sampler": 0, "target": {"path": "pointer"}}],
+            "samplers": [{"input": 0, "output": 0}]
+        }]);
+        document["cameras"] = json!([{}]);
+        document["materials"] = json!([{"alphaMode": 7}]);
+        document["scenes"].as_array_mut().unwrap().push(json!({"name": "empty"}));
+    });
+    is_tetrahedron(outcome, 1);
+    let broken = changed(|document, _| {
+        document["cameras"] = json!([{}]);
+        document["accessors"][0]["count"] = json!("four");
+    });
+    refused("an accessor", broken, "JSON: line 1, column ");
+}
+
 #[test]
 fn other_versions_are_named() {
     let old = json!({"asset": {"version": "1.0"}, "buffers": {"a": {}}, "meshes": {"b": {}}});
