@@ -27,7 +27,7 @@ pub(super) struct Args {
     /// repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Print all measures instead of those that decide between planners.
+    /// Print all measures.
     #[arg(long)]
     wide: bool,
 }

@@ -94,7 +94,7 @@ pub(super) struct Args {
     /// Print the summary as JSON instead of a table.
     #[arg(long, conflicts_with = "shard")]
     json: bool,
-    /// Print all measures instead of those that decide between planners.
+    /// Print all measures.
     #[arg(long, conflicts_with_all = ["shard", "json"])]
     wide: bool,
 }

@@ -40,8 +40,14 @@ fn allowed() -> BTreeMap<String, String> {
     };
     let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
     let rules = Rules::allowed_values(&complete).into_iter();
+    // The page lists the measures themselves.
+    let measures = MEASURES.iter().map(|measure| measure.id).collect::<Vec<_>>().join(", ");
+    let cell = |allowed: String| match allowed == measures {
+        true => "[measures](#measures)".into(),
+        false => allowed,
+    };
     // A check that all entries share is listed once.
-    rules.map(|(key, allowed)| (whole(&key), allowed)).collect()
+    rules.map(|(key, allowed)| (whole(&key), cell(allowed))).collect()
 }
 
 /// Returns `key` without the indices of its entries.

@@ -1,6 +1,7 @@
 //! Objects of a library, of which each trial touches one at a drawn pose.
 
 use super::library_settings::LibrarySettings;
+use super::placement::plausible_units;
 use super::scene::{ObjectSettings, Scene, Unit};
 use nalgebra::{Isometry3, Vector3};
 use palpate_explore::recognition::{Library, LibraryObject, PosePrior, Turn};
@@ -47,6 +48,30 @@ pub struct TrueObject {
     pub offset_m: [f64; 3],
 }
 
+/// Sizes of an object on a table.
+// heuristic: from a bead to a piece of furniture; a wrong unit is off by ten or more.
+const SIZES_M: [f64; 2] = [0.002, 2.0];
+
+/// Checks the size of an object read in `unit`.
+///
+/// # Errors
+/// If a finger cannot explore it, with the unit that would give such a size.
+fn check_size(size_m: f64, unit: Unit) -> Result<(), InputError> {
+    let [least_m, most_m] = SIZES_M;
+    if (least_m..=most_m).contains(&size_m) {
+        return Ok(());
+    }
+    let extent = size_m / unit.metres_per_unit();
+    let other = plausible_units(extent, false).first().map(|other| {
+        let would_m = extent * other.metres_per_unit();
+        format!("; with library.unit = \"{other}\" it would measure {would_m:.3} m")
+    });
+    Err(InputError::new(format!(
+        "with library.unit = \"{unit}\" the object measures {size_m:.3e} m"
+    ))
+    .allowed(format!("{least_m} to {most_m} m{}", other.unwrap_or_default())))
+}
+
 impl LoadedLibrary {
     /// Reads the meshes of a library.
     ///
@@ -82,7 +107,9 @@ impl LoadedLibrary {
             let (mesh, report) = import(path, unit.metres_per_unit())?;
             content.update(format!("{name} {}\n", report.sha256));
             let class = name.split('-').next().filter(|_| *has_classes).unwrap_or(name);
-            Ok((path.clone(), Arc::new(LibraryObject::new(name, &mesh).of_class(class))))
+            let object = LibraryObject::new(name, &mesh).of_class(class);
+            check_size(2.0 * object.radius_m(), *unit).map_err(|error| error.at(path.display()))?;
+            Ok((path.clone(), Arc::new(object)))
         };
         let mut chosen = |is_chosen: &dyn Fn(&String) -> bool| {
             files.iter().filter(|(name, _)| is_chosen(name)).map(&mut read).collect()

@@ -93,6 +93,9 @@ fn a_run_depends_on_the_meshes_of_its_library() {
     fs::write(path.join("objects/._large.obj"), "resource fork").unwrap();
     fs::write(path.join("objects/README.md"), "two cubes").unwrap();
     succeeds(path, &RUN);
+    // In mm, as most parts are.
+    write("small.obj", 30.0);
+    fails(path, &RUN, &["small.obj", "with library.unit = \"mm\" it would measure 0.10"]);
     write("small.obj", 0.031);
     fails(path, &RUN, &["scene.library.folder", "has changed since the run began"]);
 }

@@ -14,6 +14,9 @@ pub const TEXT_MAX: u64 = 64 << 20;
 /// Byte order mark that some programs write before UTF-8 text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
+/// First bytes of a file that Git LFS puts in place of a large one.
+const LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
+
 /// Opens a file for reading.
 ///
 /// # Errors
@@ -32,20 +35,22 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// Reads the bytes of a file of at most `most` bytes.
 ///
 /// # Errors
-/// The errors of [`open`], and if it is larger.
+/// The errors of [`open`], and if it is larger, or a pointer of Git LFS.
 pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(file.metadata()?.len().min(most) as usize)?;
     // A file may grow while it is read, and some report a size of zero and never end.
     file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > most {
-        true => Err(io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            format!("larger than {} MiB", most >> 20),
-        )),
-        false => Ok(bytes),
+    if bytes.len() as u64 > most {
+        let size = format!("larger than {} MiB", most >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, size));
     }
+    if bytes.starts_with(LFS_POINTER) {
+        let pointer = "a pointer of Git LFS, not the file: run git lfs pull in its repository";
+        return Err(io::Error::new(io::ErrorKind::InvalidData, pointer));
+    }
+    Ok(bytes)
 }
 
 /// Reads the text of a file of at most `most` bytes, without a byte order mark.

@@ -130,7 +130,10 @@ fn parsed_contents(simulation: &Simulation) -> Result<Vec<(PathBuf, String)>, Ru
     if let Some(arm) = scene.arm.as_ref().filter(|arm| arm.is_file()) {
         let path = PathBuf::from(&arm.model);
         let mut bytes = files::bytes(&path, files::TEXT_MAX).map_err(io_error(&path))?;
-        bytes.extend(environment.arm_mjcf().unwrap_or_default().as_bytes());
+        // Both have the capsules that were fitted to the meshes of its file.
+        let capsules = || format!("{:?}", environment.robot().map(|robot| robot.capsules()));
+        let model = environment.arm_mjcf().map_or_else(capsules, str::to_owned);
+        bytes.extend(model.as_bytes());
         contents.push((path, sha256(&bytes)));
     }
     Ok(contents)

@@ -38,7 +38,8 @@ pub(super) fn points(
         return Err(at(InputError::new("is neither a PLY or PCD cloud nor a PNG image")
             .remedy("allowed are .ply, .pcd, and .png with 16-bit depths")));
     }
-    let cloud = if is_pcd { pcd::points(&bytes) } else { ply::vertices(&bytes) }.map_err(at)?;
+    let cloud = if is_pcd { pcd::points(&bytes, camera.frame) } else { ply::vertices(&bytes) }
+        .map_err(at)?;
     let moved = |p: Point3<f64>| match camera.frame {
         Frame::Camera => p * scale,
         Frame::World => x_wc.inverse_transform_point(&(p * scale)),

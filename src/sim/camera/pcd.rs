@@ -1,5 +1,6 @@
 //! Point clouds of the Point Cloud Library (`.pcd`, version 0.7).
 
+use super::settings::Frame;
 use nalgebra::Point3;
 use palpate_input::error::InputError;
 
@@ -14,15 +15,18 @@ struct Layout {
     /// Position of each coordinate among the values of a line.
     columns: [usize; 3],
     encoding: String,
+    viewpoint: Vec<String>,
 }
 
-/// Returns the points of a cloud with a depth, in the file's unit.
+/// Returns the points of a cloud with a depth, in the file's unit; `frame` is that of its points.
 ///
 /// # Errors
-/// If the header is invalid, or the data are shorter than it states.
-pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
+/// If the header is invalid, the data are shorter than it states, or the viewpoint leaves the frame
+/// open.
+pub(super) fn points(bytes: &[u8], frame: Frame) -> Result<Vec<Point3<f64>>, InputError> {
     let (layout, data) = header(bytes)?;
-    let Layout { points, axes, step, columns, encoding } = &layout;
+    let Layout { points, axes, step, columns, encoding, viewpoint } = &layout;
+    check_viewpoint(viewpoint, frame)?;
     let decoded;
     let (data, is_by_axis) = match encoding.as_str() {
         "ascii" => return written(data, *points, columns),
@@ -91,6 +95,7 @@ fn written(
 
 fn header(bytes: &[u8]) -> Result<(Layout, &[u8]), InputError> {
     let [mut names, mut sizes, mut kinds, mut counts]: [Vec<String>; 4] = Default::default();
+    let mut viewpoint = Vec::new();
     let (mut points, mut rest) = (None, bytes);
     while let Some(end) = rest.iter().position(|byte| *byte == b'\n') {
         let line = String::from_utf8_lossy(&rest[..end]).into_owned();
@@ -102,12 +107,12 @@ fn header(bytes: &[u8]) -> Result<(Layout, &[u8]), InputError> {
             "SIZE" => sizes = words.collect(),
             "TYPE" => kinds = words.collect(),
             "COUNT" => counts = words.collect(),
-            "VIEWPOINT" => check_viewpoint(words)?,
+            "VIEWPOINT" => viewpoint = words.collect(),
             "POINTS" => points = words.next().and_then(|count| count.parse().ok()),
             "DATA" => {
                 let layout = layout([&names, &sizes, &kinds, &counts], points);
                 let encoding = words.next().unwrap_or_default();
-                return Ok((Layout { encoding, ..layout? }, rest));
+                return Ok((Layout { encoding, viewpoint, ..layout? }, rest));
             }
             _ => {}
         }
@@ -115,14 +120,17 @@ fn header(bytes: &[u8]) -> Result<(Layout, &[u8]), InputError> {
     Err(InputError::new("PCD: no line DATA"))
 }
 
-/// Refuses a viewpoint other than the identity (translation, then quaternion w, x, y, z): PCL's
-/// viewer takes it for the pose of the points' frame, `pointcloud_to_pcd` of pcl_ros writes with it
-/// points that are in the world already.
-fn check_viewpoint(words: impl Iterator<Item = String>) -> Result<(), InputError> {
-    let words: Vec<String> = words.collect();
-    let numbers = words.iter().map(|word| word.parse::<f64>().ok());
-    let identity = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0].map(Some);
-    match numbers.eq(identity) {
+/// Checks the viewpoint: translation, then quaternion w, x, y, z. One at the origin is a turn for
+/// the eye, which drivers of cameras write with points in the camera's frame.
+///
+/// # Errors
+/// If it states another pose: PCL's viewer takes it for that of the points' frame, and
+/// `pointcloud_to_pcd` of pcl_ros writes it with points that are in the world already.
+fn check_viewpoint(words: &[String], frame: Frame) -> Result<(), InputError> {
+    let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();
+    let is_identity = numbers == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    let is_turn = frame == Frame::Camera && numbers.len() == 7 && numbers[..3] == [0.0; 3];
+    match words.is_empty() || is_identity || is_turn {
         true => Ok(()),
         false => Err(InputError::new(format!("PCD: VIEWPOINT {}", words.join(" ")))
             .allowed("VIEWPOINT 0 0 0 1 0 0 0, since programs disagree on the frame of other files")
@@ -160,7 +168,7 @@ fn layout(lines: [&Vec<String>; 4], points: Option<usize>) -> Result<Layout, Inp
         return Err(InputError::new("PCD: FIELDS lacks x, y or z"));
     };
     let (axes, columns) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
-    Ok(Layout { points, axes, step, columns, encoding: String::new() })
+    Ok(Layout { points, axes, step, columns, encoding: String::new(), viewpoint: Vec::new() })
 }
 
 /// Returns the data of `binary_compressed`: two sizes and a stream of the format LZF.
@@ -199,7 +207,41 @@ fn decompressed(data: &[u8]) -> Result<Vec<u8>, InputError> {
 
 #[cfg(test)]
 mod tests {
-    use super::points;
+    use super::{Frame, points as read};
+    use nalgebra::Point3;
+    use palpate_input::error::InputError;
+
+    fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, InputError> {
+        read(bytes, Frame::Camera)
+    }
+
+    #[test]
+    fn lines_and_viewpoint_must_be_those_of_the_header() {
+        let lines = b"7 0.5 1 2\n7 nan nan nan\n7 0.5 1 3\n";
+        let ascii = encoded("ascii", lines);
+        for more in [&b""[..], b"7 1 1 1\n"] {
+            let other = [&encoded("ascii", &lines[..10])[..], more].concat();
+            assert!(points(&other).unwrap_err().to_string().contains("POINTS 3"));
+        }
+        let stated = |viewpoint: &str| {
+            let text = String::from_utf8(ascii.clone()).unwrap();
+            text.replace("VIEWPOINT 0 0 0 1 0 0 0", &format!("VIEWPOINT {viewpoint}")).into_bytes()
+        };
+        for (viewpoint, is_camera, is_world) in [
+            ("0 0 0 1 0 0 0", true, true),
+            ("0 0 0 0 1 0 0", true, false),
+            ("0.1 0 0 1 0 0 0", false, false),
+            ("0 0 0 1 0 0", false, false),
+        ] {
+            let bytes = stated(viewpoint);
+            for (frame, is_read) in [(Frame::Camera, is_camera), (Frame::World, is_world)] {
+                let found = read(&bytes, frame);
+                assert_eq!(found.is_ok(), is_read, "{viewpoint} {frame:?}");
+                let said = found.err().map(|error| error.to_string()).unwrap_or_default();
+                assert!(is_read || said.contains(viewpoint), "{said}");
+            }
+        }
+    }
 
     const HEADER: &str = "# .PCD v0.7\nVERSION 0.7\nFIELDS rgb x y z\nSIZE 4 4 4 4\nTYPE U F F F\n\
                           COUNT 1 1 1 1\nWIDTH 3\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\nDATA ";

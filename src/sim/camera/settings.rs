@@ -44,7 +44,7 @@ pub struct CameraSettings {
     /// Unit of the file; default: `m` for a cloud, `mm` for depths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
-    /// Length of one unit of the file, in place of `unit`: 1e-4 for the raw depths of a D405.
+    /// Length of one unit of the file, in place of `unit`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_m: Option<f64>,
     /// Frame of a cloud's points.
@@ -54,13 +54,13 @@ pub struct CameraSettings {
     /// default: by `fov_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics_px: Option<[f64; 4]>,
-    /// Pixels along width and height; default: `[640, 360]`, or those of a PNG.
+    /// Pixels along width and height; default: `[640, 360]`, or a PNG's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixels: Option<[usize; 2]>,
     /// Horizontal field of view.
     #[serde(default = "fov_deg")]
     pub fov_deg: f64,
-    /// Noise of each pixel; default: none if simulated, that of the model or of a D405 for a file.
+    /// Noise of each pixel; for a file, default: the model's or a D405's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<PixelNoise>,
     /// Error of the stated pose, common to a view.

@@ -35,9 +35,6 @@ const FORMATS: &[(&str, Read)] = &[
     ("ply", ply::read),
 ];
 
-/// First bytes of a file that Git LFS puts in place of a large one.
-const LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
-
 /// Whether the extension of a path is that of a mesh format, and its file is not hidden: macOS
 /// writes a file `._NAME` beside each file on other systems' disks.
 pub fn is_mesh_file(path: &Path) -> bool {
@@ -107,10 +104,6 @@ fn read_and_repair(
         return Err(InputError::new(format!("is a \".{extension}\" file; supported: {supported}")));
     };
     let bytes = files::bytes(path, BYTES_MAX).map_err(unreadable)?;
-    if bytes.starts_with(LFS_POINTER) {
-        let pointer = InputError::new("is a pointer of Git LFS, not the mesh");
-        return Err(pointer.remedy("run git lfs pull in its repository"));
-    }
     let mut raw = read(&Source { path, bytes: &bytes, allow_external_buffers, upright })?;
     raw.scale(metres_per_unit);
     let (mesh, report) = repair(raw)?;

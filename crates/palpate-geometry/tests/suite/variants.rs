@@ -326,7 +326,7 @@ fn point_clouds_are_named_with_their_elements() {
 fn pointers_to_stored_files_are_named() {
     let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
     for name in ["mesh.obj", "mesh.stl", "mesh.ply", "mesh.gltf", "mesh.glb"] {
-        refused(name, import_bytes(name, pointer), "is a pointer of Git LFS, not the mesh");
+        refused(name, import_bytes(name, pointer), "a pointer of Git LFS, not the file");
     }
 }
 
