@@ -112,6 +112,7 @@ mod shell_reference;
 mod solid;
 mod strokes;
 mod sweeps;
+mod toml_files;
 mod twin;
 mod twin_faults;
 mod whole;
