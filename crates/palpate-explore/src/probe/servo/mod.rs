@@ -1,9 +1,11 @@
 //! Servo: carries out a touch with a backend: travel, tare, approach, settle, read, retract.
 
 mod contact_monitor;
+mod home;
 mod reach;
 mod slide;
 mod trajectory;
+mod zone_reach;
 
 use super::{Contact, Probe, SweptVolume, Touch, check_finite};
 use crate::backend::{Backend, Command, Fault};
@@ -20,8 +22,10 @@ use reach::PathSegment;
 use trajectory::{ARRIVED_M, Path, paths_around};
 
 pub use crate::task::approach::BEYOND_M;
-pub use reach::{ArmReach, check_reach};
+pub use home::find_home;
+pub use reach::ArmReach;
 pub(super) use reach::{standoff, turning_point};
+pub use zone_reach::check_reach;
 
 /// Distance beyond the stand-off up to which a finger moves there directly; a heuristic: smaller
 /// than the height of any object.

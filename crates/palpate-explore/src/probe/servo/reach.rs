@@ -5,18 +5,17 @@
 
 use super::trajectory::{ARRIVED_M, ArcPath, JointLine, Path, paths_around};
 use crate::backend::interlock::defaults;
-use crate::control::{Controller, JointMotion, posture};
+use crate::control::{Controller, JointMotion};
 use crate::robot::Robot;
 use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{
-    ArmError, Chain, Clearance, JointSegment, JointType, Joints, LinkCapsule, RobotPart,
+    Chain, Clearance, JointSegment, JointType, Joints, LinkCapsule, RobotPart,
 };
 use crate::task::approach::BEYOND_M;
 use crate::task::touch::TouchSettings;
-use crate::task::{Approach, Ball, DIRECTIONS, Task};
+use crate::task::{Approach, Ball};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_geometry::sweep::Capsule;
-use palpate_input::error::InputError;
 
 /// Returns the stand-off pose of the tip, in front of the zone of possible contact.
 pub(in crate::probe) fn standoff(
@@ -40,116 +39,6 @@ pub(in crate::probe) fn turning_point(robot: &Robot, approach: &Approach) -> Iso
     let hull_w = ahead_w * robot.finger.radius_m;
     let p_wt = approach.p_far_w + hull_w + ahead_w * BEYOND_M;
     Isometry3::from_parts(p_wt.into(), approach.r_wt())
-}
-
-/// Number of places checked along each side of the zone; a heuristic.
-const TRIED_PER_SIDE: usize = 5;
-
-/// Checks that `robot` reaches the whole zone of the task: in front of each place of a grid, and
-/// at the turning point behind the farthest depth. For a whole object, checks that it reaches the
-/// centre from at least one direction.
-///
-/// # Errors
-/// If it does not; the error names the place with the largest deviation.
-pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), InputError> {
-    let Some(zone) = task.zone() else {
-        let of = DIRECTIONS;
-        let is_any = task.unreached(of).len() < of;
-        return match is_any {
-            true => Ok(()),
-            false => Err(InputError::new(format!(
-                "the finger cannot reach the object from any of {of} directions"
-            ))
-            .remedy(
-                "move it closer (object.position_m), move arm.base_position_m, or decrease \
-                 whole_object.radius_m or whole_object.lowest_m",
-            )),
-        };
-    };
-    let places = zone.grid(TRIED_PER_SIDE);
-    let of = places.len();
-    let missed: Vec<_> =
-        places.iter().filter_map(|place| Some((place, miss(robot, task, place)?))).collect();
-    let by = |(_, miss): &(_, Miss)| miss.distance_m + miss.angle_rad;
-    let count = missed.len();
-    let Some((place, miss)) = missed.into_iter().max_by(|a, b| by(a).total_cmp(&by(b))) else {
-        return Ok(());
-    };
-    let away =
-        format!("{:.2} mm and {:.1} deg", 1e3 * miss.distance_m, miss.angle_rad.to_degrees());
-    let found = match nearest_base(robot, task, &zone.grid(2)) {
-        Some(by_w) => format!(
-            "set arm.base_position_m to {:?}, or subtract {:?} from the positions of object and \
-             zone: then the arm reaches the zone's corners",
-            (robot.chain.base.translation.vector + by_w).as_slice(),
-            by_w.as_slice()
-        ),
-        None => "move the object and the zone closer (object.position_m, zone), move \
-                 arm.base_position_m, or make the zone smaller"
-            .into(),
-    };
-    Err(InputError::new(format!(
-        "the arm does not reach {count} of {of} places of the zone: at {place:?} the tip misses {} by \
-         {away}",
-        miss.phase
-    ))
-    .remedy(found))
-}
-
-/// Pose of an approach that a robot does not reach, and how far its closest pose is away.
-struct Miss {
-    phase: &'static str,
-    distance_m: f64,
-    angle_rad: f64,
-}
-
-/// Returns the pose that `robot` misses in the approach to `place`.
-fn miss(robot: &Robot, task: &Task, place: &[f64]) -> Option<Miss> {
-    let approach = task.approach(&place.to_vec().into())?;
-    let poses = [
-        ("the stand-off", standoff(robot, task.touch().standoff_m, &approach)),
-        ("the farthest depth", turning_point(robot, &approach)),
-    ];
-    let missed = poses.iter().find_map(|(phase, x_wt)| match posture(&robot.chain, x_wt) {
-        Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
-            Some(Miss { phase, distance_m, angle_rad })
-        }
-        _ => None,
-    });
-    missed.or_else(|| {
-        // An arm may reach a pose, and still stop on its way at the limit of a joint.
-        let chain = &robot.chain;
-        let (mut q, mut from) = (chain.home, chain.forward(&chain.home));
-        let speeds_m_s = [task.touch().travel_m_s, task.touch().approach_m_s];
-        let ways = ["the stand-off on the way from home", "the farthest depth on the approach"];
-        for ((way, (_, to)), speed_m_s) in ways.into_iter().zip(&poses).zip(speeds_m_s) {
-            let path = Path::straight(from.translation.vector, *to, speed_m_s);
-            match rehearse(chain, q, path, |_, _| true) {
-                Ok(there) => (q, from) = (there, *to),
-                Err((distance_m, angle_rad)) => {
-                    return Some(Miss { phase: way, distance_m, angle_rad });
-                }
-            }
-        }
-        None
-    })
-}
-
-/// Distances by which a better base is searched along each axis, m; a heuristic: up to half the
-/// reach of a table-mounted arm.
-const MOVES_M: [f64; 7] = [0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
-
-/// Returns the smallest move of the base along an axis of `W` after which `robot` reaches `places`.
-fn nearest_base(robot: &Robot, task: &Task, places: &[Vec<f64>]) -> Option<Vector3<f64>> {
-    let axes = [Vector3::y(), Vector3::z(), Vector3::x()];
-    let moves = MOVES_M
-        .into_iter()
-        .flat_map(|move_m| axes.into_iter().flat_map(move |axis| [axis * move_m, axis * -move_m]));
-    moves.into_iter().find(|by_w| {
-        let mut moved = robot.clone();
-        moved.chain.base.translation.vector += by_w;
-        places.iter().all(|place| miss(&moved, task, place).is_none())
-    })
 }
 
 /// Fractions of an approach from which the path home is checked, since contact may occur anywhere:
@@ -349,7 +238,7 @@ const REACTION: f64 = 2.0;
 ///
 /// # Errors
 /// If it does not get to the end: the distance, m, and the angle, rad, to the goal at that time.
-fn rehearse(
+pub(super) fn rehearse(
     chain: &Chain,
     mut q: Joints,
     mut path: Path,

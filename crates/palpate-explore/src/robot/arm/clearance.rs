@@ -97,6 +97,7 @@ fn part_free(found_m: f64, least_m: f64, length_m: f64) -> Option<f64> {
 }
 
 /// Something that a link must not meet.
+#[derive(Clone)]
 pub enum Obstacle {
     /// Another link.
     Link(usize),
@@ -107,6 +108,7 @@ pub enum Obstacle {
 }
 
 /// The capsules of a robot with the obstacles that they must avoid.
+#[derive(Clone)]
 pub struct Clearance {
     links: Vec<LinkCapsule>,
     /// Pairs of a link and an obstacle.
