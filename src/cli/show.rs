@@ -17,6 +17,7 @@ use crate::experiment::truth::Truth;
 use crate::report;
 use crate::report::files::png;
 use crate::sim::environment::ObjectShape;
+use crate::sim::home::home_deg;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
 use anyhow::{Context, bail, ensure};
@@ -63,6 +64,9 @@ pub(super) struct Args {
     /// Draw a scene's object with its zone, or the reachable surface of a whole object.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    /// Find a home posture of a scene's arm.
+    #[arg(long)]
+    home: bool,
     /// Draw what the depth camera of a scene sees.
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
@@ -93,6 +97,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         ("--mjcf", args.mjcf.is_some(), is_scene, "a scene (.toml)"),
         ("--png", args.png.is_some(), is_scene, "a scene (.toml)"),
         ("--render", args.render.is_some(), is_scene, "a scene (.toml)"),
+        ("--home", args.home, is_scene, "a scene (.toml)"),
         ("--camera", args.camera.is_some(), is_scene, "a scene (.toml)"),
         ("--watch", args.watch.watch, is_toml, "a scene or an experiment (.toml)"),
         ("--json", args.json, is_folder, "a run's folder"),
@@ -114,6 +119,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     }
     let text = match extension {
         _ if is_folder => run_folder(&Run::read(&path)?, args.json),
+        Some("toml") if is_scene && args.home => home(Scene::load(&path, &args.set)?, talk)?,
         Some("toml") if is_scene => scene(&path, args, talk)?,
         Some("toml") => store::resolved(&Experiment::load(&path, &args.set)?),
         _ => {
@@ -138,6 +144,15 @@ fn run_folder(run: &Run, json: bool) -> String {
         true => format!("{:#}", report::tables::summary::json(run)),
         false => report::tables::summary::text(run, false),
     }
+}
+
+/// Returns a home posture of a scene's arm as a setting.
+fn home(scene: Scene, talk: Verbosity) -> anyhow::Result<String> {
+    let home = report_slow_steps(talk, |tell| {
+        tell("searching a home posture");
+        home_deg(scene)
+    })?;
+    Ok(format!("home_deg = {home:?}"))
 }
 
 fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
@@ -182,6 +197,9 @@ fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
             "a stage that turns the finger around an object has no MuJoCo model; allowed is a scene \
              with [arm]"
         );
+        if let Some(error) = environment.missing_masses() {
+            return Err(error.into());
+        }
         bail!("this scene has no mesh to write as MJCF or to draw");
     }
     Ok(text)

@@ -11,6 +11,7 @@ use crate::sim::finger::effects::wrench::WrenchEffect;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
 use palpate_explore::robot::Robot;
+use palpate_explore::robot::arm::parts::{ArmParts, Gaps};
 use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
@@ -34,6 +35,8 @@ pub struct Environment {
     task: Task,
     arm: Option<Chain>,
     arm_mjcf: Option<String>,
+    /// Links of the arm without a usable mass.
+    massless: Vec<String>,
     fingertip: Option<Fingertip>,
     notices: Vec<String>,
 }
@@ -56,23 +59,42 @@ pub(super) fn missing_part(part: &str) -> InputError {
     InputError::new(format!("the scene has no {part}, which its simulator needs"))
 }
 
+/// Returns the error of an arm some of whose links have no usable mass.
+fn missing_masses(settings: &ArmSettings, massless: &[String]) -> InputError {
+    InputError::new(format!("no mass of {}", massless.join(", ")))
+        .at(&settings.model)
+        .allowed("a mass above 0 with its inertia: <inertial>, or `dynamics` of an arm model")
+        .remedy("use simulator = \"kinematic\" without masses")
+}
+
 /// Returns an [`InputError`] with the message of another error.
 pub(super) fn invalid(error: impl std::fmt::Display) -> InputError {
     InputError::new(error.to_string())
 }
 
 impl Environment {
-    /// Returns the model of an arm, and what its file lacks or what is assumed instead, in words.
+    /// Returns the model of an arm, and what its file lacks.
     ///
     /// # Errors
     /// If the file cannot be read, or does not describe an arm.
-    pub fn arm_model(settings: &ArmSettings) -> Result<(ArmModel, Vec<String>), InputError> {
+    pub fn arm_model(settings: &ArmSettings) -> Result<(ArmModel, Gaps), InputError> {
+        match Self::arm_parts(settings)? {
+            Some(parts) => settings.assembled(parts),
+            None => settings.model(),
+        }
+    }
+
+    /// Returns joints and shapes of a URDF or an MJCF; `None` for an arm model.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or does not describe an arm.
+    pub fn arm_parts(settings: &ArmSettings) -> Result<Option<ArmParts>, InputError> {
         #[cfg(feature = "mujoco")]
         if settings.model.ends_with(".xml") {
             let path = settings.model.as_ref();
-            return settings.assembled(super::mujoco::arm_parts(path, settings.tip.as_deref())?);
+            return super::mujoco::arm_parts(path, settings.tip.as_deref()).map(Some);
         }
-        settings.model()
+        settings.parts()
     }
 
     /// Loads the mesh that the scene names and builds the environment.
@@ -119,13 +141,14 @@ impl Environment {
     pub fn with_shape(mut scene: Scene, shape: ObjectShape) -> Result<Self, InputError> {
         let mut notices = Vec::new();
         let (shape, holes) = with_patches(&scene, shape);
-        let mut arm_mjcf = None;
+        let (mut arm_mjcf, mut massless) = (None, Vec::new());
         let arm = match &scene.arm {
             Some(settings) => {
-                let (model, lacks) = Self::arm_model(settings)?;
-                if !lacks.is_empty() {
-                    notices.push(notice::arm_lacks(&settings.model, &lacks));
+                let (model, gaps) = Self::arm_model(settings)?;
+                if !gaps.notes.is_empty() {
+                    notices.push(notice::arm_lacks(&settings.model, &gaps.notes));
                 }
+                massless = gaps.massless;
                 arm_mjcf =
                     model::mjcf(&settings.model, &model).map_err(invalid)?.or_else(|| arm(&model));
                 Some(settings.chain_of(&model)?)
@@ -170,14 +193,20 @@ impl Environment {
             zone.datum_y_m.get_or_insert(0.0);
             Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
         };
-        if scene.simulator == SimulatorKind::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
-            return Err(missing_part(
-                "masses: `mjcf` or the `dynamics` of every joint, in its arm's model",
-            ));
+        if scene.simulator == SimulatorKind::Dynamic
+            && let (Some(settings), None) = (&scene.arm, &arm_mjcf)
+        {
+            return Err(missing_masses(settings, &massless));
         }
         let fingertip =
             scene.effects.has_load().then(|| Fingertip::new(&scene.finger, &scene.effects));
-        Ok(Self { scene, shape, task, arm, arm_mjcf, fingertip, notices })
+        Ok(Self { scene, shape, task, arm, arm_mjcf, massless, fingertip, notices })
+    }
+
+    /// Returns the error of an arm without the masses that its MJCF needs; `None` if it has them.
+    pub fn missing_masses(&self) -> Option<InputError> {
+        let settings = self.scene.arm.as_ref().filter(|_| self.arm_mjcf.is_none())?;
+        Some(missing_masses(settings, &self.massless))
     }
 
     /// Returns warnings about likely configuration mistakes.
@@ -561,7 +590,7 @@ fn whole_object_task(
 }
 
 /// Returns the robot of a scene, whose finger `chain` carries.
-fn robot(scene: &Scene, chain: Chain) -> Robot {
+pub(super) fn robot(scene: &Scene, chain: Chain) -> Robot {
     let effects = &scene.effects;
     let accuracy = effects.wrench.as_ref().map(WrenchEffect::accuracy);
     let robot = Robot::new(chain, scene.finger.clone(), effects.skin.is_some());

@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod environment;
 pub mod finger;
+pub mod home;
 pub mod kinematic;
 pub mod known_body;
 pub mod library;

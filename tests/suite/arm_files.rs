@@ -247,13 +247,16 @@ fn what_a_file_lacks_is_said() -> io::Result<()> {
     for (arm, words) in [
         (
             "model = \"arm.urdf\"",
-            "arm.tip is needed, the link that carries the tool; the ends are jaw, camera",
+            "arm.tip = missing: allowed is the link that carries the tool; the ends are jaw, camera",
         ),
         ("model = \"arm.urdf\"\ntip = \"hand\"", "allowed is a link: root, link1"),
         ("model = \"arm.urdf\"\ntip = \"tool\"", "arm.home_deg = missing: allowed is 6 numbers"),
         ("model = \"arm.urdf\"\ntip = \"tool\"\nhome_deg = [1, 2]", "allowed is 6 numbers"),
         ("model = \"twice.urdf\"\ntip = \"tool\"", "link1 is moved by another joint"),
-        ("model = \"fast.urdf\"\ntip = \"link1\"\nhome_deg = [1]", "joint[0].speed_rad_s = 1000"),
+        (
+            "model = \"fast.urdf\"\ntip = \"link1\"\nhome_deg = [1]",
+            "joint joint1: speed_rad_s = 1000",
+        ),
         ("model = \"none.xml\"\ntip = \"tool\"", "none.xml: No such file"),
         ("model = \"one.xml\"\ntip = \"a\\u0000b\"", "a name without a zero byte"),
         ("model = \"one.xml\"\ntip = \"tool\"", "arm.tip = \"tool\": allowed is a site, or a body"),

@@ -10,6 +10,9 @@ mod approach;
 mod arm;
 #[cfg(feature = "mujoco")]
 mod arm_files;
+#[cfg(feature = "mujoco")]
+mod arm_mjcf;
+mod arm_urdf;
 mod around_commands;
 mod backend;
 mod band;

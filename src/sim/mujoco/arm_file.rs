@@ -1,5 +1,6 @@
 //! Arms from MJCF files, which MuJoCo reads.
 
+use super::arm_joint::{check_constraints, motor, name};
 use super::quiet;
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase, MjtJoint, MjtObjBase};
@@ -8,7 +9,7 @@ use nalgebra::{
 };
 use palpate_explore::robot::arm::JointType;
 use palpate_explore::robot::arm::parts::{
-    ArmParts, Body, LinkParts, Motor, PartMass, Shape, check_count, corners, rim,
+    ArmParts, Body, LinkParts, PartMass, Shape, check_count, corners, rim,
 };
 use palpate_input::error::InputError;
 use palpate_input::files;
@@ -24,17 +25,19 @@ use std::path::Path;
 pub fn arm_parts(path: &Path, tip: Option<&str>) -> Result<ArmParts, InputError> {
     let fail = |what: String| InputError::new(what).at(path.display());
     // MuJoCo does not say that a file is missing.
-    files::text(path, files::TEXT_MAX).map_err(|cause| InputError::io(path, cause))?;
+    let text = files::text(path, files::TEXT_MAX).map_err(|cause| InputError::io(path, cause))?;
+    check_root(&text).map_err(|cause| cause.at(path.display()))?;
     if tip.is_some_and(|tip| tip.contains('\0')) {
         return Err(fail("arm.tip".into()).allowed("a name without a zero byte"));
     }
     quiet();
-    let model = MjModel::from_xml(path).map_err(|cause| fail(format!("not an MJCF: {cause}")))?;
+    let model =
+        MjModel::from_xml(path).map_err(|cause| fail(format!("MuJoCo refuses it: {cause}")))?;
     let mut data = MjData::try_new(&model).map_err(|cause| fail(cause.to_string()))?;
     data.qpos_mut().fill(0.0);
     data.forward();
     let bodies = model.body_parentid().len();
-    let name = |kind, id: usize| model.id_to_name(kind, id).unwrap_or("unnamed").to_owned();
+    let name = |kind, id: usize| name(&model, kind, id);
     let names = |ids: &[usize]| -> String {
         let names = ids.iter().map(|id| name(MjtObjBase::mjOBJ_BODY, *id));
         names.collect::<Vec<_>>().join(", ")
@@ -73,41 +76,53 @@ pub fn arm_parts(path: &Path, tip: Option<&str>) -> Result<ArmParts, InputError>
     // Number of joints that move each body of the chain.
     let mut movers = vec![None; bodies];
     movers[0] = Some(0);
+    let mut joints = Vec::new();
     for &body in &chain {
         for joint in (0..model.jnt_type().len()).filter(|i| model.jnt_bodyid()[*i] as usize == body)
         {
-            let kind = match model.jnt_type()[joint] {
-                MjtJoint::mjJNT_HINGE => JointType::Revolute,
-                MjtJoint::mjJNT_SLIDE => JointType::Prismatic,
-                kind => {
-                    let problem = fail(format!("joint {}", name(MjtObjBase::mjOBJ_JOINT, joint)));
-                    return Err(problem.value(format!("{kind:?}")).allowed("hinge or slide"));
-                }
+            let at = |cause: InputError| {
+                let joint = name(MjtObjBase::mjOBJ_JOINT, joint);
+                cause.at(format!("{}: joint {joint}", path.display()))
             };
-            let limits = model.jnt_range()[joint];
+            let kind = kind(&model, joint).map_err(at)?;
+            if model.jnt_stiffness()[joint] != 0.0 {
+                let name = name(MjtObjBase::mjOBJ_JOINT, joint);
+                parts.lacks.push(format!("the spring of {name} (assumed: none)"));
+            }
+            joints.push(joint);
             parts.links.push(LinkParts {
                 joint: name(MjtObjBase::mjOBJ_JOINT, joint),
+                link: name(MjtObjBase::mjOBJ_BODY, body),
                 kind,
                 origin: data.xanchor()[joint].into(),
                 axis: UnitVector3::new_normalize(Vector3::from(data.xaxis()[joint])),
-                limits: model.jnt_limited()[joint].then_some(limits),
+                limits: model.jnt_limited()[joint].then_some(model.jnt_range()[joint]),
                 speed: None,
                 acceleration: None,
                 body: Body::default(),
-                motor: motor(&model, joint),
+                motor: motor(&model, joint).map_err(at)?,
             });
         }
         movers[body] = Some(parts.links.len());
     }
     check_count(&path.display().to_string(), parts.links.len())?;
+    // A body off the chain moves with the body of the chain that carries it.
+    let carrier = |mut id: usize| {
+        while movers[id].is_none() {
+            id = parent(id);
+        }
+        id
+    };
+    check_constraints(&model, &joints, |id| movers[carrier(id)].unwrap_or_default())
+        .map_err(|cause| cause.at(path.display()))?;
+    match home(&model, &joints) {
+        Ok(home) => parts.home = Some(home),
+        Err(names) => parts.postures = names,
+    }
     let solid =
         |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;
     for id in 1..bodies {
-        // A body off the chain moves with the body of the chain that carries it.
-        let mut carrier = id;
-        while movers[carrier].is_none() {
-            carrier = parent(carrier);
-        }
+        let carrier = carrier(id);
         // The tool replaces the bodies that the tip carries.
         if carrier == body && id != body {
             continue;
@@ -117,7 +132,10 @@ pub fn arm_parts(path: &Path, tip: Option<&str>) -> Result<ArmParts, InputError>
             .collect();
         let has_solid = geoms.iter().any(|geom| solid(*geom));
         let drawn = geoms.into_iter().filter(|geom| !has_solid || solid(*geom));
-        let shapes = drawn.filter_map(|geom| shape(&model, &data, geom));
+        let shapes = drawn.filter_map(|geom| shape(&model, &data, geom).transpose());
+        let shapes = shapes.collect::<Result<Vec<_>, _>>().map_err(|cause| {
+            cause.at(format!("{}: body {}", path.display(), name(MjtObjBase::mjOBJ_BODY, id)))
+        })?;
         match movers[carrier] {
             Some(count) if count > 0 => {
                 let whole = &mut parts.links[count - 1].body;
@@ -130,6 +148,23 @@ pub fn arm_parts(path: &Path, tip: Option<&str>) -> Result<ArmParts, InputError>
     Ok(parts)
 }
 
+/// Returns the type of a joint of the chain.
+///
+/// # Errors
+/// If it is a ball or free joint, or a slide without limits.
+fn kind(model: &MjModel, joint: usize) -> Result<JointType, InputError> {
+    match model.jnt_type()[joint] {
+        MjtJoint::mjJNT_HINGE => Ok(JointType::Revolute),
+        MjtJoint::mjJNT_SLIDE if model.jnt_limited()[joint] => Ok(JointType::Prismatic),
+        MjtJoint::mjJNT_SLIDE => {
+            Err(InputError::new("range").value("missing").allowed("two numbers, m"))
+        }
+        kind => Err(InputError::new("type")
+            .value(if kind == MjtJoint::mjJNT_BALL { "ball" } else { "free" })
+            .allowed("hinge or slide")),
+    }
+}
+
 /// Returns the mass of a body in the world, if it has one.
 fn mass(model: &MjModel, data: &MjData<&MjModel>, body: usize) -> Option<PartMass> {
     let mass_kg = model.body_mass()[body];
@@ -138,26 +173,32 @@ fn mass(model: &MjModel, data: &MjData<&MjModel>, body: usize) -> Option<PartMas
     (mass_kg > 0.0).then(|| PartMass::at(&x_wi, mass_kg, &principal))
 }
 
-/// Returns the motor of a joint: its effort is that of the first actuator with a limit.
-fn motor(model: &MjModel, joint: usize) -> Motor {
-    let dof = model.jnt_dofadr()[joint] as usize;
-    let limit = |i: usize| {
-        let [forces, controls] = [model.actuator_forcerange()[i], model.actuator_ctrlrange()[i]];
-        let is_motor = model.actuator_biasprm()[i].iter().all(|part| *part == 0.0);
-        let gear = model.actuator_gear()[i][0].abs() * model.actuator_gainprm()[i][0].abs();
-        match (model.actuator_forcelimited()[i], model.actuator_ctrllimited()[i] && is_motor) {
-            (true, _) => Some(forces[1]),
-            (false, true) => Some(controls[1] * gear),
-            _ => None,
+/// Returns the posture of the keyframe `home`, one number per joint of `chain`, rad or m; if there
+/// is none, the names of the other keyframes.
+fn home(model: &MjModel, chain: &[usize]) -> Result<Vec<f64>, Vec<String>> {
+    let positions = model.jnt_qposadr();
+    let count = model.nq() as usize;
+    match model.name_to_id(MjtObjBase::mjOBJ_KEY, "home") {
+        Some(key) => {
+            let qpos = &model.key_qpos()[key * count..];
+            Ok(chain.iter().map(|joint| qpos[positions[*joint] as usize]).collect())
         }
-    };
-    let drives = |i: &usize| model.actuator_trnid()[*i][0] as usize == joint;
-    let efforts = (0..model.actuator_trnid().len()).filter(drives).filter_map(limit);
-    Motor {
-        armature: Some(model.dof_armature()[dof]).filter(|armature| *armature > 0.0),
-        effort_limit: efforts.filter(|limit| *limit > 0.0).reduce(f64::max),
-        damping: model.dof_damping()[dof],
-        friction: model.dof_frictionloss()[dof],
+        None => {
+            let keys = 0..model.key_qpos().len() / count.max(1);
+            Err(keys.map(|key| name(model, MjtObjBase::mjOBJ_KEY, key)).collect())
+        }
+    }
+}
+
+/// Checks that the outermost element of a file is not that of a URDF, which MuJoCo reads without
+/// its couplings and soft limits.
+fn check_root(text: &str) -> Result<(), InputError> {
+    match text.contains("<robot") && !text.contains("<mujoco") {
+        true => Err(InputError::new("outermost element")
+            .value("<robot>")
+            .allowed("<mujoco>")
+            .remedy("rename the URDF to end in .urdf")),
+        false => Ok(()),
     }
 }
 
@@ -175,7 +216,14 @@ fn placed(position: [f64; 3], rows: [f64; 9]) -> Isometry3<f64> {
 }
 
 /// Returns a geom in the world; `None` for a plane or height field.
-fn shape(model: &MjModel, data: &MjData<&MjModel>, geom: usize) -> Option<Shape> {
+///
+/// # Errors
+/// If its mesh is not in metres.
+fn shape(
+    model: &MjModel,
+    data: &MjData<&MjModel>,
+    geom: usize,
+) -> Result<Option<Shape>, InputError> {
     let [x, y, z] = model.geom_size()[geom];
     let balls: Vec<(Point3<f64>, f64)> = match model.geom_type()[geom] {
         MjtGeomBase::mjGEOM_SPHERE => vec![(Point3::origin(), x)],
@@ -189,8 +237,13 @@ fn shape(model: &MjModel, data: &MjData<&MjModel>, geom: usize) -> Option<Shape>
             let vertices = &model.mesh_vert()[first..first + count];
             vertices.iter().map(|p| (Point3::from(p.map(f64::from)), 0.0)).collect()
         }
-        _ => return None,
+        _ => return Ok(None),
     };
+    let shape = Shape(balls);
+    if model.geom_type()[geom] == MjtGeomBase::mjGEOM_MESH {
+        let mesh = model.geom_dataid()[geom] as usize;
+        shape.check_unit(&name(model, MjtObjBase::mjOBJ_MESH, mesh))?;
+    }
     let x_wg = placed(data.geom_xpos()[geom], data.geom_xmat()[geom]);
-    Some(Shape(balls).moved(&x_wg))
+    Ok(Some(shape.moved(&x_wg)))
 }

@@ -1,6 +1,7 @@
 //! MuJoCo bindings: compilation of models, and the plant that steps one.
 
 mod arm_file;
+mod arm_joint;
 mod dynamic;
 mod joint_servo;
 mod models;

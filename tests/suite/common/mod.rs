@@ -13,6 +13,7 @@ pub mod rig;
 pub mod runs;
 pub mod shapes;
 pub mod shipped;
+pub mod six;
 pub mod solids;
 pub mod tap;
 pub mod viewer;

@@ -1,7 +1,8 @@
 //! Model of an arm: a file with its joints, home posture, collision capsules and topics.
 
 use super::chain::{Joint, JointType, Joints, LinkCapsule, MAX_JOINTS, RobotPart};
-use nalgebra::{Isometry3, UnitVector3, Vector3};
+use super::inertia::inertia_fault;
+use nalgebra::{Isometry3, Matrix3, UnitVector3, Vector3};
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate};
 use palpate_input::files;
@@ -197,6 +198,29 @@ impl ArmModel {
         }
     }
 
+    /// Returns the names of the joints whose links have no mass; none if a MuJoCo file gives them.
+    pub fn massless(&self) -> Vec<String> {
+        let without = self.joint.iter().filter(|joint| joint.dynamics().is_none());
+        match self.mjcf {
+            Some(_) => Vec::new(),
+            None => without.map(|joint| joint.name().to_owned()).collect(),
+        }
+    }
+
+    /// Returns the key of a setting with the joint's or link's name in place of its index.
+    pub fn named(&self, key: &str) -> String {
+        let name = |list: &str| -> Option<String> {
+            let (index, rest) = key.strip_prefix(list)?.strip_prefix('[')?.split_once(']')?;
+            let index: usize = index.parse().ok()?;
+            let name = match list {
+                "joint" => self.joint.get(index)?.name(),
+                _ => &self.capsule.get(index)?.link,
+            };
+            Some(format!("{list} {name}: {}", rest.trim_start_matches('.')))
+        };
+        name("joint").or_else(|| name("capsule")).unwrap_or_else(|| key.into())
+    }
+
     /// Returns the number of joints that move the elbow's link.
     pub fn elbow(&self) -> Option<usize> {
         self.link(self.elbow.as_deref()?)
@@ -265,6 +289,13 @@ impl JointDynamics {
         rules.number(&format!("{key}.mass_kg"), self.mass_kg, 1e-6..=1e4);
         rules.numbers(&format!("{key}.centre_m"), &self.centre_m, -FAR_M..=FAR_M);
         rules.numbers(&format!("{key}.inertia_kg_m2"), &self.inertia_kg_m2, -1e4..=1e4);
+        let [xx, yy, zz, xy, xz, yz] = self.inertia_kg_m2;
+        if let Some(fault) = inertia_fault(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)) {
+            let value = format!("{:?}", self.inertia_kg_m2);
+            rules.require(&format!("{key}.inertia_kg_m2"), value, false, || {
+                format!("the inertia of a body; it has {fault}")
+            });
+        }
         rules.number(&format!("{key}.armature"), self.armature, 1e-6..=1e4);
         rules.number(&format!("{key}.effort_limit"), self.effort_limit, 1e-3..=1e6);
         rules.number(&format!("{key}.damping"), self.damping, 0.0..=1e6);

@@ -1,8 +1,10 @@
 //! An arm as a robot description file gives it, and its conversion to an arm model.
 
 use super::JointType;
+use super::inertia::{LEAST_KG_M2, rounded_up};
 use super::model::{ArmModel, BASE, CapsuleModel, JointDynamics, JointModel};
 use nalgebra::{Isometry3, Matrix3, Point3, UnitVector3, Vector3};
+use palpate_gp::math::pose;
 use palpate_input::error::InputError;
 use std::f64::consts::{PI, TAU};
 
@@ -18,8 +20,21 @@ pub struct ArmParts {
     pub links: Vec<LinkParts>,
     /// Frame of the tool; it points along +z.
     pub tool: Isometry3<f64>,
+    /// Home posture of the file, rad or m and one number per joint.
+    pub home: Option<Vec<f64>>,
+    /// Names of the file's other postures, if none is its home.
+    pub postures: Vec<String>,
     /// Parts that the file lacks, in words.
     pub lacks: Vec<String>,
+}
+
+/// Parts that an arm's file lacks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Gaps {
+    /// Each part, with what is assumed instead, in words.
+    pub notes: Vec<String>,
+    /// Links, or joints of an arm model, without a usable mass; with the reason if there is one.
+    pub massless: Vec<String>,
 }
 
 /// A joint with the link that it moves. A missing number is `None`.
@@ -27,6 +42,8 @@ pub struct ArmParts {
 pub struct LinkParts {
     /// Name of the joint.
     pub joint: String,
+    /// Name of the link.
+    pub link: String,
     /// Type of the joint.
     pub kind: JointType,
     /// A point on the axis.
@@ -52,6 +69,8 @@ pub struct Body {
     pub shapes: Vec<Shape>,
     /// Masses.
     pub masses: Vec<PartMass>,
+    /// Parts whose mass cannot be that of a body, each with the reason.
+    pub mass_faults: Vec<String>,
 }
 
 /// Mass of a part: its centre, and its inertia about the centre, kg·m².
@@ -103,7 +122,8 @@ impl PartMass {
             let square = Matrix3::identity() * away.norm_squared() - away * away.transpose();
             part.inertia_kg_m2 + square * part.mass_kg
         };
-        Some(Self { mass_kg, centre, inertia_kg_m2: parts.iter().map(about).sum() })
+        let inertia_kg_m2 = rounded_up(parts.iter().map(about).sum());
+        Some(Self { mass_kg, centre, inertia_kg_m2 })
     }
 }
 
@@ -135,12 +155,28 @@ const SPEED_UP_S: f64 = 1.0;
 const NEAR_BASE: usize = 2;
 
 impl ArmParts {
+    /// Returns the middle of each joint's limits, deg or m.
+    pub fn middle(&self) -> Vec<f64> {
+        let middle = |link: &LinkParts| {
+            let [low, high] = link.limits.unwrap_or_default();
+            link.in_file_units(0.5 * (low + high))
+        };
+        self.links.iter().map(middle).collect()
+    }
+
+    /// Returns the home posture of the file, deg or m.
+    pub fn home(&self) -> Option<Vec<f64>> {
+        let home = self.links.iter().zip(self.home.as_ref()?);
+        Some(home.map(|(link, q)| link.in_file_units(*q)).collect())
+    }
+
     /// Converts the parts to a model with the home posture `home`, deg or m and one number per
-    /// joint, and returns it with what the file lacks or what was assumed instead, in words.
-    pub fn model(mut self, home: &[f64]) -> (ArmModel, Vec<String>) {
+    /// joint, and returns it with what the file lacks.
+    pub fn model(mut self, home: &[f64]) -> (ArmModel, Gaps) {
         let mut previous = Point3::origin();
         let mut joint = Vec::new();
-        let mut without: [Vec<String>; 7] = Default::default();
+        let mut without: [Vec<String>; 6] = Default::default();
+        let mut massless = Vec::new();
         let mut capsule: Vec<CapsuleModel> =
             self.base.iter().filter_map(|shape| capsule_of(shape, BASE, &previous, true)).collect();
         for (i, link) in self.links.iter().enumerate() {
@@ -149,13 +185,12 @@ impl ArmParts {
             let kind = usize::from(link.kind == JointType::Prismatic);
             let speed = link.speed.unwrap_or(SPEED[kind]);
             let acceleration = link.acceleration.unwrap_or(speed / SPEED_UP_S);
-            let mass = PartMass::of_all(&link.body.masses);
+            let mass = link.mass().map_err(|cause| massless.push(cause)).ok();
             let is_missing = [
                 link.limits.is_none(),
                 link.speed.is_none(),
                 link.acceleration.is_none(),
                 link.body.shapes.is_empty(),
-                mass.is_none(),
                 mass.is_some() && link.motor.armature.is_none(),
                 mass.is_some() && link.motor.effort_limit.is_none(),
             ];
@@ -213,16 +248,15 @@ impl ArmParts {
             format!("speeds (assumed: {} rad/s or {} m/s)", SPEED[0], SPEED[1]),
             format!("accelerations (assumed: to the speed in {SPEED_UP_S} s)"),
             "shapes of the links for collision checks".to_owned(),
-            "masses, which simulator = \"dynamic\" needs,".to_owned(),
             format!("inertias of the rotors (assumed: {ARMATURE} kg m² or kg)"),
             format!("largest efforts (assumed: {EFFORT} N m or N)"),
         ];
-        for (what, names) in assumed.iter().zip(without) {
-            if !names.is_empty() {
-                self.lacks.push(format!("{what} of {}", names.join(", ")));
-            }
+        let masses = "masses, which simulator = \"dynamic\" needs,".to_owned();
+        let all = assumed.into_iter().zip(without).chain([(masses, massless.clone())]);
+        for (what, names) in all.filter(|(_, names)| !names.is_empty()) {
+            self.lacks.push(format!("{what} of {}", names.join(", ")));
         }
-        let (roll, pitch, yaw) = self.tool.rotation.euler_angles();
+        let (_, flange_rotation_deg) = pose::parts(&self.tool);
         let model = ArmModel {
             namespace: format!("/{}", self.name),
             name: self.name,
@@ -230,15 +264,41 @@ impl ArmParts {
             elbow: None,
             base_position_m: [0.0; 3],
             flange_m: (self.tool.translation.vector - previous.coords).into(),
-            flange_rotation_deg: [roll, pitch, yaw].map(f64::to_degrees),
+            flange_rotation_deg,
             joint,
             capsule,
         };
-        (model, self.lacks)
+        (model, Gaps { notes: self.lacks, massless })
     }
 }
 
-/// Returns the capsule around a shape in the frame at `origin` of its link; `None` if it is empty.
+impl LinkParts {
+    /// Converts a position of the joint from rad to deg; m stay m.
+    fn in_file_units(&self, q: f64) -> f64 {
+        match self.kind {
+            JointType::Revolute => q.to_degrees(),
+            JointType::Prismatic => q,
+        }
+    }
+
+    /// Returns the mass of the link with all that is fixed to it.
+    ///
+    /// # Errors
+    /// If it has none: the link's name, with the reason if a mass is unusable.
+    fn mass(&self) -> Result<PartMass, String> {
+        if !self.body.mass_faults.is_empty() {
+            return Err(self.body.mass_faults.join(", "));
+        }
+        let mass = PartMass::of_all(&self.body.masses).ok_or_else(|| self.link.clone())?;
+        match mass.inertia_kg_m2.norm() > LEAST_KG_M2 {
+            true => Ok(mass),
+            false => Err(format!("{} (its inertia is zero)", self.link)),
+        }
+    }
+}
+
+/// Returns the capsule around a shape in the frame at `origin` of its link; `None` if it is empty
+/// or a point.
 fn capsule_of(
     shape: &Shape,
     link: &str,
@@ -246,6 +306,9 @@ fn capsule_of(
     near_base: bool,
 ) -> Option<CapsuleModel> {
     let ([from, to], radius_m) = smallest_capsule(&shape.0)?;
+    if radius_m == 0.0 && from == to {
+        return None;
+    }
     let [from_m, to_m] = [from, to].map(|end| (end - origin).into());
     Some(CapsuleModel {
         link: link.into(),
@@ -307,7 +370,31 @@ fn smallest_capsule(balls: &[(Point3<f64>, f64)]) -> Option<([Point3<f64>; 2], f
     Some((best.1, best.2))
 }
 
+/// Largest extent of a shape, m.
+// heuristic: beyond any part of an arm, and below most parts in mm that are read as m.
+const SHAPE_MAX_M: f64 = 10.0;
+
 impl Shape {
+    /// Checks that the file `mesh`, which gave the shape, is in metres.
+    ///
+    /// # Errors
+    /// If the shape is larger than any arm.
+    pub fn check_unit(&self, mesh: &str) -> Result<(), InputError> {
+        let [low, high] =
+            self.0.iter().fold(
+                [Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)],
+                |[low, high], (p, _)| [low.inf(&p.coords), high.sup(&p.coords)],
+            );
+        let side_m = (high - low).max();
+        if side_m <= SHAPE_MAX_M {
+            return Ok(());
+        }
+        Err(InputError::new(format!("size of mesh {mesh}"))
+            .value(format!("{side_m:.4} m"))
+            .allowed(format!("up to {SHAPE_MAX_M} m"))
+            .remedy("for a mesh in mm add scale=\"0.001 0.001 0.001\" to its <mesh>"))
+    }
+
     /// Returns the shape moved by `x`.
     pub fn moved(self, x: &Isometry3<f64>) -> Self {
         Self(self.0.into_iter().map(|(p, r)| (x * p, r)).collect())

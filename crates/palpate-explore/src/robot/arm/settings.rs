@@ -2,7 +2,7 @@
 
 use super::chain::{Chain, JointType};
 use super::model::{ArmModel, MODELS};
-use super::parts::ArmParts;
+use super::parts::{ArmParts, Gaps};
 use super::urdf;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::pose::pose;
@@ -23,17 +23,16 @@ pub struct ArmSettings {
     #[serde(alias = "links", deserialize_with = "model")]
     #[schemars(extend("format" = PATH_OR_NAME))]
     pub model: String,
-    /// Link (URDF), body or site (MJCF) that carries the tool along its +z; default: the only end
-    /// of the file's robot.
+    /// Link (URDF), body or site (MJCF) that carries the tool along its +z; default: the only end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
-    /// Position of the base in `W`, m; default: the model's. A URDF or MJCF has none: the origin.
+    /// Position of the base in `W`, m; default: the model's, or the origin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base_position_m: Option<[f64; 3]>,
     /// Rotation of the base about the fixed axes x, then y, then z of `W`, deg.
     pub base_rotation_deg: [f64; 3],
-    /// Home posture, one number per joint, deg or m (prismatic); default: the model's. A URDF or
-    /// MJCF has none.
+    /// Home posture, one number per joint, deg or m (prismatic); default: the model's, of an MJCF
+    /// its keyframe `home`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home_deg: Option<Vec<f64>>,
     /// Distance from the flange along its axis to the origin of `T`, m.
@@ -94,23 +93,35 @@ impl ArmSettings {
         FILE_ENDINGS.iter().any(|ending| self.model.ends_with(ending))
     }
 
-    /// Returns the model, and what was assumed because its file lacks it, in words. An MJCF needs
-    /// MuJoCo, which this crate does not use.
+    /// Returns the model, and what its file lacks. An MJCF needs MuJoCo, which this crate does not
+    /// use.
     ///
     /// # Errors
     /// If the file cannot be read, or does not describe an arm.
-    pub fn model(&self) -> Result<(ArmModel, Vec<String>), InputError> {
+    pub fn model(&self) -> Result<(ArmModel, Gaps), InputError> {
+        match self.parts()? {
+            Some(parts) => self.assembled(parts),
+            None => {
+                let model = ArmModel::load(&self.model);
+                let model = model.map_err(|cause| InputError::new(cause.to_string()))?;
+                let gaps = Gaps { massless: model.massless(), ..Gaps::default() };
+                Ok((model, gaps))
+            }
+        }
+    }
+
+    /// Returns joints and shapes of a URDF; `None` for an arm model.
+    ///
+    /// # Errors
+    /// As [`model`](Self::model).
+    pub fn parts(&self) -> Result<Option<ArmParts>, InputError> {
         let path = Path::new(&self.model);
         match path.extension().and_then(|extension| extension.to_str()) {
-            Some("urdf") => self.assembled(urdf::read(path, self.tip.as_deref())?),
+            Some("urdf") => urdf::read(path, self.tip.as_deref()).map(Some),
             Some("xml") => {
                 Err(InputError::new("an MJCF needs a program with MuJoCo").at(&self.model))
             }
-            _ => {
-                let model = ArmModel::load(&self.model);
-                let model = model.map_err(|cause| InputError::new(cause.to_string()))?;
-                Ok((model, Vec::new()))
-            }
+            _ => Ok(None),
         }
     }
 
@@ -119,25 +130,37 @@ impl ArmSettings {
     /// # Errors
     /// If `home_deg` is missing or does not have one number per joint, or a number of the file is
     /// not one of an arm.
-    pub fn assembled(&self, parts: ArmParts) -> Result<(ArmModel, Vec<String>), InputError> {
+    pub fn assembled(&self, parts: ArmParts) -> Result<(ArmModel, Gaps), InputError> {
         let joints = parts.links.len();
-        match &self.home_deg {
-            Some(home) if home.len() == joints => {
-                let (model, lacks) = parts.model(home);
-                match Rules::first_violation(&model) {
-                    None => Ok((model, lacks)),
-                    Some((key, value, allowed)) => {
-                        Err(InputError::new(key).at(&self.model).value(value).allowed(allowed))
-                    }
-                }
+        let home = self.home_deg.clone().or_else(|| parts.home());
+        let Some(home) = home.filter(|home| home.len() == joints) else {
+            return Err(self.home_missing(&parts));
+        };
+        let (model, gaps) = parts.model(&home);
+        match Rules::first_violation(&model) {
+            None => Ok((model, gaps)),
+            Some((key, value, allowed)) => {
+                let problem = InputError::new(model.named(&key)).at(&self.model);
+                Err(problem.value(value).allowed(allowed))
             }
-            home => Err(InputError::new("arm.home_deg")
-                .at(&self.model)
-                .value(home.as_ref().map_or("missing".into(), |home| format!("{home:?}")))
-                .allowed(format!(
-                    "{joints} numbers, one per joint, deg or m: the file has no home"
-                ))),
         }
+    }
+
+    /// Returns the error of a `home_deg` that does not have one number per joint.
+    fn home_missing(&self, parts: &ArmParts) -> InputError {
+        let joints = parts.links.len();
+        let why = match (&self.home_deg, &parts.postures[..]) {
+            (Some(_), _) => String::new(),
+            (None, []) => ": the file has no home".into(),
+            (None, names) => {
+                format!(": no keyframe of the file is named \"home\" ({})", names.join(", "))
+            }
+        };
+        InputError::new("arm.home_deg")
+            .at(&self.model)
+            .value(self.home_deg.as_ref().map_or("missing".into(), |home| format!("{home:?}")))
+            .allowed(format!("{joints} numbers, one per joint, deg or m{why}"))
+            .remedy("find a home with: palpate show SCENE --home")
     }
 
     /// Returns the arm as a chain from `W` to `T`.
@@ -186,15 +209,25 @@ impl ArmSettings {
         }
         home.iter().zip(&joints).enumerate().find_map(|(i, (&home, joint))| {
             let [low, high] = match joint.kind {
-                JointType::Revolute => joint.q_limits.map(f64::to_degrees).map(f64::round),
+                JointType::Revolute => joint.q_limits.map(f64::to_degrees),
                 JointType::Prismatic => joint.q_limits,
             };
-            let allowed = || format!("{low} to {high}");
-            let is_within = (low..=high).contains(&home);
+            let allowed = || {
+                let [low, high] = [(low / LAST_DIGIT).ceil(), (high / LAST_DIGIT).floor()]
+                    .map(|steps| steps * LAST_DIGIT);
+                format!("{low:.4} to {high:.4} (limits of {})", joint.name)
+            };
+            let is_within = (low - ROUNDING..=high + ROUNDING).contains(&home);
             (!is_within).then(|| (format!("home_deg[{i}]"), home.to_string(), allowed()))
         })
     }
 }
+
+/// Rounding of a limit that is converted from deg to rad and back, deg.
+const ROUNDING: f64 = 1e-9;
+
+/// Last digit of a limit in a message, deg or m; limits are rounded inwards.
+const LAST_DIGIT: f64 = 1e-4;
 
 /// Reads `model`; version 0.1 had `links = "C"` or `"A"` instead.
 fn model<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
@@ -226,7 +259,11 @@ impl Validate for ArmSettings {
         rules.require("model", format!("\"{}\"", self.model), is_known || self.is_file(), || {
             let names: Vec<String> =
                 MODELS.iter().map(|(name, ..)| format!("\"{name}\"")).collect();
-            format!("{}, or a file ending in {}", names.join(", "), FILE_ENDINGS.join(", "))
+            let xacro = match self.model.ends_with(".xacro") {
+                true => "; run `xacro FILE > out.urdf` and use out.urdf",
+                false => "",
+            };
+            format!("{}, or a file ending in {}{xacro}", names.join(", "), FILE_ENDINGS.join(", "))
         });
         // The file is read when the arm is built: the folder of a run can be read without it.
         if let Some(model) = is_known.then(|| ArmModel::load(&self.model).ok()).flatten()
