@@ -2,13 +2,11 @@
 
 use super::JointType;
 use super::parts::{ArmParts, Body, LinkParts, Motor, PartMass, Shape, check_count, corners, rim};
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use palpate_geometry::import::import_in_file_frame;
 use super::urdf_checks::{
     check_joint, check_motor, check_sizes, inertia, limits, mass_fault, parse,
 };
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use palpate_geometry::import::import;
+use palpate_geometry::import::import_in_file_frame;
 use palpate_input::error::InputError;
 use palpate_input::files;
 use std::path::{Path, PathBuf};
@@ -230,12 +228,10 @@ fn shape(geometry: &Geometry, file: &Path) -> Result<Shape, String> {
         }
         Geometry::Sphere { radius } => vec![(Point3::origin(), *radius)],
         Geometry::Mesh { filename, scale } => {
-            let path = find(filename, file).ok_or_else(|| format!("{filename} is not found"))?;
+            let path = find(filename, file).ok_or_else(|| not_found(filename))?;
             // The frame of the file, also of glTF, as in geometric_shapes of MoveIt and in
             // yourdfpy, which read collision meshes; for display, rviz2 of 2025 turns y-up to z-up.
             let (mesh, _) = import_in_file_frame(&path, 1.0).map_err(|cause| cause.to_string())?;
-            let path = find(filename, file).ok_or_else(|| not_found(filename))?;
-            let (mesh, _) = import(&path, 1.0).map_err(|cause| cause.to_string())?;
             let scale = scale.map_or(Vector3::repeat(1.0), |scale| Vector3::from(*scale));
             mesh.vertices()
                 .iter()
