@@ -265,7 +265,7 @@ impl Validate for Scene {
         given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
         let has_pad = self.effects.gel.is_some() || self.sensor.kind == SensorKind::DepthPatch;
         let allowed = "no stroke with [effects.gel] or sensor.kind = \"depth_patch\": the points of the \
-                       pad's patch and of the stroke's path are not told apart";
+                       pad's patch and of the stroke's path share one list";
         given(rules, "touch.stroke", self.touch.stroke.is_some() && has_pad, allowed);
         let body = self.simulator.name();
         if self.simulator == SimulatorKind::Analytic {

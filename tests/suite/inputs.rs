@@ -82,7 +82,7 @@ fn a_run_depends_on_the_meshes_of_its_library() {
     write("large.obj", 0.04);
     write("small.obj", 0.03);
     let scene = "simulator = \"swept\"\n[library]\nfolder = \"objects\"\n[pose]\nposition_m = [0, -0.65, 0.4]\n\
-                 half_width_m = [0.01, 0.01, 0]\nturn = \"yaw\"\n[whole_object]\nlowest_m = 0.4\n\
+                 half_width_m = [0.01, 0.01, 0]\nturn = \"yaw\"\n[whole_object]\ncentre_m = [0, -0.65, 0.44]\nradius_m = 0.12\nlowest_m = 0.4\n\
                  [finger]\nradius_m = 0.005\nlength_m = 0.1\npitch_deg = 0\n";
     fs::write(path.join("scene.toml"), scene).unwrap();
     let experiment = "name = \"small\"\nscene = \"scene.toml\"\nplanners = [\"sobol\"]\ntrials = 2\n\

@@ -301,6 +301,23 @@ fn reports_know_nothing_of_the_simulator() {
     assert!(seen > 100, "the test found only {seen} imports");
 }
 
+/// A path in settings is an `InputPath`: only this type is made absolute, and hashed for a run.
+#[test]
+fn paths_in_settings_have_their_type() {
+    let mut seen = 0;
+    for path in LAYERS.iter().flat_map(|(package, _)| sources(&folder(package))) {
+        let text = fs::read_to_string(&path).unwrap();
+        for settings in text.split("#[derive(").filter(|part| {
+            part.split(")]").next().is_some_and(|derived| derived.contains("JsonSchema"))
+        }) {
+            let fields = settings.split("\n}").next().unwrap();
+            assert!(!fields.contains("PathBuf"), "{}: {fields}", path.display());
+            seen += 1;
+        }
+    }
+    assert!(seen > 50, "the test found only {seen} types");
+}
+
 #[test]
 fn a_file_is_one_idea() {
     for path in LAYERS.iter().flat_map(|(package, _)| sources(&folder(package))) {

@@ -161,7 +161,7 @@ fn a_unit_is_taken_with_its_evidence_or_named_as_a_guess() {
     let said = new(&folder, &["egg.obj", "--up", "y", "--unit", "m"]);
     assert!(said.contains("note: in ") && said.contains("as mm 120 mm"), "{said}");
     assert_eq!(scene(&folder, "egg").object.unwrap().scale, 1.0);
-    let tiny = ["new", "egg.obj", "--up", "y", "--unit", "um"];
+    let tiny = ["--quiet", "new", "egg.obj", "--up", "y", "--unit", "um"];
     fails(folder.path(), &tiny, &["measures 1.2e-4 m", "use another --unit"]);
     write(&folder, "egg.obj", obj("unit: m", &egg(|_| false), |p| 1e3 * p));
     let said = new(&folder, &["egg.obj", "--up", "y"]);

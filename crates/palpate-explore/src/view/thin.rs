@@ -56,7 +56,7 @@ const ROUNDS: usize = 4;
 const SD_PER_MAD: f64 = 1.4826;
 
 /// Mean number of points of the small cells that show the noise, and largest number of these cells.
-// heuristic: six times the surface's coefficients; the median of as many cells varies by a hundredth.
+// heuristic: six times the surface's coefficients; the cells' median varies by a hundredth.
 const SMALL: usize = 3 * LEAST;
 const SAMPLED: usize = 256;
 

@@ -281,8 +281,11 @@ impl Loader {
         self.table = table;
     }
 
-    /// Returns the absolute path `name` under `key`.
+    /// Returns the absolute path `name` under `key`; an empty name stays empty.
     fn resolved(&self, key: &str, name: &str) -> String {
+        if name.is_empty() {
+            return String::new();
+        }
         let path = self.located(key, Path::new(name));
         let path = std::path::absolute(&path).unwrap_or(path);
         tidy(&path).to_string_lossy().into_owned()
