@@ -45,7 +45,7 @@ fn rows(folder: &Path, run: &str) -> Vec<u8> {
     fs::read(folder.join(run).join("trials.jsonl")).unwrap()
 }
 
-const RUN: [&str; 3] = ["run", "small.toml", "--no-report"];
+const RUN: [&str; 4] = ["--quiet", "run", "small.toml", "--no-report"];
 
 /// Rows of the earlier content are not taken for those of the present one.
 #[test]

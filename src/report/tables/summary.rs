@@ -75,7 +75,7 @@ pub fn brief(run: &Run) -> Table {
     let heads = [
         Column::new("touches"),
         Column::new("planner"),
-        Column::new(format!("mean {} {}", error.title, error.unit.symbol)),
+        Column::new(format!("mean {} {} [95 %]", error.title, error.unit.symbol)),
         Column::new("to the best").unit("", 1.0, 2),
         Column::new(RECOGNISED.title).unit("", 1.0, 2),
         Column::new("misses a trial").unit("", 1.0, 1),

@@ -6,9 +6,10 @@ use nalgebra::{Isometry3, Matrix3, UnitVector3, Vector3};
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate};
 use palpate_input::files;
+use palpate_input::paths::InputPath;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Built-in arms by name: model, and MJCF for a dynamic simulation.
 pub const MODELS: [(&str, &str, Option<&str>); 5] = [
@@ -29,7 +30,7 @@ pub struct ArmModel {
     pub namespace: String,
     /// MJCF file next to this one, for a dynamic simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mjcf: Option<PathBuf>,
+    pub mjcf: Option<InputPath>,
     /// Name of the joint at the elbow, which the workspace interlock monitors besides the tip.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<String>,
@@ -236,10 +237,9 @@ pub fn mjcf(file: &str, model: &ArmModel) -> Result<Option<String>, ConfigError>
     if let Some((.., mjcf)) = MODELS.iter().find(|(name, ..)| *name == file) {
         return Ok(mjcf.map(str::to_owned));
     }
-    let Some(mjcf) = &model.mjcf else { return Ok(None) };
-    let path = Path::new(file).with_file_name(mjcf);
-    let text = files::text(&path, files::TEXT_MAX);
-    text.map(Some).map_err(|cause| ConfigError::unreadable(&path, &cause))
+    let Some(path) = &model.mjcf else { return Ok(None) };
+    let text = files::text(path, files::TEXT_MAX);
+    text.map(Some).map_err(|cause| ConfigError::unreadable(path, &cause))
 }
 
 impl JointModel {
