@@ -15,8 +15,6 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent
 ROOT = PACKAGE.parent
 HOME = PACKAGE / "palpate/home"
-#: Folders of the repository that the package does not need.
-LEFT_OUT = ("experiments/baselines", "experiments/ci", "experiments/kubernetes", "experiments/slurm")
 
 
 def copy_home(mujoco_licences):
@@ -24,8 +22,6 @@ def copy_home(mujoco_licences):
     shutil.rmtree(HOME, ignore_errors=True)
     for name in ("experiments", "scenes", "models"):
         shutil.copytree(ROOT / name, HOME / name, ignore=shutil.ignore_patterns("*.rs"))
-    for name in LEFT_OUT:
-        shutil.rmtree(HOME / name, ignore_errors=True)
     licences = HOME / "licences"
     licences.mkdir()
     for file in ROOT.glob("LICENSE-*"):

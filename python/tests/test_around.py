@@ -51,7 +51,7 @@ def test_frames_have_measures_of_shapes_and_targets_of_six(run):
     last = touches.query("touch == 10")
     assert (last["chamfer_m"] > 0).all() and last["iou"].between(0, 1).all()
     assert {"chamfer_mean_m", "f_1_mean", "iou_mean"} <= set(run.summary().columns)
-    assert "chamfer" in str(run)
+    assert "Chamfer" in str(run)
 
 
 def test_a_belief_is_a_field_and_a_closed_surface(run):

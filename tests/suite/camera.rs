@@ -444,6 +444,64 @@ fn views_are_read_from_files() {
     }
 }
 
+/// A file has noise, also if the scene states none: surface elements of a cloud are found whatever
+/// its noise, and are as far off as they state. A view with its stated noise stays as it is.
+#[test]
+fn a_file_without_stated_noise_has_the_noise_that_it_shows() {
+    let exact = look(&built(""), 0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.ply");
+    for noise_m in [0.0, 1e-4, 5e-4, 2e-3, 5e-3] {
+        let mut random = seed::stream(7, 0, "noise");
+        let lines: String = (exact.points_c.iter())
+            .map(|p| {
+                let off: f64 = StandardNormal.sample(&mut random);
+                let p = p * (1.0 + noise_m * off / p.z);
+                format!("{} {} {}\n", p.x, p.y, p.z)
+            })
+            .collect();
+        let count = exact.points_c.len();
+        let cloud = format!(
+            "ply\nformat ascii 1.0\nelement vertex {count}\nproperty double x\nproperty double y\n\
+             property double z\nend_header\n{lines}"
+        );
+        std::fs::write(&path, cloud).unwrap();
+        let environment = built(&format!(", file = {path:?}"));
+        let view = look(&environment, 0);
+        assert_eq!(view.accuracy.noise, PixelNoise::default());
+        let elements = thin(&view, |_| true, 350);
+        assert!(elements.len() > 30, "{noise_m}: {}", elements.len());
+        let mesh = MeshBvh::new(environment.mesh().unwrap().clone());
+        let is_held = |p_c: &Point3<f64>, sd_m: f64| {
+            mesh.closest_point(&(view.x_wc * p_c)).distance_m < 2.0 * sd_m
+        };
+        let held = elements.iter().filter(|element| is_held(&element.p_c, element.sd_m)).count();
+        let share = held as f64 / elements.len() as f64;
+        assert!(share > 0.9, "{noise_m}: {share}");
+    }
+    let stated = look(&built(", noise = {}"), 0);
+    let doubled = CameraAccuracy {
+        noise: PixelNoise {
+            noise_ratio: 2.0 * stated.accuracy.noise.noise_ratio,
+            ..PixelNoise::default()
+        },
+        ..stated.accuracy.clone()
+    };
+    let sds =
+        |view: &View| thin(view, |_| true, 350).iter().map(|element| element.sd_m).sum::<f64>();
+    // A larger stated noise counts, a smaller one is raised only where it explains too little.
+    let halved = CameraAccuracy {
+        noise: PixelNoise {
+            noise_ratio: 0.25 * stated.accuracy.noise.noise_ratio,
+            ..PixelNoise::default()
+        },
+        ..stated.accuracy.clone()
+    };
+    let with = |accuracy| View { accuracy, ..stated.clone() };
+    assert!(sds(&with(doubled)) > 1.5 * sds(&stated));
+    assert!(thin(&with(halved), |_| true, 350).len() > 30);
+}
+
 /// Places that a camera saw through count as empty, and are in what a row keeps of the view: the
 /// belief that is drawn from a row has the silhouette of the trial's.
 #[test]

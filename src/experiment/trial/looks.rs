@@ -46,7 +46,7 @@ impl<'a> Looks<'a> {
     ) -> Result<ViewRow, String> {
         let purpose = format!("view {number}");
         let mut random = seed::stream(self.experiment.seed, self.trial.into(), &purpose);
-        let seen = take(self.environment, number, &mut random, belief);
+        let seen = observe(self.environment, number, &mut random, belief);
         let seen = seen.map_err(|error| error.to_string())?;
         self.taken.push(number);
         probe.rest(self.look_s());
@@ -93,7 +93,7 @@ pub(in crate::experiment) fn check(
     for number in (0..places).filter(|number| camera.at(*number as usize).file.is_some()) {
         let mut random = seed::stream(experiment.seed, 0, "check of a view");
         let mut belief = Belief::new(environment.task(), finger, &experiment.gp, &experiment.space);
-        take(environment, number, &mut random, &mut belief)?;
+        observe(environment, number, &mut random, &mut belief)?;
     }
     Ok(())
 }
@@ -102,7 +102,7 @@ pub(in crate::experiment) fn check(
 ///
 /// # Errors
 /// If the view cannot be read, or shows nothing of the region.
-fn take(
+fn observe(
     environment: &Environment,
     number: u32,
     random: &mut impl Rng,
