@@ -157,7 +157,7 @@ fn soft_limits_narrow_the_limits() {
     assert_eq!(limits("k_position=\"15\"").map(|q| (q * 1e9).round()), [-6.28e9, 6.28e9]);
 }
 
-/// What the text of a comment holds, a macro's namespace, an axis that is not a unit vector, and a
+/// Words in comments, a macro's namespace, an axis that is not a unit vector, and a
 /// coupled gripper are harmless; a coupled link that follows the chain is named.
 #[test]
 fn harmless_parts_are_read() {

@@ -113,7 +113,7 @@ impl ArmSettings {
     /// Returns joints and shapes of a URDF; `None` for an arm model.
     ///
     /// # Errors
-    /// As [`model`](Self::model).
+    /// The errors of [`model`](Self::model).
     pub fn parts(&self) -> Result<Option<ArmParts>, InputError> {
         let path = Path::new(&self.model);
         match path.extension().and_then(|extension| extension.to_str()) {
