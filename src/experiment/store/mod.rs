@@ -1,7 +1,7 @@
 //! Folder of a run's results.
 //!
 //! Its files are `resolved.toml` (the experiment with all defaults), `manifest.json` (the programs
-//! that wrote the run), `content.json` (hashes of mesh, scan and external planners), `surface.csv`
+//! that wrote the run), `content.json` (hashes of input files and external planners), `surface.csv`
 //! (ground truth on the test grid; `surface.obj` for a whole object) and `trials.jsonl` (a row per
 //! finished trial). All other files are generated from these.
 //!
