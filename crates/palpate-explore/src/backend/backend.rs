@@ -183,4 +183,10 @@ pub trait Backend: Send {
     /// commands zero velocity; an arm behind topics until an operator clears it. A backend without
     /// brakes ignores the call.
     fn brake(&mut self) {}
+
+    /// Returns why the robot does not follow its commands, if it knows: asked before it counts as
+    /// not following.
+    fn reason(&mut self) -> Option<Fault> {
+        None
+    }
 }

@@ -1,5 +1,6 @@
 //! Tests of palpate-explore, in one binary.
 
+mod calibrated;
 mod planners;
 mod reach;
 mod stored;

@@ -5,6 +5,7 @@ use super::force::{FORCE, RETRACT_M_S, RETRACT_RISE_N};
 use super::interlock::{Interlock, InterlockEntry, RobotState, SafetyContext};
 use super::limits::limited;
 use super::settings::InterlockSettings;
+use super::tracking;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
 use crate::robot::arm::{Jacobian, Joints};
 use nalgebra::Isometry3;
@@ -120,7 +121,9 @@ impl InterlockedBackend {
         now.time_s = reading.time_s;
         // The robot rests during a pause between two ticks.
         let moved_s = passed_s.clamp(0.0, HELD_TICKS * now.period_s);
-        let unseen = (now.unconfirmed_motion + now.sent * moved_s)
+        // An arm that runs at a fraction of its speed moves less than it was sent.
+        let sent = now.chain.joints_from(&reading.applied.qdot).unwrap_or(now.sent);
+        let unseen = (now.unconfirmed_motion + sent * moved_s)
             .zip_map(&(now.q - before), |unseen, by| if by == 0.0 { unseen } else { 0.0 });
         now.unconfirmed_motion = unseen;
         (now.x_wt, now.jacobian) = now.chain.jacobian(&now.q);
@@ -229,6 +232,10 @@ impl InterlockedBackend {
     }
 }
 
+/// Interlocks that trip if the robot does not follow its commands.
+const NOT_FOLLOWING: [&str; 3] =
+    [tracking::STUCK_JOINT.name, tracking::VELOCITY.name, tracking::POSITION.name];
+
 /// Largest number of ticks for which a command moves the robot if no other follows: the arm treats
 /// a stale command as a stop.
 // heuristic: 30 ms at 250 Hz.
@@ -290,6 +297,11 @@ impl Backend for InterlockedBackend {
             Err(trip) => {
                 // If readings are unreliable, braking by the servos cannot be monitored.
                 if trip.interlock != FORCE.name && self.inner.capabilities().real_time {
+                    if NOT_FOLLOWING.contains(&trip.interlock)
+                        && let Some(fault) = self.inner.reason()
+                    {
+                        return Err(self.latch(fault));
+                    }
                     self.inner.brake();
                 }
                 Err(self.trip(trip))

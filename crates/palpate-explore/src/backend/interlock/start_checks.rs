@@ -18,11 +18,13 @@ pub struct StartCheckSettings {
     pub drift_n: f64,
     /// Largest standard deviation of an electrode, counts; real ones have 3 to 11.
     pub noise_counts: f64,
+    /// Largest distance of the fingertip by the driver's frames from that by the arm's model, m.
+    pub model_m: f64,
 }
 
 impl Default for StartCheckSettings {
     fn default() -> Self {
-        Self { drift_n: 0.5, noise_counts: 30.0 }
+        Self { drift_n: 0.5, noise_counts: 30.0, model_m: 5e-4 }
     }
 }
 
@@ -30,6 +32,7 @@ impl Validate for StartCheckSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("drift_n", self.drift_n, 1e-3..=100.0);
         rules.number("noise_counts", self.noise_counts, 0.1..=4095.0);
+        rules.number("model_m", self.model_m, 1e-6..=10.0);
     }
 }
 

@@ -172,10 +172,15 @@ impl Span {
         true
     }
 
+    /// Returns the oldest sample, or `now` without one.
+    fn start<'a>(&'a self, now: &'a Sample) -> &'a Sample {
+        self.samples.front().unwrap_or(now)
+    }
+
     /// Returns the movement of the joints up to `now`, and the smallest and largest commanded
     /// movement.
     fn moved(&self, now: &Sample) -> [Joints; 3] {
-        let from = self.samples.front().unwrap_or(now);
+        let from = self.start(now);
         let lags = now.commanded.iter().zip(&from.commanded);
         let first = now.commanded[0] - from.commanded[0];
         let [low, high] = lags.fold([first; 2], |[low, high], (now, from)| {
@@ -253,10 +258,30 @@ impl Interlock for Tracking {
                 let reach_m = now.reaches_m[i];
                 let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
                 let limit = FLOOR_M + SHARE * low[i].abs().max(high[i].abs()) * reach_m;
-                Trip::check(found <= limit, POSITION.name, &joint.name, [found, limit], "m")?;
+                if found > limit {
+                    let behind =
+                        sample.commanded[0][i] - span.start(&sample).commanded[0][i] - moved[i];
+                    let part = format!("{}{}", joint.name, late(behind / applied[i]));
+                    return Trip::check(false, POSITION.name, &part, [found, limit], "m");
+                }
             }
         }
         Ok(())
+    }
+}
+
+/// Largest delay that is taken for that of a servo, s.
+// heuristic: beyond it a robot does not follow, instead of following late.
+const LATE_MAX_S: f64 = 1.0;
+
+/// Describes a joint that follows `late_s` behind its commands.
+fn late(late_s: f64) -> String {
+    match late_s > 0.0 && late_s < LATE_MAX_S {
+        true => format!(
+            " (it follows {:.0} ms late; backend.interlocks.tracking_lag_s is the delay to allow)",
+            1e3 * late_s
+        ),
+        false => String::new(),
     }
 }
 

@@ -3,6 +3,7 @@
 mod contact_monitor;
 mod home;
 mod reach;
+mod rehearsal;
 mod slide;
 mod trajectory;
 mod zone_reach;

@@ -175,6 +175,11 @@ impl Chain {
         moved.fold(self.base, |x, (joint, &q)| joint.moved(&x, q)) * self.flange * self.tool
     }
 
+    /// Returns the pose of the flange in the frame of the base.
+    pub fn flange_at(&self, q: &Joints) -> Isometry3<f64> {
+        self.base.inverse() * self.forward(q) * self.tool.inverse()
+    }
+
     /// Returns the poses in `W` of the base and of each joint's moved frame; entries beyond the
     /// chain's joints repeat the last.
     pub fn frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS + 1] {

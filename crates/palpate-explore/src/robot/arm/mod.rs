@@ -1,5 +1,6 @@
 //! The arm or three-axis stage that carries the finger, as a chain of joints.
 
+mod calibration;
 pub mod chain;
 mod clearance;
 pub mod inertia;

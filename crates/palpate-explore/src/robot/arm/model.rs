@@ -31,6 +31,9 @@ pub struct ArmModel {
     /// MJCF file next to this one, for a dynamic simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mjcf: Option<InputPath>,
+    /// Names of base and flange in the manufacturer's URDF.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub links: Option<[String; 2]>,
     /// Name of the joint at the elbow, which the workspace interlock monitors besides the tip.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<String>,
@@ -259,6 +262,12 @@ impl JointModel {
     fn placement(&self) -> (&[f64; 3], &[f64; 3]) {
         let (Self::Revolute { origin_m, axis, .. } | Self::Prismatic { origin_m, axis, .. }) = self;
         (origin_m, axis)
+    }
+
+    /// The same, to be changed.
+    pub(super) fn placement_mut(&mut self) -> [&mut [f64; 3]; 2] {
+        let (Self::Revolute { origin_m, axis, .. } | Self::Prismatic { origin_m, axis, .. }) = self;
+        [origin_m, axis]
     }
 
     fn joint(&self) -> Joint {

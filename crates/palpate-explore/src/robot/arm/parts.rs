@@ -261,6 +261,7 @@ impl ArmParts {
             namespace: format!("/{}", self.name),
             name: self.name,
             mjcf: None,
+            links: None,
             elbow: None,
             base_position_m: [0.0; 3],
             flange_m: (self.tool.translation.vector - previous.coords).into(),

@@ -1,5 +1,6 @@
 //! Settings of the arm in a scene: model, mounting and home posture.
 
+use super::calibration::calibrate;
 use super::chain::{Chain, JointType};
 use super::model::{ArmModel, MODELS};
 use super::parts::{ArmParts, Gaps};
@@ -8,7 +9,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use palpate_gp::math::pose::pose;
 use palpate_input::config::{Rules, Validate};
 use palpate_input::error::InputError;
-use palpate_input::paths::PATH_OR_NAME;
+use palpate_input::paths::{InputPath, PATH_OR_NAME};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -26,6 +27,10 @@ pub struct ArmSettings {
     /// Link (URDF), body or site (MJCF) that carries the tool along its +z; default: the only end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
+    /// URDF of this robot, e.g. as published by its driver, whose origins and axes replace the
+    /// model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<InputPath>,
     /// Position of the base in `W`, m; default: the model's, or the origin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base_position_m: Option<[f64; 3]>,
@@ -61,6 +66,7 @@ impl Default for ArmSettings {
         Self {
             model: MODELS[0].0.into(),
             tip: None,
+            calibration: None,
             base_position_m: None,
             base_rotation_deg: [0.0; 3],
             home_deg: None,
@@ -103,7 +109,10 @@ impl ArmSettings {
             Some(parts) => self.assembled(parts),
             None => {
                 let model = ArmModel::load(&self.model);
-                let model = model.map_err(|cause| InputError::new(cause.to_string()))?;
+                let mut model = model.map_err(|cause| InputError::new(cause.to_string()))?;
+                if let Some(file) = &self.calibration {
+                    calibrate(&mut model, file)?;
+                }
                 let gaps = Gaps { massless: model.massless(), ..Gaps::default() };
                 Ok((model, gaps))
             }
@@ -116,6 +125,14 @@ impl ArmSettings {
     /// The errors of [`model`](Self::model).
     pub fn parts(&self) -> Result<Option<ArmParts>, InputError> {
         let path = Path::new(&self.model);
+        if let Some(file) =
+            self.calibration.as_ref().filter(|_| !self.model.ends_with(".toml") && self.is_file())
+        {
+            return Err(InputError::new("arm.calibration").value(file.display()).allowed(format!(
+                "a model of a kind of arm, unlike {}, which is that of one robot",
+                self.model
+            )));
+        }
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("urdf") => urdf::read(path, self.tip.as_deref()).map(Some),
             Some("xml") => {

@@ -42,6 +42,53 @@ pub fn read(path: &Path, tip: Option<&str>) -> Result<ArmParts, InputError> {
     Ok(parts)
 }
 
+/// Joints between two links of a URDF, at rest in the frame of the first.
+pub struct Kinematics {
+    /// Name, origin and axis of each joint.
+    pub joints: Vec<(String, Point3<f64>, UnitVector3<f64>)>,
+    /// Pose of the second link.
+    pub flange: Isometry3<f64>,
+}
+
+/// Reads the joints from the link `base` to the link `flange`; their names may have a prefix.
+///
+/// # Errors
+/// If the file is not a URDF, or the links are not there or not joined so.
+pub fn kinematics(path: &Path, base: &str, flange: &str) -> Result<Kinematics, InputError> {
+    let text = files::text(path, files::TEXT_MAX).map_err(|cause| InputError::io(path, cause))?;
+    let robot = parse(&text, path)?;
+    let named = |name: &str| {
+        let is_it =
+            |link: &&urdf_rs::Link| link.name == name || link.name.ends_with(&format!("_{name}"));
+        let found = robot.links.iter().find(is_it).map(|link| link.name.as_str());
+        found.ok_or_else(|| InputError::new(format!("no link {name}")))
+    };
+    let (flange_link, base_link) = (named(flange)?, named(base)?);
+    let (root, to_base) = way_to(&robot, base_link)?;
+    let (other_root, to_flange) = way_to(&robot, flange_link)?;
+    // The base may be beside the chain, joined to its root.
+    let mut x_base = Isometry3::identity();
+    for joint in to_base {
+        if kind(joint)?.is_some() {
+            return Err(InputError::new(format!("{base_link} moves with {}", joint.name)));
+        }
+        x_base *= pose(&joint.origin);
+    }
+    if root != other_root {
+        return Err(InputError::new(format!("{flange_link} is not joined to {base_link}")));
+    }
+    let mut x = x_base.inverse();
+    let mut joints = Vec::new();
+    for joint in to_flange {
+        x *= pose(&joint.origin);
+        if kind(joint)?.is_some() {
+            let origin = Point3::from(x.translation.vector);
+            joints.push((joint.name.clone(), origin, axis(joint, &x)?));
+        }
+    }
+    Ok(Kinematics { joints, flange: x })
+}
+
 /// Returns the link of this name, or the only end of the tree.
 fn tip_link<'a>(robot: &'a Robot, tip: Option<&str>) -> Result<&'a str, InputError> {
     let list = |names: &mut dyn Iterator<Item = &str>| names.collect::<Vec<_>>().join(", ");
@@ -102,11 +149,7 @@ fn link(
     x: &Isometry3<f64>,
     body: Body,
 ) -> Result<LinkParts, InputError> {
-    let axis = UnitVector3::try_new(x.rotation * Vector3::from(*joint.axis.xyz), 1e-9);
-    let axis = axis.ok_or_else(|| {
-        let problem = InputError::new("<axis> xyz").value(format!("{:?}", *joint.axis.xyz));
-        problem.allowed("three numbers that are not all zero")
-    })?;
+    let axis = axis(joint, x)?;
     check_motor(joint)?;
     let limit = &joint.limit;
     let dynamics = joint.dynamics.as_ref();
@@ -127,6 +170,15 @@ fn link(
             damping: dynamics.map_or(0.0, |it| it.damping),
             friction: dynamics.map_or(0.0, |it| it.friction),
         },
+    })
+}
+
+/// Returns the axis of a joint whose frame has the pose `x`.
+fn axis(joint: &Joint, x: &Isometry3<f64>) -> Result<UnitVector3<f64>, InputError> {
+    let axis = UnitVector3::try_new(x.rotation * Vector3::from(*joint.axis.xyz), 1e-9);
+    axis.ok_or_else(|| {
+        let problem = InputError::new("<axis> xyz").value(format!("{:?}", *joint.axis.xyz));
+        problem.allowed("three numbers that are not all zero")
     })
 }
 
