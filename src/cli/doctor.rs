@@ -1,8 +1,10 @@
 //! Command `palpate doctor`.
 
-use super::find::{EXPERIMENTS, SCENES, file_stems};
+use super::doctor_arm;
+use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::host::Host;
 use super::terminal::{Outcome, print};
+use crate::experiment::Experiment;
 use palpate_ros::network::network;
 use palpate_ros::settings::BackendSettings;
 use std::fs;
@@ -14,13 +16,27 @@ use std::time::Duration;
 #[command(after_help = "\
 Examples:
   palpate doctor
+  palpate doctor --arm real_ur5e
+  palpate doctor --arm real_ur5e --save my-ur5e.urdf
 
-Prints a line for each part: ok, absent (an optional part), or wrong, with the remedy. Exit code 1 if a part is wrong.")]
-pub(super) struct Args {}
+Prints a line for each part: ok, absent (an optional part), or wrong, with the remedy. Exit code 1 if a part is wrong.
+With --arm it listens to the arm for 10 s and commands nothing: topics with type, rate, age and frame, services, \
+controllers, and where the fingertip is by the driver's frames.")]
+pub(super) struct Args {
+    /// Experiment (.toml, or the name of a shipped one) with the arm to listen to.
+    #[arg(long, value_name = "EXPERIMENT")]
+    arm: Option<PathBuf>,
+    /// Write the robot's URDF, as its driver publishes it, to this file.
+    #[arg(long, value_name = "FILE.urdf", requires = "arm")]
+    save: Option<PathBuf>,
+    /// Change one setting of the experiment; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE", requires = "arm")]
+    set: Vec<String>,
+}
 
 /// State of a part.
 #[derive(PartialEq)]
-enum State {
+pub(super) enum State {
     Ok,
     /// An optional part is missing.
     Absent,
@@ -28,22 +44,16 @@ enum State {
 }
 
 /// A part, its state, and what was found or what to do.
-type Line = (&'static str, State, String);
+pub(super) type Line = (&'static str, State, String);
 
-pub(super) fn run(host: &Host) -> anyhow::Result<Outcome> {
-    let variable = |name: &str| std::env::var(name).ok();
-    let lines = [
-        ("palpate", State::Ok, format!("{} ({})", env!("CARGO_PKG_VERSION"), host.commit)),
-        mujoco(),
-        machine(),
-        shipped_files(),
-        working_folder(),
-        display(&variable),
-        egl(),
-        ros2(&variable),
-        ros1(&variable),
-        clock(),
-    ];
+pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
+    let lines = match &args.arm {
+        None => parts(host),
+        Some(path) => {
+            let experiment = Experiment::load(&find(path, EXPERIMENTS)?, &args.set)?;
+            doctor_arm::lines(&experiment, args.save.as_deref())?
+        }
+    };
     let line = |(part, state, text): &Line| {
         let word = match state {
             State::Ok => "ok",
@@ -55,6 +65,23 @@ pub(super) fn run(host: &Host) -> anyhow::Result<Outcome> {
     print(lines.iter().map(line).collect::<String>().trim_end())?;
     let is_wrong = lines.iter().any(|(_, state, _)| *state == State::Wrong);
     Ok(if is_wrong { Outcome::Failed } else { Outcome::Done })
+}
+
+/// Returns the lines about this machine.
+fn parts(host: &Host) -> Vec<Line> {
+    let variable = |name: &str| std::env::var(name).ok();
+    vec![
+        ("palpate", State::Ok, format!("{} ({})", env!("CARGO_PKG_VERSION"), host.commit)),
+        mujoco(),
+        machine(),
+        shipped_files(),
+        working_folder(),
+        display(&variable),
+        egl(),
+        ros2(&variable),
+        ros1(&variable),
+        clock(),
+    ]
 }
 
 #[cfg(feature = "mujoco")]

@@ -12,6 +12,7 @@ mod compare;
 mod completions;
 mod deprecated_commands;
 mod doctor;
+mod doctor_arm;
 mod export;
 mod find;
 mod host;
@@ -29,6 +30,7 @@ mod progress;
 mod reference;
 mod register;
 mod register_cloud;
+mod rehearse;
 mod replay;
 mod report;
 mod run;
@@ -215,7 +217,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::Calibrate(args) => calibrate::run(&args),
         Command::CalibrateBand(args) => calibrate_band::run(&args, talk),
         Command::List(args) => list::run(&args),
-        Command::Doctor(_) => doctor::run(host),
+        Command::Doctor(args) => doctor::run(&args, host),
         Command::Completions(args) => completions::run(&args, Cli::command()),
         Command::Reference(_) => print(reference().trim_end()).map(|()| Outcome::Done),
     }

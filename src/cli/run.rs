@@ -6,6 +6,7 @@ use super::host::Host;
 use super::plan::plan;
 use super::prepare::{connect_arm, planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
+use super::rehearse;
 use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
 use crate::experiment::experiment::Experiment;
@@ -35,6 +36,7 @@ Examples:
   palpate run runs/toy/resolved.toml --out runs/again    repeat a run, byte for byte
   palpate run experiments/suite/six.toml                 several objects ([sweep])
   palpate run toy --shard 3/8                            an eighth of the trials; palpate report --merge
+  palpate run real_ur5e --dry                            follow the approaches, touch nothing
   palpate run bird --plan 8 --threads 16                 estimate time and memory of 8 shards
 
 Press Ctrl-C to stop after the running trials; repeat the command to continue. On a finished run, new
@@ -78,6 +80,9 @@ pub(super) struct Args {
     /// folder.
     #[arg(long)]
     record: bool,
+    /// Follow the approaches above the surface and touch nothing; the robot needs no forces.
+    #[arg(long, conflicts_with_all = ["shard", "plan", "step", "record", "json", "wide"])]
+    dry: bool,
     /// Clear latched faults on the robot before moving (operator only).
     #[arg(long)]
     clear_fault: bool,
@@ -155,16 +160,17 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         let out = args.out.clone();
         let experiment =
             with_planners((&args.set, &args.planner), |sets| Experiment::load(&path, sets))?;
+        if args.dry {
+            return rehearse::run(experiment, args.clear_fault, talk);
+        }
         if let Some(shards) = args.plan {
             return plan(experiment, shards, args.threads, talk);
         }
         return run_one(args, experiment, out, &mut stop, (talk, host));
     }
-    ensure!(
-        args.plan.is_none(),
-        "{}: --plan needs an experiment without a [sweep]",
-        path.display()
-    );
+    for (option, is_given) in [("--plan", args.plan.is_some()), ("--dry", args.dry)] {
+        ensure!(!is_given, "{}: {option} needs an experiment without a [sweep]", path.display());
+    }
     // All combinations are loaded before the first is run.
     let load = |case| {
         with_planners((&args.set, &args.planner), |sets| Experiment::load_cell(&path, case, sets))

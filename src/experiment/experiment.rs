@@ -17,7 +17,7 @@ use palpate_explore::recognition::RecognitionSettings;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
-use palpate_ros::profile::Profile;
+use palpate_ros::driver::Profile;
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

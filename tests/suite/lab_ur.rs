@@ -8,8 +8,8 @@ use palpate::backend::Backend;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner::Fallback;
 use palpate::ros::arm::RosArm;
+use palpate::ros::service::Service;
 use palpate::ros::settings::BackendSettings;
-use palpate::ros::topics::Service;
 use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
@@ -73,7 +73,7 @@ fn stops_of_a_ur_end_the_run_and_say_what_to_do() {
         ("program_stop", "External Control"),
         ("estop", "emergency stop"),
         ("deadman", "dead-man"),
-        ("no_wrench", "no new message on /force_torque_sensor_broadcaster/ft_data"),
+        ("no_wrench", "no new message on /force_torque_sensor_broadcaster/wrench"),
     ]
     .into_iter()
     .enumerate()

@@ -5,12 +5,14 @@ use crate::common::hub::Hub;
 #[cfg(feature = "mujoco")]
 use crate::common::rig::ARM;
 use crate::common::rig::{Rig, STAGE, patient};
+use palpate::backend::{Backend, Command};
 use palpate::explore::probe::Touch;
 use palpate::ros::arm::RosArm;
-use palpate::ros::profile::Profile;
+use palpate::ros::driver::Profile;
 use palpate::ros::server::serve::services;
+use palpate::ros::service::Service;
 use palpate::ros::settings::BackendSettings;
-use palpate::ros::topics::{CommandMessage, Endpoint, Service, TactileMessage};
+use palpate::ros::topics::{CommandMessage, Endpoint, TactileMessage};
 
 /// Compares the contact over topics with that of the body itself at the same place.
 fn compare(scene: &str, settings: BackendSettings) {
@@ -51,18 +53,25 @@ fn other_drivers_and_other_names_touch_there_too() {
     compare(STAGE, settings);
 }
 
+/// The explorer that moves the arm does not notice the second one.
 #[test]
-fn a_second_explorer_is_refused_and_the_first_is_stopped() {
-    let rig = Rig::new(STAGE, BackendSettings::default(), &[]);
-    let first = rig.lab().unwrap();
+fn a_second_explorer_is_refused_and_the_first_goes_on() {
+    let rig = Rig::new(STAGE, patient(), &[]);
+    let [first, second] = [(); 2].map(|()| rig.lab().unwrap());
+    let mut moving = first.backend();
+    moving.reset(0).unwrap();
     // Publishers are counted ten times a second.
-    let second = (0..50).find_map(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(10));
-        rig.lab().err()
-    });
-    let second = second.map(|fault| fault.to_string()).unwrap_or_default();
-    assert!(second.contains("2 publishers on "), "{second}");
-    drop(first);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let fault = second.backend().reset(0).map(|_| ()).unwrap_err().to_string();
+    assert!(fault.contains("another program commands the arm"), "{fault}");
+    let still = Command { qdot: vec![0.0; 3] };
+    for _ in 0..100 {
+        moving.step(&still).unwrap();
+    }
+    drop((moving, first));
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let third = rig.lab().unwrap();
+    third.backend().reset(0).unwrap();
 }
 
 #[test]

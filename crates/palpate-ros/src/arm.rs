@@ -1,21 +1,18 @@
-//! Arm behind topics, as a [`Backend`]: sends commands at a fixed rate, and returns the newest
-//! received messages as readings.
+//! Arm behind topics: its connection, its services, and what it shows to viewers.
 
-use super::link::Link;
+use super::backend::RosBackend;
+use super::link::{Link, TURN};
 use super::message::Time;
 use super::net_ft::{NetFt, NetFtSettings, Record};
-use super::profile::Profile;
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
+use super::service::{Answer, Service};
 use super::settings::{BackendKind, BackendSettings};
-use super::status::ArmStatus;
-use super::topics::{Endpoint, Service, Topic};
+use super::topics::{Endpoint, Topic};
 use super::transport::{Connect, Packet, cannot_open};
-use super::ur::{TrajectoryStream, stoppable_share};
 use super::view::{MarkerArray, TFMessage};
 use nalgebra::Isometry3;
 use palpate_explore::backend::interlock::check_start;
-use palpate_explore::backend::pace::{self, RealTimePacer};
-use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
+use palpate_explore::backend::{Fault, LinkFault, pace};
 use palpate_explore::robot::arm::Chain;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
@@ -25,13 +22,17 @@ use std::time::{Duration, Instant};
 
 /// Connection to an arm; several backends may use it, one after another.
 pub struct RosArm {
-    chain: Chain,
-    link: Link,
-    mailbox: Arc<TopicReceiver>,
+    pub(super) chain: Chain,
+    pub(super) link: Link,
+    pub(super) mailbox: Arc<TopicReceiver>,
+    /// Time at which the transport was opened.
+    pub(super) opened: Instant,
     /// First fault; it is latched until the operator clears it.
     latched: Mutex<Option<LinkFault>>,
-    /// Number of the call that made the arm accept commands, until it is handed back.
-    engaged_by: Mutex<Option<usize>>,
+    /// Call after which the arm is as it was, until it is handed back.
+    pub(super) hand_back: Mutex<Option<Service>>,
+    /// Pose of the force/torque sensor in the flange's frame, once it is known.
+    pub(super) sensor: Mutex<Option<Isometry3<f64>>>,
     /// Shapes as last published, by name.
     shown: Mutex<MarkerArray>,
     /// Receiver of the force/torque sensor over UDP, if one is configured.
@@ -39,11 +40,11 @@ pub struct RosArm {
 }
 
 /// Polling interval for received messages; a heuristic: well below a control tick.
-const POLL_INTERVAL: Duration = Duration::from_millis(1);
+pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
-/// Time within which all parts of a UR's state have arrived.
-// heuristic: fifty cycles of the robot's controller (500 Hz).
-const STATE_SPREAD: Duration = Duration::from_millis(100);
+/// Time between two readings, beyond that of a stall, from which on the arm was at rest; a
+/// heuristic: several ticks, less than a fit.
+const PLANNING_S: f64 = 0.05;
 
 /// Time without an answer after which an idempotent service call is repeated.
 // heuristic: ten times the duration of discovery and an answer on a local network.
@@ -55,7 +56,8 @@ impl RosArm {
     /// # Errors
     /// The errors of [`connect`](Self::connect), and an error if this build lacks the transport.
     pub fn connect_over(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
-        let open = super::connect(settings, Endpoint::Explorer, settings.profile.services())?;
+        let services = settings.driver().services.to_vec();
+        let open = super::connect(settings, Endpoint::Explorer, services)?;
         Self::connect(settings, chain, open)
     }
 
@@ -77,33 +79,25 @@ impl RosArm {
         let link = Link::open(connect, period, take, move || idler.idle_command())?;
         let sensor = settings.net_ft.as_ref();
         let _net_ft = sensor.map(|sensor| listen(sensor, &mailbox)).transpose()?;
-        let (chain, latched, engaged_by) = (chain.clone(), Mutex::default(), Mutex::default());
-        let shown = Mutex::default();
-        let lab = Arc::new(Self { chain, link, mailbox, latched, engaged_by, shown, _net_ft });
+        let lab = Arc::new(Self {
+            chain: chain.clone(),
+            link,
+            mailbox,
+            opened: Instant::now(),
+            latched: Mutex::default(),
+            hand_back: Mutex::default(),
+            sensor: Mutex::default(),
+            shown: Mutex::default(),
+            _net_ft,
+        });
         lab.show_frames(None);
         lab.wait_for_topics()?;
-        lab.check_publishers()?;
         Ok(lab)
     }
 
     /// Returns a backend on this arm; use one at a time.
     pub fn backend(self: &Arc<Self>) -> RosBackend {
-        let period_s = 1.0 / self.settings().rate_hz;
-        let capabilities = Capabilities {
-            resettable: false,
-            real_time: true,
-            tactile: self.settings().topics.tactile.message.is_of_biotac(),
-            ..Capabilities::simulated(&self.chain, period_s)
-        };
-        RosBackend {
-            lab: Arc::clone(self),
-            capabilities,
-            reading: Reading::default(),
-            since: Instant::now(),
-            pace: RealTimePacer::new(period_s),
-            still: Command { qdot: vec![0.0; self.chain.joints.len()] },
-            sent: Command::default(),
-        }
+        RosBackend::new(self)
     }
 
     /// Commands the arm to rest, sets the zero of its force/torque sensor if its driver asks for
@@ -112,11 +106,13 @@ impl RosArm {
     /// # Errors
     /// The first check that fails.
     pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
-        if let Some(service) = self.settings().zero_wrench() {
-            let failed = |cause| Fault::Link { time_s: 0.0, cause };
-            self.call(&service).map_err(failed)?;
+        let failed = |cause| Fault::Link { time_s: 0.0, cause };
+        let zero_wrench = self.settings().driver().zero_wrench.as_ref();
+        if let Some(service) = zero_wrench.filter(|_| !self.settings().dry) {
+            self.call(service).map_err(failed)?;
         }
-        check_start(&mut self.backend(), &self.chain, &self.settings().start_checks, 0)
+        check_start(&mut self.backend(), &self.chain, &self.settings().start_checks, 0)?;
+        self.check_model().map_err(failed)
     }
 
     /// Publishes a message for viewers, if this transport has its topic.
@@ -147,7 +143,7 @@ impl RosArm {
 
     /// Publishes the pose of `W` in the frame of the robot's base, and of an object in `W`.
     fn show_frames(&self, x_wm: Option<&Isometry3<f64>>) {
-        let mut frames = TFMessage::of_base(self.settings().base_frame(), &self.chain.base);
+        let mut frames = TFMessage::of_base(&self.settings().base_frame(), &self.chain.base);
         if let Some(x_wm) = x_wm {
             frames = frames.with("object", "W", x_wm);
         }
@@ -155,7 +151,7 @@ impl RosArm {
         self.show(frames);
     }
 
-    fn settings(&self) -> &BackendSettings {
+    pub(super) fn settings(&self) -> &BackendSettings {
         &self.mailbox.settings
     }
 
@@ -164,11 +160,15 @@ impl RosArm {
     ///
     /// # Errors
     /// If there is no server or no answer within the timeout, or the answer is a refusal.
-    pub fn call(&self, service: &Service) -> Result<(), LinkFault> {
+    pub fn call(&self, service: &Service) -> Result<Answer, LinkFault> {
         self.call_within(service, self.settings().connect_timeout_s)
     }
 
-    fn call_within(&self, service: &Service, timeout_s: f64) -> Result<(), LinkFault> {
+    pub(super) fn call_within(
+        &self,
+        service: &Service,
+        timeout_s: f64,
+    ) -> Result<Answer, LinkFault> {
         self.mailbox.latest().answers.retain(|(other, _)| other != service);
         self.link.call(service.clone());
         let begun = Instant::now();
@@ -178,7 +178,7 @@ impl RosArm {
             let found = heard.answers.iter().position(|(other, _)| other == service);
             if let Some((_, answer)) = found.map(|i| heard.answers.swap_remove(i)) {
                 match answer.success {
-                    true => return Ok(()),
+                    true => return Ok(answer),
                     false => break answer.message,
                 }
             }
@@ -189,7 +189,11 @@ impl RosArm {
                     false => format!("no server ({}) found in {timeout_s} s", service.type_name()),
                     true => format!(
                         "a server was found, but did not answer within {timeout_s} s; check that \
-                         backend.service_mapping fits its DDS implementation"
+                         {}backend.service_mapping fits its DDS implementation",
+                        match service.depends_on_release() {
+                            true => "backend.release is that of the driver's computer, and that ",
+                            false => "",
+                        }
                     ),
                 };
             }
@@ -208,7 +212,8 @@ impl RosArm {
     /// # Errors
     /// If the arm refuses.
     pub fn clear_fault(&self) -> Result<(), LinkFault> {
-        self.settings().clear_fault().map_or(Ok(()), |service| self.call(&service))?;
+        let service = self.settings().driver().clear_fault.as_ref();
+        service.map(|service| self.call(service)).transpose()?;
         let mut heard = self.mailbox.latest();
         heard.refused = None;
         heard.topics.iter_mut().for_each(|state| state.stamp_s = 0.0);
@@ -217,7 +222,7 @@ impl RosArm {
         Ok(())
     }
 
-    fn latch(&self) -> MutexGuard<'_, Option<LinkFault>> {
+    pub(super) fn latch(&self) -> MutexGuard<'_, Option<LinkFault>> {
         self.latched.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -254,38 +259,35 @@ impl RosArm {
         }
     }
 
-    fn check_publishers(&self) -> Result<(), LinkFault> {
-        let count = self.link.publisher_count(Topic::Command);
-        if count <= 1 {
-            return Ok(());
-        }
-        let topic = self.settings().topics.name(Topic::Command);
-        let words = format!("{count} publishers on {topic}; allowed is one (this program)");
-        Err(InputError::new(words).into())
-    }
-
-    /// Makes the arm accept commands.
-    fn engage(&self) -> Result<(), LinkFault> {
-        let mut refusal = Ok(());
-        for (i, service) in self.settings().engage().iter().enumerate() {
-            refusal = self.call(service);
-            if refusal.is_ok() {
-                // Later strict calls are refused, because the controller is active since the first.
-                self.engaged_by().get_or_insert(i);
-                break;
-            }
-        }
-        refusal
-    }
-
-    fn engaged_by(&self) -> MutexGuard<'_, Option<usize>> {
-        self.engaged_by.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Sends joint velocities.
-    fn command(&self, qdot: &[f64]) {
+    pub(super) fn command(&self, qdot: &[f64]) {
         if let Some(packet) = self.mailbox.command(qdot) {
             self.link.send(packet);
+        }
+    }
+
+    /// Returns the newest messages if they are recent enough and permit motion; the last reading is
+    /// `dt_s` old. A standstill of this program is not taken for a silence of the arm: what arrived
+    /// meanwhile is read first.
+    pub(super) fn checked(&self, dt_s: f64) -> Result<MutexGuard<'_, LatestMessages>, LinkFault> {
+        let mut heard = self.mailbox.latest();
+        let mut checked = self.check(&heard);
+        if checked.as_ref().is_err_and(|cause| !matches!(cause, LinkFault::Arm(_))) {
+            drop(heard);
+            self.link.wait_for_turn(TURN);
+            heard = self.mailbox.latest();
+            checked = self.check(&heard);
+        }
+        // While it plans, the arm rests.
+        let stall_s = self.link.take_stall_s().filter(|it| dt_s < it + PLANNING_S);
+        match (stall_s, checked) {
+            (_, Err(LinkFault::Arm(words))) => Err(LinkFault::Arm(words)),
+            (Some(stall_s), _) => Err(InputError::new(format!(
+                "this program stood still for {:.0} ms; the arm has come to rest by itself",
+                1e3 * stall_s
+            ))
+            .into()),
+            (None, checked) => checked.map(|()| heard),
         }
     }
 
@@ -317,7 +319,7 @@ impl RosArm {
         }
         match self.link.broken() {
             Some(broken) => Err(broken.into()),
-            None => self.check_publishers(),
+            None => self.check_sole(heard),
         }
     }
 }
@@ -356,188 +358,12 @@ fn silent(topic: &str, age_s: f64, state: &TopicState) -> InputError {
 impl Drop for RosArm {
     /// Hands the arm back before commands cease, so that it raises no alarm.
     fn drop(&mut self) {
-        let was_engaged = {
+        {
             let mut heard = self.mailbox.latest();
-            heard.is_ready = false;
-            std::mem::take(&mut heard.is_engaged)
-        };
-        let granted = self.engaged_by().take().filter(|_| was_engaged);
-        if let Some(service) = granted.and_then(|granted| self.settings().hand_back(granted)) {
+            (heard.is_ready, heard.is_engaged) = (false, false);
+        }
+        if let Some(service) = self.hand_back().take() {
             let _ = self.call_within(&service, REPEAT_S);
         }
-    }
-}
-
-/// Backend of an arm behind topics.
-pub struct RosBackend {
-    lab: Arc<RosArm>,
-    capabilities: Capabilities,
-    reading: Reading,
-    since: Instant,
-    pace: RealTimePacer,
-    still: Command,
-    /// The last command as sent.
-    sent: Command,
-}
-
-impl RosBackend {
-    fn time_s(&self) -> f64 {
-        self.since.elapsed().as_secs_f64()
-    }
-
-    /// Commands zero velocity, latches a fault and returns the latched one.
-    fn fault(&self, mut cause: LinkFault) -> Fault {
-        // Otherwise the last command would remain valid until it expires.
-        self.lab.command(&self.still.qdot);
-        // No command goes to an arm that was stopped by hand: even a zero velocity could release
-        // its brakes again.
-        if matches!(cause, LinkFault::Arm(_)) {
-            let mut heard = self.lab.mailbox.latest();
-            (heard.is_engaged, heard.is_ready) = (false, false);
-            drop(heard);
-            // The parts of a UR's state arrive one after another; the last one may be the reason.
-            if self.lab.settings().profile == Profile::Ur {
-                sleep(STATE_SPREAD);
-                let heard = self.lab.mailbox.latest();
-                let refusal = heard.status.as_ref().and_then(ArmStatus::refusal);
-                cause = refusal.map_or(cause, LinkFault::Arm);
-            }
-        }
-        let cause = self.lab.latch().get_or_insert(cause).clone();
-        Fault::Link { time_s: self.time_s(), cause }
-    }
-
-    /// Returns the latched fault as an error, if there is one.
-    fn latched(&self) -> Result<(), Fault> {
-        match self.lab.latch().clone() {
-            Some(cause) => Err(Fault::Link { time_s: self.time_s(), cause }),
-            None => Ok(()),
-        }
-    }
-
-    /// Returns the newest reading, or latches a fault.
-    fn read(&mut self) -> Result<&Reading, Fault> {
-        match self.update_reading() {
-            Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
-        }
-    }
-
-    /// Copies the newest messages into the reading.
-    fn update_reading(&mut self) -> Result<(), LinkFault> {
-        let mailbox = Arc::clone(&self.lab.mailbox);
-        let mut heard = mailbox.latest();
-        self.lab.check(&heard)?;
-        let time_s = self.time_s();
-        let dt_s = time_s - self.reading.time_s;
-        // While it plans, the arm rests.
-        if let Some(stall_s) = self.lab.link.take_stall_s().filter(|it| dt_s < it + PLANNING_S) {
-            let words = format!(
-                "this program stood still for {:.0} ms; the arm has come to rest by itself",
-                1e3 * stall_s
-            );
-            return Err(InputError::new(words).into());
-        }
-        if self.reading.q.len() == heard.q.len() {
-            let joints = self.lab.chain.joints.iter().zip(self.reading.q.iter().zip(&heard.q));
-            for (joint, (&from, &to)) in joints {
-                if (to - from).abs() > JUMP_RAD + joint.qdot_limit * dt_s {
-                    let (joint, dt_ms) = (&joint.name, 1e3 * dt_s);
-                    let words = format!(
-                        "joint \"{joint}\" jumped from {from:.4} to {to:.4} in {dt_ms:.0} ms, beyond its speed limit"
-                    );
-                    return Err(InputError::new(words).into());
-                }
-            }
-        }
-        let Reading { q, qdot, wrench, samples, .. } = &mut self.reading;
-        q.clone_from(&heard.q);
-        qdot.clone_from(&heard.qdot);
-        *wrench = heard.wrench.map(|wrench| wrench.moved(&self.lab.chain.tool.inverse()));
-        samples.clear();
-        samples.extend(heard.samples.drain(..));
-        self.reading.time_s = time_s;
-        Ok(())
-    }
-}
-
-/// Time between two readings, beyond that of a stall, from which on the arm was at rest; a
-/// heuristic: several ticks, less than a fit.
-const PLANNING_S: f64 = 0.05;
-
-/// Tolerance of the jump detection beyond motion at a joint's speed limit, rad; a heuristic: a tick
-/// at half the fastest joint's speed.
-const JUMP_RAD: f64 = 0.02;
-
-/// Duration of zero velocity commands before the arm moves, s; a heuristic.
-const HANDSHAKE_S: f64 = 0.1;
-
-impl Backend for RosBackend {
-    fn capabilities(&self) -> &Capabilities {
-        &self.capabilities
-    }
-
-    /// Starts sending zero velocities, without moving the arm.
-    fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
-        self.latched()?;
-        let lab = Arc::clone(&self.lab);
-        (self.since, self.reading) = (Instant::now(), Reading::default());
-        {
-            let mut heard = lab.mailbox.latest();
-            heard.since = Some(self.since);
-            heard.stream = TrajectoryStream::default();
-            heard.samples.clear();
-            (heard.is_engaged, heard.is_ready) = (true, false);
-        }
-        if let Err(fault) = lab.engage() {
-            return Err(self.fault(fault));
-        }
-        // Brakes are released after the first zero velocity commands.
-        let begun = Instant::now();
-        loop {
-            sleep(POLL_INTERVAL);
-            let mut heard = lab.mailbox.latest();
-            let status = heard.status.as_ref();
-            let is_ready = status.is_some_and(|status| status.refusal().is_none());
-            let is_final = status.is_some_and(ArmStatus::needs_operator);
-            let waited_s = begun.elapsed().as_secs_f64();
-            heard.is_ready = is_ready && waited_s > HANDSHAKE_S;
-            let is_done = heard.is_ready || is_final && waited_s > HANDSHAKE_S;
-            if is_done || waited_s > lab.settings().connect_timeout_s {
-                break;
-            }
-        }
-        self.pace.restart();
-        self.reading.applied.clone_from(&self.still);
-        self.read()
-    }
-
-    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        self.latched()?;
-        self.capabilities.accept(command)?;
-        let is_stream = self.lab.settings().sends_trajectories();
-        let share = if is_stream { stoppable_share(&command.qdot) } else { 1.0 };
-        self.sent.qdot.clear();
-        self.sent.qdot.extend(command.qdot.iter().map(|qdot| qdot * share));
-        self.lab.command(&self.sent.qdot);
-        self.pace.wait(1);
-        let before_s = self.reading.time_s;
-        self.read()?;
-        let applied = &mut self.reading.applied.qdot;
-        let heard = &mut *self.lab.mailbox.latest();
-        if is_stream {
-            heard.stream.take_motion(&heard.q, Instant::now(), applied);
-            let passed_s = (self.reading.time_s - before_s).max(f64::MIN_POSITIVE);
-            applied.iter_mut().for_each(|motion| *motion /= passed_s);
-        } else {
-            applied.clear();
-            applied.extend(self.sent.qdot.iter().map(|qdot| qdot * heard.speed_scale));
-        }
-        Ok(&self.reading)
-    }
-
-    /// Calls the arm's stop service, without waiting for its answer.
-    fn brake(&mut self) {
-        self.lab.link.call(self.lab.settings().stop());
     }
 }

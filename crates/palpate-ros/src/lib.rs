@@ -3,8 +3,8 @@
 //! | module | content |
 //! |---|---|
 //! | [`arm`] | the arm: a [`Backend`](palpate_explore::backend::Backend) over topics |
-//! | [`profile`], [`ur`] | the drivers of arms, and where they differ |
-//! | [`topics`], [`message`] | the topics and services of an arm, and their messages |
+//! | [`driver`] | the drivers of arms, and where they differ |
+//! | [`topics`], [`service`], [`message`] | the topics and services of an arm, and their messages |
 //! | [`camera`] | one view of a depth camera |
 //! | [`view`] | messages that RViz, Foxglove and other viewers draw |
 //! | [`transport`] | sends and receives packets; [`connect`] creates one from settings |
@@ -26,15 +26,20 @@
 //! ```
 
 pub mod arm;
-mod calls;
+mod backend;
 pub mod camera;
+pub mod control_message;
+pub mod controllers;
 pub mod definition;
+pub mod driver;
+mod engage;
+pub mod frames;
 pub mod joints;
 pub mod link;
+pub mod listen;
 pub mod message;
 pub mod net_ft;
 pub mod network;
-pub mod profile;
 pub mod receiver;
 pub mod recording;
 #[cfg(feature = "ros1")]
@@ -42,20 +47,22 @@ mod ros1;
 #[cfg(feature = "ros2")]
 mod ros2;
 pub mod server;
+pub mod service;
 pub mod settings;
 pub mod status;
 pub mod tactile;
 pub mod topics;
+pub mod trajectory_stream;
 pub mod transport;
-pub mod ur;
 pub mod view;
 
 use camera::{CameraMessage, CameraTopics, Cloud, FirstMessages};
 use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
 pub use ros1::disable_tls_certificates;
+use service::Service;
 use settings::{BackendKind, BackendSettings};
-use topics::{Endpoint, Service};
+use topics::Endpoint;
 use transport::Connect;
 
 /// Returns a function that opens the transport of `settings`, to be called in the thread that will

@@ -1,12 +1,12 @@
 //! Thread that serves the topics of one side: passes on received messages immediately, and sends
 //! without blocking the control loop.
 
-use super::message::TriggerResponse;
-use super::topics::{Service, Topic};
-use super::transport::{Connect, Delivery, Packet, Transport, Waker};
+use super::service::{Answer, Service};
+use super::topics::Topic;
+use super::transport::{Connect, Delivery, Packet, Publisher, Transport, Waker};
 use palpate_input::error::InputError;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -18,6 +18,10 @@ const COUNTED_S: f64 = 0.1;
 /// Time without a turn of the thread after which this program counts as stopped, s: an arm has come
 /// to rest by itself in that time.
 const STALL_S: f64 = 0.15;
+
+/// Largest time for a turn of the thread.
+// heuristic: five control ticks.
+pub const TURN: Duration = Duration::from_millis(20);
 
 /// A send operation, run by the thread.
 type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), InputError> + Send>;
@@ -31,6 +35,10 @@ struct Shared {
     is_closed: AtomicBool,
     /// Number of known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
+    /// Number of known subscribers of commands.
+    subscribers: AtomicUsize,
+    /// Number of turns of the thread.
+    turns: AtomicU64,
     broken: Mutex<Option<InputError>>,
     /// Duration of the last stall that was not taken, s.
     stalled_s: Mutex<Option<f64>>,
@@ -96,13 +104,58 @@ impl Link {
     }
 
     /// Answers a call.
-    pub fn answer(&self, service: Service, call: u64, answer: TriggerResponse) {
+    pub fn answer(&self, service: Service, call: u64, answer: Answer) {
         self.add(Box::new(move |transport| transport.answer(&service, call, answer)));
     }
 
     /// Returns the number of known publishers of a topic, including this side's own.
     pub fn publisher_count(&self, topic: Topic) -> usize {
         self.shared.publishers[topic as usize].load(Ordering::Relaxed)
+    }
+
+    /// Returns the number of known subscribers of the commands.
+    pub fn subscriber_count(&self) -> usize {
+        self.shared.subscribers.load(Ordering::Relaxed)
+    }
+
+    /// Returns all known publishers, if the network announces them; waits for the thread's answer
+    /// for at most a second.
+    pub fn publishers(&self) -> Vec<Publisher> {
+        let (sender, found) = channel();
+        self.add(Box::new(move |transport| {
+            let _ = sender.send(transport.publishers());
+            Ok(())
+        }));
+        found.recv_timeout(Duration::from_secs(1)).unwrap_or_default()
+    }
+
+    /// Returns those of `services` whose server is not known.
+    pub fn missing(&self, services: &[Service]) -> Vec<Service> {
+        let (sender, found) = channel();
+        let services = services.to_vec();
+        self.add(Box::new(move |transport| {
+            let mut is_missing = |service: &Service| !transport.is_served(service);
+            let _ = sender.send(services.into_iter().filter(|it| is_missing(it)).collect());
+            Ok(())
+        }));
+        found.recv_timeout(Duration::from_secs(1)).unwrap_or_default()
+    }
+
+    /// Creates this side's publisher of commands.
+    pub fn open_commands(&self) {
+        self.add(Box::new(|transport| transport.open_commands()));
+    }
+
+    /// Waits until everything that has arrived was passed on; returns after `timeout` at the
+    /// latest.
+    pub fn wait_for_turn(&self, timeout: Duration) {
+        let turns = || self.shared.turns.load(Ordering::Acquire);
+        let (begun, first) = (Instant::now(), turns());
+        (self.waker)();
+        // The turn that runs now may have begun before the last arrival.
+        while turns() < first + 2 && begun.elapsed() < timeout {
+            std::thread::sleep(Duration::from_micros(200));
+        }
     }
 
     /// Returns the error that ended sending, if there is one.
@@ -186,8 +239,11 @@ fn serve(
                 let count = transport.publisher_count(topic);
                 shared.publishers[topic as usize].store(count, Ordering::Relaxed);
             }
+            let count = transport.subscriber_count(Topic::Command);
+            shared.subscribers.store(count, Ordering::Relaxed);
         }
         *lock(&shared.broken) = result.err();
+        shared.turns.fetch_add(1, Ordering::Release);
     }
     // Pending messages are still sent at the end.
     for job in lock(&shared.jobs).drain(..) {
@@ -221,6 +277,14 @@ mod tests {
             0
         }
 
+        fn subscriber_count(&self, _: Topic) -> usize {
+            0
+        }
+
+        fn open_commands(&mut self) -> Result<(), InputError> {
+            Ok(())
+        }
+
         fn is_served(&mut self, _: &Service) -> bool {
             false
         }
@@ -229,7 +293,7 @@ mod tests {
             Ok(())
         }
 
-        fn answer(&mut self, _: &Service, _: u64, _: TriggerResponse) -> Result<(), InputError> {
+        fn answer(&mut self, _: &Service, _: u64, _: Answer) -> Result<(), InputError> {
             Ok(())
         }
     }

@@ -146,57 +146,6 @@ messages! {
         uint8 mode,
     }
 
-    /// Request to switch controllers of `ros2_control`, from ROS 2 Jazzy on.
-    controller_manager_msgs/SwitchControllerRequest {
-        "int32 BEST_EFFORT=1\nint32 STRICT=2\n"
-        /// Controllers to activate.
-        string[] activate_controllers,
-        /// Controllers to deactivate.
-        string[] deactivate_controllers,
-        /// Strictness; 1: as far as possible, 2: all or none.
-        int32 strictness,
-        /// Whether to activate as soon as the hardware is ready.
-        bool activate_asap,
-        /// Timeout; zero: none.
-        builtin_interfaces/Duration timeout,
-    }
-
-    /// The same request in ROS 2 Humble.
-    controller_manager_msgs/SwitchControllerHumbleRequest {
-        "int32 BEST_EFFORT=1\nint32 STRICT=2\n"
-        /// Controllers to activate.
-        string[] activate_controllers,
-        /// Controllers to deactivate.
-        string[] deactivate_controllers,
-        /// Empty.
-        string[] start_controllers,
-        /// Empty.
-        string[] stop_controllers,
-        /// Strictness; 1: as far as possible, 2: all or none.
-        int32 strictness,
-        /// False.
-        bool start_asap,
-        /// Whether to activate as soon as the hardware is ready.
-        bool activate_asap,
-        /// Timeout; zero: none.
-        builtin_interfaces/Duration timeout,
-    }
-
-    /// Response of a switch of controllers, from ROS 2 Jazzy on.
-    controller_manager_msgs/SwitchControllerResponse {
-        /// Whether the controllers were switched.
-        bool ok,
-        /// Description.
-        string message,
-    }
-
-    /// The same response in ROS 2 Humble.
-    #[derive(Copy)]
-    controller_manager_msgs/SwitchControllerHumbleResponse {
-        /// Whether the controllers were switched.
-        bool ok,
-    }
-
     /// Data of one finger, in counts.
     biotac_sensors/BioTacData {
         /// Serial number.

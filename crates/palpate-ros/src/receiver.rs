@@ -1,14 +1,18 @@
 //! Newest message of each topic, stamped on receipt by the monotonic clock; and zero velocity
 //! commands while the explorer is computing.
 
+use super::control_message::GoalStatusArray;
+use super::driver::ur::UrState;
+use super::frames::FrameTree;
 use super::joints::JointNames;
-use super::message::{Time, TriggerResponse};
+use super::message::Time;
+use super::service::{Answer, Service};
 use super::settings::{BackendSettings, CLOCK_AHEAD_S};
 use super::status::ArmStatus;
 use super::tactile;
-use super::topics::{Endpoint, Service, Topic};
+use super::topics::{Endpoint, Topic};
+use super::trajectory_stream::TrajectoryStream;
 use super::transport::{Delivery, Packet};
-use super::ur::{TrajectoryStream, UrState};
 use palpate_explore::backend::{LinkFault, Sample, Wrench, pace};
 use palpate_input::error::InputError;
 use std::collections::VecDeque;
@@ -31,6 +35,14 @@ pub struct LatestMessages {
     pub qdot: Vec<f64>,
     /// Reading of the force/torque sensor, in its own frame.
     pub wrench: Option<Wrench>,
+    /// Name of that frame.
+    pub wrench_frame: String,
+    /// Frames of the robot's links.
+    pub frames: FrameTree,
+    /// Goals of other programs.
+    pub goals: GoalStatusArray,
+    /// Time of a simulated robot, s, and of its receipt.
+    clock: Option<(f64, Instant)>,
     /// Unread samples of the fingertip, oldest first, with the time of receipt since `since`, s.
     pub samples: VecDeque<Sample>,
     /// State of the arm.
@@ -46,7 +58,7 @@ pub struct LatestMessages {
     /// Fault of the first refused message; it ends the run.
     pub refused: Option<LinkFault>,
     /// Answers of services.
-    pub answers: Vec<(Service, TriggerResponse)>,
+    pub answers: Vec<(Service, Answer)>,
     /// Time of the last command, if any.
     pub commanded: Option<Instant>,
     /// Whether the arm is commanded to zero velocity in the absence of other commands.
@@ -144,8 +156,10 @@ impl TopicReceiver {
 
     fn take_packet(&self, mut packet: Packet, received: Instant) {
         let topic = packet.topic();
-        let is_other = topic == Topic::Wrench && self.settings.net_ft.is_some();
-        if is_other || topic.publisher() == Endpoint::Explorer {
+        let has_other = self.settings.net_ft.is_some() || self.settings.dry;
+        let is_other = topic == Topic::Wrench && has_other;
+        let is_of_arm = topic.publisher() == Endpoint::Arm || topic == Topic::Frames;
+        if is_other || !is_of_arm {
             return;
         }
         let heard = &mut *self.latest();
@@ -193,7 +207,14 @@ impl TopicReceiver {
             status = heard.ur.status();
         }
         // A message without a header is as old as its receipt.
-        let is_timely = stamp.map_or(Ok(true), |stamp| self.is_timely(state, topic, stamp));
+        let now_s = match (self.settings.use_sim_time, heard.clock) {
+            (false, _) => pace::now_s(),
+            (true, Some((at_s, since))) => at_s + since.elapsed().as_secs_f64(),
+            // Without a time of the simulation no stamp can be judged.
+            (true, None) if topic != Topic::Clock => return Ok(()),
+            (true, None) => 0.0,
+        };
+        let is_timely = stamp.map_or(Ok(true), |stamp| self.is_timely(state, topic, stamp, now_s));
         if let Some(status) = &status {
             // A fault that only an operator can clear counts regardless of its stamp.
             let is_read = status.needs_operator() || is_timely.clone()?;
@@ -218,7 +239,13 @@ impl TopicReceiver {
                     return Err(refuse(format!("{force:?} and {torque:?}")));
                 }
                 heard.wrench = Some(wrench);
+                if heard.wrench_frame != message.header.frame_id {
+                    heard.wrench_frame.clone_from(&message.header.frame_id);
+                }
             }
+            Packet::Frames(message) => heard.frames.read(message),
+            Packet::Goals(message) => heard.goals = message.clone(),
+            Packet::Clock(message) => heard.clock = Some((message.clock.s(), received)),
             Packet::Status(_)
             | Packet::RobotMode(_)
             | Packet::SafetyMode(_)
@@ -244,13 +271,13 @@ impl TopicReceiver {
             | Packet::Velocities(_)
             | Packet::Markers(_)
             | Packet::Points(_)
-            | Packet::Frames(_) => return Ok(()),
+            | Packet::Description(_) => return Ok(()),
         }
         heard.topics[topic as usize].at = Some(received);
         Ok(())
     }
 
-    /// Whether a message of `topic` with this stamp is recent enough and in order.
+    /// Whether a message of `topic` with this stamp is recent enough at `now_s` and in order.
     ///
     /// # Errors
     /// If it has no stamp, or one from the future.
@@ -259,6 +286,7 @@ impl TopicReceiver {
         state: &mut TopicState,
         topic: Topic,
         stamp: Time,
+        now_s: f64,
     ) -> Result<bool, LinkFault> {
         let topics = &self.settings.topics;
         let stamp_s = stamp.s();
@@ -272,7 +300,7 @@ impl TopicReceiver {
                 )),
             };
         }
-        let age_s = pace::now_s() - stamp_s;
+        let age_s = now_s - stamp_s;
         if age_s < -CLOCK_AHEAD_S {
             let ahead_ms = -1e3 * age_s;
             let words = format!(

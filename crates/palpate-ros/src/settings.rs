@@ -1,8 +1,10 @@
 //! Settings of the backend: table `[backend]`.
 
+use super::controllers::Switch;
+use super::driver::{Driver, Profile, Release};
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
-use super::profile::{Profile, Release};
+use super::service::Service;
 use super::topics::{CommandMessage, TactileMessage, Topic, Topics};
 use palpate_explore::backend::interlock::{FORMER_KEYS, InterlockSettings, StartCheckSettings};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
@@ -62,8 +64,21 @@ pub struct BackendSettings {
     /// Driver of the arm: `palpate` for one as in the guide "Your robot", `ur` for
     /// `ur_robot_driver`.
     pub profile: Profile,
-    /// ROS 2 release of `ur_robot_driver`, which decides the layout of its services.
+    /// ROS 2 release on the driver's computer, which decides its controllers and the layout of its
+    /// services.
     pub release: Release,
+    /// Prefix of the driver's joints and frames, e.g. `"ur5e_"`.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub prefix: String,
+    /// Whether nothing is touched, so that joint states are enough; set by `--dry` only.
+    #[serde(skip)]
+    pub dry: bool,
+    /// Whether topics that no touch needs are received, too.
+    #[serde(skip)]
+    pub hears_all: bool,
+    /// Whether stamps have the time of `/clock`, as with Gazebo.
+    #[serde(skip_serializing_if = "is_default")]
+    pub use_sim_time: bool,
     /// Time after which a watchdog of the laboratory stops the arm when velocities cease, s;
     /// required for velocities to `ur_robot_driver`, which has none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,6 +148,10 @@ impl Default for BackendSettings {
             kind: BackendKind::Simulated,
             profile: Profile::Palpate,
             release: Release::Jazzy,
+            prefix: String::new(),
+            dry: false,
+            hears_all: false,
+            use_sim_time: false,
             watchdog_s: None,
             address: None,
             realtime: true,
@@ -225,11 +244,27 @@ impl BackendSettings {
         }
     }
 
+    /// Returns the description of the arm's driver.
+    pub fn driver(&self) -> &'static Driver {
+        self.profile.driver()
+    }
+
     /// Returns the topics that the arm publishes and without which it is not moved.
-    pub fn topics_of_arm(&self) -> impl Iterator<Item = Topic> {
+    pub fn topics_of_arm(&self) -> impl Iterator<Item = Topic> + use<> {
         let is_silent = self.topics.tactile.message == TactileMessage::None;
-        let all = self.profile.topics().iter().copied();
-        all.filter(move |topic| !(is_silent && *topic == Topic::Tactile))
+        let all = match self.dry {
+            true => [Topic::Joints].iter(),
+            false => self.driver().topics.iter(),
+        };
+        let all = all.copied();
+        let clock = self.use_sim_time.then_some(Topic::Clock);
+        all.filter(move |topic| !(is_silent && *topic == Topic::Tactile)).chain(clock)
+    }
+
+    /// Returns the topics of the arm that are read if they are there.
+    pub fn further_topics(&self) -> impl Iterator<Item = Topic> + use<> {
+        let description = self.hears_all.then_some(Topic::Description);
+        self.driver().further.iter().copied().chain(description)
     }
 
     /// Whether messages of `topic` are sent on change only, and kept for later readers.
@@ -238,24 +273,50 @@ impl BackendSettings {
             Topic::Status => self.status_on_change,
             Topic::RobotMode | Topic::SafetyMode | Topic::ProgramRunning => true,
             Topic::Markers | Topic::Points | Topic::Frames => true,
+            Topic::FixedTransforms | Topic::Goals | Topic::Description => true,
             _ => false,
         }
     }
 
     /// Whether commands are trajectories that end at rest.
     pub fn sends_trajectories(&self) -> bool {
-        self.profile == Profile::Ur && self.topics.command.message == CommandMessage::Trajectory
+        let has_controllers = self.driver().modes.is_some();
+        has_controllers && self.topics.command.message == CommandMessage::Trajectory
     }
 
-    /// Returns the frame of the robot's base for viewers.
-    pub fn base_frame(&self) -> &str {
-        self.base_frame.as_deref().unwrap_or(self.profile.base_frame())
+    /// Returns the frame of the robot's base.
+    pub fn base_frame(&self) -> String {
+        let usual = || format!("{}{}", self.prefix, self.driver().base_frame);
+        self.base_frame.clone().unwrap_or_else(usual)
+    }
+
+    /// Returns the frame of the flange, if the driver publishes frames.
+    pub fn flange_frame(&self) -> Option<String> {
+        self.driver().flange_frame.map(|name| format!("{}{name}", self.prefix))
+    }
+
+    /// Returns the name of the controller of `ros2_control` that takes the commands: the part of
+    /// their topic before the last.
+    pub fn controller(&self) -> String {
+        let name = self.topics.name(Topic::Command);
+        name.rsplit('/').nth(1).unwrap_or_default().to_owned()
+    }
+
+    /// Returns the call that stops the arm when its readings are unreliable.
+    pub fn stop(&self) -> Service {
+        match self.driver().modes {
+            None => Service::Stop,
+            // Without an active controller the robot stops itself.
+            Some(_) => Service::SwitchController(Switch::off(self.controller())),
+        }
     }
 
     /// Returns the names that the joints of `chain` have in messages.
     pub fn joint_names(&self, chain: &Chain) -> JointNames {
         JointNames::new(match self.joints.as_slice() {
-            [] => chain.joints.iter().map(|joint| joint.name.to_string()).collect(),
+            [] => {
+                chain.joints.iter().map(|joint| format!("{}{}", self.prefix, joint.name)).collect()
+            }
             named => named.to_vec(),
         })
     }
@@ -273,6 +334,10 @@ impl Validate for BackendSettings {
         let is_address = self.master.starts_with("http://") && self.master.len() > 7;
         rules.require("master", format!("\"{}\"", self.master), is_address, || {
             "an address, e.g. \"http://127.0.0.1:11311\"".into()
+        });
+        let is_plain = self.prefix.chars().all(|c| c.is_ascii_alphanumeric() || "_/".contains(c));
+        rules.require("prefix", format!("\"{}\"", self.prefix), is_plain, || {
+            "letters, digits, _ and slashes".into()
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
         if self.profile == Profile::Ur {

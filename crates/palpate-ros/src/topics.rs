@@ -1,12 +1,13 @@
-//! Topics of an arm: names, message types and age limits; and its services.
+//! Topics of an arm: names, message types and age limits.
 
+use super::control_message::{Clock, GoalStatusArray, RobotDescription};
 use super::definition::HasDefinition;
 use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
     JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
 };
 use super::view::{MarkerArray, PointCloud2, TFMessage};
-use palpate_input::config::{Rules, Validate};
+use palpate_input::config::{Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,16 @@ pub enum Topic {
     Points,
     /// Pose of `W` in the frame of the robot's base, for viewers.
     Frames,
+    /// Poses of the robot's links.
+    Transforms,
+    /// Poses of links that do not move.
+    FixedTransforms,
+    /// Goals of other programs for the controller that takes the commands.
+    Goals,
+    /// URDF of the robot.
+    Description,
+    /// Time of a simulated robot.
+    Clock,
 }
 
 /// Side of the topics: explorer or arm.
@@ -50,7 +61,7 @@ pub enum Endpoint {
 
 impl Topic {
     /// All topics.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 17] = [
         Self::Joints,
         Self::Wrench,
         Self::Tactile,
@@ -63,14 +74,28 @@ impl Topic {
         Self::Markers,
         Self::Points,
         Self::Frames,
+        Self::Transforms,
+        Self::FixedTransforms,
+        Self::Goals,
+        Self::Description,
+        Self::Clock,
     ];
 
     /// Topics of the explorer for viewers.
     pub const VIEWED: [Self; 3] = [Self::Markers, Self::Points, Self::Frames];
 
     /// Topics with settings in `[backend.topics]`.
-    pub const SET: [Self; 5] =
-        [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command];
+    pub const SET: [Self; 9] = [
+        Self::Joints,
+        Self::Wrench,
+        Self::Tactile,
+        Self::Status,
+        Self::Command,
+        Self::RobotMode,
+        Self::SafetyMode,
+        Self::ProgramRunning,
+        Self::SpeedScaling,
+    ];
 
     /// Returns the side that publishes the topic.
     pub fn publisher(self) -> Endpoint {
@@ -82,32 +107,49 @@ impl Topic {
 
     /// Returns the topic's key in `[backend.topics]`, if it has settings there.
     pub fn key(self) -> &'static str {
-        let keys = ["joints", "wrench", "tactile", "status", "command"];
-        keys.get(self as usize).copied().unwrap_or_default()
+        KEYS.get(self as usize).copied().unwrap_or_default()
     }
 }
 
-/// Names and age limits, s, of the topics without settings: first those of `ur_robot_driver`.
-// heuristic: the age limit of the only one that is published periodically, at 100 Hz.
-const FIXED: [(&str, f64); 7] = [
-    ("io_and_status_controller/robot_mode", f64::INFINITY),
-    ("io_and_status_controller/safety_mode", f64::INFINITY),
-    ("io_and_status_controller/robot_program_running", f64::INFINITY),
-    ("speed_scaling_state_broadcaster/speed_scaling", 0.2),
-    ("/palpate/markers", f64::INFINITY),
-    ("/palpate/points", f64::INFINITY),
-    ("/tf_static", f64::INFINITY),
+/// Keys of the topics with settings, in their order.
+const KEYS: [&str; 9] = [
+    "joints",
+    "wrench",
+    "tactile",
+    "status",
+    "command",
+    "robot_mode",
+    "safety_mode",
+    "program_running",
+    "speed_scaling",
 ];
 
-/// Default name and age limit, s, of each topic, as used by drivers (`pa10_hardware_interface`,
-/// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`).
+/// Names of the topics without settings, in their order.
+const FIXED: [&str; 8] = [
+    "/palpate/markers",
+    "/palpate/points",
+    "/tf_static",
+    "/tf",
+    "/tf_static",
+    "follow_joint_trajectory/_action/status",
+    "robot_description",
+    "/clock",
+];
+
+/// Default name and age limit, s, of each topic with settings, as used by drivers
+/// (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`, `ur_robot_driver`).
+/// Topics without a limit are published on change.
 // heuristic: the age limits; some frames of each topic may be lost.
-const USUAL: [(&str, f64); 5] = [
+const USUAL: [(&str, f64); 9] = [
     ("/joint_states", 0.05),
     ("/ft_sensor/wrench", 0.06),
     ("/biotac_pub", 0.08),
     ("status", 0.2),
     ("joint_velocity_cmd", 0.03),
+    ("io_and_status_controller/robot_mode", f64::INFINITY),
+    ("io_and_status_controller/safety_mode", f64::INFINITY),
+    ("io_and_status_controller/robot_program_running", f64::INFINITY),
+    ("speed_scaling_state_broadcaster/speed_scaling", 0.2),
 ];
 
 /// Message type of the fingertip's samples.
@@ -183,6 +225,30 @@ topic_settings!(WrenchTopic, Topic::Wrench);
 topic_settings!(TactileTopic, Topic::Tactile, TactileMessage);
 topic_settings!(StatusTopic, Topic::Status);
 topic_settings!(CommandTopic, Topic::Command, CommandMessage);
+topic_settings!(SpeedScalingTopic, Topic::SpeedScaling);
+
+/// Defines the settings of a topic that is published on change.
+macro_rules! latched_settings {
+    ($name:ident, $topic:expr) => {
+        /// Name of a topic that is published on change.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name {
+            /// Name, relative to the namespace unless it begins with a slash.
+            pub name: String,
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { name: USUAL[$topic as usize].0.into() }
+            }
+        }
+    };
+}
+
+latched_settings!(RobotModeTopic, Topic::RobotMode);
+latched_settings!(SafetyModeTopic, Topic::SafetyMode);
+latched_settings!(ProgramRunningTopic, Topic::ProgramRunning);
 
 /// Table `[backend.topics]`: topics of the arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -202,6 +268,18 @@ pub struct Topics {
     pub status: StatusTopic,
     /// Joint velocity commands, to the arm.
     pub command: CommandTopic,
+    /// Mode of a Universal Robots arm.
+    #[serde(skip_serializing_if = "is_default")]
+    pub robot_mode: RobotModeTopic,
+    /// Its safety mode.
+    #[serde(skip_serializing_if = "is_default")]
+    pub safety_mode: SafetyModeTopic,
+    /// Whether it runs the driver's program.
+    #[serde(skip_serializing_if = "is_default")]
+    pub program_running: ProgramRunningTopic,
+    /// Its speed as a percentage of the commanded one.
+    #[serde(skip_serializing_if = "is_default")]
+    pub speed_scaling: SpeedScalingTopic,
 }
 
 impl Topics {
@@ -213,12 +291,22 @@ impl Topics {
             Topic::Tactile => (&self.tactile.name, self.tactile.max_age_s),
             Topic::Status => (&self.status.name, self.status.max_age_s),
             Topic::Command => (&self.command.name, self.command.max_age_s),
-            other => FIXED[other as usize - USUAL.len()],
+            Topic::RobotMode => (&self.robot_mode.name, f64::INFINITY),
+            Topic::SafetyMode => (&self.safety_mode.name, f64::INFINITY),
+            Topic::ProgramRunning => (&self.program_running.name, f64::INFINITY),
+            Topic::SpeedScaling => (&self.speed_scaling.name, self.speed_scaling.max_age_s),
+            other => (FIXED[other as usize - USUAL.len()], f64::INFINITY),
         }
     }
 
     /// Returns the name of a topic, with its namespace.
     pub fn name(&self, topic: Topic) -> String {
+        if topic == Topic::Goals {
+            // The action belongs to the controller that takes the commands.
+            let command = self.name(Topic::Command);
+            let controller = command.rsplit_once('/').map_or("", |(controller, _)| controller);
+            return format!("{controller}/{}", self.entry(topic).0);
+        }
         match self.entry(topic).0 {
             name if name.starts_with('/') => name.into(),
             name => format!("{}/{name}", self.namespace()),
@@ -253,7 +341,12 @@ impl Topics {
             Topic::SpeedScaling => Float64::DEFINITION.name,
             Topic::Markers => MarkerArray::DEFINITION.name,
             Topic::Points => PointCloud2::DEFINITION.name,
-            Topic::Frames => TFMessage::DEFINITION.name,
+            Topic::Frames | Topic::Transforms | Topic::FixedTransforms => {
+                TFMessage::DEFINITION.name
+            }
+            Topic::Goals => GoalStatusArray::DEFINITION.name,
+            Topic::Description => RobotDescription::DEFINITION.name,
+            Topic::Clock => Clock::DEFINITION.name,
         }
     }
 
@@ -265,80 +358,6 @@ impl Topics {
     /// Returns the name of the arm's entry in its status: its namespace without slashes.
     pub fn device(&self) -> &str {
         self.namespace().trim_matches('/')
-    }
-}
-
-/// Switch of controllers of `ros2_control`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
-pub struct Switch {
-    /// Controllers to activate.
-    pub activate: Vec<String>,
-    /// Controllers to deactivate.
-    pub deactivate: Vec<String>,
-    /// Whether all are switched or none; otherwise as many as possible.
-    pub is_strict: bool,
-}
-
-/// A call of a service of the arm: `std_srvs/Trigger`, except for a switch of controllers.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Service {
-    /// Stops the arm and ignores commands.
-    Hold,
-    /// Accepts commands again.
-    Unhold,
-    /// Stops immediately by the brakes, like the emergency stop.
-    Stop,
-    /// Clears faults; for the operator.
-    ClearFault,
-    /// Sets the zero of the force/torque sensor to its current value.
-    Bias,
-    /// The same for a Universal Robots arm.
-    ZeroFtSensor,
-    /// Switches controllers of `ros2_control`.
-    SwitchController(Switch),
-    /// Starts or ends a failure by its name; supported by a simulated robot only.
-    Twin(&'static str),
-}
-
-impl Service {
-    /// Services of an arm with a driver for Palpate.
-    pub const COMMON: [Self; 5] =
-        [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
-
-    /// Whether the call is idempotent: false for a bias, which may be taken under load the second
-    /// time, for an injected failure, which a second call ends, and for a strict switch, which
-    /// fails if nothing is left to do.
-    pub fn is_idempotent(&self) -> bool {
-        match self {
-            Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault => true,
-            Self::SwitchController(switch) => !switch.is_strict,
-            Self::Bias | Self::ZeroFtSensor | Self::Twin(_) => false,
-        }
-    }
-
-    /// Returns the service's type.
-    pub fn type_name(&self) -> &'static str {
-        match self {
-            Self::SwitchController(_) => "controller_manager_msgs/srv/SwitchController",
-            _ => "std_srvs/srv/Trigger",
-        }
-    }
-
-    /// Returns the service's name for an arm with this namespace.
-    pub fn name(&self, namespace: &str) -> String {
-        match self {
-            Self::Hold => format!("{namespace}/hold"),
-            Self::Unhold => format!("{namespace}/unhold"),
-            Self::Stop => format!("{namespace}/stop"),
-            Self::ClearFault => format!("{namespace}/clear_fault"),
-            Self::Bias => "/ft_sensor/bias".into(),
-            Self::ZeroFtSensor => format!("{namespace}/io_and_status_controller/zero_ftsensor"),
-            Self::SwitchController(_) => {
-                format!("{namespace}/controller_manager/switch_controller")
-            }
-            Self::Twin(name) => format!("/twin/{name}"),
-        }
     }
 }
 
@@ -368,7 +387,9 @@ impl Validate for Topics {
                 !names[..i].contains(&names[i]),
                 || "a unique name".into(),
             );
-            rules.number(&format!("{}.max_age_s", topic.key()), max_age_s, 1e-3..=10.0);
+            if max_age_s.is_finite() {
+                rules.number(&format!("{}.max_age_s", topic.key()), max_age_s, 1e-3..=10.0);
+            }
         }
     }
 }

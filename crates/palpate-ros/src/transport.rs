@@ -1,10 +1,12 @@
 //! Packets, and the transports that carry them: ROS 2, ROS 1, or a channel for tests.
 
+use super::control_message::{Clock, GoalStatusArray, RobotDescription};
 use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
-    JointTrajectory, RobotMode, SafetyMode, Time, Touching, TriggerResponse, WrenchStamped,
+    JointTrajectory, RobotMode, SafetyMode, Time, Touching, WrenchStamped,
 };
-use super::topics::{Service, Topic};
+use super::service::{Answer, Service};
+use super::topics::Topic;
 use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::error::InputError;
 use std::time::{Duration, Instant};
@@ -78,10 +80,16 @@ packets! {
     Markers(Box<MarkerArray>): MarkerArray on Markers,
     /// Points for viewers.
     Points(Box<PointCloud2>): PointCloud2 on Points,
-    /// Frames for viewers.
+    /// Frames for viewers; received ones are those of the robot's links.
     Frames(TFMessage): TFMessage on Frames,
     /// Joint velocities for `ros_control`.
     Velocities(Float64MultiArray): Float64MultiArray on Command,
+    /// Goals of other programs.
+    Goals(GoalStatusArray): GoalStatusArray on Goals,
+    /// URDF of the robot.
+    Description(RobotDescription): RobotDescription on Description,
+    /// Time of a simulated robot.
+    Clock(Clock): Clock on Clock,
 }
 
 impl Packet {
@@ -103,7 +111,10 @@ impl Packet {
             | Self::Markers(_)
             | Self::Points(_)
             | Self::Frames(_)
-            | Self::Velocities(_) => return None,
+            | Self::Velocities(_)
+            | Self::Goals(_)
+            | Self::Description(_)
+            | Self::Clock(_) => return None,
         };
         Some(&mut header.stamp)
     }
@@ -140,7 +151,7 @@ pub enum Delivery {
         /// Service.
         service: Service,
         /// Answer.
-        answer: TriggerResponse,
+        answer: Answer,
     },
 }
 
@@ -153,6 +164,19 @@ pub(super) fn cannot_open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> Inp
 #[cfg(any(feature = "ros1", feature = "ros2"))]
 pub(super) fn cannot_send(what: &str, error: impl std::fmt::Display) -> InputError {
     InputError::new(format!("cannot send to {what}: {error}"))
+}
+
+/// A publisher of another program, as announced on the network.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Publisher {
+    /// Name of its topic.
+    pub topic: String,
+    /// Type of its messages.
+    pub type_name: String,
+    /// Whether lost messages are sent again.
+    pub is_reliable: bool,
+    /// Whether the last message is kept for later readers.
+    pub is_kept: bool,
 }
 
 /// Wakes a waiting transport from another thread.
@@ -175,6 +199,21 @@ pub trait Transport {
     /// Returns the number of known publishers of a topic, including this side's own.
     fn publisher_count(&self, topic: Topic) -> usize;
 
+    /// Returns all known publishers, if the network announces them.
+    fn publishers(&self) -> Vec<Publisher> {
+        Vec::new()
+    }
+
+    /// Returns the number of known subscribers of a topic.
+    fn subscriber_count(&self, topic: Topic) -> usize;
+
+    /// Creates the explorer's publisher of commands; without it no command can be sent. Until then
+    /// another explorer does not see this one.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    fn open_commands(&mut self) -> Result<(), InputError>;
+
     /// Whether a server of `service` has been found, so that a call reaches it.
     fn is_served(&mut self, service: &Service) -> bool;
 
@@ -188,12 +227,7 @@ pub trait Transport {
     ///
     /// # Errors
     /// If the answer cannot be sent.
-    fn answer(
-        &mut self,
-        service: &Service,
-        call: u64,
-        answer: TriggerResponse,
-    ) -> Result<(), InputError>;
+    fn answer(&mut self, service: &Service, call: u64, answer: Answer) -> Result<(), InputError>;
 }
 
 /// Creates a transport in the thread that will own it.

@@ -87,7 +87,7 @@ fn record(
     let recording = Recording::create(path, &about)?;
     let settings = &simulation.experiment().backend;
     let base = simulation.environment().chain().map(|chain| chain.base).unwrap_or_default();
-    recording.show_frames(&TFMessage::of_base(settings.base_frame(), &base))?;
+    recording.show_frames(&TFMessage::of_base(&settings.base_frame(), &base))?;
     recording.show(0.0, &[view::limits(simulation)])?;
     for (row, count) in made.iter().zip(1..) {
         recording.touched(&recorded(row, count)?)?;

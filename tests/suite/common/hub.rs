@@ -1,8 +1,8 @@
 //! An in-process transport with any number of ends on either side.
 
 use palpate::error::InputError;
-use palpate::ros::message::TriggerResponse;
-use palpate::ros::topics::{Endpoint, Service, Topic};
+use palpate::ros::service::{Answer, Service};
+use palpate::ros::topics::{Endpoint, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -21,6 +21,8 @@ struct Ends {
 struct End {
     id: u64,
     side: Endpoint,
+    /// Whether it publishes commands.
+    has_commands: bool,
     /// Queue of incoming messages; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
 }
@@ -41,7 +43,7 @@ impl Hub {
         let mut ends = self.lock();
         let id = ends.count;
         ends.count += 1;
-        ends.all.push(End { id, side, inlet: inlet.clone() });
+        ends.all.push(End { id, side, has_commands: false, inlet: inlet.clone() });
         Memory { hub: self.clone(), id, side, inlet, outlet }
     }
 
@@ -79,6 +81,11 @@ impl Transport for Memory {
     }
 
     fn send(&mut self, packet: &Packet) -> Result<(), InputError> {
+        let has_commands = |end: &End| end.id == self.id && end.has_commands;
+        let is_open = self.hub.lock().all.iter().any(has_commands);
+        if packet.topic() == Topic::Command && self.side == Endpoint::Explorer && !is_open {
+            return Err(InputError::new("this side does not publish commands"));
+        }
         let packet = packet.clone();
         let delivery = Delivery::Packet { packet, sender: self.id, received: Instant::now() };
         self.to(self.others(), &delivery);
@@ -94,7 +101,21 @@ impl Transport for Memory {
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
-        self.hub.lock().all.iter().filter(|end| end.side == topic.publisher()).count()
+        let publishes = |end: &&End| {
+            end.side == topic.publisher() && (topic != Topic::Command || end.has_commands)
+        };
+        self.hub.lock().all.iter().filter(publishes).count()
+    }
+
+    fn subscriber_count(&self, topic: Topic) -> usize {
+        self.hub.lock().all.iter().filter(|end| end.side != topic.publisher()).count()
+    }
+
+    fn open_commands(&mut self) -> Result<(), InputError> {
+        let mut ends = self.hub.lock();
+        let own = ends.all.iter_mut().find(|end| end.id == self.id);
+        own.into_iter().for_each(|end| end.has_commands = true);
+        Ok(())
     }
 
     fn is_served(&mut self, _: &Service) -> bool {
@@ -108,12 +129,7 @@ impl Transport for Memory {
         Ok(())
     }
 
-    fn answer(
-        &mut self,
-        service: &Service,
-        call: u64,
-        answer: TriggerResponse,
-    ) -> Result<(), InputError> {
+    fn answer(&mut self, service: &Service, call: u64, answer: Answer) -> Result<(), InputError> {
         let delivery = Delivery::Response { service: service.clone(), answer };
         self.to(|end| end.id == call, &delivery);
         Ok(())

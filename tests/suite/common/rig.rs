@@ -10,11 +10,11 @@ use palpate::explore::probe::{Probe, Touch};
 use palpate::robot::arm::ArmSettings;
 use palpate::robot::arm::Chain;
 use palpate::ros::arm::RosArm;
-use palpate::ros::message::TriggerResponse;
 use palpate::ros::server::failure::by_name;
 use palpate::ros::server::serve::{Event, Injection, SimulatedRobotServer};
+use palpate::ros::service::{Answer, Service};
 use palpate::ros::settings::BackendSettings;
-use palpate::ros::topics::{Endpoint, Service, Topic};
+use palpate::ros::topics::{Endpoint, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use palpate::sim::finger::effects::wrench::WrenchEffect;
 use palpate::sim::simulator::Simulator;
@@ -117,6 +117,14 @@ impl Transport for Wired {
         self.end.publisher_count(topic)
     }
 
+    fn subscriber_count(&self, topic: Topic) -> usize {
+        self.end.subscriber_count(topic)
+    }
+
+    fn open_commands(&mut self) -> Result<(), InputError> {
+        self.end.open_commands()
+    }
+
     fn is_served(&mut self, service: &Service) -> bool {
         self.end.is_served(service)
     }
@@ -128,12 +136,7 @@ impl Transport for Wired {
         }
     }
 
-    fn answer(
-        &mut self,
-        service: &Service,
-        call: u64,
-        it: TriggerResponse,
-    ) -> Result<(), InputError> {
+    fn answer(&mut self, service: &Service, call: u64, it: Answer) -> Result<(), InputError> {
         self.end.answer(service, call, it)
     }
 }

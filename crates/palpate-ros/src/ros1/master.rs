@@ -18,7 +18,8 @@ const EVERY: Duration = Duration::from_millis(250);
 /// Counter of known publishers of each topic, in its own thread, so that no caller waits for the
 /// master; the thread also configures new connections.
 pub struct PublisherCounter {
-    counts: Arc<[AtomicUsize; Topic::ALL.len()]>,
+    /// Number of publishers and of subscribers of each topic.
+    counts: Arc<[[AtomicUsize; 2]; Topic::ALL.len()]>,
     /// Ends the thread when dropped.
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -27,15 +28,17 @@ pub struct PublisherCounter {
 impl PublisherCounter {
     /// Creates a counter of the publishers of `topics` known to the master at `uri`.
     pub fn new(uri: &str, topics: &Topics) -> Self {
-        let counts: Arc<[AtomicUsize; Topic::ALL.len()]> = Arc::default();
+        let counts: Arc<[[AtomicUsize; 2]; Topic::ALL.len()]> = Arc::default();
         let (uri, topics, shared) = (uri.to_owned(), topics.clone(), Arc::clone(&counts));
         let (stop, stopped) = channel::<()>();
         let thread = std::thread::spawn(move || {
             loop {
                 let state = state(&uri).unwrap_or_default();
                 for (topic, shared) in Topic::ALL.into_iter().zip(&*shared) {
-                    let known = count(&state, &topics.name(topic)).unwrap_or(0);
-                    shared.store(known, Ordering::Relaxed);
+                    for (role, shared) in shared.iter().enumerate() {
+                        let known = count(&state, role, &topics.name(topic)).unwrap_or(0);
+                        shared.store(known, Ordering::Relaxed);
+                    }
                 }
                 #[cfg(unix)]
                 set_tcp_nodelay();
@@ -49,7 +52,12 @@ impl PublisherCounter {
 
     /// Returns the number of nodes that publish `topic`; 0 if the master does not answer.
     pub fn publishers(&self, topic: Topic) -> usize {
-        self.counts[topic as usize].load(Ordering::Relaxed)
+        self.counts[topic as usize][0].load(Ordering::Relaxed)
+    }
+
+    /// Returns the number of nodes that subscribe to `topic`; 0 if the master does not answer.
+    pub fn subscribers(&self, topic: Topic) -> usize {
+        self.counts[topic as usize][1].load(Ordering::Relaxed)
     }
 }
 
@@ -101,14 +109,18 @@ fn set_tcp_nodelay() {
     }
 }
 
-/// Returns the number of nodes that publish `topic` in an answer to `getSystemState`, which is
-/// `[code, words, [publishers, subscribers, services]]`; each of the three is a list of `[topic,
-/// [node…]]`.
-fn count(text: &str, topic: &str) -> Option<usize> {
+/// Returns the number of nodes that publish `topic` (role 0) or subscribe to it (role 1) in an answer
+/// to `getSystemState`, which is `[code, words, [publishers, subscribers, services]]`; each of the
+/// three is a list of `[topic, [node…]]`.
+fn count(text: &str, role: usize, topic: &str) -> Option<usize> {
     let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
-    let publishers = list_at(compact.split_once("<methodResponse>")?.1, 3)?;
+    let mut rest = list_at(compact.split_once("<methodResponse>")?.1, 2)?;
+    for _ in 0..role {
+        let list = list_at(rest, 1)?;
+        rest = rest.get(rest.find("<data>")? + "<data>".len() + list.len()..)?;
+    }
     let name = format!("<value><string>{topic}</string></value>");
-    let Some((_, nodes)) = publishers.split_once(&name) else { return Some(0) };
+    let Some((_, nodes)) = list_at(rest, 1)?.split_once(&name) else { return Some(0) };
     let nodes = nodes.split_once("</data>")?.0;
     Some(nodes.matches("<string>").count())
 }
@@ -147,8 +159,9 @@ mod tests {
         let state = list(&(publishers + &list(&entry("/c", &["/z"])) + &list("")));
         let state = list(&("<value><int>1</int></value>".to_owned() + &value("state") + &state));
         let text = format!("HTTP/1.0 200 OK\r\n\r\n<?xml version='1.0'?>\n<methodResponse>{state}");
-        assert_eq!([count(&text, "/a"), count(&text, "/b")], [Some(1), Some(2)]);
-        assert_eq!([count(&text, "/c"), count(&text, "/d")], [Some(0); 2]);
-        assert_eq!(count("nonsense", "/a"), None);
+        assert_eq!([count(&text, 0, "/a"), count(&text, 0, "/b")], [Some(1), Some(2)]);
+        assert_eq!([count(&text, 0, "/c"), count(&text, 0, "/d")], [Some(0); 2]);
+        assert_eq!([count(&text, 1, "/a"), count(&text, 1, "/c")], [Some(0), Some(1)]);
+        assert_eq!(count("nonsense", 0, "/a"), None);
     }
 }

@@ -5,12 +5,12 @@ mod master;
 mod wire;
 
 use crate::message::{
-    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
-    TriggerResponse, WrenchStamped,
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, Image, JointState, JointTrajectory,
+    Touching, TriggerResponse, WrenchStamped,
 };
-use crate::message::{Image, Touching};
+use crate::service::{Answer, Service};
 use crate::settings::BackendSettings;
-use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic, Topics};
+use crate::topics::{CommandMessage, Endpoint, TactileMessage, Topic, Topics};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
 };
@@ -40,6 +40,9 @@ pub struct Ros1 {
     node: NodeHandle,
     census: PublisherCounter,
     topics: Topics,
+    side: Endpoint,
+    /// Whether the explorer's publisher of commands exists.
+    has_commands: bool,
     /// Received items from any thread; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
     outlet: Receiver<Option<Delivery>>,
@@ -47,7 +50,7 @@ pub struct Ros1 {
     /// Servers of the services; dropping a server ends its service.
     _servers: Vec<ServiceServer>,
     /// Incoming calls that wait for their answer.
-    waiting: Arc<Mutex<HashMap<u64, Sender<TriggerResponse>>>>,
+    waiting: Arc<Mutex<HashMap<u64, Sender<Answer>>>>,
 }
 
 /// Disables TLS certificates, which ROS 1 does not use; loading them for each dead publisher would
@@ -86,6 +89,8 @@ impl Ros1 {
             node,
             census: PublisherCounter::new(&master, &settings.topics),
             topics: settings.topics.clone(),
+            side,
+            has_commands: side == Endpoint::Arm,
             inlet,
             outlet,
             writers: Vec::new(),
@@ -114,6 +119,12 @@ impl Ros1 {
                 })?;
             }
         }
+        if side == Endpoint::Arm { self.commands() } else { Ok(()) }
+    }
+
+    /// Creates the topic of commands.
+    fn commands(&mut self) -> Result<(), InputError> {
+        let side = self.side;
         match self.topics.command.message {
             CommandMessage::Velocities => {
                 self.topic::<Float64MultiArray>(side, Topic::Command, Into::into, |packet| {
@@ -198,10 +209,10 @@ impl Ros1 {
             let (sender, answer) = channel();
             waiting.lock().unwrap_or_else(PoisonError::into_inner).insert(number, sender);
             let _ = inlet.send(Some(Delivery::Call { service: service.clone(), call: number }));
-            Ok(answer.recv_timeout(ANSWER).unwrap_or_else(|_| TriggerResponse {
-                success: false,
-                message: "no answer within the timeout".into(),
-            }))
+            let Answer { success, message, .. } = answer
+                .recv_timeout(ANSWER)
+                .unwrap_or_else(|_| Answer::refused("no answer within the timeout"));
+            Ok(TriggerResponse { success, message })
         };
         let server = self
             .runtime
@@ -240,6 +251,17 @@ impl Transport for Ros1 {
         self.census.publishers(topic)
     }
 
+    fn subscriber_count(&self, topic: Topic) -> usize {
+        self.census.subscribers(topic)
+    }
+
+    fn open_commands(&mut self) -> Result<(), InputError> {
+        match std::mem::replace(&mut self.has_commands, true) {
+            true => Ok(()),
+            false => self.commands(),
+        }
+    }
+
     /// Returns true, because a call queries the master for the server itself.
     fn is_served(&mut self, _: &Service) -> bool {
         true
@@ -253,19 +275,18 @@ impl Transport for Ros1 {
                 Ok(client) => client.call(&Request {}).await.map_err(|error| error.to_string()),
                 Err(error) => Err(error.to_string()),
             };
-            let failed = |message| TriggerResponse { success: false, message };
-            let answer = answered.unwrap_or_else(failed);
+            let answer = match answered {
+                Ok(TriggerResponse { success, message }) => {
+                    Answer { success, message, ..Answer::default() }
+                }
+                Err(words) => Answer::refused(words),
+            };
             let _ = inlet.send(Some(Delivery::Response { service, answer }));
         });
         Ok(())
     }
 
-    fn answer(
-        &mut self,
-        service: &Service,
-        call: u64,
-        answer: TriggerResponse,
-    ) -> Result<(), InputError> {
+    fn answer(&mut self, service: &Service, call: u64, answer: Answer) -> Result<(), InputError> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         let sent = waiting.remove(&call).and_then(|waiting| waiting.send(answer).ok());
         sent.ok_or_else(|| {

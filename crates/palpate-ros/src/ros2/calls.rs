@@ -1,26 +1,31 @@
 //! Clients and servers of the services, each with the types of its messages.
 
 use super::endpoint::{reliable, watch};
-use crate::message::{
-    Duration, SwitchControllerHumbleRequest, SwitchControllerHumbleResponse,
-    SwitchControllerRequest, SwitchControllerResponse, TriggerRequest, TriggerResponse,
+use crate::control_message::{
+    ControllerState, ControllerStateHumble, ListControllersHumbleResponse, ListControllersRequest,
+    ListControllersResponse, SwitchControllerHumbleRequest, SwitchControllerHumbleResponse,
+    SwitchControllerRequest, SwitchControllerResponse,
 };
-use crate::profile::Release;
-use crate::topics::{Service, Switch};
+use crate::controllers::{Controller, STATES, Switch};
+use crate::driver::Release;
+use crate::message::{Duration, TriggerRequest, TriggerResponse};
+use crate::service::{Answer, Service};
 use crate::transport::cannot_open;
 use palpate_input::error::InputError;
 use ros2_client::request_id::RmwRequestId;
 use ros2_client::{Client, Message, Name, Node, Server, ServiceMapping, ServiceTypeName};
 use rustdds::mio1::Poll;
+use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::marker::PhantomData;
 use std::rc::Rc;
 use std::time::Instant;
 
 /// A type of request, and that of its response.
 pub(super) trait Request: Message + Default + Clone + 'static {
     /// Type of the response.
-    type Response: Answer;
+    type Response: Response;
 
     /// Returns the request that calls `service`.
     fn of(service: &Service) -> Self;
@@ -30,12 +35,12 @@ pub(super) trait Request: Message + Default + Clone + 'static {
 }
 
 /// A type of response.
-pub(super) trait Answer: Message + Clone + 'static {
+pub(super) trait Response: Message + Clone + 'static {
     /// Returns the response that contains `answer`.
-    fn of(answer: &TriggerResponse) -> Self;
+    fn of(answer: &Answer) -> Self;
 
     /// Returns the answer that it contains.
-    fn answer(self) -> TriggerResponse;
+    fn answer(self) -> Answer;
 }
 
 impl Message for TriggerRequest {}
@@ -44,6 +49,30 @@ impl Message for SwitchControllerRequest {}
 impl Message for SwitchControllerResponse {}
 impl Message for SwitchControllerHumbleRequest {}
 impl Message for SwitchControllerHumbleResponse {}
+impl Message for ListControllersResponse {}
+impl Message for ListControllersHumbleResponse {}
+
+/// Request to list controllers, with the response of a release.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(super) struct ListRequest<R> {
+    message: ListControllersRequest,
+    response: PhantomData<R>,
+}
+
+impl<R> Message for ListRequest<R> {}
+
+impl<R: Response + Default> Request for ListRequest<R> {
+    type Response = R;
+
+    fn of(_: &Service) -> Self {
+        Self::default()
+    }
+
+    fn call(self, _: &Service) -> Service {
+        Service::ListControllers
+    }
+}
 
 impl Request for TriggerRequest {
     type Response = TriggerResponse;
@@ -57,15 +86,60 @@ impl Request for TriggerRequest {
     }
 }
 
-impl Answer for TriggerResponse {
-    fn of(answer: &TriggerResponse) -> Self {
-        answer.clone()
+impl Response for TriggerResponse {
+    fn of(answer: &Answer) -> Self {
+        Self { success: answer.success, message: answer.message.clone() }
     }
 
-    fn answer(self) -> TriggerResponse {
-        self
+    fn answer(self) -> Answer {
+        Answer { success: self.success, message: self.message, ..Answer::default() }
     }
 }
+
+/// Implements the responses of a release that list controllers.
+macro_rules! list_response {
+    ($response:ident of $state:ident) => {
+        impl Response for $response {
+            fn of(answer: &Answer) -> Self {
+                let state = |one: &Controller| $state {
+                    name: one.name.clone(),
+                    state: one.state.clone(),
+                    r#type: one.kind.clone(),
+                    claimed_interfaces: one.claimed.clone(),
+                    ..$state::default()
+                };
+                Self { controller: answer.controllers.iter().map(state).collect() }
+            }
+
+            fn answer(self) -> Answer {
+                listed(self.controller.into_iter().map(|one| Controller {
+                    name: one.name,
+                    state: one.state,
+                    kind: one.r#type,
+                    claimed: one.claimed_interfaces,
+                }))
+            }
+        }
+    };
+}
+
+list_response!(ListControllersResponse of ControllerState);
+list_response!(ListControllersHumbleResponse of ControllerStateHumble);
+
+/// Returns the answer with these controllers, unless they cannot be some: another release lays
+/// them out differently.
+fn listed(controllers: impl Iterator<Item = Controller>) -> Answer {
+    let controllers: Vec<Controller> = controllers.collect();
+    let is_one = |one: &Controller| !one.name.is_empty() && STATES.contains(&one.state.as_str());
+    match controllers.iter().all(is_one) {
+        true => Answer { success: true, controllers, ..Answer::default() },
+        false => Answer::refused(OTHER_RELEASE),
+    }
+}
+
+/// Remedy of an answer with another layout.
+const OTHER_RELEASE: &str = "its answer cannot be read; set backend.release to the release of ROS 2 on \
+                             the driver's computer";
 
 /// Strictness of a switch: as far as possible, or all or none.
 const STRICTNESS: [i32; 2] = [1, 2];
@@ -104,13 +178,13 @@ impl Request for SwitchControllerRequest {
     }
 }
 
-impl Answer for SwitchControllerResponse {
-    fn of(answer: &TriggerResponse) -> Self {
+impl Response for SwitchControllerResponse {
+    fn of(answer: &Answer) -> Self {
         Self { ok: answer.success, message: answer.message.clone() }
     }
 
-    fn answer(self) -> TriggerResponse {
-        TriggerResponse { success: self.ok, message: self.message }
+    fn answer(self) -> Answer {
+        Answer { success: self.ok, message: self.message, ..Answer::default() }
     }
 }
 
@@ -139,14 +213,16 @@ impl Request for SwitchControllerHumbleRequest {
     }
 }
 
-impl Answer for SwitchControllerHumbleResponse {
-    fn of(answer: &TriggerResponse) -> Self {
+impl Response for SwitchControllerHumbleResponse {
+    fn of(answer: &Answer) -> Self {
         Self { ok: answer.success }
     }
 
-    fn answer(self) -> TriggerResponse {
-        let message = if self.ok { "" } else { "the controller manager refuses" };
-        TriggerResponse { success: self.ok, message: message.into() }
+    fn answer(self) -> Answer {
+        match self.ok {
+            true => Answer { success: true, ..Answer::default() },
+            false => Answer::refused("the controller manager refuses; its log has the reason"),
+        }
     }
 }
 
@@ -176,8 +252,14 @@ pub(super) trait OpenService: Sized {
             (Service::SwitchController(_), Release::Humble) => {
                 Self::typed::<SwitchControllerHumbleRequest>(place, service)
             }
-            (Service::SwitchController(_), Release::Jazzy) => {
+            (Service::SwitchController(_), _) => {
                 Self::typed::<SwitchControllerRequest>(place, service)
+            }
+            (Service::ListControllers, Release::Humble) => {
+                Self::typed::<ListRequest<ListControllersHumbleResponse>>(place, service)
+            }
+            (Service::ListControllers, _) => {
+                Self::typed::<ListRequest<ListControllersResponse>>(place, service)
             }
             _ => Self::typed::<TriggerRequest>(place, service),
         }
@@ -187,12 +269,12 @@ pub(super) trait OpenService: Sized {
 /// Sends a request that calls a service.
 type Send = Box<dyn Fn(&Service) -> Result<(), String>>;
 /// Sends the response to a request.
-type Respond = Box<dyn Fn(RmwRequestId, &TriggerResponse) -> Result<(), String>>;
+type Respond = Box<dyn Fn(RmwRequestId, &Answer) -> Result<(), String>>;
 
 /// A client of a service.
 pub(super) struct ServiceClient {
     send: Send,
-    take: Box<dyn Fn() -> Option<TriggerResponse>>,
+    take: Box<dyn Fn() -> Option<Answer>>,
     /// Last call, which the next response answers.
     called: RefCell<Service>,
     /// Time of creation.
@@ -209,6 +291,7 @@ impl OpenService for ServiceClient {
             .create_client(mapping, &path, &type_name(&service), reliable(), reliable())
             .map_err(cannot_open(name))?;
         watch(poll, &mut client, name)?;
+        let is_of_release = service.depends_on_release();
         let client = Rc::new(client);
         let responses = Rc::clone(&client);
         Ok(Self {
@@ -216,9 +299,10 @@ impl OpenService for ServiceClient {
                 let sent = client.send_request(R::of(service));
                 sent.map(drop).map_err(|error| error.to_string())
             }),
-            take: Box::new(move || {
-                let response = responses.receive_response().ok().flatten();
-                response.map(|(_, response)| response.answer())
+            take: Box::new(move || match responses.receive_response() {
+                Ok(response) => response.map(|(_, response)| response.answer()),
+                // Of other types, it may be the answer to another client.
+                Err(_) => is_of_release.then(|| Answer::refused(OTHER_RELEASE)),
             }),
             called: RefCell::new(service),
             since: Instant::now(),
@@ -234,7 +318,7 @@ impl ServiceClient {
     }
 
     /// Returns the next received response, with the call that it answers.
-    pub(super) fn take(&self) -> Option<(Service, TriggerResponse)> {
+    pub(super) fn take(&self) -> Option<(Service, Answer)> {
         (self.take)().map(|answer| (self.called.borrow().clone(), answer))
     }
 }
@@ -281,11 +365,7 @@ impl ServiceServer {
     }
 
     /// Answers a call; returns `None` if it is none of this server.
-    pub(super) fn answer(
-        &mut self,
-        call: u64,
-        answer: &TriggerResponse,
-    ) -> Option<Result<(), String>> {
+    pub(super) fn answer(&mut self, call: u64, answer: &Answer) -> Option<Result<(), String>> {
         self.calls.remove(&call).map(|id| (self.answer)(id, answer))
     }
 }

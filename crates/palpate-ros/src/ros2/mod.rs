@@ -4,17 +4,18 @@ mod calls;
 pub mod camera;
 mod endpoint;
 
+use crate::control_message::{Clock, GoalStatusArray, RobotDescription};
 use crate::definition::HasDefinition;
 use crate::message::{
-    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, JointState,
-    JointTrajectory, RobotMode, SafetyMode, TriggerResponse, WrenchStamped,
+    BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
+    JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
 };
-use crate::message::{Image, Touching};
 use crate::network::network;
+use crate::service::{Answer, Service};
 use crate::settings::{BackendSettings, MappingKind};
-use crate::topics::{CommandMessage, Endpoint, Service, TactileMessage, Topic};
+use crate::topics::{CommandMessage, Endpoint, TactileMessage, Topic};
 use crate::transport::{
-    Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
+    Delivery, Packet, PacketMessage, Publisher, Transport, Waker, cannot_open, cannot_send,
 };
 use crate::view::{MarkerArray, PointCloud2, TFMessage};
 use calls::{OpenService as _, ServiceClient, ServiceServer};
@@ -24,8 +25,10 @@ use ros2_client::{
     Context, MessageTypeName, Name, Node, NodeName, NodeOptions, QosProfile, ServiceMapping,
 };
 use rustdds::DomainParticipantBuilder;
+use rustdds::discovery::DiscoveredWriterData;
 use rustdds::mio1;
 use rustdds::mio1::{Events, Poll};
+use rustdds::policy::{Durability, Reliability};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
@@ -48,6 +51,8 @@ pub struct Ros2 {
     waker: Arc<mio1::Waker>,
     readers: Vec<Reader>,
     writers: Vec<Writer>,
+    /// Whether the explorer's publisher of commands exists.
+    has_commands: bool,
     /// Services with their clients, once servers are found.
     clients: Vec<(Service, Option<ServiceClient>)>,
     /// Time of the last search for servers.
@@ -120,6 +125,7 @@ impl Ros2 {
             waker: Arc::new(waker),
             readers: Vec::new(),
             writers: Vec::new(),
+            has_commands: side == Endpoint::Arm,
             clients: Vec::new(),
             looked: Instant::now(),
             servers: Vec::new(),
@@ -137,7 +143,8 @@ impl Ros2 {
 
     fn topics(&mut self) -> Result<(), InputError> {
         let tactile = self.settings.topics.tactile.message;
-        for topic in self.settings.clone().topics_of_arm() {
+        let settings = self.settings.clone();
+        for topic in settings.topics_of_arm().chain(settings.further_topics()) {
             match topic {
                 Topic::Joints => self.topic::<JointState>(topic)?,
                 Topic::Wrench => self.topic::<WrenchStamped>(topic)?,
@@ -160,14 +167,24 @@ impl Ros2 {
                 Topic::SafetyMode => self.topic::<SafetyMode>(topic)?,
                 Topic::ProgramRunning => self.topic::<Bool>(topic)?,
                 Topic::SpeedScaling => self.topic::<Float64>(topic)?,
+                Topic::Transforms => self.topic::<TFMessage>(topic)?,
+                Topic::FixedTransforms => self.topic::<TFMessage>(topic)?,
+                Topic::Goals => self.topic::<GoalStatusArray>(topic)?,
+                Topic::Description => self.topic::<RobotDescription>(topic)?,
+                Topic::Clock => self.topic::<Clock>(topic)?,
                 Topic::Command | Topic::Markers | Topic::Points | Topic::Frames => (),
             }
         }
         if self.side == Endpoint::Explorer {
             self.topic::<MarkerArray>(Topic::Markers)?;
             self.topic::<PointCloud2>(Topic::Points)?;
-            self.topic::<TFMessage>(Topic::Frames)?;
+            return self.topic::<TFMessage>(Topic::Frames);
         }
+        self.commands()
+    }
+
+    /// Creates the topic of commands.
+    fn commands(&mut self) -> Result<(), InputError> {
         match self.settings.topics.command.message {
             CommandMessage::Velocities => self.topic::<Float64MultiArray>(Topic::Command),
             CommandMessage::Trajectory => self.topic::<JointTrajectory>(Topic::Command),
@@ -297,6 +314,11 @@ fn dds_topic<M: HasDefinition>(
     node.create_topic(&path, type_name, qos).map_err(cannot_open(name))
 }
 
+/// Returns the name of a type in ROS: `a::msg::dds_::B_` of DDS is `a/msg/B`.
+fn ros_type(name: &str) -> String {
+    name.replace("::dds_::", "::").trim_end_matches('_').replace("::", "/")
+}
+
 /// Returns the mapping of a service for a server of this vendor.
 fn mapping(kind: MappingKind, vendor: [u8; 2]) -> ServiceMapping {
     match kind {
@@ -343,6 +365,31 @@ impl Transport for Ros2 {
         self.node.publisher_count(&self.settings.topics.name(topic))
     }
 
+    fn publishers(&self) -> Vec<Publisher> {
+        let writers = self.context.domain_participant().discovered_writers();
+        let publisher = |writer: &DiscoveredWriterData| {
+            let about = &writer.publication_topic_data;
+            Some(Publisher {
+                topic: about.topic_name.strip_prefix("rt")?.to_owned(),
+                type_name: ros_type(&about.type_name),
+                is_reliable: matches!(about.reliability, Some(Reliability::Reliable { .. })),
+                is_kept: !matches!(about.durability, None | Some(Durability::Volatile)),
+            })
+        };
+        writers.iter().filter_map(publisher).collect()
+    }
+
+    fn subscriber_count(&self, topic: Topic) -> usize {
+        self.node.subscription_count(&self.settings.topics.name(topic))
+    }
+
+    fn open_commands(&mut self) -> Result<(), InputError> {
+        match std::mem::replace(&mut self.has_commands, true) {
+            true => Ok(()),
+            false => self.commands(),
+        }
+    }
+
     fn is_served(&mut self, service: &Service) -> bool {
         self.client(service).is_some_and(|client| client.since.elapsed() > SETTLE)
     }
@@ -353,12 +400,7 @@ impl Transport for Ros2 {
         client.send(service).map_err(|words| cannot_send(&name, words))
     }
 
-    fn answer(
-        &mut self,
-        service: &Service,
-        call: u64,
-        answer: TriggerResponse,
-    ) -> Result<(), InputError> {
+    fn answer(&mut self, service: &Service, call: u64, answer: Answer) -> Result<(), InputError> {
         let name = self.service_name(service);
         let mut servers = self.servers.iter_mut();
         let sent = servers.find_map(|server| server.answer(call, &answer));

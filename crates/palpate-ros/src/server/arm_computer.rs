@@ -2,10 +2,11 @@
 //! commands, stops the arm when they cease, and brakes.
 
 use super::failure::FailureEffect;
+use crate::controllers::Controller;
 use crate::joints::JointNames;
+use crate::service::Service;
 use crate::settings::CLOCK_AHEAD_S;
 use crate::status::ArmStatus;
-use crate::topics::Service;
 use crate::transport::Packet;
 use palpate_explore::backend::Reading;
 
@@ -22,11 +23,16 @@ pub trait ArmComputer: Send {
     /// Processes a command that arrived at `now_s`, at `wall_s` since 1970.
     fn receive(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64);
 
-    /// Answers the call of a service.
+    /// Answers the call of a service in words.
     ///
     /// # Errors
     /// A refusal, in words.
-    fn call(&mut self, service: &Service, now_s: f64) -> Result<(), String>;
+    fn call(&mut self, service: &Service, now_s: f64) -> Result<String, String>;
+
+    /// Returns the controllers of `ros2_control`.
+    fn controllers(&self) -> &[Controller] {
+        &[]
+    }
 
     /// Starts or ends a failure of the arm.
     fn fail(&mut self, effect: &FailureEffect, is_on: bool, now_s: f64);
@@ -251,7 +257,7 @@ impl ArmComputer for SimulatedArmComputer {
         self.receive(packet, sender, now_s, wall_s);
     }
 
-    fn call(&mut self, service: &Service, now_s: f64) -> Result<(), String> {
+    fn call(&mut self, service: &Service, now_s: f64) -> Result<String, String> {
         match service {
             Service::Hold => self.set_hold(true, now_s),
             Service::Unhold => self.set_hold(false, now_s),
@@ -259,7 +265,7 @@ impl ArmComputer for SimulatedArmComputer {
             Service::ClearFault => self.clear(),
             _ => (),
         }
-        Ok(())
+        Ok("done".into())
     }
 
     fn fail(&mut self, effect: &FailureEffect, is_on: bool, _now_s: f64) {

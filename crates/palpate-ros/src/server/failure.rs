@@ -1,8 +1,8 @@
 //! Injected failures of a simulated robot, and the sender that applies them.
 
+use crate::driver::Profile;
 use crate::link::Link;
 use crate::message::{DiagnosticStatus, JointState, Time};
-use crate::profile::Profile;
 use crate::topics::Topic;
 use crate::transport::Packet;
 use palpate_gp::math::seed;
@@ -28,7 +28,12 @@ impl Failure {
             Profile::Ur => !matches!(self.act, FailureEffect::Flags(..) | FailureEffect::NoFlags),
             Profile::Palpate => !matches!(
                 self.act,
-                FailureEffect::ProtectiveStop | FailureEffect::ProgramStop | FailureEffect::Slow(_)
+                FailureEffect::ProtectiveStop
+                    | FailureEffect::ProgramStop
+                    | FailureEffect::Slow(_)
+                    | FailureEffect::RemoteOff
+                    | FailureEffect::TakeController
+                    | FailureEffect::Goal
             ),
         }
     }
@@ -61,6 +66,12 @@ pub enum FailureEffect {
     ProgramStop,
     /// Reduces the speed to this fraction.
     Slow(f64),
+    /// Switches the robot off.
+    RemoteOff,
+    /// Another program takes the controller.
+    TakeController,
+    /// Another program's goal is pursued.
+    Goal,
 }
 
 /// State of the failures.
@@ -159,6 +170,14 @@ pub static FAILURES: &[Failure] = &[
         "the arm moves at 50 % of the commanded speed (profile ur)",
         FailureEffect::Slow(0.5),
     ),
+    failure("pause", "the operator pauses the program (profile ur)", FailureEffect::Slow(0.0)),
+    failure("remote_off", "the robot is switched off (profile ur)", FailureEffect::RemoteOff),
+    failure(
+        "take_controller",
+        "another program takes the controller (profile ur)",
+        FailureEffect::TakeController,
+    ),
+    failure("goal", "another program's goal is pursued (profile ur)", FailureEffect::Goal),
     failure(
         "hold",
         "the status reports a hold, but the arm follows commands",

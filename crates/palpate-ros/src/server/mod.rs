@@ -5,6 +5,7 @@
 //! [`serve`](mod@serve) the loop.
 
 pub mod arm_computer;
+mod controller_manager;
 pub mod failure;
 pub mod serve;
 pub mod ur_computer;

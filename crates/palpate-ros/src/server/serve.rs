@@ -4,15 +4,17 @@
 use super::arm_computer::{ArmComputer, SimulatedArmComputer};
 use super::failure::{FAILURES, FailureInjector, by_name, failures_of};
 use super::ur_computer::UrComputer;
+use crate::driver::Profile;
 use crate::joints::JointNames;
 use crate::link::Link;
-use crate::message::{Header, Time, TriggerResponse, Wrench as WrenchMessage, WrenchStamped};
-use crate::profile::Profile;
+use crate::message::{Header, Time, Wrench as WrenchMessage, WrenchStamped};
+use crate::service::{Answer, Service};
 use crate::settings::BackendSettings;
 use crate::status::ArmStatus;
 use crate::tactile;
-use crate::topics::{Service, Topic};
+use crate::topics::Topic;
 use crate::transport::{Connect, Delivery, Packet};
+use crate::view::TFMessage;
 use nalgebra::Isometry3;
 use palpate_explore::backend::pace::{self, RealTimePacer};
 use palpate_explore::backend::{Backend, Command, Fault, Reading, Wrench};
@@ -32,6 +34,10 @@ const SLACK_TICKS: u32 = 10;
 /// Rates at which joints and force are published, Hz, as by drivers of a PA-10 and its sensor.
 const JOINTS_HZ: f64 = 250.0;
 const WRENCH_HZ: f64 = 500.0;
+
+/// Rate of the frames, Hz.
+// heuristic: that of `robot_state_publisher` is 20, that of `pose_broadcaster` 500.
+const FRAMES_HZ: f64 = 100.0;
 
 /// Rate of both for a UR of the e-Series, Hz (`update_rate` of its driver).
 const UR_HZ: f64 = 500.0;
@@ -75,7 +81,7 @@ pub struct Injection {
 /// Returns the services of a simulated robot with this driver.
 pub fn services(profile: Profile) -> Vec<Service> {
     let own = failures_of(profile).map(|failure| Service::Twin(failure.name));
-    profile.services().into_iter().chain(own).collect()
+    profile.driver().services.iter().cloned().chain(own).collect()
 }
 
 /// Simulated arm behind topics.
@@ -91,8 +97,10 @@ pub struct SimulatedRobotServer {
     link: Link,
     sender: FailureInjector,
     injections: Vec<Injection>,
-    /// Pose of `T` in the sensor's frame.
-    x_mt: Isometry3<f64>,
+    /// Pose of `T` in the flange's frame, and that of the sensor.
+    x_ft: Isometry3<f64>,
+    x_fs: Isometry3<f64>,
+    chain: Chain,
     bias: Wrench,
     /// Whether the next reading of the force/torque sensor becomes its zero.
     wants_bias: bool,
@@ -146,7 +154,7 @@ impl SimulatedRobotServer {
                 let valid_s = settings.topics.command.max_age_s;
                 Box::new(SimulatedArmComputer::new(named, limits, valid_s))
             }
-            Profile::Ur => Box::new(UrComputer::new(named, period_s, settings.controller())),
+            Profile::Ur => Box::new(UrComputer::new(named, period_s, limits, settings)),
         };
         Ok(Self {
             period_s,
@@ -166,7 +174,9 @@ impl SimulatedRobotServer {
             link,
             sender: FailureInjector::new(seed),
             injections,
-            x_mt: chain.tool,
+            x_ft: chain.tool,
+            x_fs: Isometry3::identity(),
+            chain: chain.clone(),
             bias: Wrench::default(),
             wants_bias: false,
             since: Instant::now(),
@@ -174,6 +184,12 @@ impl SimulatedRobotServer {
             is_moving: false,
             tick: 0,
         })
+    }
+
+    /// Sets the tool centre point, its pose in the flange's frame: a driver with frames reports
+    /// forces there.
+    pub fn set_tool_centre(&mut self, x_fs: Isometry3<f64>) {
+        self.x_fs = x_fs;
     }
 
     /// Serves until `stop` becomes true; passes events with their time since 1970 to `tell`.
@@ -258,8 +274,12 @@ impl SimulatedRobotServer {
         }
     }
 
-    fn serve(&mut self, service: &Service, now_s: f64) -> TriggerResponse {
+    fn serve(&mut self, service: &Service, now_s: f64) -> Answer {
         let done = match service {
+            Service::ListControllers => {
+                let controllers = self.pc.controllers().to_vec();
+                return Answer { success: true, controllers, ..Answer::default() };
+            }
             Service::Bias | Service::ZeroFtSensor => {
                 self.wants_bias = true;
                 Ok("done".into())
@@ -269,10 +289,9 @@ impl SimulatedRobotServer {
                 self.set(failure, is_on, now_s);
                 format!("{name} {}", if is_on { "begins" } else { "ends" })
             })),
-            other => self.pc.call(other, now_s).map(|()| "done".into()),
+            other => self.pc.call(other, now_s),
         };
-        let success = done.is_ok();
-        TriggerResponse { success, message: done.unwrap_or_else(|words| words) }
+        done.into()
     }
 
     fn set(&mut self, failure: usize, is_on: bool, now_s: f64) {
@@ -326,13 +345,27 @@ impl SimulatedRobotServer {
             let message = self.names.state(stamp_s, &reading.q, &reading.qdot);
             self.send(Packet::Joints(message), now_s);
         }
-        if let Some(wrench) = reading.wrench.map(|wrench| wrench.moved(&self.x_mt)) {
+        let x_st = self.x_fs.inverse() * self.x_ft;
+        if let Some(flange) = self.settings.flange_frame()
+            && self.is_due(FRAMES_HZ)
+            && let Some(q) = self.chain.joints_from(&reading.q)
+        {
+            let (base, x_bf) = (self.settings.base_frame(), self.chain.flange_at(&q));
+            let mut frames = TFMessage::default().with(&flange, &base, &x_bf).with(
+                &self.wrench_frame(),
+                &base,
+                &(x_bf * self.x_fs),
+            );
+            frames.set_stamp(Time::from_s(stamp_s));
+            self.send(Packet::Frames(frames), now_s);
+        }
+        if let Some(wrench) = reading.wrench.map(|wrench| wrench.moved(&x_st)) {
             if self.is_due(wrench_hz) {
                 let message = WrenchMessage {
                     force: (wrench.force_n - self.bias.force_n).into(),
                     torque: (wrench.torque_nm - self.bias.torque_nm).into(),
                 };
-                let header = Header::new(stamp_s, "ft_sensor");
+                let header = Header::new(stamp_s, &self.wrench_frame());
                 self.send(Packet::Wrench(WrenchStamped { header, wrench: message }), now_s);
             }
             if std::mem::take(&mut self.wants_bias) {
@@ -343,6 +376,15 @@ impl SimulatedRobotServer {
         for sample in &reading.samples {
             let packet = tactile::packet_of(sample, stamp_s, finger, message);
             packet.into_iter().for_each(|packet| self.send(packet, now_s));
+        }
+    }
+
+    /// Returns the name of the frame of the forces.
+    fn wrench_frame(&self) -> String {
+        match self.settings.profile {
+            Profile::Palpate => "ft_sensor".into(),
+            // `ur_controllers.yaml`
+            Profile::Ur => format!("{}tool0_controller", self.settings.prefix),
         }
     }
 

@@ -2,15 +2,20 @@
 //! time moves the arm, execution of trajectories, speed scaling and stops.
 
 use super::arm_computer::{ArmComputer, StatePacket};
+use super::controller_manager::ControllerManager;
 use super::failure::FailureEffect;
 use super::ur_trajectory::Trajectory;
+use crate::control_message::{GoalStatus, GoalStatusArray};
+use crate::controllers::{Controller, Switch};
+use crate::driver::Release;
+use crate::driver::ur::{IDLE, POWER_OFF, RUNNING, UrState, safety};
 use crate::joints::JointNames;
 use crate::message::{Bool, Float64, RobotMode, SafetyMode};
-use crate::profile::UR_CONTROLLERS;
+use crate::service::Service;
+use crate::settings::BackendSettings;
 use crate::status::ArmStatus;
-use crate::topics::{Service, Switch};
+use crate::trajectory_stream::STOP_RAD_S2;
 use crate::transport::Packet;
-use crate::ur::{IDLE, RUNNING, STOP_RAD_S2, UrState, safety};
 use palpate_explore::backend::Reading;
 use std::collections::VecDeque;
 
@@ -30,6 +35,15 @@ const ACCELERATION_S: f64 = 0.012;
 /// Rate of the speed scaling, Hz (`ur_controllers.yaml`).
 const SCALING_HZ: f64 = 100.0;
 
+/// Increment of the speed per cycle after a pause (`hardware_interface.cpp`).
+const RAMP: f64 = 0.01;
+
+/// Controller of another program that takes the arm.
+const PASSTHROUGH: &str = "passthrough_trajectory_controller";
+
+/// State of a goal that is pursued (`action_msgs/GoalStatus`).
+const EXECUTING: i8 = 2;
+
 /// Source of the setpoints.
 enum Motion {
     /// The last setpoint is held.
@@ -46,13 +60,24 @@ enum Motion {
 pub struct UrComputer {
     names: JointNames,
     period_s: f64,
+    /// Speed limit of each joint, rad/s; a command beyond it ends in a protective stop.
+    qdot_limits: Vec<f64>,
     /// Controller to which the topic of commands belongs.
     controller: String,
-    /// Index of the active controller that moves the arm.
-    active: Option<usize>,
+    manager: ControllerManager,
+    /// Whether a new trajectory continues from the last setpoint, as in Lyrical; otherwise from the
+    /// measured position.
+    blends: bool,
+    /// Time without velocities after which the laboratory's watchdog stops the arm, s.
+    watchdog_s: Option<f64>,
+    /// Time of the last velocities, s.
+    commanded_s: f64,
+    /// Whether another program's goal is pursued.
+    has_goal: bool,
     state: UrState,
-    /// Speed as a fraction of the commanded one.
+    /// Speed as a fraction of the commanded one, and the one that it rises to.
     scale: f64,
+    wanted_scale: f64,
     motion: Motion,
     /// Setpoint of the controller, and its velocity.
     setpoint: Vec<f64>,
@@ -68,20 +93,31 @@ pub struct UrComputer {
 }
 
 impl UrComputer {
-    /// Creates an arm at rest, switched on, with ticks of `period_s`. Commands go to `controller`.
-    pub fn new(names: JointNames, period_s: f64, controller: String) -> Self {
+    /// Creates an arm at rest, switched on, with ticks of `period_s` and these speed limits, rad/s.
+    pub fn new(
+        names: JointNames,
+        period_s: f64,
+        qdot_limits: Vec<f64>,
+        settings: &BackendSettings,
+    ) -> Self {
         let count = names.names().len();
         Self {
+            manager: ControllerManager::new(names.names(), &settings.prefix, settings.release),
+            blends: settings.release == Release::Lyrical,
             names,
             period_s,
-            controller,
-            active: Some(0),
+            qdot_limits,
+            controller: settings.controller(),
+            watchdog_s: settings.watchdog_s,
+            commanded_s: 0.0,
+            has_goal: false,
             state: UrState {
                 robot_mode: Some(RUNNING),
                 safety_mode: Some(safety::NORMAL),
                 is_program_running: Some(true),
             },
             scale: 1.0,
+            wanted_scale: 1.0,
             motion: Motion::Hold,
             setpoint: Vec::new(),
             velocity: vec![0.0; count],
@@ -101,8 +137,7 @@ impl UrComputer {
 
     /// Whether commands move the arm.
     fn accepts(&self) -> Result<(), String> {
-        let is_active = self.active.is_some_and(|i| UR_CONTROLLERS[i] == self.controller);
-        if !is_active {
+        if !self.manager.is_active(&self.controller) {
             return Err(format!("{} is not active", self.controller));
         }
         match self.status().refusal() {
@@ -111,41 +146,17 @@ impl UrComputer {
         }
     }
 
-    /// Returns the active controller after a switch.
-    fn switched(&self, switch: &Switch) -> Result<Option<usize>, String> {
-        let index = |name: &String| {
-            let found = UR_CONTROLLERS.iter().position(|known| known == name);
-            found.ok_or_else(|| format!("no controller {name}"))
-        };
-        let find = |names: &[String]| -> Result<Vec<usize>, String> {
-            let found: Vec<_> = names.iter().map(index).collect();
-            match switch.is_strict {
-                true => found.into_iter().collect(),
-                false if !found.is_empty() && found.iter().all(Result::is_err) => {
-                    found.into_iter().collect()
-                }
-                false => Ok(found.into_iter().filter_map(Result::ok).collect()),
-            }
-        };
-        let (activate, deactivate) = (find(&switch.activate)?, find(&switch.deactivate)?);
-        let is_active = |i: &usize| self.active == Some(*i);
-        if switch.is_strict {
-            if let Some(&i) = activate.iter().find(|i| is_active(i)) {
-                return Err(format!("{} is active already", UR_CONTROLLERS[i]));
-            }
-            if let Some(&i) = deactivate.iter().find(|i| !is_active(i)) {
-                return Err(format!("{} is not active", UR_CONTROLLERS[i]));
-            }
-        }
-        let kept = self.active.filter(|i| !deactivate.contains(i));
-        let mut wanted = activate.into_iter().filter(|i| kept != Some(*i));
-        let Some(first) = wanted.next() else { return Ok(kept) };
-        match kept.or(wanted.next()) {
-            None => Ok(Some(first)),
-            Some(other) => Err(format!(
-                "{} and {} command the same joints",
-                UR_CONTROLLERS[first], UR_CONTROLLERS[other]
-            )),
+    /// Stops the arm with its safety mode `mode`.
+    fn protect(&mut self, mode: u8) {
+        self.state.safety_mode = Some(mode);
+        self.motion = Motion::Stop;
+    }
+
+    /// Sets whether the driver's program runs; its controllers stop and start with it.
+    fn run_program(&mut self, is_running: bool) {
+        if self.state.is_program_running != Some(is_running) {
+            self.state.is_program_running = Some(is_running);
+            self.manager.run_program(is_running);
         }
     }
 
@@ -155,10 +166,15 @@ impl UrComputer {
         match &mut self.motion {
             Motion::Hold => (),
             Motion::Trajectory(trajectory) => {
-                trajectory.advance(self.period_s, self.scale, reading, &mut self.setpoint);
+                let start = match self.blends {
+                    true => [&before, &self.velocity],
+                    false => [&reading.q, &reading.qdot],
+                };
+                trajectory.advance(self.period_s, self.scale, start, &mut self.setpoint);
             }
             Motion::Velocities(velocities) => {
-                let moved = |(q, qdot): (&mut f64, &f64)| *q += qdot * self.period_s;
+                let step_s = self.period_s * self.scale;
+                let moved = |(q, qdot): (&mut f64, &f64)| *q += qdot * step_s;
                 self.setpoint.iter_mut().zip(&*velocities).for_each(moved);
             }
             Motion::Stop => {
@@ -175,6 +191,16 @@ impl UrComputer {
         self.velocity.extend(rates);
     }
 
+    fn is_too_fast(&self, qdot: &[f64]) -> bool {
+        qdot.iter().zip(&self.qdot_limits).any(|(qdot, limit)| qdot.abs() > *limit)
+    }
+
+    /// Returns the goals of other programs.
+    fn goals(&self) -> GoalStatusArray {
+        let goal = GoalStatus { status: EXECUTING, ..GoalStatus::default() };
+        GoalStatusArray { status_list: self.has_goal.then_some(goal).into_iter().collect() }
+    }
+
     /// Begins again at rest where the arm is.
     fn restart_at(&mut self, q: &[f64]) {
         self.motion = Motion::Hold;
@@ -186,59 +212,93 @@ impl UrComputer {
 }
 
 impl ArmComputer for UrComputer {
-    fn receive(&mut self, packet: &Packet, _sender: u64, _now_s: f64, wall_s: f64) {
+    fn receive(&mut self, packet: &Packet, _sender: u64, now_s: f64, wall_s: f64) {
+        let count = self.names.names().len();
         let read = self.accepts().and_then(|()| match packet {
             Packet::Command(message) => {
                 Trajectory::read(message, &self.names, wall_s).map(Motion::Trajectory)
             }
-            Packet::Velocities(message) if message.data.len() == self.names.names().len() => {
-                Ok(Motion::Velocities(message.data.clone()))
+            Packet::Velocities(message) if message.data.len() == count => {
+                match message.data.iter().all(|qdot| qdot.is_finite()) {
+                    true => Ok(Motion::Velocities(message.data.clone())),
+                    false => Err(format!("velocities {:?} are not finite", message.data)),
+                }
             }
             _ => Err("the message does not fit the controller".into()),
         });
         match read {
-            Ok(motion) => self.motion = motion,
+            Ok(Motion::Velocities(velocities)) if self.is_too_fast(&velocities) => {
+                let limits = &self.qdot_limits;
+                self.refuse(format!("velocities {velocities:?} are beyond the limits {limits:?}"));
+                self.protect(safety::PROTECTIVE_STOP);
+            }
+            Ok(motion) => (self.motion, self.commanded_s) = (motion, now_s),
             Err(words) => self.refuse(words),
         }
     }
 
-    fn call(&mut self, service: &Service, _now_s: f64) -> Result<(), String> {
-        if let Service::SwitchController(switch) = service {
-            let active = self.switched(switch)?;
-            if active != self.active {
-                (self.active, self.motion) = (active, Motion::Stop);
-            }
+    fn call(&mut self, service: &Service, _now_s: f64) -> Result<String, String> {
+        let Service::SwitchController(switch) = service else { return Ok(String::new()) };
+        let was_active = self.manager.is_active(&self.controller);
+        let done = self.manager.switch(switch)?;
+        if was_active != self.manager.is_active(&self.controller) {
+            self.motion = Motion::Stop;
         }
-        Ok(())
+        Ok(done)
+    }
+
+    fn controllers(&self) -> &[Controller] {
+        self.manager.list()
     }
 
     fn fail(&mut self, effect: &FailureEffect, is_on: bool, _now_s: f64) {
-        let state = &mut self.state;
-        let safe = |mode| Some(if is_on { mode } else { safety::NORMAL });
+        let safe = |mode| if is_on { mode } else { safety::NORMAL };
         match effect {
             FailureEffect::Estop => {
-                state.safety_mode = safe(safety::ROBOT_EMERGENCY_STOP);
-                state.robot_mode = Some(if is_on { IDLE } else { RUNNING });
+                self.state.robot_mode = Some(if is_on { IDLE } else { RUNNING });
+                self.protect(safe(safety::ROBOT_EMERGENCY_STOP));
+                self.run_program(!is_on);
             }
-            FailureEffect::Deadman => state.safety_mode = safe(safety::THREE_POSITION_STOP),
-            FailureEffect::ProtectiveStop => state.safety_mode = safe(safety::PROTECTIVE_STOP),
-            FailureEffect::ProgramStop => (),
+            FailureEffect::RemoteOff => {
+                self.state.robot_mode = Some(if is_on { POWER_OFF } else { RUNNING });
+                self.motion = Motion::Stop;
+                self.run_program(!is_on);
+            }
+            // The program waits: it still runs, and its controllers stay active.
+            FailureEffect::Deadman => self.protect(safe(safety::THREE_POSITION_STOP)),
+            FailureEffect::ProtectiveStop => self.protect(safe(safety::PROTECTIVE_STOP)),
+            FailureEffect::ProgramStop => {
+                self.motion = Motion::Stop;
+                self.run_program(!is_on);
+            }
             FailureEffect::Slow(scale) => {
-                self.scale = if is_on { *scale } else { 1.0 };
-                return;
+                self.wanted_scale = if is_on { *scale } else { 1.0 };
+                // After a pause the speed rises slowly.
+                if self.scale > 0.0 {
+                    self.scale = self.wanted_scale;
+                }
             }
-            _ => return,
+            FailureEffect::TakeController => {
+                let (own, other) = (vec![self.controller.clone()], vec![PASSTHROUGH.to_owned()]);
+                let (activate, deactivate) = if is_on { (other, own) } else { (own, other) };
+                let _ = self.manager.switch(&Switch { activate, deactivate, is_strict: false });
+                self.motion = Motion::Stop;
+            }
+            FailureEffect::Goal => self.has_goal = is_on,
+            _ => (),
         }
-        // Every stop ends the program; the operator who ends the stop starts it again.
-        self.state.is_program_running = Some(!is_on);
-        self.motion = Motion::Stop;
     }
 
     fn alarm(&mut self, words: &str, _now_s: f64) {
         self.refuse(words.into());
     }
 
-    fn advance(&mut self, _now_s: f64, reading: &Reading) -> &[f64] {
+    fn advance(&mut self, now_s: f64, reading: &Reading) -> &[f64] {
+        self.scale = self.wanted_scale.min(self.scale + RAMP);
+        let is_silent = |watchdog_s| now_s - self.commanded_s > watchdog_s;
+        if matches!(self.motion, Motion::Velocities(_)) && self.watchdog_s.is_some_and(is_silent) {
+            self.motion = Motion::Stop;
+        }
         if self.status().brake || self.setpoint.len() != reading.q.len() {
             self.restart_at(&reading.q);
         }
@@ -283,6 +343,7 @@ impl ArmComputer for UrComputer {
             StatePacket { packet: Packet::SafetyMode(safety), rate_hz: None },
             StatePacket { packet: Packet::ProgramRunning(running), rate_hz: None },
             StatePacket { packet: Packet::SpeedScaling(scaling), rate_hz: Some(SCALING_HZ) },
+            StatePacket { packet: Packet::Goals(self.goals()), rate_hz: None },
         ]
     }
 

@@ -2,7 +2,6 @@
 
 use crate::joints::JointNames;
 use crate::message::JointTrajectory;
-use palpate_explore::backend::Reading;
 
 /// State of all joints at a time from the start, with what is known of it.
 struct Waypoint {
@@ -12,10 +11,10 @@ struct Waypoint {
     qddot: Vec<f64>,
 }
 
-/// A trajectory in execution. It begins at the measured state.
+/// A trajectory in execution.
 pub struct Trajectory {
     points: Vec<Waypoint>,
-    /// Measured state at the start, once execution has begun.
+    /// State at the start, once execution has begun.
     before: Option<Waypoint>,
     /// Time since the start, which passes at the robot's speed.
     time_s: f64,
@@ -71,8 +70,15 @@ impl Trajectory {
         Ok(Self { points, before: None, time_s })
     }
 
-    /// Advances by `period_s` at `scale` times the speed, and writes the setpoint to `q`.
-    pub fn advance(&mut self, period_s: f64, scale: f64, reading: &Reading, q: &mut Vec<f64>) {
+    /// Advances by `period_s` at `scale` times the speed, and writes the setpoint to `q`. At first it
+    /// begins with the positions and velocities of `start`.
+    pub fn advance(
+        &mut self,
+        period_s: f64,
+        scale: f64,
+        [start_q, start_qdot]: [&Vec<f64>; 2],
+        q: &mut Vec<f64>,
+    ) {
         let before = match &self.before {
             Some(before) => {
                 self.time_s += period_s * scale;
@@ -80,8 +86,8 @@ impl Trajectory {
             }
             None => self.before.insert(Waypoint {
                 time_s: self.time_s,
-                q: reading.q.clone(),
-                qdot: reading.qdot.clone(),
+                q: start_q.clone(),
+                qdot: start_qdot.clone(),
                 qddot: Vec::new(),
             }),
         };

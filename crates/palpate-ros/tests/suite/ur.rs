@@ -2,22 +2,35 @@
 //! follows, and comes to rest by itself whenever they cease.
 
 use palpate_explore::backend::{Command, Reading};
+use palpate_ros::controllers::Switch;
+use palpate_ros::driver::ur::trajectory_controller;
+use palpate_ros::driver::{Profile, Release};
 use palpate_ros::joints::JointNames;
-use palpate_ros::message::{Duration as Span, JointTrajectory, JointTrajectoryPoint, Time};
-use palpate_ros::profile::UR_CONTROLLERS;
+use palpate_ros::message::{
+    Duration as Span, Float64MultiArray, JointTrajectory, JointTrajectoryPoint, Time,
+};
 use palpate_ros::server::arm_computer::ArmComputer;
 use palpate_ros::server::failure::FailureEffect;
 use palpate_ros::server::ur_computer::UrComputer;
 use palpate_ros::server::ur_trajectory::Trajectory;
-use palpate_ros::topics::{Service, Switch};
+use palpate_ros::service::Service;
+use palpate_ros::settings::BackendSettings;
+use palpate_ros::trajectory_stream::{TrajectoryStream, stoppable_share};
 use palpate_ros::transport::Packet;
-use palpate_ros::ur::{TrajectoryStream, stoppable_share};
 use proptest::prelude::*;
 use std::time::{Duration, Instant};
 
 /// Periods of the robot and of the explorer, s.
 const ROBOT_S: f64 = 0.002;
 const TICK_S: f64 = 0.004;
+
+/// Settings of a driver of this release.
+fn settings(release: Release) -> BackendSettings {
+    let mut settings = BackendSettings { profile: Profile::Ur, release, ..Default::default() };
+    let controller = trajectory_controller(release);
+    settings.topics.command.name = format!("/{controller}/joint_trajectory");
+    settings
+}
 
 /// A robot of one joint whose servo follows velocities with a lag.
 struct Robot {
@@ -30,8 +43,16 @@ struct Robot {
 
 impl Robot {
     fn new(lag_s: f64) -> Self {
+        Self::of_release(lag_s, Release::Jazzy)
+    }
+
+    fn of_release(lag_s: f64, release: Release) -> Self {
+        Self::with(lag_s, settings(release))
+    }
+
+    fn with(lag_s: f64, settings: BackendSettings) -> Self {
         let names = JointNames::new(vec!["a".into()]);
-        let computer = UrComputer::new(names.clone(), ROBOT_S, UR_CONTROLLERS[0].into());
+        let computer = UrComputer::new(names.clone(), ROBOT_S, vec![3.14], &settings);
         let reading = Reading { q: vec![0.5], qdot: vec![0.0], ..Reading::default() };
         Self { names, computer, reading, lag_s, time_s: 0.0 }
     }
@@ -48,8 +69,12 @@ impl Robot {
 
 /// Commands `speed(t)` for `span_s` and then nothing for a second; returns the robot's positions
 /// at its ticks, and the integral of the commands at the end of each.
-fn drive(lag_s: f64, span_s: f64, speed: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
-    let mut robot = Robot::new(lag_s);
+fn drive(
+    (lag_s, release): (f64, Release),
+    span_s: f64,
+    speed: impl Fn(f64) -> f64,
+) -> Vec<[f64; 2]> {
+    let mut robot = Robot::of_release(lag_s, release);
     let (mut stream, begun) = (TrajectoryStream::default(), Instant::now());
     let mut commanded = robot.reading.q[0];
     let mut rows = Vec::new();
@@ -93,8 +118,9 @@ proptest! {
         speed in -0.12..0.12_f64,
         span_s in 0.4..2.0,
         lag_s in prop::sample::select(vec![0.001, 0.01, 0.02]),
+        release in prop::sample::select(vec![Release::Jazzy, Release::Lyrical]),
     ) {
-        let rows = drive(lag_s, span_s, movement(speed, span_s));
+        let rows = drive((lag_s, release), span_s, movement(speed, span_s));
         let [q, commanded] = rows[rows.len() - 1];
         prop_assert!((q - commanded).abs() < 1e-3, "{q} {commanded}");
         // It never trails or leads by more than a tenth of a second of movement.
@@ -108,8 +134,9 @@ proptest! {
         speed in -0.12..0.12_f64,
         end_s in 0.2..0.6,
         lag_s in prop::sample::select(vec![0.001, 0.01, 0.02]),
+        release in prop::sample::select(vec![Release::Jazzy, Release::Lyrical]),
     ) {
-        let rows = drive(lag_s, end_s, movement(speed, 2.0));
+        let rows = drive((lag_s, release), end_s, movement(speed, 2.0));
         let rest = ((end_s + 0.15) / ROBOT_S) as usize;
         for tick in rest..rows.len() {
             prop_assert!(last_speed(&rows, tick) < 2e-3, "{tick} {}", last_speed(&rows, tick));
@@ -199,18 +226,21 @@ fn what_the_controller_would_refuse_is_refused() {
 #[test]
 fn controllers_are_switched_as_by_the_controller_manager() {
     let mut robot = Robot::new(0.01);
+    const NAMES: [&str; 3] = [
+        "scaled_joint_trajectory_controller",
+        "joint_trajectory_controller",
+        "passthrough_trajectory_controller",
+    ];
     let switch = |activate: &[usize], deactivate: &[usize], is_strict| {
-        let name = |i: &usize| UR_CONTROLLERS[*i].to_owned();
-        Service::SwitchController(Switch {
-            activate: activate.iter().map(name).collect(),
-            deactivate: deactivate.iter().map(name).collect(),
-            is_strict,
-        })
+        let names = |all: &[usize]| all.iter().map(|i| NAMES[*i].to_owned()).collect();
+        let (activate, deactivate) = (names(activate), names(deactivate));
+        Service::SwitchController(Switch { activate, deactivate, is_strict })
     };
     for (activate, deactivate, is_strict, is_granted) in [
         (&[0][..], &[][..], true, false), // active already
-        (&[2], &[], true, false),         // the first one commands the same joints
+        (&[2], &[], true, false),         // the first one holds the arm
         (&[2], &[], false, false),
+        (&[1], &[], false, false),
         (&[0], &[2], false, true), // nothing to do
         (&[2], &[0], true, true),
         (&[0], &[], true, false),
@@ -232,7 +262,7 @@ fn controllers_are_switched_as_by_the_controller_manager() {
     assert!((robot.reading.q[0] - 0.6).abs() < 1e-3, "{}", robot.reading.q[0]);
 }
 
-/// A protective stop ends the movement and the program; commands are refused until it has ended.
+/// A protective stop ends the movement; commands are refused until it has ended.
 #[test]
 fn a_protective_stop_stops_the_arm_and_says_what_to_do() {
     let mut robot = Robot::new(0.01);
@@ -270,4 +300,51 @@ fn the_speed_slider_stretches_time() {
     };
     let ratio = arrival(Some(0.5)) / arrival(None);
     assert!((ratio - 2.0).abs() < 0.05, "{ratio}");
+}
+
+/// Velocities that no robot can follow are refused, and those that cease end with the watchdog.
+#[test]
+fn velocities_have_limits_and_a_watchdog() {
+    let mut settings = settings(Release::Jazzy);
+    settings.topics.command.name = "/forward_velocity_controller/commands".into();
+    settings.watchdog_s = Some(0.1);
+    let mut robot = Robot::with(0.01, settings);
+    let velocities = |qdot: f64| {
+        Packet::Velocities(Float64MultiArray { data: vec![qdot], ..Float64MultiArray::default() })
+    };
+    robot.tick();
+    robot.computer.receive(&velocities(0.1), 0, 0.0, 0.0);
+    assert!(robot.computer.refused().1.contains("not active"));
+    let [old, new] = ["scaled_joint_trajectory_controller", "forward_velocity_controller"];
+    let switch =
+        Switch { activate: vec![new.into()], deactivate: vec![old.into()], is_strict: true };
+    robot.computer.call(&Service::SwitchController(switch), 0.0).unwrap();
+    robot.computer.receive(&velocities(f64::NAN), 0, robot.time_s, 0.0);
+    assert!(robot.computer.refused().1.contains("not finite"));
+    robot.computer.receive(&velocities(0.1), 0, robot.time_s, 0.0);
+    (0..45).for_each(|_| robot.tick());
+    assert!((robot.reading.qdot[0] - 0.1).abs() < 0.01, "{:?}", robot.reading);
+    (0..100).for_each(|_| robot.tick());
+    assert!(robot.reading.qdot[0].abs() < 1e-3, "{:?}", robot.reading);
+    robot.computer.receive(&velocities(1e9), 0, robot.time_s, 0.0);
+    assert!(robot.computer.status().refusal().unwrap().contains("protective stop"));
+}
+
+/// A pause holds the arm, and a movement goes on after it.
+#[test]
+fn a_pause_holds_the_arm() {
+    let mut robot = Robot::new(0.001);
+    robot.tick();
+    let message = Packet::Command(trajectory(&[(0.7, 0.0, 1.0)]));
+    robot.computer.receive(&message, 0, 0.0, 0.0);
+    (0..200).for_each(|_| robot.tick());
+    robot.computer.fail(&FailureEffect::Slow(0.0), true, 0.0);
+    (0..300).for_each(|_| robot.tick());
+    let held = robot.reading.q[0];
+    (0..500).for_each(|_| robot.tick());
+    assert!((robot.reading.q[0] - held).abs() < 1e-6 && held < 0.65, "{held}");
+    assert_eq!(robot.computer.status().refusal(), None);
+    robot.computer.fail(&FailureEffect::Slow(0.0), false, 0.0);
+    (0..500).for_each(|_| robot.tick());
+    assert!((robot.reading.q[0] - 0.7).abs() < 1e-3, "{:?}", robot.reading);
 }
