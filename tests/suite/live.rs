@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::Path;
 use std::process::Stdio;
 use std::sync::Arc;
@@ -251,6 +251,28 @@ fn a_request_without_the_token_is_refused() {
     let port = host.split(':').next_back().unwrap();
     let cookie = format!("Host: {host}\r\nCookie: palpate-{port}={token}\r\nConnection: close");
     assert_eq!(answer(host, &format!("GET / HTTP/1.1\r\n{cookie}\r\n\r\n")).0, 200);
+}
+
+/// A link in a run's folder is not served, and no path through one.
+#[test]
+fn links_of_a_run_are_not_followed() {
+    let page = Page::of(TOY, &["planners=['active']", "trials=1", "touches=3"]);
+    page.viewer.when(|state| statuses(state) == ["held"]);
+    let (run, outside) = (page.folder.path().join("run"), page.folder.path().join("outside"));
+    fs::create_dir(&outside).unwrap();
+    fs::write(outside.join("secret.json"), "{}").unwrap();
+    fs::write(run.join("real.json"), "{}").unwrap();
+    assert_eq!(page.viewer.get("/real.json").0, 200);
+    symlink(outside.join("secret.json"), run.join("report.html")).unwrap();
+    symlink("real.json", run.join("inside.json")).unwrap();
+    symlink(&outside, run.join("figures")).unwrap();
+    for path in ["/report.html", "/inside.json", "/figures/secret.json"] {
+        assert_eq!(page.viewer.get(path).0, 404, "{path}");
+    }
+    fs::remove_file(run.join("figures")).unwrap();
+    fs::create_dir(run.join("figures")).unwrap();
+    fs::copy(outside.join("secret.json"), run.join("figures/own.json")).unwrap();
+    assert_eq!(page.viewer.get("/figures/own.json").0, 200);
 }
 
 /// Number of connections of a crowd: a thousand pass too, but may need more files than a process may
