@@ -5,7 +5,7 @@ use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::host::Host;
 use super::terminal::{Outcome, print};
 use crate::experiment::Experiment;
-use palpate_ros::network::network;
+use palpate_ros::network::{discovery_note, network};
 use palpate_ros::settings::BackendSettings;
 use std::fs;
 use std::net::{TcpStream, ToSocketAddrs};
@@ -164,12 +164,13 @@ fn ros2(variable: &impl Fn(&str) -> Option<String>) -> Line {
     if !cfg!(feature = "ros2") {
         return ("ROS 2", State::Absent, "build with the feature ros2".into());
     }
+    let note = discovery_note(variable).map_or(String::new(), |note| format!("; {note}"));
     match network(&BackendSettings::default(), variable, &[]) {
         Ok((domain, None)) => {
-            ("ROS 2", State::Ok, format!("domain {domain}, all network interfaces"))
+            ("ROS 2", State::Ok, format!("domain {domain}, all network interfaces{note}"))
         }
         Ok((domain, Some(_))) => {
-            ("ROS 2", State::Ok, format!("domain {domain}, this machine only"))
+            ("ROS 2", State::Ok, format!("domain {domain}, this machine only{note}"))
         }
         Err(error) => ("ROS 2", State::Wrong, error),
     }

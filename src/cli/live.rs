@@ -18,12 +18,14 @@ use anyhow::Context;
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
 use palpate_input::files;
+use std::io::Write as _;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
+use tempfile::NamedTempFile;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -33,10 +35,12 @@ Examples:
   palpate live experiments/bird.toml --hold      step through the touches
   palpate live real_arm --approve                approve each touch of a real arm
   palpate live runs/bird                         replay a finished run
-  palpate live bird --listen 0.0.0.0:8080        for other machines; the printed address has a token
+  palpate live bird --listen 0.0.0.0:8080        for other machines
 
 Serves one page on which you watch trials while they run, hold them, step, approve a touch or choose the next one. The rows are \
 those of `palpate run`, also of the planner `human`, and palpate run continues an unfinished run. Ctrl-C ends it.
+
+The printed address has a token. Requests without it are refused, also those of other users of this machine.
 
 A real arm holds before a touch while no page has been visible for 5 s. Closing the page, a sleeping laptop or a cut network let it \
 finish the touch and then hold. Stop ends the trials before the next touch, as Ctrl-C does.")]
@@ -113,9 +117,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Re
     };
     let server = Server::open(args.listen, Box::new(page))?;
     print(&format!("live page: {}", server.url()))?;
-    if !args.no_browser {
-        open_browser(&server.url());
-    }
+    let _entry = if args.no_browser { None } else { open_browser(&server.url()) };
     let live = Live { args, talk, program, server, interrupt };
     let mut outcome = work.map_or(Ok(Outcome::Done), |work| live.show(work))?;
     while let Some(experiment) = live.next(&starts) {
@@ -342,17 +344,34 @@ fn new_folder(name: &str) -> PathBuf {
     (1..).map(folder).find(|path| !path.exists()).unwrap_or_else(|| folder(0))
 }
 
-/// Opens the page, if there is a screen; a failure is none, because the address is printed.
-fn open_browser(url: &str) {
+/// Writes a file in `folder` that only this user can read and that leads a browser to `url`. Other
+/// users see the arguments of a process, so that the token cannot be one.
+fn entry_file(folder: &Path, url: &str) -> std::io::Result<NamedTempFile> {
+    files::make_folder(folder)?;
+    let mut file = tempfile::Builder::new().prefix("live-").suffix(".html").tempfile_in(folder)?;
+    write!(
+        file,
+        "<!doctype html>\n<meta charset=\"utf-8\">\n<title>Palpate live</title>\n\
+         <meta http-equiv=\"refresh\" content=\"0;url={url}\">\n<a href=\"{url}\">Palpate live</a>\n"
+    )?;
+    Ok(file)
+}
+
+/// Opens the page if there is a screen, by a file that lasts as long as the returned value. Errors
+/// are ignored, because the address is printed.
+fn open_browser(url: &str) -> Option<NamedTempFile> {
     let has_screen =
         ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
     let opener = match () {
         () if cfg!(target_os = "macos") => "open",
         () if has_screen => "xdg-open",
-        () => return,
+        () => return None,
     };
+    let file = entry_file(Path::new("runs"), url).ok()?;
+    let path = file.path().canonicalize().ok()?;
     let quiet = || std::process::Stdio::null();
-    let _ = std::process::Command::new(opener).arg(url).stdout(quiet()).stderr(quiet()).spawn();
+    let _ = std::process::Command::new(opener).arg(path).stdout(quiet()).stderr(quiet()).spawn();
+    Some(file)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::sim::{Scene, known_body};
 use anyhow::{Context, bail};
 use palpate_explore::robot::sensor::SensorKind;
 use palpate_ros::connect;
+use palpate_ros::network::discovery_note;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
 use palpate_ros::server::serve::{Injection, SimulatedRobotServer, services};
 use palpate_ros::settings::BackendKind;
@@ -121,6 +122,9 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         bail!("{path}: backend.topics.tactile.type = \"{name}\" needs {needed} in the scene");
     }
     let stop = stop_on_interrupt("ticks")?;
+    if settings.kind == BackendKind::Ros2 {
+        discovery_note(|name| std::env::var(name).ok()).iter().for_each(|note| talk.note(note));
+    }
     let open = connect(&settings, Endpoint::Arm, services(settings.profile))?;
     let injections = args.inject.clone();
     let mut twin =

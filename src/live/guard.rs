@@ -2,7 +2,7 @@
 //!
 //! A page of another site can send requests from a person's browser. It cannot set `Host` or
 //! `Origin`, so those must be the server's own; a name that is rebound to this machine (DNS
-//! rebinding) is another host. A server that other machines reach also asks for a token.
+//! rebinding) is another host. A token keeps out other users of this machine and other machines.
 
 use hyper::header::{AUTHORIZATION, COOKIE, HOST, HeaderMap, ORIGIN};
 use hyper::{Method, StatusCode, Uri};
@@ -12,11 +12,15 @@ use subtle::ConstantTimeEq;
 /// Number of random bytes of a token.
 const TOKEN_BYTES: usize = 16;
 
+/// Refusal of a request without the token.
+const NO_TOKEN: &str =
+    "the token is missing or wrong: open the address that `palpate live` printed";
+
 /// Rules of who may use the server.
 pub struct Access {
     address: SocketAddr,
-    /// Secret of a server that other machines reach.
-    token: Option<String>,
+    /// Secret of the printed address.
+    token: String,
 }
 
 /// Answer that an allowed request gets.
@@ -29,27 +33,21 @@ pub(super) enum Passage {
 }
 
 impl Access {
-    /// Creates the rules of a server at `address`: with a new token, unless only this machine
-    /// reaches it.
+    /// Creates the rules of a server at `address` with a new token.
     pub fn new(address: SocketAddr) -> Self {
-        let token = || {
-            let bytes: [u8; TOKEN_BYTES] = rand::random();
-            bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-        };
-        Self { address, token: (!address.ip().is_loopback()).then(token) }
+        let bytes: [u8; TOKEN_BYTES] = rand::random();
+        let token = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        Self { address, token }
     }
 
-    /// Address for a browser.
+    /// Address for a browser, with the token.
     pub fn url(&self) -> String {
         let host = if self.address.ip().is_unspecified() {
             SocketAddr::new(IpAddr::from([127, 0, 0, 1]), self.address.port())
         } else {
             self.address
         };
-        match &self.token {
-            None => format!("http://{host}/"),
-            Some(token) => format!("http://{host}/?token={token}"),
-        }
+        format!("http://{host}/?token={}", self.token)
     }
 
     /// Name of the cookie; browsers share cookies between the ports of a host.
@@ -59,8 +57,9 @@ impl Access {
 
     /// Value of `Set-Cookie` for a page that has entered.
     pub(super) fn set_cookie(&self) -> String {
-        let token = self.token.as_deref().unwrap_or_default();
-        format!("{}={token}; HttpOnly; SameSite=Strict; Path=/", self.cookie())
+        // `Lax`, because a browser counts a file and a link as another site, and would not send a
+        // `Strict` cookie to the page that follows the token.
+        format!("{}={}; HttpOnly; SameSite=Lax; Path=/", self.cookie(), self.token)
     }
 
     /// Checks a request.
@@ -88,20 +87,17 @@ impl Access {
         if !(is_fine || is_entry && origin.is_none()) {
             return Err((StatusCode::FORBIDDEN, "another page's request"));
         }
-        let Some(token) = &self.token else { return Ok(Passage::Free) };
         let query = uri.query().and_then(|query| query.strip_prefix("token="));
-        if is_entry && query.is_some_and(|given| is_equal(given, token)) {
+        if is_entry && query.is_some_and(|given| is_equal(given, &self.token)) {
             return Ok(Passage::Enters);
         }
         let cookie = format!("{}=", self.cookie());
         let cookies = text(COOKIE).unwrap_or_default().split(';').map(str::trim);
         let bearer = text(AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
         let mut given = cookies.filter_map(|it| it.strip_prefix(&cookie)).chain(bearer);
-        match given.any(|given| is_equal(given, token)) {
+        match given.any(|given| is_equal(given, &self.token)) {
             true => Ok(Passage::Free),
-            false => {
-                Err((StatusCode::UNAUTHORIZED, "no token, or a wrong one: use the printed address"))
-            }
+            false => Err((StatusCode::FORBIDDEN, NO_TOKEN)),
         }
     }
 
@@ -144,6 +140,8 @@ mod tests {
     #[test]
     fn only_its_own_page_orders() {
         let access = Access::new(([127, 0, 0, 1], 8080).into());
+        let bearer = format!("Bearer {}", access.token);
+        let bearer = ("authorization", bearer.as_str());
         let own = ("host", "127.0.0.1:8080");
         let same = ("origin", "http://127.0.0.1:8080");
         for (method, headers, status) in [
@@ -162,38 +160,66 @@ mod tests {
             (Method::GET, &[], 421),
             (Method::GET, &[own, own], 421),
         ] {
+            let entered = [headers, &[bearer]].concat();
             assert_eq!(
-                check(&access, method.clone(), "/events", headers),
+                check(&access, method.clone(), "/events", &entered),
                 status,
                 "{method} {headers:?}"
             );
+            let status = status.max(403);
+            assert_eq!(check(&access, method.clone(), "/events", headers), status, "no token");
         }
         // A link from elsewhere shows the page, and nothing more.
-        let link = [own, ("sec-fetch-site", "cross-site")];
+        let link = [own, ("sec-fetch-site", "cross-site"), bearer];
         assert_eq!(check(&access, Method::GET, "/", &link), 200);
     }
 
     #[test]
-    fn a_server_for_others_asks_for_its_token() {
-        let access = Access { address: ([0, 0, 0, 0], 8080).into(), token: Some("secret".into()) };
-        let own = ("host", "10.0.0.1:8080");
-        let cookie = |value| [own, ("cookie", value)];
-        assert_eq!(check(&access, Method::GET, "/?token=secret", &[own]), 303);
-        assert_eq!(check(&access, Method::GET, "/events?token=secret", &[own]), 401);
-        for (value, status) in [
-            ("palpate-8080=secret", 200),
-            ("a=b; palpate-8080=secret", 200),
-            ("palpate-8080=secre", 401),
-            ("palpate-8080=secrets", 401),
-            ("palpate-8080=", 401),
-            ("palpate-8081=secret", 401),
-        ] {
-            assert_eq!(check(&access, Method::GET, "/events", &cookie(value)), status, "{value}");
+    fn every_server_asks_for_its_token() {
+        for (ip, host) in [([127, 0, 0, 1], "127.0.0.1:8080"), ([0, 0, 0, 0], "10.0.0.1:8080")] {
+            let access = Access { address: (ip, 8080).into(), token: "secret".into() };
+            let own = ("host", host);
+            let cookie = |value| [own, ("cookie", value)];
+            for (path, status) in [
+                ("/?token=secret", 303),
+                ("/?token=secrets", 403),
+                ("/?token=", 403),
+                ("/?", 403),
+                ("/", 403),
+                ("/events?token=secret", 403),
+                ("/live.js", 403),
+                ("/trials.jsonl", 403),
+            ] {
+                assert_eq!(check(&access, Method::GET, path, &[own]), status, "{path}");
+            }
+            for (value, status) in [
+                ("palpate-8080=secret", 200),
+                ("a=b; palpate-8080=secret", 200),
+                ("palpate-8080=secre", 403),
+                ("palpate-8080=secrets", 403),
+                ("palpate-8080=", 403),
+                ("palpate-8081=secret", 403),
+            ] {
+                let found = check(&access, Method::GET, "/events", &cookie(value));
+                assert_eq!(found, status, "{value}");
+            }
+            let origin = format!("http://{host}");
+            let same = ("origin", origin.as_str());
+            let bearer = ("authorization", "Bearer secret");
+            for path in ["/order", "/seen", "/mesh", "/start"] {
+                assert_eq!(check(&access, Method::POST, path, &[own, same]), 403, "{path}");
+                assert_eq!(check(&access, Method::POST, path, &[own, same, bearer]), 200, "{path}");
+            }
+            let other = ("host", "evil.example:8080");
+            assert_eq!(check(&access, Method::GET, "/events", &[other, bearer]), 421);
         }
-        let bearer = [own, ("authorization", "Bearer secret")];
-        assert_eq!(check(&access, Method::GET, "/state", &bearer), 200);
-        assert_eq!(check(&access, Method::GET, "/events", &[("host", "evil.example:8080")]), 421);
-        let open = Access::new(([0, 0, 0, 0], 1).into());
-        assert_eq!(open.token.unwrap().len(), 2 * TOKEN_BYTES);
+    }
+
+    #[test]
+    fn tokens_are_new_and_in_the_address() {
+        let [one, other] = [(); 2].map(|()| Access::new(([127, 0, 0, 1], 80).into()));
+        assert_eq!(one.token.len(), 2 * TOKEN_BYTES);
+        assert_ne!(one.token, other.token);
+        assert_eq!(one.url(), format!("http://127.0.0.1:80/?token={}", one.token));
     }
 }

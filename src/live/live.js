@@ -348,7 +348,11 @@ source.addEventListener("state", ({ data: text }) => show(JSON.parse(text)));
 source.addEventListener("alert", ({ data: text }) => say(JSON.parse(text)));
 source.addEventListener("reload", () => location.reload());
 source.addEventListener("readings", ({ data: text }) => told?.planners && trace(JSON.parse(text)));
-source.addEventListener("error", () => say("The connection is lost. A real arm finishes its touch and holds."));
+source.addEventListener("error", () => {
+  // A refused connection is closed.
+  const remedy = source.readyState === EventSource.CLOSED ? " Open the address that palpate live printed." : "";
+  say(`The connection is lost. A real arm finishes its touch and holds.${remedy}`);
+});
 source.addEventListener("open", () => say(""));
 
 // A visible page lets a real arm move.

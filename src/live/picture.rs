@@ -174,16 +174,14 @@ const KINDS: [(&str, &str); 8] = [
     ("toml", "application/toml"),
 ];
 
-impl Shown {
-    /// Finds a file of the run by a path of the page: a plain name, or one in `figures`. Returns it
-    /// with its kind.
-    pub fn file(&self, path: &str) -> Option<(PathBuf, &'static str)> {
-        let path = path.strip_prefix('/')?;
-        let name = path.strip_prefix("figures/").unwrap_or(path);
-        let (stem, ending) = name.split_once('.')?;
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
-        let (_, kind) = KINDS.iter().find(|(known, _)| *known == ending)?;
-        let is_named = !stem.is_empty() && stem.chars().all(is_plain);
-        is_named.then(|| (self.folder.join(path), *kind))
-    }
+/// Returns the file of a run's folder that has this path on the page, and its kind: a plain name,
+/// or one in `figures`.
+pub(super) fn file(path: &str) -> Option<(PathBuf, &'static str)> {
+    let path = path.strip_prefix('/')?;
+    let name = path.strip_prefix("figures/").unwrap_or(path);
+    let (stem, ending) = name.split_once('.')?;
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    let (_, kind) = KINDS.iter().find(|(known, _)| *known == ending)?;
+    let is_named = !stem.is_empty() && stem.chars().all(is_plain);
+    is_named.then(|| (path.into(), *kind))
 }

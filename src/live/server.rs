@@ -25,6 +25,7 @@ use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use palpate_input::error::InputError;
+use palpate_input::files::bytes_below;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use socket2::SockRef;
@@ -275,9 +276,9 @@ impl Server {
                 Ok(json_file(&json!({})))
             }
             (Method::GET, path) => {
-                let found = shown.and_then(|shown| shown.file(path));
-                let (path, kind) = found.ok_or_else(missing)?;
-                let read = blocking(move || palpate_input::files::bytes(&path, FILE_BYTES)).await?;
+                let shown = shown.ok_or_else(missing)?;
+                let (path, kind) = picture::file(path).ok_or_else(missing)?;
+                let read = blocking(move || bytes_below(&shown.folder, &path, FILE_BYTES)).await?;
                 let mut response =
                     Response::new(Full::new(read.map_err(|_| missing())?.into()).boxed());
                 response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));

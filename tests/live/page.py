@@ -1,5 +1,5 @@
 """Test of the live page in headless Chromium: a mesh is dropped, explored by planners and by a person, held, stepped,
-reloaded, seen in two tabs, on a phone, on dark paper, by keyboard alone, and checked by axe.
+reloaded, entered by its token, seen in two tabs, on a phone, on dark paper, by keyboard alone, and checked by axe.
 
 Usage: python page.py PROGRAM MESH [--axe axe.min.js] [--pictures FOLDER]
 """
@@ -120,6 +120,24 @@ def main() -> None:
         expect(page.locator("#bring")).to_be_visible()
         page.close()
         assert not errors, errors
+
+        # The token is needed; a browser also takes it from a file and from a link of another site, and keeps it.
+        with browser.new_context() as fresh, tempfile.NamedTemporaryFile("w", suffix=".html") as entry:
+            page = fresh.new_page()
+            bare = live.url.split("?")[0]
+            assert page.goto(bare).status == 403
+            assert "open the address" in page.inner_text("body")
+            entry.write(f'<meta http-equiv="refresh" content="0;url={live.url}">')
+            entry.flush()
+            page.goto(f"file://{entry.name}")
+            expect(page.locator("#bring")).to_be_visible(timeout=LONGEST_MS)
+            assert page.url == bare, page.url
+        with browser.new_context() as fresh:
+            page = fresh.new_page()
+            page.set_content(f'<a href="{live.url}">live</a>')
+            page.click("a")
+            expect(page.locator("#bring")).to_be_visible(timeout=LONGEST_MS)
+        print("token")
         context = browser.new_context(viewport={"width": 1200, "height": 900}, bypass_csp=True)
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))

@@ -287,5 +287,10 @@ fn the_doctor_reports_every_part() {
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(text.contains("WRONG") && text.contains("allowed are 0 to"), "{text}");
         assert_eq!(output.status.code(), Some(1));
+        let mut program = command(home, &["doctor"]);
+        program.env("ROS_STATIC_PEERS", "10.0.0.7");
+        let output = run_to_end(&mut program, "doctor");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains("ROS_STATIC_PEERS is \"10.0.0.7\": Palpate finds"), "{text}");
     }
 }

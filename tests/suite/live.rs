@@ -8,8 +8,10 @@ use palpate::experiment::{Experiment, Simulation, runner};
 use palpate::live::session::Session;
 use palpate::live::{Brought, Host, MeshWish, Server};
 use serde_json::{Value, json};
+use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::Path;
 use std::process::Stdio;
 use std::sync::Arc;
@@ -174,10 +176,11 @@ fn a_request_that_is_not_the_pages_own_is_refused() {
     let port = host.split(':').next_back().unwrap();
     let get =
         |path: &str, head: &str| answer(&host, &format!("GET {path} HTTP/1.1\r\n{head}\r\n\r\n"));
-    let own = format!("Host: {host}\r\nConnection: close");
+    let own = format!("{}\r\nConnection: close", page.viewer.head());
+    let evil = own.replacen(&host, &format!("evil.example:{port}"), 1);
     for (path, head, expected) in [
         ("/", own.clone(), 200),
-        ("/events", format!("Host: evil.example:{port}\r\nConnection: close"), 421),
+        ("/events", evil, 421),
         ("/beliefs?touches=1", format!("{own}\r\nOrigin: http://evil.example"), 403),
         ("/beliefs?touches=x", own.clone(), 422),
         ("/../../etc/passwd", own.clone(), 404),
@@ -192,13 +195,13 @@ fn a_request_that_is_not_the_pages_own_is_refused() {
         assert_eq!(get(path, &head).0, expected, "{path} {head}");
     }
     let foreign = format!(
-        "POST /order HTTP/1.1\r\nHost: {host}\r\nOrigin: http://evil.example\r\nContent-Length: 16\r\n\
-         Connection: close\r\n\r\n{{\"order\":\"stop\"}}"
+        "POST /order HTTP/1.1\r\n{own}\r\nOrigin: http://evil.example\r\nContent-Length: 16\r\n\r\n\
+         {{\"order\":\"stop\"}}"
     );
     assert_eq!(answer(&host, &foreign).0, 403);
     for (path, bytes) in [("/mesh", 100 << 20), ("/order", 100 << 20)] {
         let head = format!(
-            "POST {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nConnection: close\r\n\
+            "POST {path} HTTP/1.1\r\n{own}\r\nOrigin: http://{host}\r\n\
              X-Mesh: {{\"name\":\"a.stl\",\"side\":\"front\",\"finger\":\"rigid\"}}\r\nContent-Length: {bytes}\r\n\r\n"
         );
         assert_eq!(answer(&host, &head).0, 413, "{path}");
@@ -215,6 +218,63 @@ fn a_request_that_is_not_the_pages_own_is_refused() {
     assert_eq!(statuses(&page.viewer.when(|state| !statuses(state).is_empty())), ["held"]);
 }
 
+/// Without the token no request is answered, also of another program on this machine.
+#[test]
+fn a_request_without_the_token_is_refused() {
+    let page = Page::of(TOY, &["planners=['active']", "trials=1", "touches=3"]);
+    page.viewer.order(&json!({ "order": "approve", "each": true }));
+    let Viewer { host, token } = &page.viewer;
+    let wrong = token.replace(|digit| digit != '0', "0");
+    let heads = ["".into(), format!("Authorization: Bearer {wrong}\r\n")];
+    let posts = ["/order", "/seen", "/mesh", "/start"].map(|path| ("POST", path));
+    let gets = ["/", "/live.js", "/live.css", "/events", "/beliefs?touches=1", "/trials.jsonl"];
+    for (method, path) in gets.map(|path| ("GET", path)).into_iter().chain(posts) {
+        let body = r#"{"order":"approve","each":false}"#;
+        for given in &heads {
+            let head = format!(
+                "{method} {path} HTTP/1.1\r\nHost: {host}\r\n{given}Origin: http://{host}\r\n\
+                 Content-Length: {}\r\nConnection: close\r\n\r\n{body}",
+                body.len()
+            );
+            let (status, words) = answer(host, &head);
+            assert!(
+                status == 403 && words.contains("open the address"),
+                "{path}: {status} {words}"
+            );
+        }
+    }
+    assert_eq!(page.viewer.when(|state| state["approves"].is_boolean())["approves"], json!(true));
+    // A browser keeps the token of the printed address in a cookie.
+    let entry =
+        format!("GET /?token={token} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
+    assert_eq!(answer(host, &entry).0, 303);
+    let port = host.split(':').next_back().unwrap();
+    let cookie = format!("Host: {host}\r\nCookie: palpate-{port}={token}\r\nConnection: close");
+    assert_eq!(answer(host, &format!("GET / HTTP/1.1\r\n{cookie}\r\n\r\n")).0, 200);
+}
+
+/// A link in a run's folder is not served, and no path through one.
+#[test]
+fn links_of_a_run_are_not_followed() {
+    let page = Page::of(TOY, &["planners=['active']", "trials=1", "touches=3"]);
+    page.viewer.when(|state| statuses(state) == ["held"]);
+    let (run, outside) = (page.folder.path().join("run"), page.folder.path().join("outside"));
+    fs::create_dir(&outside).unwrap();
+    fs::write(outside.join("secret.json"), "{}").unwrap();
+    fs::write(run.join("real.json"), "{}").unwrap();
+    assert_eq!(page.viewer.get("/real.json").0, 200);
+    symlink(outside.join("secret.json"), run.join("report.html")).unwrap();
+    symlink("real.json", run.join("inside.json")).unwrap();
+    symlink(&outside, run.join("figures")).unwrap();
+    for path in ["/report.html", "/inside.json", "/figures/secret.json"] {
+        assert_eq!(page.viewer.get(path).0, 404, "{path}");
+    }
+    fs::remove_file(run.join("figures")).unwrap();
+    fs::create_dir(run.join("figures")).unwrap();
+    fs::copy(outside.join("secret.json"), run.join("figures/own.json")).unwrap();
+    assert_eq!(page.viewer.get("/figures/own.json").0, 200);
+}
+
 /// Number of connections of a crowd: a thousand pass too, but may need more files than a process may
 /// open.
 const CROWD: usize = 400;
@@ -227,7 +287,7 @@ fn no_trial_waits_for_a_viewer() {
     let mut crowd: Vec<TcpStream> =
         (0..CROWD).filter_map(|_| TcpStream::connect(&host).ok()).collect();
     for stream in &mut crowd {
-        let _ = write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        let _ = write!(stream, "GET /events HTTP/1.1\r\n{}\r\n\r\n", page.viewer.head());
     }
     // Beyond the limit a connection is closed.
     let closed = crowd.iter_mut().rev().take(CROWD / 2).filter(|stream| {
@@ -241,8 +301,7 @@ fn no_trial_waits_for_a_viewer() {
     while page.viewer.get("/").0 != 200 {
         assert!(begun.elapsed() < LONGEST, "connections that are closed still count");
     }
-    let mut silent = TcpStream::connect(&host).unwrap();
-    write!(silent, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+    let mut silent = page.viewer.events();
     page.viewer.order(&json!({ "order": "go" }));
     page.viewer.when(|state| touches(state) == [300]);
     // Each change is an event of the whole state, so that the buffers of a viewer that does not read
@@ -262,13 +321,40 @@ fn no_trial_waits_for_a_viewer() {
 fn a_mistake_is_shown() {
     let server = Server::open(([127, 0, 0, 1], 0).into(), Box::new(NoFiles)).unwrap();
     server.alert("no \"mesh\"\n2".into());
-    let host = Viewer::new(&server.url()).host;
-    let mut stream = TcpStream::connect(&host).unwrap();
-    stream.set_read_timeout(Some(LONGEST)).unwrap();
-    write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
-    let lines = BufReader::new(stream).lines().map_while(Result::ok);
+    let lines = BufReader::new(Viewer::new(&server.url()).events()).lines().map_while(Result::ok);
     let after = lines.skip_while(|line| line != "event: alert").nth(1);
     assert_eq!(after.as_deref(), Some(r#"data: "no \"mesh\"\n2""#));
+}
+
+/// Other users see the arguments of the browser, and not the token.
+#[test]
+fn the_browser_gets_the_token_by_a_private_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let opener = folder.path().join("xdg-open");
+    fs::write(&opener, "#!/bin/sh\necho \"$1\" > opened.part && mv opened.part opened\n").unwrap();
+    fs::set_permissions(&opener, fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var("PATH").unwrap();
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_palpate"));
+    command.arg("live").current_dir(folder.path()).stdout(Stdio::piped());
+    command.env("DISPLAY", ":0").env("PATH", format!("{}:{path}", folder.path().display()));
+    let mut child = command.spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    let token = Viewer::new(line.trim().trim_start_matches("live page: ")).token;
+    let begun = Instant::now();
+    let opened = loop {
+        match fs::read_to_string(folder.path().join("opened")) {
+            Ok(opened) => break opened,
+            Err(_) => assert!(begun.elapsed() < LONGEST, "nothing was opened"),
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let entry = Path::new(opened.trim());
+    let (text, mode) = (fs::read_to_string(entry), fs::metadata(entry).unwrap().mode());
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!opened.contains(&token) && text.unwrap().contains(&token), "{opened}");
+    assert_eq!(mode & 0o777, 0o600);
 }
 
 /// The command serves a run folder as a replay, and a wrong path is an error with code 2.

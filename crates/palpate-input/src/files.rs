@@ -1,7 +1,8 @@
 //! Reading and writing of user files.
 //!
 //! Only regular files of a bounded size are read, since a pipe or a device may block or never end.
-//! Writes do not follow symbolic links, so that a run's folder cannot change a file outside.
+//! Writes do not follow symbolic links, so that a run's folder cannot change a file outside;
+//! [`bytes_below`] does not follow them either.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Read, Write};
@@ -51,6 +52,21 @@ pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
         return Err(io::Error::new(io::ErrorKind::InvalidData, pointer));
     }
     Ok(bytes)
+}
+
+/// Reads the bytes of the file `path` below `folder`, of at most `most` bytes, without following
+/// symbolic links below `folder`.
+///
+/// # Errors
+/// The errors of [`bytes`], and if the path leaves the folder or contains a symbolic link.
+pub fn bytes_below(folder: &Path, path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let folder = folder.canonicalize()?;
+    let file = folder.join(path);
+    if !file.starts_with(&folder) || file.canonicalize()? != file {
+        let problem = "outside of the folder, or a symbolic link, which is not followed";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
+    bytes(&file, most)
 }
 
 /// Reads the text of a file of at most `most` bytes, without a byte order mark.

@@ -4,6 +4,7 @@ use super::backend::RosBackend;
 use super::link::{Link, TURN};
 use super::message::Time;
 use super::net_ft::{NetFt, NetFtSettings, Record};
+use super::network::discovery_note;
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
 use super::service::{Answer, Service};
 use super::settings::{BackendKind, BackendSettings};
@@ -245,11 +246,21 @@ impl RosArm {
                     |topic: Topic| format!("{} ({})", topics.name(topic), topics.type_name(topic));
                 let names: Vec<String> = missing.iter().copied().map(name).collect();
                 let skipped = missing.iter().filter_map(|topic| state(topic).skipped.as_ref());
-                let skipped: String =
+                let mut more: String =
                     skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
+                if missing.contains(&Topic::ProgramRunning) {
+                    more += " A UR's driver publishes its modes and its program when they change: start \
+                             the program External Control on the pendant. Mock hardware has none: \
+                             palpate run --dry.";
+                }
+                if self.settings().kind == BackendKind::Ros2
+                    && let Some(note) = discovery_note(|name| std::env::var(name).ok())
+                {
+                    more += &format!(" {note}");
+                }
                 return Err(InputError::new(format!(
                     "no message within {connect_timeout_s} s on {}; check that the arm's driver runs in the same \
-                     domain and that [backend.topics] has its names and types.{skipped}",
+                     domain and that [backend.topics] has its names and types.{more}",
                     names.join(", ")
                 ))
                 .into());

@@ -81,17 +81,25 @@ impl FirstMessages {
         self.points.is_some() || self.image.is_some() && self.info.is_some()
     }
 
-    /// Returns the view, of the `topics` of which those are `published`.
+    /// Returns the view, of the `topics` of which those are `published`. `note` describes the
+    /// network for the error that nothing is published.
     ///
     /// # Errors
     /// If it is not complete, or its message is invalid.
-    pub fn cloud(self, topics: &CameraTopics, published: &[String]) -> Result<Cloud, InputError> {
+    pub fn cloud(
+        self,
+        topics: &CameraTopics,
+        (published, note): (&[String], Option<String>),
+    ) -> Result<Cloud, InputError> {
         let (name, span_s) = (topics.view, topics.timeout.as_secs_f64());
         let missing = |what: &str, topic: &str| {
             let error = InputError::new(format!("no {what} on {topic} within {span_s} s"));
             match published {
                 [] => {
-                    error.remedy("no camera publishes here: is its driver running, in this domain?")
+                    let note = note.as_ref().map_or(String::new(), |note| format!(" {note}"));
+                    error.remedy(format!(
+                        "no camera publishes here: is its driver running, in this domain?{note}"
+                    ))
                 }
                 names => error.remedy(format!("published are {}", names.join(", "))),
             }
@@ -292,6 +300,18 @@ mod tests {
         cloud.width = u32::MAX;
         cloud.point_step = u32::MAX;
         assert!(cloud.cloud().is_err());
+    }
+
+    #[test]
+    fn a_missing_view_is_reported_with_what_is_published() {
+        let topics = CameraTopics { view: "/points", info: None, timeout: Duration::from_secs(2) };
+        let error = |published: &[String], note: Option<&str>| {
+            let note = note.map(str::to_owned);
+            FirstMessages::default().cloud(&topics, (published, note)).err().unwrap().to_string()
+        };
+        assert!(error(&[], None).ends_with("in this domain?"));
+        assert!(error(&[], Some("A is \"b\": c.")).ends_with("in this domain? A is \"b\": c."));
+        assert!(error(&["/other".into()], Some("note")).ends_with("published are /other"));
     }
 
     #[test]

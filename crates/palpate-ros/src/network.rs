@@ -1,4 +1,4 @@
-//! Domain and network interfaces of ROS 2, from settings or from the ROS environment.
+//! Domain, network interfaces and discovery of ROS 2, from settings or from the ROS environment.
 
 use super::settings::{BackendSettings, DOMAIN_MAX};
 use std::net::{IpAddr, Ipv4Addr};
@@ -43,7 +43,7 @@ pub fn network(
     let is_local = match range.as_deref() {
         None | Some("SUBNET" | "SYSTEM_DEFAULT") => local_only,
         Some("LOCALHOST") => true,
-        // Without discovery no peer is found, and peers cannot be listed.
+        // OFF: without discovery no arm is found.
         other => {
             let other = other.unwrap_or_default();
             return Err(format!(
@@ -53,6 +53,60 @@ pub fn network(
         }
     };
     Ok((domain, is_local.then(|| vec![Ipv4Addr::LOCALHOST.into()])))
+}
+
+/// Largest number of characters of a variable's value in a note.
+const VALUE_MAX: usize = 60;
+
+/// Remedy of a file of a DDS vendor, which may list peers and interfaces.
+const FILE_REMEDY: &str = "Palpate does not read this file. Name its interfaces in backend.interfaces. If it lists peers or forbids \
+                           multicast, list this computer in the driver's file.";
+
+/// Environment variables of ROS 2 and of DDS vendors that Palpate does not support, with remedies.
+const UNSUPPORTED: [(&str, &str); 7] = [
+    (
+        "RMW_IMPLEMENTATION",
+        "Palpate uses DDS. Start the driver with RMW_IMPLEMENTATION=rmw_fastrtps_cpp or rmw_cyclonedds_cpp.",
+    ),
+    (
+        "ROS_STATIC_PEERS",
+        "Palpate finds other computers by multicast. Put both in one subnet, or list this computer in \
+         ROS_STATIC_PEERS of the driver. If discovery is limited to LOCALHOST, also name the interface in \
+         backend.interfaces.",
+    ),
+    ("ROS_DISCOVERY_SERVER", "Palpate uses no discovery server. Start the driver without one."),
+    ("FASTRTPS_DEFAULT_PROFILES_FILE", FILE_REMEDY),
+    ("FASTDDS_DEFAULT_PROFILES_FILE", FILE_REMEDY),
+    ("CYCLONEDDS_URI", FILE_REMEDY),
+    (
+        "ROS_SECURITY_ENABLE",
+        "Palpate has no DDS security. Start the driver with ROS_SECURITY_ENABLE=false.",
+    ),
+];
+
+/// Whether a variable of [`UNSUPPORTED`] has a value that changes nothing.
+fn is_supported(name: &str, value: &str) -> bool {
+    match name {
+        "RMW_IMPLEMENTATION" => ["fastrtps", "dds"].iter().any(|dds| value.contains(dds)),
+        "ROS_SECURITY_ENABLE" => value != "true",
+        _ => false,
+    }
+}
+
+/// Returns a note on the environment variables that are set and that Palpate does not support, with
+/// their values, as returned by `variable`, and the remedies; `None` without any.
+///
+/// They are no error of [`network`], because they need not keep the arm from being found.
+pub fn discovery_note(variable: impl Fn(&str) -> Option<String>) -> Option<String> {
+    let notes = UNSUPPORTED.iter().filter_map(|(name, remedy)| {
+        let value = variable(name)?;
+        let value = value.trim();
+        let shown: String = value.chars().take(VALUE_MAX).collect();
+        let is_noted = !value.is_empty() && !is_supported(name, value);
+        is_noted.then(|| format!("{name} is {shown:?}: {remedy}"))
+    });
+    let notes: Vec<String> = notes.collect();
+    (!notes.is_empty()).then(|| notes.join(" "))
 }
 
 /// Returns the addresses of the interface with this name or address.
@@ -119,6 +173,47 @@ mod tests {
         assert_eq!(read("", &variables), all(0));
         let one = read("interfaces = [\"10.0.0.3\"]", &[]).unwrap().1;
         assert_eq!(one, Some(vec![IpAddr::from([10, 0, 0, 3])]));
+    }
+
+    #[test]
+    fn variables_that_are_not_supported_are_named_with_a_remedy() {
+        let note = |variables: &[(&str, &str)]| {
+            discovery_note(|name| {
+                let found = variables.iter().find(|(other, _)| *other == name);
+                found.map(|(_, value)| (*value).to_owned())
+            })
+        };
+        for (name, value, says) in [
+            ("ROS_STATIC_PEERS", "10.0.0.7;arm.local", "one subnet"),
+            ("ROS_DISCOVERY_SERVER", "10.0.0.7:11811", "without one"),
+            ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", "rmw_fastrtps_cpp or rmw_cyclonedds_cpp"),
+            ("CYCLONEDDS_URI", "file:///etc/cyclone.xml", "backend.interfaces"),
+            ("FASTRTPS_DEFAULT_PROFILES_FILE", "fast.xml", "list this computer"),
+            ("FASTDDS_DEFAULT_PROFILES_FILE", "fast.xml", "list this computer"),
+            ("ROS_SECURITY_ENABLE", "true", "ROS_SECURITY_ENABLE=false"),
+        ] {
+            let found = note(&[(name, value)]).unwrap();
+            assert!(found.starts_with(&format!("{name} is {value:?}: ")), "{found}");
+            assert!(found.contains(says) && found.ends_with('.'), "{found}");
+            // No variable keeps Palpate from a network in which the arm may be found.
+            assert!(read("", &[(name, value)]).is_ok(), "{name}");
+        }
+        for supported in [
+            ("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"),
+            ("RMW_IMPLEMENTATION", "rmw_fastrtps_dynamic_cpp"),
+            ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"),
+            ("RMW_IMPLEMENTATION", "rmw_connextdds"),
+            ("ROS_STATIC_PEERS", " "),
+            ("ROS_SECURITY_ENABLE", "false"),
+            ("ROS_DOMAIN_ID", "7"),
+        ] {
+            assert_eq!(note(&[supported]), None, "{supported:?}");
+        }
+        assert_eq!(note(&[]), None);
+        let both = note(&[("CYCLONEDDS_URI", &"<x/>".repeat(99)), ("ROS_STATIC_PEERS", "a")]);
+        let both = both.unwrap();
+        assert!(both.contains("ROS_STATIC_PEERS is \"a\"") && both.contains(". CYCLONEDDS_URI"));
+        assert!(both.len() < 600, "{both}");
     }
 
     #[test]

@@ -12,23 +12,31 @@ pub const LONGEST: Duration = Duration::from_secs(120);
 pub struct Viewer {
     /// Address and port.
     pub host: String,
+    pub token: String,
 }
 
 impl Viewer {
     /// Creates the viewer of a printed address.
     pub fn new(url: &str) -> Self {
-        Self { host: url.trim_start_matches("http://").trim_end_matches('/').to_owned() }
+        let (host, token) = url.trim_start_matches("http://").split_once("/?token=").unwrap();
+        Self { host: host.into(), token: token.into() }
+    }
+
+    /// Headers of the viewer's requests.
+    pub fn head(&self) -> String {
+        format!("Host: {}\r\nAuthorization: Bearer {}", self.host, self.token)
     }
 
     pub fn get(&self, path: &str) -> (u16, String) {
-        let host = &self.host;
-        answer(host, &format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"))
+        let head = self.head();
+        let request = format!("GET {path} HTTP/1.1\r\n{head}\r\nConnection: close\r\n\r\n");
+        answer(&self.host, &request)
     }
 
     pub fn post(&self, path: &str, body: &Value) -> (u16, String) {
-        let (host, body) = (&self.host, body.to_string());
+        let (host, head, body) = (&self.host, self.head(), body.to_string());
         let head = format!(
-            "POST {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nConnection: close\r\n\
+            "POST {path} HTTP/1.1\r\n{head}\r\nOrigin: http://{host}\r\nConnection: close\r\n\
              Content-Length: {}\r\n\r\n{body}",
             body.len()
         );
@@ -40,12 +48,17 @@ impl Viewer {
         assert_eq!(status, 200, "{order}: {words}");
     }
 
+    /// Opens the stream of events.
+    pub fn events(&self) -> TcpStream {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(LONGEST)).unwrap();
+        write!(stream, "GET /events HTTP/1.1\r\n{}\r\n\r\n", self.head()).unwrap();
+        stream
+    }
+
     /// Returns the first state that fits.
     pub fn when(&self, fits: impl Fn(&Value) -> bool) -> Value {
-        let host = &self.host;
-        let mut stream = TcpStream::connect(host).unwrap();
-        stream.set_read_timeout(Some(LONGEST)).unwrap();
-        write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        let stream = self.events();
         let (begun, mut last) = (Instant::now(), Value::Null);
         for line in BufReader::new(stream).lines() {
             let line = line.unwrap();
