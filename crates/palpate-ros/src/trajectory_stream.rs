@@ -6,7 +6,7 @@ use super::transport::Packet;
 use std::time::{Duration, Instant};
 
 /// Interval between trajectories. A new one begins at the measured position, which trails the
-/// desired one: replaced at every tick, the arm would fall behind by many times its own lag.
+/// desired one: replaced at every tick, the setpoint would return there as often.
 // heuristic: eight cycles of the robot's controller (500 Hz).
 const SEND: Duration = Duration::from_millis(16);
 
@@ -14,6 +14,12 @@ const SEND: Duration = Duration::from_millis(16);
 /// kept, s.
 // heuristic: two intervals, for late messages; the arm trails by more if it is longer.
 const LEAD_S: f64 = 0.032;
+
+/// Time from a trajectory's start to a point on the reference, s. A new trajectory begins at the
+/// measured position, which trails the reference: without this point the arm would follow 3.5 times
+/// as late as its servo.
+// heuristic: two cycles of the robot's controller (500 Hz).
+const JOIN_S: f64 = 0.004;
 
 /// Longest duration of a trajectory, s.
 // heuristic: a robot that needs another 80 ms to follow is at rest within 150 ms.
@@ -67,7 +73,7 @@ pub fn stoppable_share(qdot: &[f64]) -> f64 {
 /// Joint velocities as a stream of short trajectories, each of which ends at rest: an arm that
 /// receives no more comes to rest by itself.
 ///
-/// A trajectory keeps the commanded velocity for a while, then decelerates. Its positions
+/// A trajectory joins the reference, keeps the commanded velocity for a while, then decelerates. Its positions
 /// follow a reference, the integral of the commands, so that errors do not accumulate. A late
 /// command finds the reference where the trajectory before it ended.
 #[derive(Debug, Default)]
@@ -141,7 +147,8 @@ impl TrajectoryStream {
         let lead_s = LEAD_S.min(SPAN_S - stop_s(qdot)) * scale;
         let stop_s = stop_s(qdot) * scale;
         let end = point(self.moved(qdot, lead_s + 0.5 * stop_s), None, lead_s + stop_s);
-        vec![point(self.moved(qdot, lead_s), Some(qdot), lead_s), end]
+        let on_reference = |time_s| point(self.moved(qdot, time_s), Some(qdot), time_s);
+        vec![on_reference(JOIN_S * scale), on_reference(lead_s), end]
     }
 
     /// Returns the point at which the arm, moving with the velocities `qdot`, comes to rest.

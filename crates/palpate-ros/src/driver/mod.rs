@@ -11,7 +11,6 @@ pub use driver::{Driver, Release};
 use palpate_input::config::Loader;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use toml::Value;
 
 /// Driver of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

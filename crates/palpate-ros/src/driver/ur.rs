@@ -44,6 +44,10 @@ pub(super) static DRIVER: Driver = Driver {
 // heuristic: three times the controller's time constant.
 const SETTLE_S: f64 = 0.6;
 
+/// Delay with which a UR may follow, s.
+// heuristic: the lag of a slow servo, 0.1 s, and of the network.
+const TRACKING_LAG_S: f64 = 0.15;
+
 /// Returns the name of the controller of trajectories: from Lyrical on, the plain one scales its
 /// speed itself (`ur_controllers.yaml`; `doc/migration/lyrical.rst`).
 pub fn trajectory_controller(release: Release) -> &'static str {
@@ -64,6 +68,7 @@ fn defaults(release: Release, command: CommandMessage) -> Vec<(&'static str, Val
     };
     vec![
         ("scene.touch.settle_s", SETTLE_S.into()),
+        ("backend.interlocks.tracking_lag_s", TRACKING_LAG_S.into()),
         ("backend.topics.namespace", "".into()),
         ("backend.topics.joints.name", "joint_states".into()),
         ("backend.topics.wrench.name", "force_torque_sensor_broadcaster/wrench".into()),

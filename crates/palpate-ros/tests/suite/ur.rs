@@ -182,6 +182,88 @@ proptest! {
     }
 }
 
+/// A joint whose servo follows its setpoints with a lag, behind a controller whose new trajectories
+/// begin at the setpoint (`blends`) or at the measured position.
+struct SlowServo {
+    lag_s: f64,
+    blends: bool,
+    names: JointNames,
+    trajectory: Option<Trajectory>,
+    /// Setpoint and position, with their velocities.
+    setpoint: [Vec<f64>; 2],
+    q: [Vec<f64>; 2],
+}
+
+impl SlowServo {
+    fn new(lag_s: f64, blends: bool) -> Self {
+        let rest = || [vec![0.0], vec![0.0]];
+        let names = JointNames::new(vec!["a".into()]);
+        Self { lag_s, blends, names, trajectory: None, setpoint: rest(), q: rest() }
+    }
+
+    fn tick(&mut self) {
+        let [start, rate] = if self.blends { self.setpoint.clone() } else { self.q.clone() };
+        let mut next = self.setpoint[0].clone();
+        if let Some(trajectory) = &mut self.trajectory {
+            trajectory.advance(ROBOT_S, 1.0, [&start, &rate], &mut next);
+        }
+        self.setpoint[1] = vec![(next[0] - self.setpoint[0][0]) / ROBOT_S];
+        self.setpoint[0] = next;
+        let share = 1.0 - (-ROBOT_S / self.lag_s).exp();
+        let step = (self.setpoint[0][0] - self.q[0][0]) * share;
+        self.q = [vec![self.q[0][0] + step], vec![step / ROBOT_S]];
+    }
+
+    /// Moves for `span_s` with commands until `end_s`; returns the position when they end and at
+    /// the end, and the largest delay in the second half of the commands.
+    fn drive(&mut self, stream: &mut TrajectoryStream, speed: f64, end_s: f64) -> [f64; 3] {
+        let (begun, first) = (Instant::now(), self.q[0][0]);
+        let (mut commanded, mut late_s, mut at_end) = (0.0, 0.0_f64, 0.0);
+        let speed_at = movement(speed, 1.5);
+        for tick in 0..500_u32 {
+            let time_s = f64::from(tick) * TICK_S;
+            if time_s < end_s {
+                let now = begun + Duration::from_secs_f64(time_s);
+                let qdot = [speed_at(time_s)];
+                let sent = stream.next(&qdot, &self.q[0], 1.0, now, &self.names);
+                if let Some(Packet::Command(message)) = sent {
+                    self.trajectory = Trajectory::read(&message, &self.names, 0.0).ok();
+                }
+                commanded += qdot[0] * TICK_S;
+                at_end = self.q[0][0] - first;
+                if (0.75..1.3).contains(&time_s) {
+                    late_s = late_s.max((commanded - at_end) / speed);
+                }
+            }
+            (0..2).for_each(|_| self.tick());
+        }
+        *stream = TrajectoryStream::default();
+        [at_end, self.q[0][0] - first, late_s]
+    }
+}
+
+/// A joint follows as late as its servo, ends where commanded, and goes on for that time and the
+/// rest of a trajectory when commands cease.
+#[test]
+fn a_joint_follows_as_late_as_its_servo() {
+    for lag_s in [0.02, 0.03, 0.05, 0.08, 0.1] {
+        for blends in [false, true] {
+            let mut robot = SlowServo::new(lag_s, blends);
+            let mut stream = TrajectoryStream::default();
+            let said = |values: [f64; 3]| format!("lag {lag_s} s, blends {blends}: {values:?}");
+            for (speed, span_m) in [(0.1, 0.1429), (0.03, 0.0444)] {
+                let moved = robot.drive(&mut stream, speed, 1.6);
+                assert!(moved[2] < lag_s + 0.012, "{}", said(moved));
+                assert!((moved[1] - span_m).abs() < 1e-3, "{}", said(moved));
+                assert!(moved[0] < moved[1] + 1e-4, "it returns: {}", said(moved));
+            }
+            // The planner is killed.
+            let moved = robot.drive(&mut stream, 0.1, 1.0);
+            assert!(moved[1] - moved[0] < 0.1 * (lag_s + 0.05), "{}", said(moved));
+        }
+    }
+}
+
 /// Returns a trajectory of one joint with points of position, velocity and time.
 fn trajectory(points: &[(f64, f64, f64)]) -> JointTrajectory {
     let point = |&(q, qdot, time_s): &(f64, f64, f64)| JointTrajectoryPoint {
