@@ -35,7 +35,7 @@ pub(super) fn lines(experiment: &Experiment, save: Option<&Path>) -> anyhow::Res
     lines.extend(
         settings.further_topics().filter_map(|topic| further_line(topic, settings, &report)),
     );
-    lines.extend(service_lines(settings, &report));
+    lines.extend(service_lines(settings, names.names(), &report));
     lines.extend(frame_lines(settings, &chain, &report));
     if let Some(path) = save {
         let text = report.description.as_deref().with_context(|| {
@@ -67,6 +67,7 @@ fn topic_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Line
         parts.extend(heard.rate_hz.map(|rate_hz| format!("{rate_hz:.0} Hz")));
         parts.extend(heard.age_s.map(|age_s| format!("{:.0} ms old", 1e3 * age_s)));
     }
+    parts.extend(quality(&parts[0], report));
     parts.extend(
         Some(&heard.frame).filter(|frame| !frame.is_empty()).map(|it| format!("frame {it}")),
     );
@@ -88,6 +89,14 @@ fn topic_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Line
     };
     parts.extend(words.map(String::from));
     (topic.key(), state, parts.join(", "))
+}
+
+/// Describes the quality of service of a topic's publisher, if it is announced.
+fn quality(name: &str, report: &Report) -> Option<String> {
+    let publisher = report.publishers.iter().find(|one| one.topic == name)?;
+    let reliable = if publisher.is_reliable { "reliable" } else { "best effort" };
+    let kept = if publisher.is_kept { ", transient local" } else { "" };
+    Some(format!("{reliable}{kept}"))
 }
 
 /// Describes a topic without messages by what is announced instead.
@@ -150,7 +159,7 @@ fn further_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Op
     }
 }
 
-fn service_lines(settings: &BackendSettings, report: &Report) -> Vec<Line> {
+fn service_lines(settings: &BackendSettings, names: &[String], report: &Report) -> Vec<Line> {
     let namespace = settings.topics.namespace();
     let mut lines: Vec<Line> = Vec::new();
     for service in settings.driver().services {
@@ -163,14 +172,16 @@ fn service_lines(settings: &BackendSettings, report: &Report) -> Vec<Line> {
     match &report.controllers {
         Some(Ok(all)) => {
             let own = settings.controller();
+            let groups = [names, &settings.modes()].concat();
             let states: Vec<String> = all
                 .iter()
-                .filter(|one| one.is_active() || one.name == own)
+                .filter(|one| one.holds(&groups) || one.name == own)
                 .map(|one| format!("{} {}", one.name, one.state))
                 .collect();
             let is_there = all.iter().any(|one| one.name == own);
             let state = if is_there { State::Ok } else { State::Wrong };
-            let lacks = if is_there { String::new() } else { format!("no {own}; ") };
+            let lacks =
+                if is_there { String::new() } else { format!("no {own}; set backend.release; ") };
             lines.push(("controllers", state, format!("{lacks}{}", states.join(", "))));
         }
         Some(Err(words)) => lines.push(("controllers", State::Wrong, words.clone())),

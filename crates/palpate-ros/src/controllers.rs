@@ -24,6 +24,12 @@ impl Controller {
     pub fn is_active(&self) -> bool {
         self.state == "active"
     }
+
+    /// Whether it holds an interface of one of these groups, e.g. `elbow_joint`.
+    pub fn holds(&self, groups: &[String]) -> bool {
+        let group = |interface: &String| interface.split('/').next().unwrap_or_default().to_owned();
+        self.is_active() && self.claimed.iter().any(|it| groups.contains(&group(it)))
+    }
 }
 
 /// Switch of controllers of `ros2_control`.
@@ -76,18 +82,14 @@ pub fn switch_to(
             .allowed("inactive or active")
             .remedy(format!("ros2 control set_controller_state {own} inactive")));
     }
-    let group = |interface: &String| interface.split('/').next().unwrap_or_default().to_owned();
-    let holds = |one: &Controller, groups: &[String]| {
-        one.is_active() && one.claimed.iter().any(|interface| groups.contains(&group(interface)))
-    };
-    if let Some(other) = all.iter().find(|one| holds(one, modes)) {
+    if let Some(other) = all.iter().find(|one| one.holds(modes)) {
         let name = &other.name;
         return Err(InputError::new(format!("controller {name} is active and moves the arm"))
             .remedy(format!(
                 "end its use, or: ros2 control switch_controllers --deactivate {name}"
             )));
     }
-    let others = all.iter().filter(|one| holds(one, joints));
+    let others = all.iter().filter(|one| one.holds(joints));
     Ok(Some(Switch {
         activate: vec![own.to_owned()],
         deactivate: others.map(|one| one.name.clone()).collect(),

@@ -38,17 +38,17 @@ impl RosArm {
             sleep(DISCOVERY.saturating_sub(self.opened.elapsed()));
         }
         self.check_sole(&self.mailbox.latest())?;
-        self.wait_for_subscriber()?;
         self.check_program()?;
         let hand_back = match self.settings().driver().modes {
             None => {
+                self.wait_for_subscriber()?;
                 self.open_commands();
                 self.mailbox.latest().is_engaged = true;
                 self.call(&Service::Unhold)?;
                 Some(Service::Hold)
             }
-            Some(modes) => {
-                let switched = self.switch(modes)?;
+            Some(_) => {
+                let switched = self.switch()?;
                 self.open_commands();
                 self.mailbox.latest().is_engaged = true;
                 switched.map(|switch| Service::SwitchController(switch.reversed()))
@@ -71,13 +71,12 @@ impl RosArm {
     }
 
     /// Activates the controller that takes the commands; returns the switch, unless it was active.
-    fn switch(&self, modes: &[&str]) -> Result<Option<Switch>, LinkFault> {
+    fn switch(&self) -> Result<Option<Switch>, LinkFault> {
         let settings = self.settings();
         let all = self.call(&Service::ListControllers)?.controllers;
-        let modes: Vec<String> =
-            modes.iter().map(|mode| format!("{}{mode}", settings.prefix)).collect();
         let names = self.mailbox.names.names();
-        let switch = switch_to(&settings.controller(), &all, names, &modes)?;
+        let switch = switch_to(&settings.controller(), &all, names, &settings.modes())?;
+        self.wait_for_subscriber()?;
         if let Some(switch) = &switch {
             self.call(&Service::SwitchController(switch.clone()))?;
         }
@@ -147,16 +146,24 @@ impl RosArm {
         self.settings().driver().modes?;
         let all = self.call_within(&Service::ListControllers, ASK_S).ok()?.controllers;
         let own = self.settings().controller();
-        let is_active = all.iter().any(|one| one.name == own && one.is_active());
-        let active: Vec<&str> =
-            all.iter().filter(|one| one.is_active()).map(|one| one.name.as_str()).collect();
-        (!is_active).then(|| {
+        if all.iter().any(|one| one.name == own && one.is_active()) {
+            return None;
+        }
+        // The arm is not handed back: it belongs to the other program.
+        *self.hand_back() = None;
+        let groups = [self.mailbox.names.names(), &self.settings().modes()].concat();
+        let holds = all.iter().filter(|one| one.holds(&groups));
+        let holders: Vec<&str> = holds.map(|one| one.name.as_str()).collect();
+        let by = match holders.as_slice() {
+            [] => "no other holds the arm".into(),
+            names => format!("the arm is held by {}", names.join(", ")),
+        };
+        Some(
             InputError::new(format!(
-                "controller {own} is not active any more: another program switched controllers; active are {}",
-                active.join(", ")
+                "controller {own} is not active any more: another program switched it off; {by}"
             ))
-            .into()
-        })
+            .into(),
+        )
     }
 
     /// Returns the pose of `T` in the force/torque sensor's frame, inverted: that of the sensor in

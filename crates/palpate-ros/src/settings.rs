@@ -302,6 +302,12 @@ impl BackendSettings {
         name.rsplit('/').nth(1).unwrap_or_default().to_owned()
     }
 
+    /// Returns the groups of command interfaces through which an arm moves other than by its joints.
+    pub fn modes(&self) -> Vec<String> {
+        let modes = self.driver().modes.unwrap_or_default();
+        modes.iter().map(|mode| format!("{}{mode}", self.prefix)).collect()
+    }
+
     /// Returns the call that stops the arm when its readings are unreliable.
     pub fn stop(&self) -> Service {
         match self.driver().modes {
