@@ -112,8 +112,11 @@ fn missing(topic: Topic, name: &str, type_name: &str, is_latched: bool, report: 
                 "{expected} is not kept for later readers (transient local), and nothing changed"
             )
         }
-        Some(_) if topic == Topic::ProgramRunning => {
-            format!("nothing on {expected}: start External Control on the pendant")
+        Some(_) if topic == Topic::ProgramRunning => format!(
+            "nothing on {expected}: start External Control on the pendant; mock hardware has none"
+        ),
+        Some(_) if is_latched => {
+            format!("nothing on {expected} yet; mock hardware has none: palpate run --dry")
         }
         Some(_) => {
             format!("{expected} is announced, but nothing arrives; check network and firewall")
