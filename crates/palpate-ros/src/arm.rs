@@ -248,10 +248,10 @@ impl RosArm {
                 let skipped = missing.iter().filter_map(|topic| state(topic).skipped.as_ref());
                 let mut more: String =
                     skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
-                if missing.contains(&Topic::ProgramRunning) {
-                    more += " A UR's driver publishes its modes and its program when they change: start \
-                             the program External Control on the pendant. Mock hardware has none: \
-                             palpate run --dry.";
+                if let Some((topic, words)) = self.settings().driver().silence
+                    && missing.contains(&topic)
+                {
+                    more += &format!(" {words}");
                 }
                 if self.settings().kind == BackendKind::Ros2
                     && let Some(note) = discovery_note(|name| std::env::var(name).ok())

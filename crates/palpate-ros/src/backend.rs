@@ -57,7 +57,8 @@ impl RosBackend {
     fn fault(&self, mut cause: LinkFault) -> Fault {
         // Otherwise the last command would remain valid until it expires. An arm of another program
         // receives nothing.
-        if self.lab.mailbox.latest().is_engaged {
+        let was_engaged = self.lab.mailbox.latest().is_engaged;
+        if was_engaged {
             self.lab.command(&self.still.qdot);
         }
         // No command goes to an arm that was stopped by hand: even a zero velocity could release
@@ -73,6 +74,15 @@ impl RosBackend {
                 let refusal = heard.status.as_ref().and_then(ArmStatus::refusal);
                 cause = refusal.map_or(cause, LinkFault::Arm);
             }
+        }
+        // A driver that has stopped is silent or repeats itself; its controllers have the reason.
+        let is_ended = self.lab.settings().driver().lifeline.is_some();
+        if is_ended
+            && was_engaged
+            && !matches!(cause, LinkFault::Arm(_))
+            && let Some(reason) = self.lab.lost_controller()
+        {
+            cause = reason;
         }
         let cause = self.lab.latch().get_or_insert(cause).clone();
         Fault::Link { time_s: self.time_s(), cause }

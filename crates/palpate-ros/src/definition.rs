@@ -60,15 +60,18 @@ impl Definition {
     }
 }
 
+/// Largest length of a text, bytes: that of the longest message and its parts, rounded up.
+const LENGTH_MAX: usize = 8192;
+
 /// A definition text that is assembled at compile time.
 pub(super) struct Text {
-    bytes: [u8; 4096],
+    bytes: [u8; LENGTH_MAX],
     length: usize,
 }
 
 impl Text {
     const fn of(definition: &Definition, replaced: &[(&str, &str)]) -> Self {
-        let mut text = Self { bytes: [0; 4096], length: 0 };
+        let mut text = Self { bytes: [0; LENGTH_MAX], length: 0 };
         text.push(definition.fields, replaced);
         text.push_parts(definition.parts, replaced);
         text

@@ -145,6 +145,12 @@ impl RosArm {
     pub(super) fn lost_controller(&self) -> Option<LinkFault> {
         self.settings().driver().modes?;
         let all = self.call_within(&Service::ListControllers, ASK_S).ok()?.controllers;
+        let lifeline = self.settings().driver().lifeline;
+        let is_off = |name| all.iter().any(|one| one.name == name && !one.is_active());
+        if let Some((_, words)) = lifeline.filter(|(name, _)| is_off(*name)) {
+            *self.hand_back() = None;
+            return Some(LinkFault::Arm(words.into()));
+        }
         let own = self.settings().controller();
         if all.iter().any(|one| one.name == own && one.is_active()) {
             return None;

@@ -34,6 +34,7 @@ pub mod definition;
 pub mod driver;
 mod engage;
 pub mod frames;
+pub mod franka_message;
 pub mod joints;
 pub mod link;
 pub mod listen;

@@ -2,6 +2,7 @@
 //! commands while the explorer is computing.
 
 use super::control_message::GoalStatusArray;
+use super::driver::franka_ros2::FrankaState;
 use super::driver::ur::UrState;
 use super::frames::FrameTree;
 use super::joints::JointNames;
@@ -49,6 +50,8 @@ pub struct LatestMessages {
     pub status: Option<ArmStatus>,
     /// The same as received from a UR.
     pub ur: UrState,
+    /// The same as received from a Franka arm.
+    pub franka: FrankaState,
     /// Speed of the arm as a fraction of the commanded one.
     pub speed_scale: f64,
     /// Stream of trajectories, if commands are sent so.
@@ -206,6 +209,9 @@ impl TopicReceiver {
         if heard.ur.read(packet) {
             status = heard.ur.status();
         }
+        if heard.franka.read(packet, received) {
+            status = heard.franka.status();
+        }
         // A message without a header is as old as its receipt.
         let now_s = match (self.settings.use_sim_time, heard.clock) {
             (false, _) => pace::now_s(),
@@ -238,15 +244,27 @@ impl TopicReceiver {
                 if !force.iter().chain(torque).all(|part| part.is_finite()) {
                     return Err(refuse(format!("{force:?} and {torque:?}")));
                 }
-                heard.wrench = Some(wrench);
-                if heard.wrench_frame != message.header.frame_id {
-                    heard.wrench_frame.clone_from(&message.header.frame_id);
+                let is_estimated = self.settings.has_estimated_wrench();
+                let in_flange = heard.franka.in_flange(&wrench).filter(|_| is_estimated);
+                match (is_estimated, in_flange, self.settings.flange_frame()) {
+                    (true, Some(wrench), Some(flange)) => {
+                        (heard.wrench, heard.wrench_frame) = (Some(wrench), flange);
+                    }
+                    // Without the state its frame is not known yet.
+                    (true, ..) => return Ok(()),
+                    (false, ..) => {
+                        heard.wrench = Some(wrench);
+                        if heard.wrench_frame != message.header.frame_id {
+                            heard.wrench_frame.clone_from(&message.header.frame_id);
+                        }
+                    }
                 }
             }
             Packet::Frames(message) => heard.frames.read(message),
             Packet::Goals(message) => heard.goals = message.clone(),
             Packet::Clock(message) => heard.clock = Some((message.clock.s(), received)),
             Packet::Status(_)
+            | Packet::FrankaState(_)
             | Packet::RobotMode(_)
             | Packet::SafetyMode(_)
             | Packet::ProgramRunning(_) => heard.status = status,

@@ -62,7 +62,7 @@ pub struct BackendSettings {
     /// Kind of backend: simulated, or an arm behind ROS topics.
     pub kind: BackendKind,
     /// Driver of the arm: `palpate` for one as in the guide "Your robot", `ur` for
-    /// `ur_robot_driver`.
+    /// `ur_robot_driver`, `franka_ros2` for that of a Franka arm.
     pub profile: Profile,
     /// ROS 2 release on the driver's computer, which decides its controllers and the layout of its
     /// services.
@@ -80,7 +80,7 @@ pub struct BackendSettings {
     #[serde(skip_serializing_if = "is_default")]
     pub use_sim_time: bool,
     /// Time after which a watchdog of the laboratory stops the arm when velocities cease, s;
-    /// required for velocities to `ur_robot_driver`, which has none.
+    /// required for velocities with the profiles `ur` and `franka_ros2`, which have none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub watchdog_s: Option<f64>,
     /// Address of the control box of a Franka arm, e.g. `"172.16.0.2"`.
@@ -100,7 +100,7 @@ pub struct BackendSettings {
     /// Address of the ROS 1 master.
     pub master: String,
     /// Frame of the robot's base for viewers, in which the pose of `W` is published; default:
-    /// `base_link`, with `profile = "ur"` `base`.
+    /// `base_link`, with the profile `ur` `base`, with `franka_ros2` `fr3_link0`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base_frame: Option<String>,
     /// Joint names in messages, from the base on; default: the manufacturer's.
@@ -284,6 +284,12 @@ impl BackendSettings {
         has_controllers && self.topics.command.message == CommandMessage::Trajectory
     }
 
+    /// Whether the wrench is the arm's own estimate, in a frame and with a sign of its driver.
+    pub fn has_estimated_wrench(&self) -> bool {
+        let name = &self.topics.wrench.name;
+        self.driver().estimated_wrench.is_some_and(|own| name.ends_with(own))
+    }
+
     /// Returns the frame of the robot's base.
     pub fn base_frame(&self) -> String {
         let usual = || format!("{}{}", self.prefix, self.driver().base_frame);
@@ -346,9 +352,11 @@ impl Validate for BackendSettings {
             "letters, digits, _ and slashes".into()
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
-        if self.profile == Profile::Ur {
-            let is_ros1 = self.kind == BackendKind::Ros1;
-            rules.require("profile", "\"ur\"", !is_ros1, || "\"palpate\" over ROS 1".into());
+        if self.profile != Profile::Palpate {
+            let (is_ros1, name) = (self.kind == BackendKind::Ros1, self.profile.name());
+            rules.require("profile", format!("\"{name}\""), !is_ros1, || {
+                "\"palpate\" over ROS 1".into()
+            });
             let velocities = self.topics.command.message == CommandMessage::Velocities;
             let is_safe = !velocities || self.watchdog_s.is_some();
             rules.require("topics.command.type", "std_msgs/msg/Float64MultiArray", is_safe, || {

@@ -2,6 +2,7 @@
 
 use super::control_message::{Clock, GoalStatusArray, RobotDescription};
 use super::definition::HasDefinition;
+use super::franka_message::FrankaRobotState;
 use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
     JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
@@ -32,6 +33,8 @@ pub enum Topic {
     ProgramRunning,
     /// Its speed as a fraction of the commanded one.
     SpeedScaling,
+    /// State of a Franka arm.
+    FrankaState,
     /// Shapes for viewers: belief, contacts, next approach, limits.
     Markers,
     /// Points of the believed surface with their standard deviation, for viewers.
@@ -61,7 +64,7 @@ pub enum Endpoint {
 
 impl Topic {
     /// All topics.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Joints,
         Self::Wrench,
         Self::Tactile,
@@ -71,6 +74,7 @@ impl Topic {
         Self::SafetyMode,
         Self::ProgramRunning,
         Self::SpeedScaling,
+        Self::FrankaState,
         Self::Markers,
         Self::Points,
         Self::Frames,
@@ -85,7 +89,7 @@ impl Topic {
     pub const VIEWED: [Self; 3] = [Self::Markers, Self::Points, Self::Frames];
 
     /// Topics with settings in `[backend.topics]`.
-    pub const SET: [Self; 9] = [
+    pub const SET: [Self; 10] = [
         Self::Joints,
         Self::Wrench,
         Self::Tactile,
@@ -95,6 +99,7 @@ impl Topic {
         Self::SafetyMode,
         Self::ProgramRunning,
         Self::SpeedScaling,
+        Self::FrankaState,
     ];
 
     /// Returns the side that publishes the topic.
@@ -112,7 +117,7 @@ impl Topic {
 }
 
 /// Keys of the topics with settings, in their order.
-const KEYS: [&str; 9] = [
+const KEYS: [&str; 10] = [
     "joints",
     "wrench",
     "tactile",
@@ -122,6 +127,7 @@ const KEYS: [&str; 9] = [
     "safety_mode",
     "program_running",
     "speed_scaling",
+    "franka_state",
 ];
 
 /// Names of the topics without settings, in their order.
@@ -137,10 +143,11 @@ const FIXED: [&str; 8] = [
 ];
 
 /// Default name and age limit, s, of each topic with settings, as used by drivers
-/// (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`, `ur_robot_driver`).
+/// (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`, `ur_robot_driver`,
+/// `franka_ros2`).
 /// Topics without a limit are published on change.
 // heuristic: the age limits; some frames of each topic may be lost.
-const USUAL: [(&str, f64); 9] = [
+const USUAL: [(&str, f64); 10] = [
     ("/joint_states", 0.05),
     ("/ft_sensor/wrench", 0.06),
     ("/biotac_pub", 0.08),
@@ -150,6 +157,7 @@ const USUAL: [(&str, f64); 9] = [
     ("io_and_status_controller/safety_mode", f64::INFINITY),
     ("io_and_status_controller/robot_program_running", f64::INFINITY),
     ("speed_scaling_state_broadcaster/speed_scaling", 0.2),
+    ("franka_robot_state_broadcaster/robot_state", 0.05),
 ];
 
 /// Message type of the fingertip's samples.
@@ -183,8 +191,8 @@ impl TactileMessage {
 /// Message type of commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum CommandMessage {
-    /// A point of velocities with names, stamp and validity; with `profile = "ur"` a short
-    /// trajectory of positions that ends at rest.
+    /// A point of velocities with names, stamp and validity; with the profiles `ur` and
+    /// `franka_ros2` a short trajectory of positions that ends at rest.
     #[default]
     #[serde(rename = "trajectory_msgs/msg/JointTrajectory")]
     Trajectory,
@@ -226,6 +234,7 @@ topic_settings!(TactileTopic, Topic::Tactile, TactileMessage);
 topic_settings!(StatusTopic, Topic::Status);
 topic_settings!(CommandTopic, Topic::Command, CommandMessage);
 topic_settings!(SpeedScalingTopic, Topic::SpeedScaling);
+topic_settings!(FrankaStateTopic, Topic::FrankaState);
 
 /// Defines the settings of a topic that is published on change.
 macro_rules! latched_settings {
@@ -280,6 +289,9 @@ pub struct Topics {
     /// Its speed as a percentage of the commanded one.
     #[serde(skip_serializing_if = "is_default")]
     pub speed_scaling: SpeedScalingTopic,
+    /// State of a Franka arm.
+    #[serde(skip_serializing_if = "is_default")]
+    pub franka_state: FrankaStateTopic,
 }
 
 impl Topics {
@@ -295,6 +307,7 @@ impl Topics {
             Topic::SafetyMode => (&self.safety_mode.name, f64::INFINITY),
             Topic::ProgramRunning => (&self.program_running.name, f64::INFINITY),
             Topic::SpeedScaling => (&self.speed_scaling.name, self.speed_scaling.max_age_s),
+            Topic::FrankaState => (&self.franka_state.name, self.franka_state.max_age_s),
             other => (FIXED[other as usize - USUAL.len()], f64::INFINITY),
         }
     }
@@ -339,6 +352,7 @@ impl Topics {
             Topic::SafetyMode => SafetyMode::DEFINITION.name,
             Topic::ProgramRunning => Bool::DEFINITION.name,
             Topic::SpeedScaling => Float64::DEFINITION.name,
+            Topic::FrankaState => FrankaRobotState::DEFINITION.name,
             Topic::Markers => MarkerArray::DEFINITION.name,
             Topic::Points => PointCloud2::DEFINITION.name,
             Topic::Frames | Topic::Transforms | Topic::FixedTransforms => {

@@ -1,6 +1,7 @@
 //! Packets, and the transports that carry them: ROS 2, ROS 1, or a channel for tests.
 
 use super::control_message::{Clock, GoalStatusArray, RobotDescription};
+use super::franka_message::FrankaRobotState;
 use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
     JointTrajectory, RobotMode, SafetyMode, Time, Touching, WrenchStamped,
@@ -74,6 +75,8 @@ packets! {
     ProgramRunning(Bool): Bool on ProgramRunning,
     /// Its speed, in percent of the commanded one.
     SpeedScaling(Float64): Float64 on SpeedScaling,
+    /// State of a Franka arm.
+    FrankaState(Box<FrankaRobotState>): FrankaRobotState on FrankaState,
     /// Joint velocities with names and validity, or a trajectory of joint positions.
     Command(JointTrajectory): JointTrajectory on Command,
     /// Shapes for viewers.
@@ -102,6 +105,7 @@ impl Packet {
             Self::Fingers(message) => &mut message.header,
             Self::Depth(message) => &mut message.header,
             Self::Status(message) => &mut message.header,
+            Self::FrankaState(message) => &mut message.header,
             Self::Command(message) => &mut message.header,
             Self::Touching(_)
             | Self::RobotMode(_)

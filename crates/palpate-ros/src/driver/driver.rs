@@ -40,4 +40,11 @@ pub struct Driver {
     pub zero_wrench: Option<Service>,
     /// Call that clears faults on the arm.
     pub clear_fault: Option<Service>,
+    /// Topic of a wrench that the driver estimates, with a frame and a sign of its own.
+    pub estimated_wrench: Option<&'static str>,
+    /// Controller that is active as long as the driver commands the robot, and the fault without
+    /// it.
+    pub lifeline: Option<(&'static str, &'static str)>,
+    /// Topic that is silent for a reason of the driver's own, and that reason.
+    pub silence: Option<(Topic, &'static str)>,
 }

@@ -3,6 +3,7 @@
 
 #[allow(clippy::module_inception)]
 mod driver;
+pub mod franka_ros2;
 mod palpate;
 pub mod ur;
 
@@ -21,6 +22,8 @@ pub enum Profile {
     Palpate,
     /// `ur_robot_driver` as installed, for an arm of Universal Robots.
     Ur,
+    /// `franka_ros2` with `franka_fr3_moveit_config`, for a Franka Research 3.
+    FrankaRos2,
 }
 
 impl Profile {
@@ -29,6 +32,16 @@ impl Profile {
         match self {
             Self::Palpate => &palpate::DRIVER,
             Self::Ur => &ur::DRIVER,
+            Self::FrankaRos2 => &franka_ros2::DRIVER,
+        }
+    }
+
+    /// Returns the name of this profile in settings files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Palpate => "palpate",
+            Self::Ur => "ur",
+            Self::FrankaRos2 => "franka_ros2",
         }
     }
 

@@ -14,4 +14,7 @@ pub(super) static DRIVER: Driver = Driver {
     modes: None,
     zero_wrench: None,
     clear_fault: Some(Service::ClearFault),
+    estimated_wrench: None,
+    lifeline: None,
+    silence: None,
 };

@@ -37,6 +37,13 @@ pub(super) static DRIVER: Driver = Driver {
     modes: Some(&["force_mode", "trajectory_passthrough", "freedrive_mode", "motion_primitive"]),
     zero_wrench: Some(Service::ZeroFtSensor),
     clear_fault: None,
+    estimated_wrench: None,
+    lifeline: None,
+    silence: Some((
+        Topic::ProgramRunning,
+        "A UR's driver publishes its modes and its program when they change: start the program \
+         External Control on the pendant. Mock hardware has none: palpate run --dry.",
+    )),
 };
 
 /// Time at rest on the object, s: a UR passes the point of contact by a millimetre and more, and

@@ -6,6 +6,7 @@ mod endpoint;
 
 use crate::control_message::{Clock, GoalStatusArray, RobotDescription};
 use crate::definition::HasDefinition;
+use crate::franka_message::FrankaRobotState;
 use crate::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
     JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
@@ -167,6 +168,7 @@ impl Ros2 {
                 Topic::SafetyMode => self.topic::<SafetyMode>(topic)?,
                 Topic::ProgramRunning => self.topic::<Bool>(topic)?,
                 Topic::SpeedScaling => self.topic::<Float64>(topic)?,
+                Topic::FrankaState => self.topic::<FrankaRobotState>(topic)?,
                 Topic::Transforms => self.topic::<TFMessage>(topic)?,
                 Topic::FixedTransforms => self.topic::<TFMessage>(topic)?,
                 Topic::Goals => self.topic::<GoalStatusArray>(topic)?,

@@ -26,6 +26,7 @@ impl Failure {
     pub fn applies_to(&self, profile: Profile) -> bool {
         match profile {
             Profile::Ur => !matches!(self.act, FailureEffect::Flags(..) | FailureEffect::NoFlags),
+            Profile::FrankaRos2 => false,
             Profile::Palpate => !matches!(
                 self.act,
                 FailureEffect::ProtectiveStop

@@ -155,6 +155,12 @@ impl SimulatedRobotServer {
                 Box::new(SimulatedArmComputer::new(named, limits, valid_s))
             }
             Profile::Ur => Box::new(UrComputer::new(named, period_s, limits, settings)),
+            Profile::FrankaRos2 => {
+                let cause = InputError::new(
+                    "there is no simulated robot with profile = \"franka_ros2\"; allowed are \"palpate\", \"ur\"",
+                );
+                return Err(Fault::Link { time_s: 0.0, cause: cause.into() });
+            }
         };
         Ok(Self {
             period_s,
@@ -162,7 +168,7 @@ impl SimulatedRobotServer {
             published: Default::default(),
             rates_hz: match settings.profile {
                 Profile::Palpate => [JOINTS_HZ, WRENCH_HZ],
-                Profile::Ur => [UR_HZ; 2],
+                Profile::Ur | Profile::FrankaRos2 => [UR_HZ; 2],
             },
             events: Vec::new(),
             body,
@@ -385,6 +391,7 @@ impl SimulatedRobotServer {
             Profile::Palpate => "ft_sensor".into(),
             // `ur_controllers.yaml`
             Profile::Ur => format!("{}tool0_controller", self.settings.prefix),
+            Profile::FrankaRos2 => String::new(),
         }
     }
 
