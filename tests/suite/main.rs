@@ -64,6 +64,8 @@ mod lab_camera;
 #[cfg(feature = "mujoco")]
 mod lab_faults;
 #[cfg(feature = "mujoco")]
+mod lab_fr3;
+#[cfg(feature = "mujoco")]
 mod lab_live;
 #[cfg(feature = "mujoco")]
 mod lab_recognition;

@@ -40,11 +40,16 @@ pub struct Network {
 }
 
 impl Network {
+    /// Creates the ROS 2 network with this number, of the arm of an experiment.
+    pub fn of(number: u16, experiment: &'static str) -> Self {
+        let domain = format!("backend.domain={number}");
+        let settings = Experiment::load(Path::new(experiment), &[domain]).unwrap().backend;
+        Self { settings, experiment, master: None }
+    }
+
     /// Creates the ROS 2 network with this number, of a UR5e.
     pub fn of_ur(number: u16) -> Self {
-        let domain = format!("backend.domain={number}");
-        let experiment = Experiment::load(Path::new(UR_EXPERIMENT), &[domain]).unwrap();
-        Self { settings: experiment.backend, experiment: UR_EXPERIMENT, master: None }
+        Self::of(number, UR_EXPERIMENT)
     }
 
     /// Creates the network with this number.

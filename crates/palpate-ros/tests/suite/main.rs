@@ -2,6 +2,7 @@
 
 mod arm_pc;
 mod former_keys;
+mod franka;
 mod net_ft;
 mod ros_messages;
 mod ur;

@@ -3,6 +3,7 @@
 use palpate_explore::backend::Sample;
 use palpate_explore::robot::sensor::DepthImage;
 use palpate_ros::definition::{Definition, HasDefinition};
+use palpate_ros::franka_message::*;
 use palpate_ros::message::*;
 use palpate_ros::tactile::{packet_of, sample};
 use palpate_ros::topics::TactileMessage;
@@ -67,6 +68,17 @@ fn every_message_has_the_fields_of_its_standard_definition() {
         Touching::DEFINITION,
         Biotac::DEFINITION,
         BiotacAll::DEFINITION,
+        Inertia::DEFINITION,
+        InertiaStamped::DEFINITION,
+        PoseStamped::DEFINITION,
+        Twist::DEFINITION,
+        TwistStamped::DEFINITION,
+        Accel::DEFINITION,
+        AccelStamped::DEFINITION,
+        CollisionIndicators::DEFINITION,
+        Elbow::DEFINITION,
+        Errors::DEFINITION,
+        FrankaRobotState::DEFINITION,
     ];
     assert_eq!(ours.len(), standard.len());
     for definition in ours {
