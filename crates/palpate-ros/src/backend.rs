@@ -84,6 +84,11 @@ impl RosBackend {
         {
             cause = reason;
         }
+        // The activation of a controller would recover from the error by itself, without an
+        // operator (`initializeTorqueInterface` in `franka_hardware/src/robot.cpp`).
+        if is_ended && matches!(cause, LinkFault::Arm(_)) {
+            *self.lab.hand_back() = None;
+        }
         let cause = self.lab.latch().get_or_insert(cause).clone();
         Fault::Link { time_s: self.time_s(), cause }
     }

@@ -148,7 +148,6 @@ impl RosArm {
         let lifeline = self.settings().driver().lifeline;
         let is_off = |name| all.iter().any(|one| one.name == name && !one.is_active());
         if let Some((_, words)) = lifeline.filter(|(name, _)| is_off(*name)) {
-            *self.hand_back() = None;
             return Some(LinkFault::Arm(words.into()));
         }
         let own = self.settings().controller();

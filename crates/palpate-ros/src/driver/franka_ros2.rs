@@ -65,8 +65,8 @@ const SETTLE_S: f64 = 0.3;
 const TRACKING_LAG_S: f64 = 0.15;
 
 /// Time without a change of the robot's clock after which the driver counts as stopped.
-// heuristic: a hundred cycles of the robot (1 kHz).
-const STILL: Duration = Duration::from_millis(100);
+// heuristic: fifty cycles of the robot (1 kHz).
+const STILL: Duration = Duration::from_millis(50);
 
 /// Returns the settings that differ from the usual ones: names as in `franka.launch.py` and
 /// `fr3_ros_controllers.yaml`. `joint_states` has 30 Hz, its source `franka/joint_states` 1 kHz.
@@ -144,7 +144,8 @@ impl FrankaState {
         if self.changed.is_none() || message.time != self.time_s {
             (self.time_s, self.changed) = (message.time, Some(received));
         }
-        self.still = self.changed.map_or(Duration::ZERO, |at| received.saturating_duration_since(at));
+        self.still =
+            self.changed.map_or(Duration::ZERO, |at| received.saturating_duration_since(at));
         true
     }
 
@@ -170,7 +171,9 @@ impl FrankaState {
                 "robot mode REFLEX ({errors}); remove the cause, then: ros2 action send_goal \
                  /action_server/error_recovery franka_msgs/action/ErrorRecovery {{}}"
             ),
-            mode::USER_STOPPED => "robot mode USER_STOPPED; release the stop of the enabling device".into(),
+            mode::USER_STOPPED => {
+                "robot mode USER_STOPPED; release the stop of the enabling device".into()
+            }
             mode::AUTOMATIC_ERROR_RECOVERY => String::new(),
             _ => "robot mode OTHER; unlock the joints and activate FCI in Desk".into(),
         };

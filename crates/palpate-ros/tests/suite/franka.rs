@@ -132,12 +132,12 @@ fn modes_and_errors_of_the_arm_are_named() {
     let mut found = FrankaState::default();
     let at = |ms| begun + Duration::from_millis(ms);
     let same = Packet::from(state(mode::MOVE, 1.0, &Isometry3::identity()));
-    for (ms, is_stopped) in [(0, false), (90, false), (110, true)] {
+    for (ms, is_stopped) in [(0, false), (40, false), (60, true)] {
         found.read(&same, at(ms));
         assert_eq!(refusal(&found).is_some(), is_stopped, "{ms} ms");
     }
     assert!(refusal(&found).unwrap().contains("error_recovery"));
-    found.read(&state(mode::MOVE, 1.001, &Isometry3::identity()).into(), at(120));
+    found.read(&state(mode::MOVE, 1.001, &Isometry3::identity()).into(), at(70));
     assert_eq!(refusal(&found), None);
 }
 
@@ -150,10 +150,8 @@ fn the_wrench_is_that_on_the_arm() {
         Translation3::new(0.01, -0.02, 0.15),
         UnitQuaternion::from_euler_angles(0.3, -0.4, 2.0),
     );
-    let on_arm = Wrench {
-        force_n: Vector3::new(1.0, -2.0, 5.0),
-        torque_nm: Vector3::new(0.1, 0.2, -0.3),
-    };
+    let on_arm =
+        Wrench { force_n: Vector3::new(1.0, -2.0, 5.0), torque_nm: Vector3::new(0.1, 0.2, -0.3) };
     let on_environment = Wrench { force_n: -on_arm.force_n, torque_nm: -on_arm.torque_nm };
     let estimate = on_environment.moved(&x_fk.inverse());
     let now_s = SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs_f64();
