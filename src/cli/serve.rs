@@ -9,6 +9,7 @@ use crate::experiment::Experiment;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use crate::sim::{Scene, known_body};
 use anyhow::{Context, bail};
+use nalgebra::{Isometry3, Vector3};
 use palpate_explore::robot::sensor::SensorKind;
 use palpate_ros::connect;
 use palpate_ros::network::discovery_note;
@@ -59,6 +60,10 @@ pub(super) struct Args {
     /// repeated.
     #[arg(long, value_name = "NAME@AT[+FOR]", value_parser = injection)]
     inject: Vec<Injection>,
+    /// Tool centre point of a simulated UR: its pose in the flange's frame, m, and rotation vector,
+    /// rad, as on the pendant; forces are reported there.
+    #[arg(long, value_name = "X,Y,Z,RX,RY,RZ", value_parser = pose, allow_hyphen_values = true)]
+    tcp: Option<Isometry3<f64>>,
     /// Seed of the sensor noise.
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
@@ -83,6 +88,17 @@ fn injection(text: &str) -> Result<Injection, String> {
     };
     let (at, span) = times.split_once('+').map_or((times, None), |(at, span)| (at, Some(span)));
     Ok(Injection { failure, at_s: seconds(at)?, for_s: span.map(seconds).transpose()? })
+}
+
+/// Reads a pose as position and rotation vector.
+fn pose(text: &str) -> Result<Isometry3<f64>, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z, rx, ry, rz]) if [x, y, z, rx, ry, rz].iter().all(|part| part.is_finite()) => {
+            Ok(Isometry3::new(Vector3::new(x, y, z), Vector3::new(rx, ry, rz)))
+        }
+        _ => Err("allowed are six numbers X,Y,Z,RX,RY,RZ, as in 0,0,0.12,0,0,0".into()),
+    }
 }
 
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
@@ -130,6 +146,12 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut twin =
         SimulatedRobotServer::new(body, &robot.chain, &settings, open, injections, args.seed)
             .context("cannot start the simulated robot")?;
+    if let Some(x_fs) = args.tcp {
+        if settings.driver().flange_frame.is_none() {
+            bail!("--tcp: a driver with frames is required, as with backend.profile = \"ur\"");
+        }
+        twin.set_tool_centre(x_fs);
+    }
     let mut written = Ok(());
     twin.run(&stop, &mut |time_unix_s, event| {
         let line = json!({ "time_unix_s": time_unix_s, "event": event });

@@ -15,6 +15,7 @@ use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
 use palpate_explore::recognition::RecognitionSettings;
 use palpate_explore::robot::arm::ArmSettings;
+use palpate_explore::robot::arm::model::JointModel;
 use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
 use palpate_ros::driver::Profile;
@@ -444,6 +445,15 @@ impl Validate for Experiment {
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
         rules.table("backend", &self.backend);
+        let arm = self.scene.arm.as_ref().filter(|_| !self.backend.joints.is_empty());
+        // An unreadable model is reported where the arm is built.
+        if let Some((model, _)) = arm.and_then(|arm| arm.model().ok()) {
+            let [named, joints] = [self.backend.joints.len(), model.joint.len()];
+            rules.require("backend.joints", format!("{named} names"), named == joints, || {
+                let usual: Vec<&str> = model.joint.iter().map(JointModel::name).collect();
+                format!("{joints} names, from the base on, as in {usual:?}")
+            });
+        }
         if let Some(truth) = &self.truth {
             rules.table("truth", truth);
         }

@@ -5,7 +5,7 @@
 
 franka_driver.csv is the interface, as ur_driver.csv for ur_driver.py, whose services and topics of ros2_control this
 program shares; franka_model.py is the arm, franka_messages.py has the messages. Prints a JSON object per event; the last
-one is a summary.
+one is a summary. Rests are reported as by ur_driver.py.
 
 Events (--event NAME@T[+FOR], s): reflex, user_stopped, guiding, locked (modes; during control the hardware interface
 stops, until an operator recovers at the end), take_controllers, goal, joints_silent, wrench_silent, wrench_constant,
@@ -26,16 +26,12 @@ import control_model as shared
 import franka_messages as messages
 import franka_model as model
 import ur_driver
-from ur_driver import JOINT_NOISE, numbers, plane, stamp
+from ur_driver import JOINT_NOISE, MotionObserver, emit, numbers, plane, stamp
 
 EVENTS = (*model.MODES, "take_controllers", "goal", "joints_silent", "wrench_silent", "wrench_constant", "state_silent")
 TAKER = "joint_impedance_example_controller"
 RATE = 500.0  # Hz; half of the driver's rate (rule update_rate), which Python keeps
 MARK = 1.25e99  # a number that no other field of a message has
-
-
-def emit(event, **fields):
-    print(json.dumps({"time_unix_s": time.time(), "event": event, **fields}), flush=True)
 
 
 @dataclass
@@ -114,6 +110,7 @@ class Driver(ur_driver.Driver):
             f"fr3_link{index}" for index in range(9)))]
         self.links, self.state = links, RobotState(self.joints, links, tool)
         self.read()
+        self.motion = MotionObserver(self.robot.tip_position())
         self.connect(rows)
         emit("serving")
 
@@ -130,6 +127,8 @@ class Driver(ur_driver.Driver):
         before, self.robot.flags = self.robot.flags, wanted
         for name in sorted(wanted ^ before):
             is_start = name in wanted
+            if is_start:
+                self.motion.mark(name)
             if name in model.MODES:
                 if is_start and self.robot.is_controlled:
                     self.fail()
@@ -182,6 +181,7 @@ class Driver(ur_driver.Driver):
             self.manager.controllers[name].claims for name in self.manager.active())
         robot.step(efforts, period)
         self.publish(at)
+        self.motion.update(robot.tip_position(), period, at)
         self.cycles += 1
 
     def read(self):
@@ -232,15 +232,15 @@ class Driver(ur_driver.Driver):
         period, stops = 1.0 / self.options.rate, []
         for name in (signal.SIGTERM, signal.SIGINT):
             signal.signal(name, lambda *_: stops.append(True))
+        signal.signal(signal.SIGUSR1, lambda *_: self.motion.mark("mark"))
         begun = last = due = time.monotonic()
-        overruns, longest, moved = 0, 0.0, None
+        overruns, longest = 0, 0.0
         gc.freeze()
         while not stops and (clock := time.monotonic()) - begun < self.options.seconds:
             late = clock - due
             overruns, longest = overruns + (late > period), max(longest, late)
             due = clock if late > 10.0 * period else due
-            moved = moved or (clock if self.robot.far_m > 1e-3 else None)
-            since = moved if self.options.from_motion else begun
+            since = self.motion.moved if self.options.from_motion else begun
             self.cycle(time.time(), clock, min(max(clock - last, 1e-4), 2.0 * period),
                        -1.0 if since is None else clock - since)
             last, due = clock, due + period

@@ -6,8 +6,9 @@
 ur_driver.csv is the interface: this program creates the topics and services that it has for a release, and takes from
 it controllers, claims, compatible interfaces and kinematics. Names of rules in comments are rows of that table, which
 cite the sources. ur_model.py is the arm and its controllers, ur_messages.py has
-the messages; this file connects them. Prints a JSON object per
-event, and a summary as the last line.
+the messages; this file connects them. Prints a JSON object per event, and a
+summary as the last line. After the start of an event, and after SIGUSR1 ("mark"), "rested" has the time (s) and the way
+of the fingertip (mm) until the arm is at rest.
 
 Events (--event NAME@T[+FOR], s): protective_stop, estop, pause, slow (50 %), program_stop, remote_off, packet_loss,
 rtde_loss, take_controllers, goal, wrench_silent, wrench_constant, joints_silent, joints_frozen.
@@ -15,12 +16,13 @@ rtde_loss, take_controllers, goal, wrench_silent, wrench_constant, joints_silent
 import argparse
 import gc
 import json
+import math
 import random
 import re
 import signal
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass
 
 from cyclonedds.domain import DomainParticipant
@@ -40,6 +42,8 @@ JOINT_NOISE, CURRENT_NOISE = 1e-6, 0.01  # rad, A
 CURRENTS = (0.1, 2.1, 1.2, 0.4, 0.2, 0.1)  # A at rest
 ZERO_TIME, MOCK_ZERO_TIME = 0.05, 0.55  # s; rule zero_wait
 TAKER = "passthrough_trajectory_controller"
+REST_SPEED, REST_TIME, REST_DISTANCE = 5e-4, 0.02, 1e-4  # m/s of the fingertip for s; m
+LAST = 500  # positions that are kept, a second's
 
 
 # The driver
@@ -57,7 +61,40 @@ def transform_of(pose):
 
 
 def emit(event, **fields):
-    print(json.dumps({"time": time.time(), "event": event, **fields}), flush=True)
+    print(json.dumps({"time_unix_s": time.time(), "event": event, **fields}), flush=True)
+
+
+class MotionObserver:
+    """Reports when the arm begins to move and comes to rest, and its time and way to rest after each mark.
+
+    It is at rest from the time on from which the fingertip stays within REST_DISTANCE.
+    """
+
+    def __init__(self, position):
+        self.is_moving, self.still, self.marks = False, REST_TIME, {}
+        self.last = deque([(time.time(), position)], maxlen=LAST)
+        self.moved = None  # monotonic time of the first movement
+
+    def mark(self, name):
+        self.marks[name] = time.time(), 0.0
+
+    def update(self, position, period, at):
+        step = math.dist(position, self.last[-1][1])
+        self.last.append((at, position))
+        self.marks = {name: (begun, way + step) for name, (begun, way) in self.marks.items()}
+        self.still = 0.0 if step > REST_SPEED * period else self.still + period
+        is_moving = self.still < REST_TIME
+        if is_moving and not self.is_moving:
+            self.moved = self.moved or time.monotonic()
+            emit("moving")
+        if not is_moving and (self.is_moving or self.marks):
+            rested = max((then for then, other in self.last if math.dist(other, position) > REST_DISTANCE), default=0.0)
+            if self.is_moving:
+                emit("at_rest", time_unix_s=rested or at)
+            for name, (begun, way) in self.marks.items():
+                emit("rested", after=name, time_s=max(0.0, rested - begun), way_mm=1e3 * way)
+            self.marks = {}
+        self.is_moving = is_moving
 
 
 class ControllerStopper:
@@ -112,7 +149,9 @@ class Driver:
         self.latched, self.goals, self.reading, self.has_activity = {}, {}, None, False
         self.calls, self.accepted, self.dropped = Counter(), Counter(), Counter()
         self.cycles, self.noise = 0, random.Random(3)
+        self.motion = MotionObserver(self.robot.tip_position())
         self.connect(rows)
+        emit("serving")
 
     def connect(self, rows):
         """Creates the topics and services of the table."""
@@ -245,6 +284,8 @@ class Driver:
         for name in sorted(wanted ^ self.robot.flags | (wanted & self.started)):
             is_start = name in wanted
             emit(name, is_active=is_start)
+            if is_start:
+                self.motion.mark(name)
             if name == "take_controllers":
                 self.take(is_start)
             elif name == "goal" and is_start:
@@ -298,6 +339,7 @@ class Driver:
                 emit("controller_stopper", is_running=robot.is_running(), ok=answer[0], message=answer[1],
                      controllers=self.stopper.stopped)
         self.publish(at)
+        self.motion.update(robot.tip_position(), period, at)
         self.cycles += 1
 
     def read(self):
@@ -408,6 +450,7 @@ class Driver:
         period, stops = 1.0 / self.options.rate, []
         for name in (signal.SIGTERM, signal.SIGINT):
             signal.signal(name, lambda *_: stops.append(True))
+        signal.signal(signal.SIGUSR1, lambda *_: self.motion.mark("mark"))
         begun = last = due = time.monotonic()
         overruns, longest = 0, 0.0
         gc.freeze()
@@ -415,14 +458,19 @@ class Driver:
             late = clock - due
             overruns, longest = overruns + (late > period), max(longest, late)
             due = clock if late > 10.0 * period else due
-            self.cycle(time.time(), clock, max(clock - last, 1e-4), clock - begun)
+            if self.options.from_motion and self.motion.moved is None:
+                elapsed = -1.0
+            else:
+                elapsed = clock - (self.motion.moved if self.options.from_motion else begun)
+            self.cycle(time.time(), clock, max(clock - last, 1e-4), elapsed)
             last, due = clock, due + period
             time.sleep(max(0.0, due - time.monotonic()))
         robot = self.robot
-        emit("summary", calls=self.calls, accepted=self.accepted, dropped=self.dropped,
-             q=dict(zip(self.joints, robot.q)), active=self.manager.active(), farthest_rad=robot.far_rad,
-             farthest_m=robot.far_m, peak_force_n=robot.peak, ignored_setpoints=robot.ignored, cycles=self.cycles,
-             rate_hz=self.cycles / max(time.monotonic() - begun, 1e-9), overruns=overruns, latest_ms=1e3 * longest)
+        emit("ended", ended=dict(
+            calls=self.calls, accepted=self.accepted, dropped=self.dropped, q=dict(zip(self.joints, robot.q)),
+            active=self.manager.active(), farthest_rad=robot.far_rad, farthest_m=robot.far_m, peak_force_n=robot.peak,
+            ignored_setpoints=robot.ignored, cycles=self.cycles, overruns=overruns, latest_ms=1e3 * longest,
+            rate_hz=self.cycles / max(time.monotonic() - begun, 1e-9)))
 
 
 @dataclass
@@ -489,6 +537,7 @@ def parse(arguments):
     parser.add_argument("--dh-error", nargs="?", const="calibrated", choices=("calibrated", "uncalibrated"),
                         help="other lengths (2 mm) and angles (0.3 deg); the description follows if calibrated")
     parser.add_argument("--event", type=event, action="append", default=[], metavar="NAME@T[+FOR]")
+    parser.add_argument("--from-motion", action="store_true", help="times of events count from the first movement")
     options = parser.parse_args(arguments)
     if not options.self_test and options.seconds is None:
         parser.error("DOMAIN and SECONDS are required")

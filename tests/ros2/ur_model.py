@@ -105,6 +105,10 @@ class Robot:
         self.far_rad = max(self.far_rad, max(abs(a - b) for a, b in zip(self.q, self.home)))
         self.far_m = max(self.far_m, math.dist(self.pose[1], self.start))
 
+    def tip_position(self):
+        """Returns the centre of the fingertip's ball in the frame base."""
+        return added(self.pose[1], turned(self.pose[0], self.tip))
+
     def servo(self, command, period):
         limit = IGNORED_SPEED * period
         if self.flags & LOSS:  # rule extrapolation

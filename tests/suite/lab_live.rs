@@ -1,6 +1,6 @@
 //! A live page in front of an arm over topics; see `lab`.
 
-use crate::common::lab::{CELL, Network, TwinProcess};
+use crate::common::lab::{CELL, Network, TwinProcess, UR_EXPERIMENT};
 use crate::common::viewer::{Viewer, statuses, touches};
 use palpate::experiment::store::Run;
 use serde_json::json;
@@ -43,7 +43,7 @@ fn a_person_explores_by_a_pa10() {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_person_explores_by_a_ur() {
-    a_person_explores(&Network::of_ur(16));
+    a_person_explores(&Network::of(16, UR_EXPERIMENT));
 }
 
 /// A person explores by ten touches over topics. Without a visible page the arm does not begin; a

@@ -1,15 +1,11 @@
 //! Tests of a UR5e behind its driver over ROS 2, run in a network namespace by `make test-ros2`.
 
 use crate::common::lab::{
-    End, Network, TwinProcess, UR_EXPERIMENT, contacts_off_m, count, end_planners, journal,
-    median_and_worst, row, touch_sets,
+    BALL_EXPERIMENT, End, Network, TwinProcess, UR_EXPERIMENT, contacts_off_m, count, end_planners,
+    journal, median_and_worst, row, touch_sets,
 };
-use palpate::backend::Backend;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner::Fallback;
-use palpate::ros::arm::RosArm;
-use palpate::ros::service::Service;
-use palpate::ros::settings::BackendSettings;
 use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
@@ -21,9 +17,23 @@ use std::time::Duration;
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_container_is_touched_by_a_ur_as_in_the_simulator() {
+    touched_as_in_the_simulator(&Network::of(60, UR_EXPERIMENT), &[]);
+}
+
+/// The same without a tactile sensor, with forces at a tool centre point far from the flange, and
+/// at one that is turned, too.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn the_container_is_touched_by_force_as_in_the_simulator() {
+    for (number, tcp) in [(74, "0,0,0.12,0,0,0"), (75, "0.01,-0.03,0.15,0.4,-0.5,0.8")] {
+        touched_as_in_the_simulator(&Network::of(number, BALL_EXPERIMENT), &["--tcp", tcp]);
+    }
+}
+
+/// Touches through a simulated robot, and compares the contacts with those in this process.
+fn touched_as_in_the_simulator(network: &Network, options: &[&str]) {
     let touches = count("PALPATE_UR_TOUCHES", 6);
-    let network = Network::of_ur(60);
-    let twin = TwinProcess::new(&network, UR_EXPERIMENT, &[]);
+    let twin = TwinProcess::new(network, network.experiment, options);
     let folder = tempfile::tempdir().unwrap();
     let output = network.run("active", touches, folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -33,7 +43,7 @@ fn the_container_is_touched_by_a_ur_as_in_the_simulator() {
 
     let [touches, initial_touches] = touch_sets(touches);
     let sets = ["backend.kind=\"simulated\"".into(), touches, initial_touches];
-    let experiment = Experiment::load(Path::new(UR_EXPERIMENT), &sets).unwrap();
+    let experiment = Experiment::load(Path::new(network.experiment), &sets).unwrap();
     let simulation = Simulation::new(experiment).unwrap();
     let off_m = contacts_off_m(&simulation, &row);
     let [median_m, worst_m] = median_and_worst(&off_m);
@@ -53,7 +63,7 @@ fn the_container_is_touched_by_a_ur_as_in_the_simulator() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_ur_without_its_planner_comes_to_rest() {
     for (number, end) in [(61, End::Kill), (62, End::Stop), (63, End::Cut)] {
-        let network = Network::of_ur(number);
+        let network = Network::of(number, UR_EXPERIMENT);
         let twin = TwinProcess::new(&network, UR_EXPERIMENT, &[]);
         let folder = tempfile::tempdir().unwrap();
         end_planners(end, count("PALPATE_UR_ENDS", 2), &twin, folder.path(), |touches| {
@@ -78,7 +88,7 @@ fn stops_of_a_ur_end_the_run_and_say_what_to_do() {
     .into_iter()
     .enumerate()
     {
-        let network = Network::of_ur(64 + i as u16);
+        let network = Network::of(64 + i as u16, UR_EXPERIMENT);
         let twin = TwinProcess::new(&network, UR_EXPERIMENT, &["--inject", &format!("{name}@1+1")]);
         let folder = tempfile::tempdir().unwrap();
         let output = network.run("random", 2, folder.path()).output().unwrap();
@@ -100,7 +110,7 @@ fn stops_of_a_ur_end_the_run_and_say_what_to_do() {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_ur_at_half_speed_is_followed() {
-    let network = Network::of_ur(70);
+    let network = Network::of(70, UR_EXPERIMENT);
     let twin = TwinProcess::new(&network, UR_EXPERIMENT, &["--inject", "slow@0"]);
     let folder = tempfile::tempdir().unwrap();
     let output = network.run("random", 2, folder.path()).output().unwrap();
@@ -110,7 +120,7 @@ fn a_ur_at_half_speed_is_followed() {
     println!("the twin counted {}", twin.end());
 }
 
-/// An independent peer, written from the tables of `docs/arms.md`.
+/// An independent client of a UR's driver.
 fn peer(arguments: &[&str]) -> Command {
     let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
     command.arg("tests/ros2/ur_peer.py").args(arguments);
@@ -120,7 +130,7 @@ fn peer(arguments: &[&str]) -> Command {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_peer_of_another_implementation_drives_the_twin_of_a_ur() {
-    let network = Network::of_ur(71);
+    let network = Network::of(71, UR_EXPERIMENT);
     let mapping = ["--set", "backend.service_mapping=\"cyclone\""];
     let twin = TwinProcess::new(&network, UR_EXPERIMENT, &mapping);
     let output = peer(&["drive", "71"]).output().unwrap();
@@ -130,46 +140,11 @@ fn a_peer_of_another_implementation_drives_the_twin_of_a_ur() {
     twin.end();
 }
 
-/// The arm moves as far as commanded, stops, and is handed back as it was.
-#[test]
-#[ignore = "needs a network namespace: make test-ros2"]
-fn a_ur_of_another_implementation_is_driven() {
-    let network = Network::of_ur(72);
-    let arm = peer(&["arm", "72", "14"]).stdout(Stdio::piped()).spawn().unwrap();
-    sleep(Duration::from_millis(1500));
-    let experiment = Experiment::load(Path::new(UR_EXPERIMENT), &[]).unwrap();
-    let chain = experiment.scene.arm.unwrap().chain().unwrap();
-    let patient = BackendSettings { connect_timeout_s: 8.0, ..network.settings.clone() };
-    let lab = RosArm::connect_over(&patient, &chain).unwrap();
-    lab.call(&Service::ZeroFtSensor).unwrap();
-    let mut body = lab.backend();
-    let start = body.reset(0).unwrap().q[0];
-    let mut command = palpate::backend::Command { qdot: vec![0.0; 6] };
-    for (ticks, speed) in [(125, 0.1), (75, 0.0)] {
-        command.qdot[0] = speed;
-        for _ in 0..ticks {
-            body.step(&command).unwrap();
-        }
-    }
-    let end = body.step(&command).unwrap();
-    let moved = end.q[0] - start;
-    // The time between two ticks is measured, so a late one is commanded for longer.
-    assert!((moved - 0.05).abs() < 5e-3, "{moved}");
-    assert!(end.qdot[0].abs() < 2e-3, "{}", end.qdot[0]);
-    drop((body, lab));
-    let values = String::from_utf8(arm.wait_with_output().unwrap().stdout).unwrap();
-    println!("{}", values.trim());
-    let found: Value = serde_json::from_str(&values).unwrap();
-    assert_eq!(found["problems"], serde_json::json!([]), "{values}");
-    assert_eq!(found["is_active"], false, "it was inactive before: {values}");
-    assert!(found["trajectories"].as_u64().unwrap() > 20, "{values}");
-}
-
 /// An operator confirms, skips and moves touches; the same command continues with the same ones.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_operator_is_asked_before_each_touch() {
-    let network = Network::of_ur(73);
+    let network = Network::of(73, UR_EXPERIMENT);
     let twin = TwinProcess::new(&network, UR_EXPERIMENT, &[]);
     let folder = tempfile::tempdir().unwrap();
     let answered = |answers: &str| {

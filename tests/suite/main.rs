@@ -73,6 +73,7 @@ mod lab_recognition;
 mod lab_strokes;
 #[cfg(feature = "mujoco")]
 mod lab_ur;
+mod lab_ur_driver;
 mod layers;
 mod live;
 mod memory;

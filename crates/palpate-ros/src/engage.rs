@@ -207,7 +207,7 @@ impl RosArm {
                 1e3 * off_m, 1e3 * allowed_m
             ))
             .remedy(
-                "save the robot's model by `palpate doctor EXPERIMENT --save robot.urdf`, and set \
+                "save the robot's model by `palpate doctor --arm EXPERIMENT --save robot.urdf`, and set \
                  scene.arm.calibration = \"robot.urdf\"",
             )
             .into());

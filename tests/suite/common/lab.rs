@@ -23,6 +23,9 @@ pub const EXPERIMENT: &str = "experiments/container_pa10.toml";
 /// Experiment with a UR5e and its driver.
 pub const UR_EXPERIMENT: &str = "experiments/real_ur5e.toml";
 
+/// Experiment with a UR5e, its driver, and a ball on a stylus.
+pub const BALL_EXPERIMENT: &str = "experiments/real_ur5e_ball.toml";
+
 /// Settings of the container and the cell that a real arm needs.
 pub const CELL: [&str; 3] = [
     "scene.zone.depth_m=[0.59, 0.71]",
@@ -45,11 +48,6 @@ impl Network {
         let domain = format!("backend.domain={number}");
         let settings = Experiment::load(Path::new(experiment), &[domain]).unwrap().backend;
         Self { settings, experiment, master: None }
-    }
-
-    /// Creates the ROS 2 network with this number, of a UR5e.
-    pub fn of_ur(number: u16) -> Self {
-        Self::of(number, UR_EXPERIMENT)
     }
 
     /// Creates the network with this number.
@@ -260,6 +258,18 @@ pub fn end_planners(
     out: &Path,
     run: impl Fn(u32) -> Command,
 ) {
+    end_planners_marked(end, times, twin, out, run, || ());
+}
+
+/// Ends planners as [`end_planners`] does, and calls `mark` at each end.
+pub fn end_planners_marked(
+    end: End,
+    times: u32,
+    twin: &TwinProcess,
+    out: &Path,
+    run: impl Fn(u32) -> Command,
+    mark: impl Fn(),
+) {
     let touches = times + 3;
     let mut rests_ms = Vec::new();
     let mut kept = 0;
@@ -279,6 +289,7 @@ pub fn end_planners(
             End::Cut => set_network(false),
         }
         let at_s = pace::now_s();
+        mark();
         sleep(Duration::from_millis(700));
         let rest_s = twin.rest_s().unwrap_or_else(|| panic!("{end:?}: still moving"));
         rests_ms.push(1e3 * (rest_s - at_s).max(0.0));

@@ -1,6 +1,6 @@
 //! Arm of Universal Robots behind `ur_robot_driver`: files named here are those of
 //! `Universal_Robots_ROS2_Driver` at humble eca2357c, jazzy a16a2687, kilted 3252ef56 and lyrical
-//! dcf9d0d1. The table in `tests/ros2/ur_driver.md` has their lines.
+//! dcf9d0d1. The table in `tests/ros2/ur_driver.csv` has their lines.
 
 use super::driver::{Driver, Release};
 use crate::controllers::{PLAIN_CONTROLLER, Switch};

@@ -374,7 +374,8 @@ impl Transport for Ros2 {
             Some(Publisher {
                 topic: about.topic_name.strip_prefix("rt")?.to_owned(),
                 type_name: ros_type(&about.type_name),
-                is_reliable: matches!(about.reliability, Some(Reliability::Reliable { .. })),
+                // A writer that announces nothing is reliable (DDS 1.4, section 2.2.3).
+                is_reliable: !matches!(about.reliability, Some(Reliability::BestEffort)),
                 is_kept: !matches!(about.durability, None | Some(Durability::Volatile)),
             })
         };

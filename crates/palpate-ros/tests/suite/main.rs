@@ -1,6 +1,7 @@
 //! Tests of palpate-ros, in one binary.
 
 mod arm_pc;
+mod driver_tables;
 mod former_keys;
 mod franka;
 mod net_ft;

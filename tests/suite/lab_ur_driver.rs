@@ -1,0 +1,363 @@
+//! Tests of a UR5e behind `ur_robot_driver` as its sources describe it: `tests/ros2/ur_driver.py`,
+//! on another implementation of DDS, run in a network namespace by `make test-ros2`.
+
+use crate::common::lab::{
+    BALL_EXPERIMENT, End, Network, TwinProcess, count, end_planners_marked, journal, row, signal,
+};
+use palpate::backend::{Backend, Command as Motion};
+use palpate::experiment::Experiment;
+use palpate::experiment::trial::row::TrialRow;
+use palpate::ros::arm::RosArm;
+use palpate::ros::service::Service;
+use palpate::ros::settings::BackendSettings;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// Surface in front of the arm, m along y of its base.
+const PLANE_Y_M: f64 = -0.62;
+
+/// Stiffness of the surface, N/m: aluminium and a force sensor (`docs/finger.md`).
+const STIFFNESS_N_M: f64 = 20_000.0;
+
+/// Options of an arm that stands at the home of the experiment, with a ball in front of a plane.
+fn stage() -> Vec<String> {
+    let home = "1.18490,-1.72124,1.67796,0.04328,1.18490,-1.57080";
+    let plane = format!("y={PLANE_Y_M}");
+    let stiffness = STIFFNESS_N_M.to_string();
+    let pairs = [
+        ["--start", home],
+        ["--tip", "0,0,0.12"],
+        ["--radius", "0.005"],
+        ["--plane", &plane],
+        ["--stiffness", &stiffness],
+    ];
+    pairs.into_iter().flatten().map(String::from).collect()
+}
+
+/// Command of the peer: an arm with its driver, for `seconds`.
+fn peer(network: &Network, seconds: u32, options: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
+    let domain = network.settings.domain.unwrap_or_default();
+    command.args(["tests/ros2/ur_driver.py", &domain.to_string(), &seconds.to_string()]);
+    command.args(stage()).args(options);
+    command
+}
+
+fn driver(network: &Network, options: &[&str]) -> TwinProcess {
+    TwinProcess::spawn(&mut peer(network, 600, options))
+}
+
+fn network(number: u16) -> Network {
+    Network::of(number, BALL_EXPERIMENT)
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Runs so many touches with settings; the run must succeed.
+fn touch(network: &Network, touches: u32, out: &Path, sets: &[&str]) -> TrialRow {
+    let mut run = network.run("random", touches, out);
+    run.args(sets.iter().flat_map(|set| ["--set", set]));
+    let output = run.output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let row = row(out);
+    assert_eq!((&row.failure, row.touches.len()), (&None, touches as usize));
+    row
+}
+
+/// Distances, mm, of a row's contacts from the plane, less what the surface yields to the detected
+/// force.
+fn off_mm(row: &TrialRow, detection_n: f64) -> Vec<f64> {
+    let yielded_m = detection_n / STIFFNESS_N_M;
+    let contact = |y_m: f64| 1e3 * (y_m - (PLANE_Y_M - yielded_m)).abs();
+    let contacts = row.touches.iter().map(|touch| contact(touch.contact.unwrap()[1]));
+    contacts.collect()
+}
+
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn the_peer_passes_its_own_tests() {
+    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
+    let output = command.args(["tests/ros2/ur_driver.py", "--self-test"]).output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "{\"self_test\": \"passed\"}");
+}
+
+/// The contacts lie on the surface whatever the release, tool centre point, prefix and namespace.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_ur_touches_where_the_surface_is() {
+    let touches = count("PALPATE_UR_TOUCHES", 6);
+    let turned = "0.01,-0.03,0.15,0.4,-0.5,0.8";
+    for (number, options, sets) in [
+        (100, vec!["--release", "jazzy", "--tcp", "0,0,0.12,0,0,0"], vec![]),
+        (101, vec!["--release", "lyrical", "--tcp", turned], vec!["backend.release=\"lyrical\""]),
+        (
+            102,
+            vec!["--release", "humble", "--namespace", "/ur5e", "--prefix", "ur5e_"],
+            vec![
+                "backend.release=\"humble\"",
+                "backend.prefix=\"ur5e_\"",
+                "backend.topics.namespace=\"/ur5e\"",
+            ],
+        ),
+    ] {
+        let network = network(number);
+        let twin = driver(&network, &options);
+        let folder = tempfile::tempdir().unwrap();
+        let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets), 8.0);
+        println!("{options:?}: off by {off_mm:.3?} mm");
+        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
+        let ended = twin.end();
+        assert_eq!(ended["dropped"], json!({}), "{ended}");
+        let active = ended["active"].to_string();
+        assert!(active.contains("trajectory_controller"), "as it was before: {active}");
+    }
+}
+
+/// A robot whose lengths and angles differ from the nominal ones is refused; with the URDF that its
+/// driver publishes it touches where the surface is.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_calibrated_ur_touches_where_the_surface_is() {
+    let network = network(103);
+    let twin = driver(&network, &["--dh-error"]);
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let output = network.run("random", 1, &out).output().unwrap();
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    assert!(words.contains("arm.calibration") && words.contains("doctor --arm"), "{words}");
+    assert_eq!(twin.last(|event| event == "moving"), None, "{words}");
+    let model = folder.path().join("robot.urdf");
+    let mut doctor = network.palpate(&["doctor", "--arm", BALL_EXPERIMENT]);
+    let output = doctor.arg("--save").arg(&model).output().unwrap();
+    let lines = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{lines}");
+    for words in [
+        "robot_mode, ur_dashboard_msgs/msg/RobotMode, on change, reliable, transient local",
+        "frame tool0_controller",
+        "WRONG   frames",
+        "scaled_joint_trajectory_controller active",
+    ] {
+        assert!(lines.contains(words), "{words}: {lines}");
+    }
+    let calibrated = format!("scene.arm.calibration=\"{}\"", model.display());
+    let row = touch(&network, count("PALPATE_UR_TOUCHES", 6), &out, &[&calibrated]);
+    let off_mm = off_mm(&row, 8.0);
+    println!("calibrated: off by {off_mm:.3?} mm");
+    assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
+    twin.end();
+}
+
+/// A stop of the peer: its name, part of the explorer's message, and whether the arm is stopped by
+/// the robot rather than by the explorer.
+const STOPS: &[(&str, &str)] = &[
+    ("protective_stop", "protective stop; remove its cause, enable the robot on the pendant"),
+    ("estop", "emergency stop"),
+    ("program_stop", "External Control"),
+    ("remote_off", "the robot is POWER_OFF"),
+    ("take_controllers", "scaled_joint_trajectory_controller"),
+    ("goal", "goal"),
+    ("wrench_silent", "no new message on /force_torque_sensor_broadcaster/wrench"),
+    ("wrench_constant", "wrench age"),
+    ("joints_silent", "no new message on /joint_states"),
+    ("joints_frozen", "standstill"),
+    ("packet_loss", "External Control"),
+];
+
+/// Largest time and way to rest after a failure.
+const REST_S: f64 = 0.15;
+const REST_MM: f64 = 10.0;
+
+/// Returns time, s, and way, mm, of the arm to its rest after a failure.
+fn rest(twin: &TwinProcess, name: &str) -> (f64, f64) {
+    let events = twin.events.lock().unwrap();
+    let is_it = |line: &&Value| line["event"] == "rested" && line["after"] == name;
+    let found = events.iter().rev().find(is_it).unwrap_or_else(|| panic!("{name}: {events:?}"));
+    (found["time_s"].as_f64().unwrap(), found["way_mm"].as_f64().unwrap())
+}
+
+/// Every stop ends the run with words, within 0.15 s and 10 mm of the failure; no touch is lost,
+/// and the same command goes on.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn failures_of_a_ur_bring_it_to_rest() {
+    let mut problems = Vec::new();
+    for (i, (name, words)) in STOPS.iter().enumerate() {
+        let network = network(110 + i as u16);
+        let twin = driver(&network, &["--from-motion", "--event", &format!("{name}@0.5+3")]);
+        let folder = tempfile::tempdir().unwrap();
+        let output = network.run("random", 2, folder.path()).output().unwrap();
+        let message = said(&output);
+        let kept = journal(folder.path()).iter().filter(|line| line["touch"].is_object()).count();
+        sleep(Duration::from_secs(3));
+        let (time_s, way_mm) = rest(&twin, name);
+        let first = message.lines().next().unwrap_or_default();
+        println!("| {name} | {:.0} ms | {way_mm:.1} mm | {first} |", 1e3 * time_s);
+        let is_stopped = output.status.code() == Some(2) && message.contains(words);
+        let is_short = time_s < REST_S && way_mm < REST_MM;
+        let again = network.run("random", 2, folder.path()).arg("--clear-fault").output().unwrap();
+        let found = journal(folder.path()).iter().filter(|line| line["touch"].is_object()).count();
+        if !is_stopped || !is_short || !again.status.success() || found < kept {
+            problems.push((name, message, time_s, way_mm, said(&again)));
+        }
+    }
+    assert!(problems.is_empty(), "{problems:#?}");
+}
+
+/// An arm whose explorer is killed, stopped or cut off comes to rest by itself, and no touch is
+/// lost.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_ur_without_its_explorer_comes_to_rest() {
+    for (number, end) in [(122, End::Kill), (123, End::Stop), (124, End::Cut)] {
+        let network = network(number);
+        let twin = driver(&network, &[]);
+        let folder = tempfile::tempdir().unwrap();
+        let run = |touches| {
+            let mut run = network.run("random", touches, folder.path());
+            run.arg("--clear-fault");
+            run
+        };
+        let times = count("PALPATE_UR_ENDS", 2);
+        end_planners_marked(end, times, &twin, folder.path(), run, || signal(&twin.child, "USR1"));
+        let events = twin.events.lock().unwrap();
+        let rested = events.iter().filter(|line| line["event"] == "rested");
+        for line in rested {
+            println!("{end:?}: {} s, {} mm", line["time_s"], line["way_mm"]);
+            assert!(line["time_s"].as_f64().unwrap() < REST_S, "{line}");
+            assert!(line["way_mm"].as_f64().unwrap() < REST_MM, "{line}");
+        }
+    }
+}
+
+/// A pause on the pendant, and half the speed, are waited for.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_paused_ur_is_waited_for() {
+    for (number, event) in [(125, "pause@0.5+2"), (126, "slow@0.2")] {
+        let network = network(number);
+        let twin = driver(&network, &["--from-motion", "--event", event]);
+        let folder = tempfile::tempdir().unwrap();
+        let off_mm = off_mm(&touch(&network, 2, folder.path(), &[]), 8.0);
+        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{event}: {off_mm:?}");
+        twin.end();
+    }
+}
+
+/// A second explorer with another folder is refused before it changes anything; the first goes on.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_second_explorer_is_refused_and_the_first_goes_on() {
+    let network = network(127);
+    let twin = driver(&network, &[]);
+    let [first_out, second_out] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let mut first = network.run("random", 4, first_out.path());
+    let first = first.stderr(Stdio::piped()).spawn().unwrap();
+    twin.wait_for(|event| event == "moving", 30.0);
+    let switches = |twin: &TwinProcess| {
+        let events = twin.events.lock().unwrap();
+        events.iter().filter(|line| line["event"] == "switch_controller").count()
+    };
+    let before = switches(&twin);
+    for clear in [&[][..], &["--clear-fault"]] {
+        let second = network.run("random", 2, second_out.path()).args(clear).output().unwrap();
+        let words = said(&second);
+        assert_eq!(second.status.code(), Some(2), "{words}");
+        assert!(words.contains("command"), "{words}");
+        println!("{}", words.lines().next().unwrap_or_default());
+    }
+    assert_eq!(switches(&twin), before);
+    let output = first.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+/// Mock hardware has no forces and no status: a run names the rehearsal, which follows approaches
+/// above the surface.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_rehearsal_needs_no_forces() {
+    let network = network(128);
+    let twin = driver(&network, &["--mock"]);
+    let folder = tempfile::tempdir().unwrap();
+    let output = network.run("random", 2, folder.path()).output().unwrap();
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    assert!(words.contains("--dry"), "{words}");
+    assert_eq!(twin.last(|event| event == "moving"), None, "{words}");
+    let output = network.run("random", 2, folder.path()).arg("--dry").output().unwrap();
+    println!("{}", String::from_utf8_lossy(&output.stdout));
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(twin.last(|event| event == "moving").is_some());
+    let ended = twin.end();
+    assert!(ended["farthest_m"].as_f64().unwrap() > 0.02, "{ended}");
+}
+
+/// What the driver is set up for otherwise is named, nothing moves, and its controllers stay.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
+    let passthrough = "passthrough_trajectory_controller";
+    for (number, options, words) in [
+        (129, vec!["--release", "humble"], "backend.release"),
+        (130, vec!["--release", "lyrical"], "release = \"lyrical\""),
+        (131, vec!["--active", passthrough], passthrough),
+        (132, vec!["--dh-error", "uncalibrated"], "mm"),
+        (133, vec!["--event", "estop@0"], "emergency stop"),
+        (134, vec!["--event", "program_stop@0"], "External Control"),
+    ] {
+        let network = network(number);
+        let twin = driver(&network, &options);
+        let folder = tempfile::tempdir().unwrap();
+        let output = network.run("random", 1, folder.path()).output().unwrap();
+        let message = said(&output);
+        println!("{options:?}: {}", message.lines().next().unwrap_or_default());
+        assert_eq!(output.status.code(), Some(2), "{options:?}: {message}");
+        assert!(message.contains(words), "{options:?}: {message}");
+        assert_eq!(twin.last(|event| event == "moving"), None, "{options:?}: {message}");
+        let ended = twin.end();
+        assert_eq!(ended["farthest_rad"].as_f64(), Some(0.0), "{ended}");
+        if options[0] == "--active" {
+            assert!(ended["active"].to_string().contains(passthrough), "{ended}");
+        }
+    }
+}
+
+/// Another controller that moved the arm before is active again afterwards.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn the_controller_that_was_active_is_active_again() {
+    let network = network(135);
+    let before = "forward_velocity_controller";
+    let arm = driver(&network, &["--active", before]);
+    let experiment = Experiment::load(Path::new(BALL_EXPERIMENT), &[]).unwrap();
+    let chain = experiment.scene.arm.unwrap().chain().unwrap();
+    let patient = BackendSettings { connect_timeout_s: 8.0, ..network.settings.clone() };
+    let lab = RosArm::connect_over(&patient, &chain).unwrap();
+    lab.call(&Service::ZeroFtSensor).unwrap();
+    let mut body = lab.backend();
+    let start = body.reset(0).unwrap().q[0];
+    let mut command = Motion { qdot: vec![0.0; 6] };
+    for (ticks, speed) in [(125, 0.1), (75, 0.0)] {
+        command.qdot[0] = speed;
+        for _ in 0..ticks {
+            body.step(&command).unwrap();
+        }
+    }
+    let end = body.step(&command).unwrap();
+    let moved = end.q[0] - start;
+    // The time between two ticks is measured, so a late one is commanded for longer.
+    assert!((moved - 0.05).abs() < 5e-3, "{moved}");
+    assert!(end.qdot[0].abs() < 2e-3, "{}", end.qdot[0]);
+    drop((body, lab));
+    sleep(Duration::from_millis(300));
+    let ended = arm.end();
+    let active = ended["active"].to_string();
+    assert!(active.contains(before) && !active.contains("scaled_joint"), "{active}");
+    assert!(ended["accepted"]["scaled_joint_trajectory_controller"].as_u64().unwrap() > 20);
+}
