@@ -2,7 +2,7 @@
 //! 43357d15 and jazzy 29cb85a6; both are alike).
 
 use super::definition::{Definition, HasDefinition, messages};
-use super::message::{Header, JointState, Point, Pose, Quaternion, Time, Vector3, WrenchStamped};
+use super::message::{Header, JointState, Pose, Vector3, WrenchStamped};
 use serde::{Deserialize, Serialize};
 
 messages! {
