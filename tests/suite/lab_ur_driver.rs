@@ -2,7 +2,7 @@
 //! on another implementation of DDS, run in a network namespace by `make test-ros2`.
 
 use crate::common::lab::{
-    BALL_EXPERIMENT, End, Network, TwinProcess, count, end_planners_marked, journal, row, signal,
+    BALL_EXPERIMENT, End, Network, TwinProcess, count, end_planners_marked, row, signal,
 };
 use palpate::backend::{Backend, Command as Motion};
 use palpate::experiment::Experiment;
@@ -182,8 +182,8 @@ fn rest(twin: &TwinProcess, name: &str) -> (f64, f64) {
     (found["time_s"].as_f64().unwrap(), found["way_mm"].as_f64().unwrap())
 }
 
-/// Every stop ends the run with words, within 0.15 s and 10 mm of the failure; no touch is lost,
-/// and the same command goes on.
+/// Every stop ends the run with words, within 0.15 s and 10 mm of the failure, and the same command
+/// goes on.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn failures_of_a_ur_bring_it_to_rest() {
@@ -192,18 +192,16 @@ fn failures_of_a_ur_bring_it_to_rest() {
         let network = network(110 + i as u16);
         let twin = driver(&network, &["--from-motion", "--event", &format!("{name}@0.5+3")]);
         let folder = tempfile::tempdir().unwrap();
-        let output = network.run("random", 2, folder.path()).output().unwrap();
+        let output = network.run("random", 1, folder.path()).output().unwrap();
         let message = said(&output);
-        let kept = journal(folder.path()).iter().filter(|line| line["touch"].is_object()).count();
         sleep(Duration::from_secs(3));
         let (time_s, way_mm) = rest(&twin, name);
         let first = message.lines().next().unwrap_or_default();
         println!("| {name} | {:.0} ms | {way_mm:.1} mm | {first} |", 1e3 * time_s);
         let is_stopped = output.status.code() == Some(2) && message.contains(words);
         let is_short = time_s < REST_S && way_mm < REST_MM;
-        let again = network.run("random", 2, folder.path()).arg("--clear-fault").output().unwrap();
-        let found = journal(folder.path()).iter().filter(|line| line["touch"].is_object()).count();
-        if !is_stopped || !is_short || !again.status.success() || found < kept {
+        let again = network.run("random", 1, folder.path()).arg("--clear-fault").output().unwrap();
+        if !is_stopped || !is_short || !again.status.success() {
             problems.push((name, message, time_s, way_mm, said(&again)));
         }
     }
@@ -307,7 +305,6 @@ fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
         (129, vec!["--release", "humble"], "backend.release"),
         (130, vec!["--release", "lyrical"], "release = \"lyrical\""),
         (131, vec!["--active", passthrough], passthrough),
-        (132, vec!["--dh-error", "uncalibrated"], "mm"),
         (133, vec!["--event", "estop@0"], "emergency stop"),
         (134, vec!["--event", "program_stop@0"], "External Control"),
     ] {

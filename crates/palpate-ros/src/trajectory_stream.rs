@@ -42,6 +42,10 @@ const AHEAD: (f64, f64) = (0.01, 0.15);
 /// command is skipped.
 const PAUSE: Duration = Duration::from_millis(100);
 
+/// Time in which a robot comes to rest after a pause began: from 1 rad/s with its own deceleration
+/// ([`STOP_RAD_S2`]).
+const BRAKED: Duration = Duration::from_millis(250);
+
 /// Smallest speed for which times are scaled; a slower robot takes longer to stop.
 const SLOWEST: f64 = 0.1;
 
@@ -89,6 +93,8 @@ pub struct TrajectoryStream {
     moving: Option<Vec<f64>>,
     /// Commanded motion since it was last taken, rad.
     motion: Vec<f64>,
+    /// Start of the pause in which the robot's speed is zero.
+    paused: Option<Instant>,
 }
 
 impl TrajectoryStream {
@@ -116,6 +122,7 @@ impl TrajectoryStream {
             return None;
         }
         self.qdot.extend(qdot.iter().map(|qdot| qdot * scale));
+        self.pause(q, scale, now);
         // The driver's clock of a trajectory runs at the robot's speed; with times scaled likewise
         // a stop takes as long at any speed.
         let scale = scale.clamp(SLOWEST, 1.0);
@@ -174,6 +181,19 @@ impl TrajectoryStream {
             let next = self.reference[i] + qdot * moved_s;
             self.reference[i] = next.clamp(q[i] - ahead, q[i] + ahead);
             self.motion[i] += qdot * moved_s;
+        }
+    }
+
+    /// Withdraws what an arm measured at `q`, rad, has not yet moved when a pause begins: it stops
+    /// short of its setpoint.
+    fn pause(&mut self, q: &[f64], scale: f64, now: Instant) {
+        let paused = (scale == 0.0).then(|| self.paused.unwrap_or(now));
+        self.paused = paused;
+        if paused.is_some_and(|since| now.saturating_duration_since(since) < BRAKED) {
+            for (i, (reference, q)) in self.reference.iter_mut().zip(q).enumerate() {
+                self.motion[i] += q - *reference;
+                *reference = *q;
+            }
         }
     }
 

@@ -264,6 +264,40 @@ fn a_joint_follows_as_late_as_its_servo() {
     }
 }
 
+/// A pause stops a joint short of its setpoint by as much as it lags: that motion counts as not
+/// commanded, and the joint goes on afterwards.
+#[test]
+fn a_paused_joint_is_not_behind_its_commands() {
+    for lag_s in [0.02, 0.05, 0.1] {
+        let mut robot = SlowServo::new(lag_s, false);
+        let (mut stream, begun) = (TrajectoryStream::default(), Instant::now());
+        let (mut reported, mut motion) = (0.0, Vec::new());
+        let mut before = 0.0;
+        for tick in 0..750_u32 {
+            let time_s = f64::from(tick) * TICK_S;
+            let now = begun + Duration::from_secs_f64(time_s);
+            let is_paused = (0.8..2.0).contains(&time_s);
+            let scale = if is_paused { 0.0 } else { 1.0 };
+            let sent = stream.next(&[0.1], &robot.q[0], scale, now, &robot.names);
+            if let Some(Packet::Command(message)) = sent {
+                robot.trajectory = Trajectory::read(&message, &robot.names, 0.0).ok();
+            }
+            if !is_paused {
+                (0..2).for_each(|_| robot.tick());
+            }
+            stream.take_motion(&robot.q[0], now + Duration::from_secs_f64(TICK_S), &mut motion);
+            reported += motion[0];
+            let behind = reported - robot.q[0][0];
+            // At 0.1 rad/s a joint without a pause is behind by its lag and the time of a tick.
+            assert!(behind.abs() < 0.1 * (lag_s + 0.02), "{lag_s} {time_s}: {behind}");
+            assert!(time_s < 0.81 || !is_paused || behind.abs() < 1e-9, "{time_s}: {behind}");
+            before = if time_s < 2.0 { robot.q[0][0] } else { before };
+        }
+        let after = robot.q[0][0] - before;
+        assert!(after > 0.1 * (0.98 - lag_s), "it goes on: {after}");
+    }
+}
+
 /// Returns a trajectory of one joint with points of position, velocity and time.
 fn trajectory(points: &[(f64, f64, f64)]) -> JointTrajectory {
     let point = |&(q, qdot, time_s): &(f64, f64, f64)| JointTrajectoryPoint {
