@@ -8,6 +8,8 @@ use palpate::experiment::trial::row::TrialRow;
 use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::thread::sleep;
+use std::time::Duration;
 
 const EXPERIMENT: &str = "experiments/real_fr3_ros2.toml";
 
@@ -110,6 +112,7 @@ fn an_fr3_touches_where_the_surface_is() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
     let topic = "/franka_robot_state_broadcaster";
+    let mut problems = Vec::new();
     let silent = format!("no new message on {topic}/external_wrench_in_stiffness_frame");
     for (i, (event, release, words)) in [
         ("reflex", "jazzy", "franka_ros2 has stopped after a reflex"),
@@ -137,14 +140,15 @@ fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
         let output = run().output().unwrap();
         let message = said(&output);
         println!("{event}, {release}: {}", message.lines().next().unwrap_or_default());
-        assert_eq!(output.status.code(), Some(2), "{event}: {message}");
-        assert!(message.contains(words), "{event}: {message}");
-        let is_over = |line: &serde_json::Value| *line == *event;
-        twin.wait_for(is_over, 10.0);
-        std::thread::sleep(std::time::Duration::from_secs(4));
+        // The event ends, and an operator recovers.
+        sleep(Duration::from_secs(4));
         let again = run().arg("--clear-fault").output().unwrap();
-        assert!(again.status.success(), "{event}: {}", said(&again));
+        let is_stopped = output.status.code() == Some(2) && message.contains(words);
+        if !is_stopped || !again.status.success() {
+            problems.push((event, release, message, said(&again)));
+        }
     }
+    assert!(problems.is_empty(), "{problems:#?}");
 }
 
 /// A robot that is not ready is refused before anything is switched.
