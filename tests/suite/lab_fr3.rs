@@ -147,6 +147,7 @@ fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
         if !is_stopped || !again.status.success() {
             problems.push((event, release, message, said(&again)));
         }
+        twin.end();
     }
     assert!(problems.is_empty(), "{problems:#?}");
 }
