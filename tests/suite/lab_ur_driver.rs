@@ -154,8 +154,7 @@ fn a_calibrated_ur_touches_where_the_surface_is() {
     twin.end();
 }
 
-/// A stop of the peer: its name, part of the explorer's message, and whether the arm is stopped by
-/// the robot rather than by the explorer.
+/// Failures of the peer, and parts of the explorer's messages.
 const STOPS: &[(&str, &str)] = &[
     ("protective_stop", "protective stop; remove its cause, enable the robot on the pendant"),
     ("estop", "emergency stop"),

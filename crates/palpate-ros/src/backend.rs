@@ -90,7 +90,15 @@ impl RosBackend {
     fn read(&mut self) -> Result<&Reading, Fault> {
         match self.update_reading() {
             Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
+            Err(cause) => {
+                // A trajectory ends later than the robot's own stop by the lag of its servo.
+                let is_engaged = self.lab.mailbox.latest().is_engaged;
+                let is_stopped = !is_engaged || matches!(cause, LinkFault::Arm(_));
+                if self.lab.settings().driver().modes.is_some() && !is_stopped {
+                    self.brake();
+                }
+                Err(self.fault(cause))
+            }
         }
     }
 
