@@ -56,7 +56,7 @@ test-code: setup
 # Simulated arms that move in real time, a part of all of them; they need an idle machine.
 test-arms: setup
 	$(MAKE) test-faults
-	$(MAKE) test-ros2 TOUCHES=3 UR_TOUCHES=2 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop lab_camera:: lab_ur::a_peer lab_ur::a_ur_of lab_ur::the_container lab_fr3::the_peer lab_fr3::an_fr3_touches'
+	$(MAKE) test-ros2 TOUCHES=3 UR_TOUCHES=2 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop lab_camera:: lab_ur::a_peer lab_ur::the_container_is_touched_by_a_ur lab_ur_driver::the_ lab_ur_driver::a_ur_touches lab_fr3::the_peer lab_fr3::an_fr3_touches'
 	$(MAKE) test-franka FRANKA_TESTS=franka::a_cylinder FRANKA_TOUCHES=2
 
 # Distance that the tip moves after each failure between explorer and arm: the table of docs/safety.md.
@@ -99,7 +99,7 @@ install-clusters:
 TOUCHES := 20
 UR_TOUCHES := 24
 UR_ENDS := 20
-OVER_TOPICS := lab:: lab_camera:: lab_live:: lab_recognition:: lab_strokes:: lab_faults:: lab_ur:: lab_fr3::
+OVER_TOPICS := lab:: lab_camera:: lab_live:: lab_recognition:: lab_strokes:: lab_faults:: lab_ur:: lab_ur_driver:: lab_fr3::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 NO_NAMESPACE := no permission for a network namespace (unshare --map-root-user --net)
 LAB_TESTS = cargo test --locked -p palpate --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)

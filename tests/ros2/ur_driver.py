@@ -529,7 +529,7 @@ def parse(arguments):
     parser.add_argument("--stiffness", type=float, default=3000.0, help="of the surface, N/m")
     parser.add_argument("--start", type=numbers(6), default=(0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0),
                         help="joints at start from shoulder_pan_joint, rad")
-    parser.add_argument("--lag", type=float, default=0.05, help="time constant of the servo, s")
+    parser.add_argument("--lag", type=float, default=0.03, help="time constant of the servo, s; rule servo_lookahead")
     parser.add_argument("--rate", type=float, default=model.UPDATE_RATE, help="cycles per second")
     parser.add_argument("--mock", action="store_true", help="mock hardware")
     parser.add_argument("--prefix", default="", help="tf_prefix")

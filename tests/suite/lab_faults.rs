@@ -194,6 +194,7 @@ fn a_second_publisher_of_commands_stops_the_arm() {
     let before_s = pace::now_s();
     let open = connect(&scene.network.settings, Endpoint::Explorer, Vec::new()).unwrap();
     let second = Link::open(open, Duration::from_millis(20), drop, || None).unwrap();
+    second.open_commands();
     let topic = CommandTopic { max_age_s: 0.02, ..CommandTopic::default() };
     let joints = ["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from);
     let names = JointNames::new(joints.into());

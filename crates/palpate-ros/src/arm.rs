@@ -1,6 +1,5 @@
 //! Arm behind topics: its connection, its services, and what it shows to viewers.
 
-use super::backend::RosBackend;
 use super::link::{Link, TURN};
 use super::message::Time;
 use super::net_ft::{NetFt, NetFtSettings, Record};
@@ -94,11 +93,6 @@ impl RosArm {
         lab.show_frames(None);
         lab.wait_for_topics()?;
         Ok(lab)
-    }
-
-    /// Returns a backend on this arm; use one at a time.
-    pub fn backend(self: &Arc<Self>) -> RosBackend {
-        RosBackend::new(self)
     }
 
     /// Commands the arm to rest, sets the zero of its force/torque sensor if its driver asks for

@@ -1,5 +1,5 @@
-//! Backend of an arm behind topics: sends a command in each tick, and returns the newest messages as
-//! readings.
+//! Backend of an arm behind topics: sends a command in each tick, and returns the newest messages
+//! as readings.
 
 use super::arm::{POLL_INTERVAL, RosArm};
 use super::status::ArmStatus;
@@ -28,9 +28,15 @@ pub struct RosBackend {
     sent: Command,
 }
 
+impl RosArm {
+    /// Returns a backend on this arm; use one at a time.
+    pub fn backend(self: &Arc<Self>) -> RosBackend {
+        RosBackend::new(self)
+    }
+}
+
 impl RosBackend {
-    /// Creates a backend on `lab`; use one at a time.
-    pub(super) fn new(lab: &Arc<RosArm>) -> Self {
+    fn new(lab: &Arc<RosArm>) -> Self {
         let period_s = 1.0 / lab.settings().rate_hz;
         let capabilities = Capabilities {
             resettable: false,
@@ -105,7 +111,15 @@ impl RosBackend {
     fn read(&mut self) -> Result<&Reading, Fault> {
         match self.update_reading() {
             Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
+            Err(cause) => {
+                // A trajectory ends later than the robot's own stop by the lag of its servo.
+                let is_engaged = self.lab.mailbox.latest().is_engaged;
+                let is_stopped = !is_engaged || matches!(cause, LinkFault::Arm(_));
+                if self.lab.settings().driver().modes.is_some() && !is_stopped {
+                    self.brake();
+                }
+                Err(self.fault(cause))
+            }
         }
     }
 

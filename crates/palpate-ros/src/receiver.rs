@@ -242,7 +242,15 @@ impl TopicReceiver {
                 let wrench = Wrench { force_n, torque_nm };
                 let (force, torque) = (wrench.force_n.as_slice(), wrench.torque_nm.as_slice());
                 if !force.iter().chain(torque).all(|part| part.is_finite()) {
-                    return Err(refuse(format!("{force:?} and {torque:?}")));
+                    let is_absent = force.iter().chain(torque).all(|part| part.is_nan());
+                    return Err(refuse(match is_absent {
+                        true => {
+                            "all numbers are NaN: no sensor is behind it, as on mock hardware; \
+                                 rehearse with palpate run --dry"
+                                .into()
+                        }
+                        false => format!("{force:?} and {torque:?}"),
+                    }));
                 }
                 let is_estimated = self.settings.has_estimated_wrench();
                 let in_flange = heard.franka.in_flange(&wrench).filter(|_| is_estimated);

@@ -77,9 +77,9 @@ pub fn stoppable_share(qdot: &[f64]) -> f64 {
 /// Joint velocities as a stream of short trajectories, each of which ends at rest: an arm that
 /// receives no more comes to rest by itself.
 ///
-/// A trajectory joins the reference, keeps the commanded velocity for a while, then decelerates. Its positions
-/// follow a reference, the integral of the commands, so that errors do not accumulate. A late
-/// command finds the reference where the trajectory before it ended.
+/// A trajectory joins the reference, keeps the commanded velocity for a while, then decelerates.
+/// Its positions follow a reference, the integral of the commands, so that errors do not accumulate.
+/// A late command finds the reference where the trajectory before it ended.
 #[derive(Debug, Default)]
 pub struct TrajectoryStream {
     /// Joint positions up to which motion was commanded, rad.
