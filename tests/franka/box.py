@@ -130,7 +130,8 @@ class Robot(mujoco_simulator.FrankaMujocoRobot):
                 force = force if contact.geom2 == tip else -force
                 turn = data.xmat[link].reshape(3, 3).T
                 torque = np.cross(contact.pos - data.geom_xpos[tip], force)
-                wrench += np.concatenate([turn @ force, turn @ torque])
+                # Of the arm on its environment (libfranka, robot_state.h).
+                wrench -= np.concatenate([turn @ force, turn @ torque])
         return super().state.replace(K_F_ext_hat_K=tuple(wrench.tolist()))
 
 

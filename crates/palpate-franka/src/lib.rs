@@ -264,7 +264,8 @@ fn tip_wrench(state: &RobotState, x_ft: &Isometry3<f64>) -> Wrench {
     };
     // The wrench acts on the stiffness frame K, whose pose is set in Desk or by the client.
     let x_fk = pose(&state.F_T_EE) * pose(&state.EE_T_K);
-    let [fx, fy, fz, tx, ty, tz] = state.K_F_ext_hat_K;
+    // It is that of the arm on its environment (libfranka, `robot_state.h`).
+    let [fx, fy, fz, tx, ty, tz] = state.K_F_ext_hat_K.map(|part| -part);
     let wrench = Wrench { force_n: Vector3::new(fx, fy, fz), torque_nm: Vector3::new(tx, ty, tz) };
     wrench.moved(&(x_ft.inverse() * x_fk))
 }
