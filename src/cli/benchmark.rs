@@ -26,8 +26,7 @@ benchmark.json and the table benchmark.md, with a run's folder for each object. 
 continues it, and runs only the missing planners. Results of two programs can be compared if the protocol's version and \
 hash in their files are equal. --quick runs a part of the protocol and marks its files.")]
 pub(super) struct Args {
-    /// Also run this planner, built in or Python (MODULE:CLASS); may be repeated. Python planners
-    /// need the `palpate` of the Python package.
+    /// Also run this planner, built in or Python (MODULE:CLASS); may be repeated.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
     /// Run two objects, two trials and 15 touches only, to try out a planner; the result is not

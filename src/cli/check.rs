@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// An experiment (.toml), or the name of one in experiments/.
     experiment: PathBuf,
     /// Check this planner instead of the experiment's, built in or Python (MODULE:CLASS); may be
-    /// repeated. Python planners need the `palpate` of the Python package.
+    /// repeated.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
     /// Baseline file, written by --accept.

@@ -3,7 +3,7 @@
 use super::doctor_arm;
 use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::host::Host;
-use super::terminal::{Outcome, print};
+use super::terminal::{Line, Outcome, State, print};
 use crate::experiment::Experiment;
 use palpate_ros::network::{discovery_note, network};
 use palpate_ros::settings::BackendSettings;
@@ -33,18 +33,6 @@ pub(super) struct Args {
     #[arg(long, value_name = "KEY=VALUE", requires = "arm")]
     set: Vec<String>,
 }
-
-/// State of a part.
-#[derive(PartialEq)]
-pub(super) enum State {
-    Ok,
-    /// An optional part is missing.
-    Absent,
-    Wrong,
-}
-
-/// A part, its state, and what was found or what to do.
-pub(super) type Line = (&'static str, State, String);
 
 pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
     let lines = match &args.arm {

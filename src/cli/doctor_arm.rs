@@ -1,6 +1,6 @@
 //! Command `palpate doctor --arm`: what an arm publishes, topic by topic.
 
-use super::doctor::{Line, State};
+use super::terminal::{Line, State};
 use crate::experiment::Experiment;
 use crate::sim::Environment;
 use anyhow::{Context, ensure};

@@ -9,11 +9,10 @@ pub(super) struct KnownBodyArgs {
     /// Ball of this radius, m, in place of the scene's object.
     #[arg(long, value_name = "RADIUS_M", value_parser = radius, requires = "at", conflicts_with = "plate")]
     ball: Option<f64>,
-    /// Plate in place of the scene's object; its normal in the world frame, towards the finger.
+    /// Plate in its place; its normal towards the finger.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, requires = "at", allow_hyphen_values = true)]
     plate: Option<[f64; 3]>,
-    /// Centre of the ball or a point of the plate in the world frame, m; with --cloud of `palpate
-    /// register` the initial position of the mesh's origin in the cloud's frame.
+    /// Centre of the ball, a point of the plate, or with --cloud the mesh's origin, m.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, allow_hyphen_values = true)]
     pub(super) at: Option<[f64; 3]>,
 }

@@ -60,7 +60,10 @@ fn commands(program: &Command) -> String {
             }
         }
         let help = command.disable_help_flag(true).after_help("").render_help().to_string();
-        let lines: Vec<&str> = help.lines().map(str::trim_end).collect();
+        // The usage repeats the arguments below it, except for required options.
+        let repeats = |line: &&str| line.starts_with("Usage: ") && !line.contains(" --");
+        let lines: Vec<&str> =
+            help.lines().map(str::trim_end).filter(|line| !repeats(line)).collect();
         text +=
             &format!("\n### `palpate {name}`\n\n```text\n{}\n```\n", lines.join("\n").trim_end());
     }

@@ -58,8 +58,8 @@ pub(super) struct Args {
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Also run this planner, built in or Python (MODULE:CLASS); may be repeated. Python planners
-    /// need the `palpate` of the Python package.
+    /// Also run this planner, built in or Python (MODULE:CLASS, with the Python
+    /// package's `palpate`); may be repeated.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
     /// Threads; 0 means all cores. Results do not depend on it.

@@ -143,3 +143,15 @@ mod tests {
         assert_eq!(quoted("it's"), r"'it'\''s'");
     }
 }
+
+/// State of a part that `palpate doctor` checks.
+#[derive(PartialEq)]
+pub(super) enum State {
+    Ok,
+    /// An optional part is missing.
+    Absent,
+    Wrong,
+}
+
+/// A part, its state, and what was found or what to do.
+pub(super) type Line = (&'static str, State, String);

@@ -308,7 +308,7 @@ impl BackendSettings {
         name.rsplit('/').nth(1).unwrap_or_default().to_owned()
     }
 
-    /// Returns the groups of command interfaces through which an arm moves other than by its joints.
+    /// Returns the groups of command interfaces by which an arm moves other than by its joints.
     pub fn modes(&self) -> Vec<String> {
         let modes = self.driver().modes.unwrap_or_default();
         modes.iter().map(|mode| format!("{}{mode}", self.prefix)).collect()

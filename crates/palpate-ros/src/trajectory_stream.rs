@@ -78,7 +78,7 @@ pub fn stoppable_share(qdot: &[f64]) -> f64 {
 /// receives no more comes to rest by itself.
 ///
 /// A trajectory joins the reference, keeps the commanded velocity for a while, then decelerates.
-/// Its positions follow a reference, the integral of the commands, so that errors do not accumulate.
+/// Its positions follow a reference, the integral of the commands, so that errors do not add up.
 /// A late command finds the reference where the trajectory before it ended.
 #[derive(Debug, Default)]
 pub struct TrajectoryStream {

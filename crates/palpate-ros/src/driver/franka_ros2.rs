@@ -44,7 +44,8 @@ pub(super) static DRIVER: Driver = Driver {
 const WRENCH: &str = "franka_robot_state_broadcaster/external_wrench_in_stiffness_frame";
 
 /// Fault of a driver whose hardware interface has stopped: after an error of the robot it reads no
-/// more states (`franka_hardware_interface.cpp`; `franka_hardware/doc/index.rst`, "Error Recovery").
+/// more states (`franka_hardware_interface.cpp`; `franka_hardware/doc/index.rst`, "Error
+/// Recovery").
 const STOPPED: &str = "franka_ros2 has stopped after a reflex, a limit, a user stop or lost packets; its log has the \
                        error. Recover with: ros2 action send_goal /action_server/error_recovery \
                        franka_msgs/action/ErrorRecovery {}; then ros2 control set_hardware_component_state \
