@@ -109,8 +109,8 @@ fn set_tcp_nodelay() {
     }
 }
 
-/// Returns the number of nodes that publish `topic` (role 0) or subscribe to it (role 1) in an answer
-/// to `getSystemState`, which is `[code, words, [publishers, subscribers, services]]`; each of the
+/// Returns the number of nodes that publish `topic` (role 0) or subscribe to it (role 1) in an
+/// answer to `getSystemState`, `[code, words, [publishers, subscribers, services]]`; each of the
 /// three is a list of `[topic, [node…]]`.
 fn count(text: &str, role: usize, topic: &str) -> Option<usize> {
     let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
