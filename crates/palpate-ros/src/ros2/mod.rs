@@ -19,7 +19,7 @@ use crate::transport::{
     Delivery, Packet, PacketMessage, Publisher, Transport, Waker, cannot_open, cannot_send,
 };
 use crate::view::{MarkerArray, PointCloud2, TFMessage};
-use calls::{OpenService as _, ServiceClient, ServiceServer};
+use calls::{CYCLONE, Clients, OpenService as _, ServiceClient, ServiceServer};
 use endpoint::{WAKE, best_effort, kept, latched, reliable, watch};
 use palpate_input::error::InputError;
 use ros2_client::{
@@ -68,10 +68,6 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Delay from the creation of a client until its server knows it, so that a request is not lost.
 // heuristic: several exchanges of endpoint discovery on a local network.
 const SETTLE: Duration = Duration::from_millis(200);
-
-/// Vendor id of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3;
-/// list of vendors of the DDS Foundation).
-const CYCLONE: [u8; 2] = [0x01, 0x10];
 
 /// Returns the network interfaces of this machine with their IPv4 addresses.
 fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
@@ -259,10 +255,18 @@ impl Ros2 {
 
     fn serve(&mut self, service: Service) -> Result<(), InputError> {
         let name = self.service_name(&service);
-        // The client's vendor is not known in advance: the default mapping, unless set.
-        let mapping = mapping(self.settings.service_mapping, [0, 0]);
-        let place = (&mut self.node, &self.poll, mapping, &*name);
-        self.servers.push(ServiceServer::open(place, service, self.settings.release)?);
+        let kind = self.settings.service_mapping;
+        // A client's vendor is not known in advance: one server for each default mapping.
+        let clients = match kind {
+            MappingKind::Auto => &[Clients::Others, Clients::Cyclone][..],
+            _ => &[Clients::All],
+        };
+        for &clients in clients {
+            let vendor = if clients == Clients::Cyclone { CYCLONE } else { [0, 0] };
+            let place = (&mut self.node, &self.poll, mapping(kind, vendor), &*name);
+            let server = ServiceServer::open(place, service.clone(), self.settings.release)?;
+            self.servers.push(server.of(clients));
+        }
         Ok(())
     }
 
