@@ -272,7 +272,7 @@ impl BackendSettings {
         match topic {
             Topic::Status => self.status_on_change,
             Topic::RobotMode | Topic::SafetyMode | Topic::ProgramRunning => true,
-            Topic::Markers | Topic::Points | Topic::Frames => true,
+            Topic::Markers | Topic::Points | Topic::Frames | Topic::CollisionObject => true,
             Topic::FixedTransforms | Topic::Goals | Topic::Description => true,
             _ => false,
         }

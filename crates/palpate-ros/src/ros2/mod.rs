@@ -12,6 +12,7 @@ use crate::message::{
     JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
 };
 use crate::network::network;
+use crate::planning_scene::CollisionObject;
 use crate::service::{Answer, Service};
 use crate::settings::{BackendSettings, MappingKind};
 use crate::topics::{CommandMessage, Endpoint, TactileMessage, Topic};
@@ -170,12 +171,16 @@ impl Ros2 {
                 Topic::Goals => self.topic::<GoalStatusArray>(topic)?,
                 Topic::Description => self.topic::<RobotDescription>(topic)?,
                 Topic::Clock => self.topic::<Clock>(topic)?,
-                Topic::Command | Topic::Markers | Topic::Points | Topic::Frames => (),
+                Topic::Command | Topic::Markers | Topic::Points => (),
+                Topic::Frames | Topic::CollisionObject => (),
             }
         }
         if self.side == Endpoint::Explorer {
             self.topic::<MarkerArray>(Topic::Markers)?;
             self.topic::<PointCloud2>(Topic::Points)?;
+            if settings.topics.collision_object.is_some() {
+                self.topic::<CollisionObject>(Topic::CollisionObject)?;
+            }
             return self.topic::<TFMessage>(Topic::Frames);
         }
         self.commands()
@@ -199,7 +204,12 @@ impl Ros2 {
         if topic.publisher() != self.side {
             return self.subscribe::<M>(topic, if is_kept { latched() } else { best_effort() });
         }
-        let qos = if is_kept { kept() } else { reliable() };
+        let qos = match is_kept {
+            // Object and table, one message each.
+            true if topic == Topic::CollisionObject => kept(2),
+            true => kept(1),
+            false => reliable(),
+        };
         let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let publisher =
             self.node.create_publisher::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
