@@ -131,8 +131,7 @@ fn peer(arguments: &[&str]) -> Command {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_peer_of_another_implementation_drives_the_twin_of_a_ur() {
     let network = Network::of(71, UR_EXPERIMENT);
-    let mapping = ["--set", "backend.service_mapping=\"cyclone\""];
-    let twin = TwinProcess::new(&network, UR_EXPERIMENT, &mapping);
+    let twin = TwinProcess::new(&network, UR_EXPERIMENT, &[]);
     let output = peer(&["drive", "71"]).output().unwrap();
     let values = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{values}{}", String::from_utf8_lossy(&output.stderr));

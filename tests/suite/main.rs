@@ -58,6 +58,7 @@ mod inputs;
 #[cfg(feature = "mujoco")]
 mod installed;
 mod interlocks;
+mod keep_out;
 #[cfg(feature = "mujoco")]
 mod lab;
 mod lab_camera;
@@ -67,6 +68,8 @@ mod lab_faults;
 mod lab_fr3;
 #[cfg(feature = "mujoco")]
 mod lab_live;
+#[cfg(feature = "mujoco")]
+mod lab_planning_scene;
 #[cfg(feature = "mujoco")]
 mod lab_recognition;
 #[cfg(feature = "mujoco")]

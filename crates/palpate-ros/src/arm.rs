@@ -4,6 +4,7 @@ use super::link::{Link, TURN};
 use super::message::Time;
 use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::network::discovery_note;
+use super::planning_scene::{CollisionObject, KeepOutSolid};
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
 use super::service::{Answer, Service};
 use super::settings::{BackendKind, BackendSettings};
@@ -129,6 +130,19 @@ impl RosArm {
             }
         }
         self.show(shown.clone());
+    }
+
+    /// Publishes solids that other programs' arms avoid, if `backend.topics.collision_object` is
+    /// set. They replace those of the same names, and stay after the end: so does the object.
+    pub fn show_solids(&self, solids: impl FnOnce() -> Vec<KeepOutSolid>) {
+        let settings = self.settings();
+        if settings.kind != BackendKind::Ros2 || settings.topics.collision_object.is_none() {
+            return;
+        }
+        let (frame, x_wb) = (settings.base_frame(), self.chain.base);
+        for solid in solids() {
+            self.link.send(CollisionObject::new(&solid, &frame, &x_wb, pace::now_s()).into());
+        }
     }
 
     /// Publishes the pose of a recognised object's mesh in `W` as the frame `object`.

@@ -164,7 +164,8 @@ macro_rules! messages {
             $($constants:literal)?
             $(
                 $(#[$field_meta:meta])*
-                $type:ident $(/ $part:ident)? $([$($count:literal)?])? $field:ident $($default:literal)?,
+                $type:ident $(/ $part:ident)? $([$(<= $most:literal)? $($count:literal)?])?
+                $field:ident $($default:literal)?,
             )*
         }
     )*) => {$(
@@ -173,7 +174,7 @@ macro_rules! messages {
         pub struct $name {
             $(
                 $(#[$field_meta])*
-                pub $field: messages!(@type $type $(/ $part)? $([$($count)?])?),
+                pub $field: messages!(@type $type $(/ $part)? $([$(<= $most)? $($count)?])?),
             )*
         }
 
@@ -187,7 +188,7 @@ macro_rules! messages {
             const DEFINITION: Definition = Definition {
                 name: concat!(stringify!($package), "/msg/", stringify!($name)),
                 fields: concat!($($constants,)? $(
-                    stringify!($type), $("/", stringify!($part),)? $("[", $($count,)? "]",)?
+                    stringify!($type), $("/", stringify!($part),)? $("[", $("<=", $most,)? $($count,)? "]",)?
                     " ", stringify!($field), $(" ", $default,)? "\n",
                 )*),
                 parts: &[$($(&$part::DEFINITION,)?)*],
@@ -209,6 +210,9 @@ macro_rules! messages {
     (@type string) => { String };
     (@type $package:ident / $name:ident) => { $name };
     (@type $type:ident $(/ $part:ident)? []) => { Vec<messages!(@type $type $(/ $part)?)> };
+    (@type $type:ident $(/ $part:ident)? [<= $most:literal]) => {
+        Vec<messages!(@type $type $(/ $part)?)>
+    };
     (@type $type:ident $(/ $part:ident)? [$count:literal]) => {
         [messages!(@type $type $(/ $part)?); $count]
     };

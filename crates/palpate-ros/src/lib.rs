@@ -41,6 +41,7 @@ pub mod listen;
 pub mod message;
 pub mod net_ft;
 pub mod network;
+pub mod planning_scene;
 pub mod receiver;
 pub mod recording;
 #[cfg(feature = "ros1")]

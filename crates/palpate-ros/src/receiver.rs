@@ -297,6 +297,7 @@ impl TopicReceiver {
             | Packet::Velocities(_)
             | Packet::Markers(_)
             | Packet::Points(_)
+            | Packet::CollisionObject(_)
             | Packet::Description(_) => return Ok(()),
         }
         heard.topics[topic as usize].at = Some(received);

@@ -44,7 +44,7 @@ impl BackendKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MappingKind {
-    /// Default of the server's vendor.
+    /// Default of the other side's vendor.
     #[default]
     Auto,
     /// Request identity in the inline QoS: Fast DDS, RTI Connext, RustDDS.
@@ -95,7 +95,7 @@ pub struct BackendSettings {
     /// `ROS_AUTOMATIC_DISCOVERY_RANGE`, or all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub interfaces: Vec<String>,
-    /// Mapping of ROS 2 services to DDS; `auto` follows the server's vendor.
+    /// Mapping of ROS 2 services to DDS; `auto` follows the vendor of the other side.
     pub service_mapping: MappingKind,
     /// Address of the ROS 1 master.
     pub master: String,
@@ -272,7 +272,7 @@ impl BackendSettings {
         match topic {
             Topic::Status => self.status_on_change,
             Topic::RobotMode | Topic::SafetyMode | Topic::ProgramRunning => true,
-            Topic::Markers | Topic::Points | Topic::Frames => true,
+            Topic::Markers | Topic::Points | Topic::Frames | Topic::CollisionObject => true,
             Topic::FixedTransforms | Topic::Goals | Topic::Description => true,
             _ => false,
         }

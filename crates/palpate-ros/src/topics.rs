@@ -7,6 +7,7 @@ use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
     JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
 };
+use super::planning_scene::CollisionObject;
 use super::view::{MarkerArray, PointCloud2, TFMessage};
 use palpate_input::config::{Rules, Validate, is_default};
 use schemars::JsonSchema;
@@ -51,6 +52,8 @@ pub enum Topic {
     Description,
     /// Time of a simulated robot.
     Clock,
+    /// Solids that arms of other programs avoid.
+    CollisionObject,
 }
 
 /// Side of the topics: explorer or arm.
@@ -64,7 +67,7 @@ pub enum Endpoint {
 
 impl Topic {
     /// All topics.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Joints,
         Self::Wrench,
         Self::Tactile,
@@ -83,6 +86,7 @@ impl Topic {
         Self::Goals,
         Self::Description,
         Self::Clock,
+        Self::CollisionObject,
     ];
 
     /// Topics of the explorer for viewers.
@@ -105,7 +109,8 @@ impl Topic {
     /// Returns the side that publishes the topic.
     pub fn publisher(self) -> Endpoint {
         match self {
-            Self::Command | Self::Markers | Self::Points | Self::Frames => Endpoint::Explorer,
+            Self::Command | Self::Markers | Self::Points => Endpoint::Explorer,
+            Self::Frames | Self::CollisionObject => Endpoint::Explorer,
             _ => Endpoint::Arm,
         }
     }
@@ -131,7 +136,7 @@ const KEYS: [&str; 10] = [
 ];
 
 /// Names of the topics without settings, in their order.
-const FIXED: [&str; 8] = [
+const FIXED: [&str; 9] = [
     "/palpate/markers",
     "/palpate/points",
     "/tf_static",
@@ -140,6 +145,7 @@ const FIXED: [&str; 8] = [
     "follow_joint_trajectory/_action/status",
     "robot_description",
     "/clock",
+    "/collision_object",
 ];
 
 /// Default name and age limit, s, of each topic with settings, as used by drivers
@@ -289,6 +295,10 @@ pub struct Topics {
     /// Its speed as a percentage of the commanded one.
     #[serde(skip_serializing_if = "is_default")]
     pub speed_scaling: SpeedScalingTopic,
+    /// Topic of MoveIt on which the believed surface with its band, and the table, are published
+    /// for other programs to avoid, e.g. `"/collision_object"`; default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub collision_object: Option<String>,
     /// State of a Franka arm.
     #[serde(skip_serializing_if = "is_default")]
     pub franka_state: FrankaStateTopic,
@@ -307,6 +317,9 @@ impl Topics {
             Topic::SafetyMode => (&self.safety_mode.name, f64::INFINITY),
             Topic::ProgramRunning => (&self.program_running.name, f64::INFINITY),
             Topic::SpeedScaling => (&self.speed_scaling.name, self.speed_scaling.max_age_s),
+            Topic::CollisionObject if self.collision_object.is_some() => {
+                (self.collision_object.as_deref().unwrap_or_default(), f64::INFINITY)
+            }
             Topic::FrankaState => (&self.franka_state.name, self.franka_state.max_age_s),
             other => (FIXED[other as usize - USUAL.len()], f64::INFINITY),
         }
@@ -361,6 +374,7 @@ impl Topics {
             Topic::Goals => GoalStatusArray::DEFINITION.name,
             Topic::Description => RobotDescription::DEFINITION.name,
             Topic::Clock => Clock::DEFINITION.name,
+            Topic::CollisionObject => CollisionObject::DEFINITION.name,
         }
     }
 
@@ -387,12 +401,18 @@ impl Validate for Topics {
             || "a name that begins with a slash, or \"\" for none".into(),
         );
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
+        let is_name =
+            |name: &str| !name.is_empty() && !name.ends_with('/') && name.chars().all(is_plain);
+        if let Some(name) = &self.collision_object {
+            rules.require("collision_object", format!("\"{name}\""), is_name(name), || {
+                "letters, digits, _ and slashes".into()
+            });
+        }
         let names = Topic::SET.map(|topic| self.name(topic));
         for (i, topic) in Topic::SET.into_iter().enumerate() {
             let (name, max_age_s) = self.entry(topic);
-            let is_name = !name.is_empty() && !name.ends_with('/') && name.chars().all(is_plain);
             let key = format!("{}.name", topic.key());
-            rules.require(&key, format!("\"{name}\""), is_name, || {
+            rules.require(&key, format!("\"{name}\""), is_name(name), || {
                 "letters, digits, _ and slashes".into()
             });
             rules.require(

@@ -6,6 +6,7 @@ use super::message::{
     BioTacHand, BiotacAll, Bool, DiagnosticArray, Float64, Float64MultiArray, Image, JointState,
     JointTrajectory, RobotMode, SafetyMode, Time, Touching, WrenchStamped,
 };
+use super::planning_scene::CollisionObject;
 use super::service::{Answer, Service};
 use super::topics::Topic;
 use super::view::{MarkerArray, PointCloud2, TFMessage};
@@ -93,6 +94,8 @@ packets! {
     Description(RobotDescription): RobotDescription on Description,
     /// Time of a simulated robot.
     Clock(Clock): Clock on Clock,
+    /// A solid to avoid.
+    CollisionObject(Box<CollisionObject>): CollisionObject on CollisionObject,
 }
 
 impl Packet {
@@ -118,7 +121,8 @@ impl Packet {
             | Self::Velocities(_)
             | Self::Goals(_)
             | Self::Description(_)
-            | Self::Clock(_) => return None,
+            | Self::Clock(_)
+            | Self::CollisionObject(_) => return None,
         };
         Some(&mut header.stamp)
     }

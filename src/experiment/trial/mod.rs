@@ -1,6 +1,7 @@
 //! A trial, Algorithm 1 of Yi et al. 2016: touch, fit and plan in a loop; and its row.
 
 mod belief_shape;
+pub mod keep_out;
 pub(super) mod looks;
 mod oracle;
 pub mod planner_names;

@@ -1,6 +1,7 @@
 //! Shapes of a running trial for viewers: belief, contacts, next approach, limits of the cell.
 
 use crate::experiment::simulation::Simulation;
+use crate::experiment::trial::keep_out::{keep_out, table_sides_m};
 use crate::experiment::trial::{NextTouch, TrialEvent};
 use nalgebra::Point3;
 use palpate_ros::arm::RosArm;
@@ -17,9 +18,6 @@ const NEXT: ColorRGBA = ColorRGBA { r: 0.1, g: 0.6, b: 0.2, a: 1.0 };
 /// Colour of the limits.
 // heuristic: red.
 const LIMIT: ColorRGBA = ColorRGBA { r: 0.8, g: 0.1, b: 0.1, a: 0.8 };
-
-/// Half of the drawn part of a plane without bounds, m; a heuristic: an arm's reach.
-const PLANE_M: f64 = 0.5;
 
 /// Returns the approach of a touch: the way of the fingertip's centre through the region.
 pub(super) fn approach(next: &NextTouch) -> Marker {
@@ -41,10 +39,7 @@ pub(super) fn limits(simulation: &Simulation) -> Marker {
         marker.points = edges.flat_map(|(a, b)| [corner(a), corner(b)]).map(Point::from).collect();
     }
     if let Some(lowest_m) = interlocks.lowest_m {
-        let [x, y] = match interlocks.workspace_m {
-            Some([x, y, _]) => [x, y],
-            None => [[-PLANE_M, PLANE_M]; 2],
-        };
+        let [x, y] = table_sides_m(interlocks);
         let at = |x, y| Point3::new(x, y, lowest_m);
         let around = [at(x[0], y[0]), at(x[1], y[0]), at(x[1], y[1]), at(x[0], y[1])];
         let lines = (0..4).flat_map(|i| [around[i], around[(i + 1) % 4]]);
@@ -53,13 +48,21 @@ pub(super) fn limits(simulation: &Simulation) -> Marker {
     marker
 }
 
-/// Publishes the shapes that change with `event` to the viewers of `arm`.
+/// Publishes the shapes that change with `event` to the viewers of `arm`, and to programs that
+/// avoid them.
 pub fn show(arm: &RosArm, simulation: &Simulation, event: &TrialEvent) {
     let markers = match event {
-        TrialEvent::Next(next) => vec![approach(next), limits(simulation)],
+        TrialEvent::Next(next) => {
+            // Later, the belief is that of the last touch.
+            if next.count == 1 {
+                arm.show_solids(|| keep_out(simulation, next.belief));
+            }
+            vec![approach(next), limits(simulation)]
+        }
         TrialEvent::Finished(touched) => {
             let believed = touched.shape();
             arm.show(PointCloud2::new(&believed.points));
+            arm.show_solids(|| keep_out(simulation, touched.belief));
             believed.markers.to_vec()
         }
     };

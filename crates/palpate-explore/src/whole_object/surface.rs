@@ -8,6 +8,7 @@ use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::primitives::extent;
+use palpate_geometry::solids::Triangles;
 use palpate_gp::Posterior;
 use palpate_gp::means::MeanField;
 use rayon::iter::ParallelIterator;
@@ -55,6 +56,11 @@ const STEPS: usize = 2;
 /// Step that is the last one, in cells; a heuristic: the error after it is about its square over
 /// twice the radius of curvature, below a hundredth of a cell where that is half a cell or more.
 const SETTLED: f64 = 0.1;
+
+/// Factor of a field with its standard deviation, which rises faster than a distance near data, in
+/// the search for its zeros.
+// heuristic: slopes of 3.5 stay within the search's bound.
+const FLATTENED: f64 = 0.4;
 
 impl Surface {
     pub(super) fn new<'a>(
@@ -181,6 +187,21 @@ impl Surface {
         let (mut vertices, triangles, cell_m) = self.crude(cells);
         self.approach(&mut vertices, cell_m);
         Mesh::new(&vertices, &triangles).ok().map(|(mesh, _)| mesh)
+    }
+
+    /// Returns the closed boundary of the region of `ball` where the field is below `sds` standard
+    /// deviations, so that the object may be there, from a grid of `cells` along the diameter.
+    pub fn outer_triangles(&self, ball: &Ball, sds: f64, cells: u32) -> Triangles {
+        let corners = [-ball.radius_m, ball.radius_m].map(|r| ball.centre_w.map(|x| x + r));
+        let cell_m = 2.0 * ball.radius_m / f64::from(cells.max(1));
+        zero_set(corners, cell_m, |points_w| {
+            let fields = self.values(points_w).into_iter().zip(self.sds_m(points_w));
+            let fields = fields.zip(points_w).map(|((value, sd_m), p_w)| {
+                let beyond_m = (p_w - ball.centre_w).norm() - ball.radius_m;
+                FLATTENED * (value - sds * sd_m).max(beyond_m)
+            });
+            fields.collect()
+        })
     }
 
     /// Returns vertices where the field's interpolated values are zero, the triangles between them

@@ -323,13 +323,49 @@ impl ServiceClient {
     }
 }
 
+/// Receives the next request; an outer `None` ends the queue, an inner one is a request without
+/// this mapping.
+type Receive = Box<dyn Fn() -> Option<Option<(RmwRequestId, Service)>>>;
+
+/// Vendor id of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3;
+/// list of vendors of the DDS Foundation).
+pub(super) const CYCLONE: [u8; 2] = [0x01, 0x10];
+
+/// Vendors of the clients that a server answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Clients {
+    /// All vendors.
+    All,
+    /// Eclipse Cyclone DDS.
+    Cyclone,
+    /// All but Eclipse Cyclone DDS.
+    Others,
+}
+
+impl Clients {
+    /// Whether the client with this request is one of them.
+    fn contains(self, id: &RmwRequestId) -> bool {
+        let is_cyclone = id.writer_gid.to_bytes16().starts_with(&CYCLONE);
+        match self {
+            Self::All => true,
+            Self::Cyclone => is_cyclone,
+            Self::Others => !is_cyclone,
+        }
+    }
+}
+
 /// A server of a service.
 pub(super) struct ServiceServer {
-    take: Box<dyn Fn() -> Option<(RmwRequestId, Service)>>,
+    receive: Receive,
     answer: Respond,
+    clients: Clients,
     /// Calls that wait for their answers.
     calls: HashMap<u64, RmwRequestId>,
 }
+
+/// Largest number of requests that are read at once.
+// heuristic: more than wait in the queue of a reader.
+const REQUESTS_MAX: usize = 256;
 
 impl OpenService for ServiceServer {
     fn typed<R: Request>(
@@ -344,24 +380,38 @@ impl OpenService for ServiceServer {
         let server = Rc::new(server);
         let requests = Rc::clone(&server);
         Ok(Self {
-            take: Box::new(move || {
-                let (id, request) = requests.receive_request().ok().flatten()?;
-                Some((id, request.call(&service)))
+            receive: Box::new(move || match requests.receive_request() {
+                Ok(None) => None,
+                Ok(Some((id, request))) => Some(Some((id, request.call(&service)))),
+                Err(_) => Some(None),
             }),
             answer: Box::new(move |id, answer| {
                 server.send_response(id, R::Response::of(answer)).map_err(|error| error.to_string())
             }),
+            clients: Clients::All,
             calls: HashMap::new(),
         })
     }
 }
 
 impl ServiceServer {
+    /// Restricts the server to these clients: those of its mapping, where several servers of a
+    /// service receive each request.
+    pub(super) fn of(self, clients: Clients) -> Self {
+        Self { clients, ..self }
+    }
+
     /// Returns the next received call, to be answered under the number `call`.
     pub(super) fn take(&mut self, call: u64) -> Option<Service> {
-        let (id, service) = (self.take)()?;
-        self.calls.insert(call, id);
-        Some(service)
+        for _ in 0..REQUESTS_MAX {
+            // A request that another mapping encoded may be unreadable, or read wrongly.
+            let Some((id, service)) = (self.receive)()? else { continue };
+            if self.clients.contains(&id) {
+                self.calls.insert(call, id);
+                return Some(service);
+            }
+        }
+        None
     }
 
     /// Answers a call; returns `None` if it is none of this server.

@@ -31,9 +31,9 @@ pub(super) fn latched() -> QosProfile {
     reliable().durability(Durability::TransientLocal)
 }
 
-/// QoS of a writer whose last message is kept for later readers.
-pub(super) fn kept() -> QosProfile {
-    latched().history(History::KeepLast { depth: 1 })
+/// QoS of a writer whose last `depth` messages are kept for later readers.
+pub(super) fn kept(depth: usize) -> QosProfile {
+    latched().history(History::KeepLast { depth })
 }
 
 /// Registers `source` with the poll; all sources are read after every wake-up.

@@ -12,6 +12,7 @@ use crate::message::{
     JointTrajectory, RobotMode, SafetyMode, Touching, WrenchStamped,
 };
 use crate::network::network;
+use crate::planning_scene::CollisionObject;
 use crate::service::{Answer, Service};
 use crate::settings::{BackendSettings, MappingKind};
 use crate::topics::{CommandMessage, Endpoint, TactileMessage, Topic};
@@ -19,7 +20,7 @@ use crate::transport::{
     Delivery, Packet, PacketMessage, Publisher, Transport, Waker, cannot_open, cannot_send,
 };
 use crate::view::{MarkerArray, PointCloud2, TFMessage};
-use calls::{OpenService as _, ServiceClient, ServiceServer};
+use calls::{CYCLONE, Clients, OpenService as _, ServiceClient, ServiceServer};
 use endpoint::{WAKE, best_effort, kept, latched, reliable, watch};
 use palpate_input::error::InputError;
 use ros2_client::{
@@ -68,10 +69,6 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Delay from the creation of a client until its server knows it, so that a request is not lost.
 // heuristic: several exchanges of endpoint discovery on a local network.
 const SETTLE: Duration = Duration::from_millis(200);
-
-/// Vendor id of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3;
-/// list of vendors of the DDS Foundation).
-const CYCLONE: [u8; 2] = [0x01, 0x10];
 
 /// Returns the network interfaces of this machine with their IPv4 addresses.
 fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
@@ -174,12 +171,16 @@ impl Ros2 {
                 Topic::Goals => self.topic::<GoalStatusArray>(topic)?,
                 Topic::Description => self.topic::<RobotDescription>(topic)?,
                 Topic::Clock => self.topic::<Clock>(topic)?,
-                Topic::Command | Topic::Markers | Topic::Points | Topic::Frames => (),
+                Topic::Command | Topic::Markers | Topic::Points => (),
+                Topic::Frames | Topic::CollisionObject => (),
             }
         }
         if self.side == Endpoint::Explorer {
             self.topic::<MarkerArray>(Topic::Markers)?;
             self.topic::<PointCloud2>(Topic::Points)?;
+            if settings.topics.collision_object.is_some() {
+                self.topic::<CollisionObject>(Topic::CollisionObject)?;
+            }
             return self.topic::<TFMessage>(Topic::Frames);
         }
         self.commands()
@@ -203,7 +204,12 @@ impl Ros2 {
         if topic.publisher() != self.side {
             return self.subscribe::<M>(topic, if is_kept { latched() } else { best_effort() });
         }
-        let qos = if is_kept { kept() } else { reliable() };
+        let qos = match is_kept {
+            // Object and table, one message each.
+            true if topic == Topic::CollisionObject => kept(2),
+            true => kept(1),
+            false => reliable(),
+        };
         let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let publisher =
             self.node.create_publisher::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
@@ -259,10 +265,18 @@ impl Ros2 {
 
     fn serve(&mut self, service: Service) -> Result<(), InputError> {
         let name = self.service_name(&service);
-        // The client's vendor is not known in advance: the default mapping, unless set.
-        let mapping = mapping(self.settings.service_mapping, [0, 0]);
-        let place = (&mut self.node, &self.poll, mapping, &*name);
-        self.servers.push(ServiceServer::open(place, service, self.settings.release)?);
+        let kind = self.settings.service_mapping;
+        // A client's vendor is not known in advance: one server for each default mapping.
+        let clients = match kind {
+            MappingKind::Auto => &[Clients::Others, Clients::Cyclone][..],
+            _ => &[Clients::All],
+        };
+        for &clients in clients {
+            let vendor = if clients == Clients::Cyclone { CYCLONE } else { [0, 0] };
+            let place = (&mut self.node, &self.poll, mapping(kind, vendor), &*name);
+            let server = ServiceServer::open(place, service.clone(), self.settings.release)?;
+            self.servers.push(server.of(clients));
+        }
         Ok(())
     }
 

@@ -5,6 +5,9 @@ use palpate_explore::robot::sensor::DepthImage;
 use palpate_ros::definition::{Definition, HasDefinition};
 use palpate_ros::franka_message::*;
 use palpate_ros::message::*;
+use palpate_ros::planning_scene::{
+    CollisionObject, Mesh, MeshTriangle, ObjectType, Plane, Point32, Polygon, SolidPrimitive,
+};
 use palpate_ros::tactile::{packet_of, sample};
 use palpate_ros::topics::TactileMessage;
 use palpate_ros::transport::Packet;
@@ -68,6 +71,14 @@ fn every_message_has_the_fields_of_its_standard_definition() {
         Touching::DEFINITION,
         Biotac::DEFINITION,
         BiotacAll::DEFINITION,
+        ObjectType::DEFINITION,
+        Point32::DEFINITION,
+        Polygon::DEFINITION,
+        SolidPrimitive::DEFINITION,
+        MeshTriangle::DEFINITION,
+        Mesh::DEFINITION,
+        Plane::DEFINITION,
+        CollisionObject::DEFINITION,
         Inertia::DEFINITION,
         InertiaStamped::DEFINITION,
         PoseStamped::DEFINITION,
