@@ -41,20 +41,18 @@ pub struct Experiment {
     /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
-    /// Initial touches, the same for all planners: random places in a zone, evenly spread
-    /// directions around an object.
+    /// Initial touches, the same for all planners: random in a zone, evenly spread around an
+    /// object.
     pub initial_touches: u32,
     /// Touches per trial, initial ones included.
     pub touches: u32,
     /// Views of the scene's camera before the touches.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub views: u32,
-    /// Largest number of further views, from other places of the camera, that a planner may ask for
-    /// between its touches.
+    /// Largest number of views that a planner may ask for between its touches.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub further_views: u32,
-    /// Held-out touches after the trial's `touches`, at low-discrepancy places: they test the
-    /// predictions of the belief without ground truth.
+    /// Held-out touches after the trial's `touches`: they test predictions without ground truth.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub verification_touches: u32,
     /// Touches at earlier targets, after the held-out ones, to measure repeatability.

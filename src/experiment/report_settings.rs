@@ -10,8 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReportSettings {
-    /// Touch counts after which beliefs are drawn (default: a third, two thirds and all of the
-    /// planned touches).
+    /// Touch counts after which beliefs are drawn (default: three).
     pub touch_counts: Vec<u32>,
     /// Trial whose beliefs are drawn.
     pub trial: u32,

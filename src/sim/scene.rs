@@ -184,8 +184,8 @@ pub struct ObjectSettings {
     /// Rotation about the fixed axes x, then y, then z of `W`.
     #[serde(default)]
     pub rotation_deg: [f64; 3],
-    /// Whether a flat patch, over which no errors are computed, closes each hole of the mesh. Use
-    /// `false` if the object itself has the holes.
+    /// Whether a flat patch without errors closes each hole of the mesh; `false` if the object has
+    /// the holes.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub fill_holes: bool,
     /// Name of the analytic surface behind the mesh; errors are computed against it instead of the

@@ -24,14 +24,13 @@ pub struct Fit {
     pub hyperparameters: Hyperparameters,
     /// Log marginal likelihood of the hyperparameters.
     pub log_likelihood: f64,
-    /// Largest residual standard deviation of a touch's height given the inducing touches, in the
-    /// heights' unit, if the posterior is approximate.
+    /// Largest residual standard deviation of a touch given the inducing touches, if the posterior
+    /// is approximate.
     #[serde(default, alias = "left_sd", skip_serializing_if = "Option::is_none")]
     pub nystrom_residual_sd: Option<f64>,
     /// Number of full covariance factorisations; rows appended during the scan are not counted.
     pub factorisations: u32,
-    /// Number of observations at the last scan of the whole box, in this fit or an earlier one that
-    /// it continued.
+    /// Number of observations at the last scan of the whole box.
     pub scanned_at: usize,
     /// Reason why the best BFGS run stopped.
     pub stop: Stop,

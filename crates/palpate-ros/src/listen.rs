@@ -80,6 +80,9 @@ pub struct Report {
 /// Time without an answer after which a service counts as silent.
 const ANSWER: Duration = Duration::from_secs(2);
 
+/// Services with the controllers of their answers, or why there are none.
+type Answers = Vec<(Service, Result<Vec<Controller>, String>)>;
+
 /// Listens to the arm of `settings`, whose joints are `names`, for `span`; commands
 /// nothing.
 ///
@@ -95,7 +98,7 @@ pub fn listen(
     all.hears_all = true;
     let connect = super::connect(&all, Endpoint::Explorer, services.clone())?;
     let report: Arc<Mutex<Report>> = Arc::default();
-    let answers: Arc<Mutex<Vec<(Service, Result<Vec<Controller>, String>)>>> = Arc::default();
+    let answers: Arc<Mutex<Answers>> = Arc::default();
     let (shared, answered, owned) = (Arc::clone(&report), Arc::clone(&answers), names.cloned());
     let take = move |delivery| match delivery {
         Delivery::Packet { packet, received, .. } => {

@@ -61,8 +61,7 @@ pub enum MappingKind {
 pub struct BackendSettings {
     /// Kind of backend: simulated, or an arm behind ROS topics.
     pub kind: BackendKind,
-    /// Driver of the arm: `palpate` for one as in the guide "Your robot", `ur` for
-    /// `ur_robot_driver`, `franka_ros2` for that of a Franka arm.
+    /// Driver of the arm: one for Palpate, `ur_robot_driver` or `franka_ros2`.
     pub profile: Profile,
     /// ROS 2 release on the driver's computer, which decides its controllers and the layout of its
     /// services.
@@ -80,7 +79,7 @@ pub struct BackendSettings {
     #[serde(skip_serializing_if = "is_default")]
     pub use_sim_time: bool,
     /// Time after which a watchdog of the laboratory stops the arm when velocities cease, s;
-    /// required for velocities with the profiles `ur` and `franka_ros2`, which have none.
+    /// required for velocities where the driver has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub watchdog_s: Option<f64>,
     /// Address of the control box of a Franka arm, e.g. `"172.16.0.2"`.
@@ -99,8 +98,7 @@ pub struct BackendSettings {
     pub service_mapping: MappingKind,
     /// Address of the ROS 1 master.
     pub master: String,
-    /// Frame of the robot's base for viewers, in which the pose of `W` is published; default:
-    /// `base_link`, with the profile `ur` `base`, with `franka_ros2` `fr3_link0`.
+    /// Frame of the robot's base, in which the pose of `W` is published; default: the driver's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base_frame: Option<String>,
     /// Joint names in messages, from the base on; default: the manufacturer's.

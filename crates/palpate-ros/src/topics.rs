@@ -295,8 +295,8 @@ pub struct Topics {
     /// Its speed as a percentage of the commanded one.
     #[serde(skip_serializing_if = "is_default")]
     pub speed_scaling: SpeedScalingTopic,
-    /// Topic of MoveIt on which the believed surface with its band, and the table, are published
-    /// for other programs to avoid, e.g. `"/collision_object"`; default: none.
+    /// Topic of MoveIt for the believed surface with its band and the table, e.g.
+    /// `"/collision_object"`; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub collision_object: Option<String>,
     /// State of a Franka arm.

@@ -32,8 +32,7 @@ pub struct Metrics {
     /// Coverage of the unreachable surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unreachable_coverage: Option<f64>,
-    /// Mean interval score of the 95 % band (Gneiting & Raftery 2007, Eq. 43): its width plus 40
-    /// times the distance of the truth outside of it, m; lower is better.
+    /// Mean interval score of the 95 % band (Gneiting & Raftery 2007, Eq. 43): lower is better.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_score_m: Option<f64>,
     /// Mean negative log density of the true heights (in m): ½·ln(2π·s²) + ½·error²/s², s² = σ² +

@@ -73,15 +73,13 @@ pub struct TouchRow {
     /// Standard deviation of the contact along its normal, as the sensor states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_sd_m: Option<f64>,
-    /// Further points of the surface that the same touch shows: place, normal and standard
-    /// deviation along it, all in `W`.
+    /// Further points that the touch shows: place, normal and standard deviation along it, in `W`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub patch: Vec<[f64; 7]>,
     /// Reason why the contact is less certain than usual, or was not located.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<Doubt>,
-    /// Centre of the fingertip's hemisphere in `W` at the approach's end; written for misses, and
-    /// for contacts if used.
+    /// Centre of the fingertip's hemisphere in `W` at the approach's end, if used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<[f64; 3]>,
     /// Simulator or robot time at the touch's end, s since its start; omitted without motion.

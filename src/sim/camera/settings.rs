@@ -37,8 +37,8 @@ pub struct CameraSettings {
     /// y, then z of `W`; replaces `look_at_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<[f64; 3]>,
-    /// File with the view of a real camera, a cloud (PLY, PCD) or a 16-bit PNG of depths, relative
-    /// to the scene file; without it the view is simulated.
+    /// View of a real camera: a cloud (PLY, PCD) or a 16-bit PNG of depths; without it the view is
+    /// simulated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<InputPath>,
     /// Unit of the file; default: `m` for a cloud, `mm` for depths.
@@ -81,8 +81,7 @@ pub struct CameraSettings {
     /// Time of a look, s, which a planner weighs against that of touches.
     #[serde(default = "look_s")]
     pub look_s: f64,
-    /// Further places that it looks from, in the order of their names: the second view is from the
-    /// first of them, and after the last comes the camera's own place again.
+    /// Further places that it looks from, in the order of their names; then its own again.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub further: BTreeMap<String, CameraPlace>,
 }

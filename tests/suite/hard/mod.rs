@@ -135,6 +135,6 @@ fn the_page_lists_every_case() {
         let line = text.lines().find(|line| line.starts_with(&start));
         let line = line.unwrap_or_else(|| panic!("{}: run `make hard-cases`", case.name));
         let [first, last] = [0, case.severities.len() - 1].map(|i| page::short(case.severities[i]));
-        assert!(line.contains(&format!("|{first} to {last}|")), "{}", case.name);
+        assert!(line.contains(&format!("|{first}–{last}|")), "{}", case.name);
     }
 }

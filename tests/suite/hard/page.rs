@@ -128,7 +128,7 @@ fn line(case: &Case, verdicts: &[Verdict]) -> String {
         beyond += &format!(" ({})", case.known);
     }
     format!(
-        "|**{}**: {}|{}|{} to {}|{}|{}|{}|{}|\n",
+        "|**{}**: {}|{}|{}–{}|{}|{}|{}|{}|\n",
         case.name,
         case.why,
         case.severity,

@@ -24,8 +24,8 @@ use std::sync::Arc;
 pub struct RecognitionSettings {
     /// Prior probability that the object is none of the library.
     pub none_probability: f64,
-    /// Standard deviation of a contact along the normal, m, on top of its sensor's: of the finger's
-    /// pose and of the mesh; default 0.0005, for a soft finger 0.002.
+    /// Standard deviation of a contact along the normal, m, beside its sensor's; default 0.0005,
+    /// for a soft finger 0.002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_sd_m: Option<f64>,
     /// Standard deviation of a contact's normal about each of two axes, deg; default 10, for a soft

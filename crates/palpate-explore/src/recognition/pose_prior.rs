@@ -11,8 +11,8 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PosePrior {
-    /// Middle of the box in `W`. The object stands on it: the middle of the base of its bounding
-    /// box is there; with `turn = "free"` the middle of its bounding box.
+    /// Middle of the box in `W`, on which the middle of the object's base lies; with `turn =
+    /// "free"` that of its bounding box.
     pub position_m: [f64; 3],
     /// Half of the box's sides.
     pub half_width_m: [f64; 3],

@@ -25,9 +25,8 @@ pub struct TouchSettings {
     pub detection: Detection,
     /// Force threshold of contact, N, without a pressure sensor or as `detection.by` selects.
     pub detection_n: f64,
-    /// Distance that a soft finger or a pad, or a finger of a real robot without a tactile sensor,
-    /// is pressed beyond the point of detection for reading, m; less where the force reaches a
-    /// quarter of `force_limit_n`.
+    /// Distance that a soft finger, a pad, or a real finger without a tactile sensor is pressed
+    /// beyond detection, m; less where the force reaches a quarter of `force_limit_n`.
     pub press_m: f64,
     /// Time at rest on the object before reading, s.
     pub settle_s: f64,

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 /// Origin of each joint in its parent link: x, y, z, m, and roll, pitch, yaw, rad; values of
 /// `config/ur5e/default_kinematics.yaml` of `Universal_Robots_ROS2_Description`.
+#[allow(clippy::approx_constant)] // the file's own digits
 const NOMINAL: [[f64; 6]; 6] = [
     [0.0, 0.0, 0.1625, 0.0, 0.0, 0.0],
     [0.0, 0.0, 0.0, 1.570796327, 0.0, 0.0],

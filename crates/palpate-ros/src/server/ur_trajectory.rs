@@ -70,7 +70,7 @@ impl Trajectory {
         Ok(Self { points, before: None, time_s })
     }
 
-    /// Advances by `period_s` at `scale` times the speed, and writes the setpoint to `q`. At first it
+    /// Advances by `period_s` at `scale` times the speed, and writes the setpoint to `q`. It first
     /// begins with the positions and velocities of `start`.
     pub fn advance(
         &mut self,

@@ -18,6 +18,7 @@ use palpate_ros::settings::BackendSettings;
 use palpate_ros::trajectory_stream::{TrajectoryStream, stoppable_share};
 use palpate_ros::transport::Packet;
 use proptest::prelude::*;
+use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
 /// Periods of the robot and of the explorer, s.
@@ -52,7 +53,7 @@ impl Robot {
 
     fn with(lag_s: f64, settings: BackendSettings) -> Self {
         let names = JointNames::new(vec!["a".into()]);
-        let computer = UrComputer::new(names.clone(), ROBOT_S, vec![3.14], &settings);
+        let computer = UrComputer::new(names.clone(), ROBOT_S, vec![PI], &settings);
         let reading = Reading { q: vec![0.5], qdot: vec![0.0], ..Reading::default() };
         Self { names, computer, reading, lag_s, time_s: 0.0 }
     }

@@ -9,8 +9,7 @@ effect! {
     /// Table `[gel]`: an elastomer pad with a camera behind it; instead of a `[skin]`.
     GelEffect in "gel"
     settings checked by check_settings {
-        /// Whether pressure moves the surface around it too, as on an elastic half-space; otherwise
-        /// each point yields by itself, as in a thin layer.
+        /// Whether pressure also moves the surface around it, as on an elastic half-space.
         spread: bool = true,
         /// Pixels of a depth image along the pad's width and height.
         pixels: [usize; 2] = [80, 60],

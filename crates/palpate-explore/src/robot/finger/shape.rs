@@ -24,8 +24,8 @@ pub struct Finger {
     /// Angle of the finger's axis above the approach, deg: 0 touches with the apex, 90 with the
     /// side.
     pub pitch_deg: f64,
-    /// Further pitches that a touch of a zone may use, deg; planners choose. At 0 the finger is
-    /// narrowest and reaches most. Requires `simulator = "swept"`.
+    /// Further pitches that planners may choose for a touch of a zone, deg. Requires `simulator =
+    /// "swept"`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub other_pitches_deg: Vec<f64>,
 }
