@@ -222,13 +222,14 @@ fn a_ur_without_its_explorer_comes_to_rest() {
             run
         };
         let times = count("PALPATE_UR_ENDS", 2);
-        end_planners_marked(end, times, &twin, folder.path(), run, || signal(&twin.child, "USR1"));
-        let events = twin.events.lock().unwrap();
-        let rested = events.iter().filter(|line| line["event"] == "rested");
-        for line in rested {
-            println!("{end:?}: {} s, {} mm", line["time_s"], line["way_mm"]);
-            assert!(line["time_s"].as_f64().unwrap() < REST_S, "{line}");
-            assert!(line["way_mm"].as_f64().unwrap() < REST_MM, "{line}");
+        let rests = end_planners_marked(end, times, &twin, folder.path(), run, || {
+            signal(&twin.child, "USR1");
+        });
+        assert_eq!(rests.len(), times as usize);
+        for rest in rests {
+            println!("{end:?}: {} s, {} mm", rest["time_s"], rest["way_mm"]);
+            assert!(rest["time_s"].as_f64().unwrap() < REST_S, "{rest}");
+            assert!(rest["way_mm"].as_f64().unwrap() < REST_MM, "{rest}");
         }
     }
 }

@@ -261,7 +261,8 @@ pub fn end_planners(
     end_planners_marked(end, times, twin, out, run, || ());
 }
 
-/// Ends planners as [`end_planners`] does, and calls `mark` at each end.
+/// Ends planners as [`end_planners`] does, and calls `mark` at each end. Returns the events of
+/// rests after a mark.
 pub fn end_planners_marked(
     end: End,
     times: u32,
@@ -269,7 +270,8 @@ pub fn end_planners_marked(
     out: &Path,
     run: impl Fn(u32) -> Command,
     mark: impl Fn(),
-) {
+) -> Vec<Value> {
+    let mut rests = Vec::new();
     let touches = times + 3;
     let mut rests_ms = Vec::new();
     let mut kept = 0;
@@ -293,6 +295,9 @@ pub fn end_planners_marked(
         sleep(Duration::from_millis(700));
         let rest_s = twin.rest_s().unwrap_or_else(|| panic!("{end:?}: still moving"));
         rests_ms.push(1e3 * (rest_s - at_s).max(0.0));
+        let events = twin.events.lock().unwrap();
+        rests.extend(events.iter().filter(|line| line["event"] == "rested").cloned());
+        drop(events);
         match end {
             End::Kill => (),
             End::Stop => signal(&explorer, "CONT"),
@@ -318,6 +323,7 @@ pub fn end_planners_marked(
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let row = row(out);
     assert_eq!((row.failure, row.touches.len()), (None, touches as usize));
+    rests
 }
 
 /// Distances, m, ascending, between the contacts of a row and those of the same targets touched in
