@@ -59,8 +59,7 @@ fn main() -> anyhow::Result<()> {
             let is_chosen = (BEGIN..CHOSEN).contains(&count);
             let plan = if is_chosen { planner.plan(&belief) } else { other.plan(&belief) }?;
             let Some(approach) = task.approach(&plan.target) else { continue };
-            let touch = probe.touch(&approach)?;
-            belief.observe(&plan.target, &approach, (&touch, probe.swept_volume().as_ref()));
+            belief.observe(&plan.target, &approach, &probe.execute(&approach)?);
             count += 1;
             let is_near = count + UPDATED > last;
             if count > CHOSEN && !is_near {

@@ -70,10 +70,9 @@ fn main() -> anyhow::Result<()> {
                 }
                 let approach = task.approach(&plan.target);
                 let approach = approach.ok_or_else(|| anyhow::anyhow!("out of reach"))?;
-                let made = probe.touch(&approach)?;
+                let outcome = probe.execute(&approach)?;
                 let begun = Instant::now();
-                let swept = probe.swept_volume();
-                belief.observe(&plan.target, &approach, (&made, swept.as_ref()));
+                belief.observe(&plan.target, &approach, &outcome);
                 if let Some(curve) = AT.iter().position(|at| *at == touch) {
                     seconds[curve].push(begun.elapsed().as_secs_f64());
                 }

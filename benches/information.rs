@@ -15,7 +15,7 @@ use palpate::experiment::statistics::{PairedDifference, median};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, Probe, SweptVolume, Touch};
+use palpate::explore::probe::{Contact, Outcome, Probe, Touch};
 use palpate::math::seed;
 use palpate::task::Approach;
 use rand::RngExt;
@@ -49,10 +49,10 @@ impl Estimating {
 }
 
 impl Probe for Estimating {
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        let touch = self.exact.touch(approach)?;
+    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
+        let outcome = self.exact.execute(approach)?;
         let (moved, turned) = (PLACE_SD_M * self.normals(), TILT_RAD * self.normals());
-        Ok(match touch {
+        let touch = match outcome.touch {
             none @ (Touch::Miss | Touch::Overload) => none,
             Touch::Contact(Contact { p_wc, normal_w, .. }) => {
                 let tangent = turned - normal_w * turned.dot(&normal_w);
@@ -60,11 +60,8 @@ impl Probe for Estimating {
                 let normal_w = Rotation3::from_axis_angle(&axis, angle) * normal_w;
                 Touch::Contact(Contact::new(p_wc + moved, normal_w))
             }
-        })
-    }
-
-    fn swept_volume(&self) -> Option<SweptVolume> {
-        self.exact.swept_volume()
+        };
+        Ok(Outcome { touch, ..outcome })
     }
 
     fn time_s(&self) -> Option<f64> {

@@ -9,7 +9,7 @@ use palpate::experiment::trial;
 use palpate::explore::belief::SurfaceBelief;
 use palpate::explore::planner::sample::random_aim;
 use palpate::explore::planner::uniform;
-use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::probe::{Contact, Probe};
 use palpate::explore::recognition::Library;
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
@@ -314,17 +314,14 @@ impl Episode {
         let task = self.world.task();
         let mut met = None;
         if let Some(approach) = task.approach(target) {
-            let touch = self.probe.touch(&approach)?;
+            let mut outcome = self.probe.execute(&approach)?;
             let recognises = self.world.library.is_some();
             if self.how.believes || self.how.reward != Reward::None || recognises {
                 let is_used = self.world.is_around() || recognises;
-                let swept = self.probe.swept_volume().filter(|_| is_used);
-                self.known.observe(target, &approach, (&touch, swept.as_ref()));
+                outcome.swept = outcome.swept.filter(|_| is_used);
+                self.known.observe(target, &approach, &outcome);
             }
-            met = match touch {
-                Touch::Contact(contact) => Some(contact),
-                Touch::Miss | Touch::Overload => None,
-            };
+            met = outcome.contact().cloned();
         }
         let numbers = self.world.touch_row(target, met.as_ref());
         let row = self.observations[self.count * numbers.len()..].iter_mut();

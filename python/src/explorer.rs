@@ -42,7 +42,7 @@ impl Exploration {
         let fitted = py.detach(|| {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(target) = Target::from_numbers(&target) {
-                known.observe(&target, &values.approach, (&values.touch, values.swept.as_ref()));
+                known.observe(&target, &values.approach, &values.outcome);
             }
             known.refit().map(|_| ())
         });

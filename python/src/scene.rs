@@ -110,19 +110,19 @@ impl Scene {
                 Some(probe) => probe,
                 none => none.insert(self.simulator.probe(self.seed)?),
             };
-            let touch = probe.touch(&approach)?;
-            Ok::<_, Fault>((touch, probe.swept_volume(), probe.time_s()))
+            Ok::<_, Fault>((probe.execute(&approach)?, probe.time_s()))
         });
-        let (touch, swept, time_s) = touched.map_err(errors::scene)?;
-        let (outcome, contact) = match &touch {
-            probe::Touch::Contact(contact) => (OUTCOMES[0], Some(contact.clone())),
-            probe::Touch::Miss => (OUTCOMES[1], None),
-            probe::Touch::Overload => (OUTCOMES[2], None),
+        let (found, time_s) = touched.map_err(errors::scene)?;
+        let outcome = match &found.touch {
+            probe::Touch::Contact(_) => OUTCOMES[0],
+            probe::Touch::Miss => OUTCOMES[1],
+            probe::Touch::Overload => OUTCOMES[2],
         };
+        let contact = found.contact().cloned();
         let place = (task.zone())
             .zip(contact.as_ref())
             .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
-        let values = TouchData { approach, touch, swept };
+        let values = TouchData { approach, outcome: found };
         Ok((Touch { target, outcome, contact, place, time_s }, values))
     }
 }
@@ -131,10 +131,8 @@ impl Scene {
 pub(crate) struct TouchData {
     /// Approach of the finger.
     pub(crate) approach: Approach,
-    /// Outcome of the touch.
-    pub(crate) touch: probe::Touch,
-    /// Swept free volume, if known.
-    pub(crate) swept: Option<probe::SweptVolume>,
+    /// What the touch has shown.
+    pub(crate) outcome: probe::Outcome,
 }
 
 #[pymethods]

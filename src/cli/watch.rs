@@ -11,7 +11,7 @@ use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
 use palpate_explore::planner;
 use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::servo::Servo;
-use palpate_explore::probe::{Probe, SweptVolume, Touch};
+use palpate_explore::probe::{self, Probe, Touch};
 use palpate_explore::task::Approach;
 use palpate_input::format::{counted, did_you_mean};
 use std::path::Path;
@@ -107,10 +107,10 @@ struct ReportingProbe {
 }
 
 impl Probe for ReportingProbe {
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        let touch = self.servo.touch(approach)?;
+    fn execute(&mut self, approach: &Approach) -> Result<probe::Outcome, Fault> {
+        let outcome = self.servo.execute(approach)?;
         self.count += 1;
-        let found = match &touch {
+        let found = match &outcome.touch {
             Touch::Contact(contact) => {
                 self.sight.mark(contact.p_wc);
                 let [x, y, z] = (contact.p_wc.coords * 1e3).into();
@@ -124,11 +124,7 @@ impl Probe for ReportingProbe {
             self.time_s().unwrap_or_default(),
             self.count
         ));
-        Ok(touch)
-    }
-
-    fn swept_volume(&self) -> Option<SweptVolume> {
-        self.servo.swept_volume()
+        Ok(outcome)
     }
 
     fn time_s(&self) -> Option<f64> {

@@ -10,8 +10,6 @@ use crate::report::table::digits;
 use anyhow::{Context, ensure};
 use nalgebra::Point3;
 use palpate_explore::belief::HeightField;
-use palpate_explore::probe::SweptVolume;
-use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 
@@ -69,9 +67,8 @@ impl<'a> BeliefReplay<'a> {
             touch.target.place().filter(is_place).with_context(|| {
                 format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
-            let (touched, swept) =
-                (touch.touch(-zone.ahead_w().into_inner()), swept(finger, touch));
-            belief.observe_target(&touch.target, (&touched, swept.as_ref()));
+            let outcome = touch.outcome(finger, -zone.ahead_w().into_inner());
+            belief.observe_target(&touch.target, &outcome);
         }
         belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };
@@ -214,10 +211,4 @@ pub fn heights_m<'a>(
         .flat_map(|row| &row.touches)
         .filter_map(move |touch| Some(contact(run.experiment.scene.zone.as_ref()?, touch)?.1));
     run.truth.heights_m.iter().flatten().copied().chain(touched)
-}
-
-/// Returns the volume that the finger swept in a recorded touch, if it is known.
-pub(super) fn swept(finger: &Finger, touch: &TouchRow) -> Option<SweptVolume> {
-    let finger = finger.with_pitch(touch.target.pitch_deg())?;
-    Some(SweptVolume { finger, p_wt: Point3::from(touch.tip?) })
 }

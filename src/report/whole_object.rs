@@ -3,7 +3,7 @@
 
 use super::explorer::Counts;
 use super::figures::ReportFigure;
-use super::replay::{self, swept};
+use super::replay;
 use super::solid::{self, PlannerSurfaces, SolidTouch, SurfaceFrame, counts};
 use super::table::digits;
 use crate::experiment::Experiment;
@@ -173,9 +173,8 @@ pub fn belief(
         let approach = ball.approach_to(&touch.target, &scene.finger, standoff_m, 0.0);
         let (aim, approach) = (touch.target.aim().zip(approach))
             .context("the target has no direction, which a whole object needs")?;
-        let swept = swept(&scene.finger, touch);
-        let touched = touch.touch(-approach.direction_w().into_inner());
-        belief.observe(aim, &approach, (&touched, swept.as_ref()));
+        let outcome = touch.outcome(&scene.finger, -approach.direction_w().into_inner());
+        belief.observe(aim, &approach, &outcome);
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))

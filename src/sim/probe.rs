@@ -4,7 +4,7 @@ use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, ObjectShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
-use palpate_explore::probe::{Contact, Probe, SweptVolume, Touch, check_finite};
+use palpate_explore::probe::{Contact, Outcome, Probe, SweptVolume, Touch, check_finite};
 use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::SensedContact;
 use palpate_explore::task::Approach;
@@ -16,19 +16,17 @@ use std::sync::Arc;
 
 /// Returns a probe that touches the environment's surface exactly and at once.
 pub fn exact_probe(environment: Arc<Environment>) -> Box<dyn Probe> {
-    Box::new(ExactProbe { environment, swept: None, sensed: None })
+    Box::new(ExactProbe { environment })
 }
 
 /// Probe that evaluates the scene's function, or sweeps the finger's hull along the approach to
 /// first contact on the exact mesh.
 struct ExactProbe {
     environment: Arc<Environment>,
-    swept: Option<SweptVolume>,
-    sensed: Option<(Isometry3<f64>, SensedContact)>,
 }
 
 impl Probe for ExactProbe {
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
         check_finite(approach)?;
         let environment = &self.environment;
         if let (ObjectShape::Function(function), Some(zone)) =
@@ -39,7 +37,7 @@ impl Probe for ExactProbe {
             let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
             let p_wc = zone.point(&place, function.height_m(x_m));
             let normal_w = zone.x_wz().rotation * normal_z;
-            return Ok(Touch::Contact(Contact::new(p_wc, normal_w)));
+            return Ok(Touch::Contact(Contact::new(p_wc, normal_w)).into());
         }
         let found = resting_pose(environment, approach);
         let turned_w = || {
@@ -47,24 +45,17 @@ impl Probe for ExactProbe {
                 + approach.direction_w().scale(turnaround_distance_m(environment, approach))
         };
         let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
-        self.swept = Some(SweptVolume { finger: pitched(environment, approach), p_wt });
-        self.sensed = found.map(|RestingPose { p_wt, hit }| {
+        let swept = Some(SweptVolume { finger: pitched(environment, approach), p_wt });
+        let sensed = found.map(|RestingPose { p_wt, hit }| {
             let x_wt = Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
             let p_tc = x_wt.inverse_transform_point(&hit.point);
             (x_wt, SensedContact::new(p_tc, x_wt.inverse_transform_vector(&hit.normal)))
         });
-        Ok(found.map_or(Touch::Miss, |rest| {
+        let touch = found.map_or(Touch::Miss, |rest| {
             let patch = slide(environment, approach, rest).collect();
             Touch::Contact(Contact { patch, ..Contact::new(rest.hit.point, rest.hit.normal) })
-        }))
-    }
-
-    fn swept_volume(&self) -> Option<SweptVolume> {
-        self.swept.clone()
-    }
-
-    fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
-        self.sensed.as_ref()
+        });
+        Ok(Outcome { touch, swept, sensed, doubt: None })
     }
 }
 

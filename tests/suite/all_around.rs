@@ -103,10 +103,10 @@ fn nothing_goes_below_what_the_object_stands_on() {
             let aim = Aim::against(MIDDLE_W.into(), &direction(i, 60));
             if task.is_reachable(&aim) {
                 let approach = task.approach(&aim.into()).unwrap();
-                let end = probe.touch(&approach).unwrap();
-                touched += usize::from(matches!(end, Touch::Contact(_)));
-                let lowest_m = probe.swept_volume().map_or(1.0, |swept| swept.p_wt.z)
-                    - finger.drop_m(&approach.r_wa);
+                let end = probe.execute(&approach).unwrap();
+                touched += usize::from(end.contact().is_some());
+                let lowest_m =
+                    end.swept.map_or(1.0, |swept| swept.p_wt.z) - finger.drop_m(&approach.r_wa);
                 assert!(lowest_m > 0.45 - 1e-9, "{i}: {lowest_m}");
             }
         }

@@ -120,10 +120,9 @@ fn touched(environment: &Arc<Environment>, view: &View, count: usize) -> HeightF
     for _ in 0..count {
         let target = zone.at(&[(); 2].map(|()| random.random_range(0.05..0.95)));
         let approach = environment.task().approach(&target.clone().into()).unwrap();
-        let touch = probe.touch(&approach).unwrap();
-        assert!(matches!(touch, Touch::Contact(_)));
-        field.observe(&target, &touch);
-        probe.swept_volume().iter().for_each(|swept| field.observe_swept(swept));
+        let outcome = probe.execute(&approach).unwrap();
+        assert!(outcome.contact().is_some());
+        field.observe_target(&target.into(), &outcome);
     }
     field.refit().unwrap();
     field
@@ -518,13 +517,12 @@ fn places_seen_through_are_kept() {
     let places = zone.grid(9);
     let mut touch = |place: &Vec<f64>| {
         let approach = environment.task().approach(&place.clone().into()).unwrap();
-        (probe.touch(&approach).unwrap(), probe.swept_volume().unwrap())
+        probe.execute(&approach).unwrap()
     };
     let touches: Vec<_> = places.iter().map(&mut touch).collect();
-    let missed = touches.iter().position(|(touch, _)| *touch == Touch::Miss).unwrap();
+    let missed = touches.iter().position(|outcome| outcome.touch == Touch::Miss).unwrap();
     for field in [&mut found, &mut drawn] {
-        field.observe(&places[missed], &touches[missed].0);
-        field.observe_swept(&touches[missed].1);
+        field.observe_target(&places[missed].clone().into(), &touches[missed]);
     }
     let [found, drawn] = [&found, &drawn].map(|field| {
         let silhouette = field.surface_evidence().silhouette();
@@ -532,8 +530,10 @@ fn places_seen_through_are_kept() {
     });
     assert_eq!(found, drawn);
     let mean = |is_miss: bool| {
-        let of =
-            touches.iter().zip(&found).filter(|((touch, _), _)| (*touch == Touch::Miss) == is_miss);
+        let of = touches
+            .iter()
+            .zip(&found)
+            .filter(|(outcome, _)| (outcome.touch == Touch::Miss) == is_miss);
         let shares: Vec<f64> = of.map(|(_, share)| *share).collect();
         shares.iter().sum::<f64>() / shares.len() as f64
     };

@@ -43,17 +43,13 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         let truth = Truth::sample(&environment, 21, &|_| ());
         let zone = environment.task().zone().unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
-        assert_eq!(probe.swept_volume(), None);
         let mut rng = seed::stream(1, 0, "targets");
         let (mut bounded, mut tight) = (0, 0);
         for _ in 0..200 {
-            let touch = probe
-                .touch(
-                    &environment.task().approach(&planner::uniform(zone, &mut rng).into()).unwrap(),
-                )
-                .unwrap();
-            let swept = probe.swept_volume().unwrap();
-            let Touch::Contact(Contact { p_wc, .. }) = touch else { panic!("missed") };
+            let target = planner::uniform(zone, &mut rng).into();
+            let outcome = probe.execute(&environment.task().approach(&target).unwrap()).unwrap();
+            let swept = outcome.swept.as_ref().unwrap();
+            let p_wc = outcome.contact().expect("missed").p_wc;
             let ceiling_m =
                 |place: &[f64]| swept.upper_bounds_m(zone, std::iter::once(place)).next().unwrap();
             let at_contact = ceiling_m(&zone.place(&p_wc)).unwrap();
@@ -68,11 +64,10 @@ fn the_surface_is_below_what_the_finger_has_swept() {
             }
         }
         assert!(bounded > 1000 && tight > 100, "{name}: {bounded} {tight}");
-        assert_eq!(
-            probe.touch(&environment.task().approach(&[0.3, 0.5].into()).unwrap()),
-            Ok(Touch::Miss)
-        );
-        assert!(probe.swept_volume().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
+        let beside = environment.task().approach(&[0.3, 0.5].into()).unwrap();
+        let outcome = probe.execute(&beside).unwrap();
+        assert_eq!(outcome.touch, Touch::Miss);
+        assert!(outcome.swept.unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
     }
 }
 

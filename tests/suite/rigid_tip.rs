@@ -318,9 +318,10 @@ fn a_ball_tip_on_a_moving_arm_touches_the_container() {
     for target in [[0.52, 0.6], [0.47, 0.65]] {
         let target = environment.task().zone().unwrap().at(&target);
         let approach = environment.task().approach(&target.into()).unwrap();
-        let touched = contact(probe.touch(&approach).unwrap());
+        let outcome = probe.execute(&approach).unwrap();
+        let touched = contact(outcome.touch);
         let off_m = (mesh.closest_point(&touched.p_wc).point - touched.p_wc).norm();
-        let (_, sensed) = probe.sensed().unwrap();
+        let (_, sensed) = outcome.sensed.unwrap();
         let force_n = sensed.load.unwrap().force_n.norm();
         println!("{off_m:.6} m, stated {:?}, {force_n:.2} N", touched.sd_m);
         assert!(off_m < 1e-3 && touched.sd_m.is_some(), "{off_m}");

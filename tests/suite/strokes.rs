@@ -10,7 +10,7 @@ use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner::stroke::{StrokeOffer, best};
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
-use palpate::explore::probe::{Contact, Probe, SweptVolume, Touch};
+use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Target, Zone};
@@ -246,7 +246,7 @@ fn a_row_with_strokes_is_replayed() {
     for touch in &row.touches {
         let approach = simulation.task().approach(&touch.target).unwrap();
         let against_w = -approach.direction_w().into_inner();
-        belief.observe(&touch.target, &approach, (&touch.touch(against_w), None));
+        belief.observe(&touch.target, &approach, &touch.touch(against_w).into());
     }
     let found = belief.refit().unwrap().hyperparameters.length_scales.clone();
     let written = &last.fit.as_ref().unwrap().hyperparameters.length_scales;
@@ -332,10 +332,8 @@ fn strokes_around_an_object_are_on_its_surface() {
                 points += 1;
             }
             let against_w = -approach.direction_w().into_inner();
-            let swept =
-                touch.tip.map(|tip| SweptVolume { finger: finger.0.clone(), p_wt: tip.into() });
-            let touched = touch.touch(against_w);
-            belief.observe(&touch.target, &approach, (&touched, swept.as_ref()));
+            let outcome = touch.outcome(finger.0, against_w);
+            belief.observe(&touch.target, &approach, &outcome);
             if count >= 2 {
                 belief.refit().unwrap();
             }

@@ -180,25 +180,23 @@ fn run_touches(
             approach = approach_to(task, &other, count)?;
             plan = Plan { target: other, sd_m: None, fallback: Some(Fallback::Operator) };
         }
-        let touch = probe.touch(&approach).map_err(|fault| format!("touch {count}: {fault}"))?;
-        let swept = probe.swept_volume();
-        belief.observe(&plan.target, &approach, (&touch, swept.as_ref()));
-        strokes.add(&plan.target, &touch);
-        let swept = swept.filter(|_| writes_tips || touch == Touch::Miss);
-        let contact = match &touch {
-            Touch::Contact(contact) => Some(contact),
-            Touch::Miss | Touch::Overload => None,
-        };
+        let outcome = probe.execute(&approach);
+        let outcome = outcome.map_err(|fault| format!("touch {count}: {fault}"))?;
+        belief.observe(&plan.target, &approach, &outcome);
+        strokes.add(&plan.target, &outcome);
+        let contact = outcome.contact();
+        let is_written = writes_tips || outcome.touch == Touch::Miss;
+        let swept = outcome.swept.as_ref().filter(|_| is_written);
         let mut touch_row = TouchRow {
             target: plan.target,
             contact: contact.map(|contact| contact.p_wc.coords.into()),
-            overload: touch == Touch::Overload,
+            overload: outcome.touch == Touch::Overload,
             normal: contact
                 .filter(|contact| contact.has_normal && (writes_normals || contact.sd_m.is_some()))
                 .map(|contact| contact.normal_w.into()),
             contact_sd_m: contact.and_then(|contact| contact.sd_m),
             patch: contact.map(TouchRow::patch_of).unwrap_or_default(),
-            doubt: probe.doubt(),
+            doubt: outcome.doubt,
             tip: swept.map(|swept| swept.p_wt.coords.into()),
             time_s: probe.time_s(),
             planned_sd_m: plan.sd_m,
@@ -216,7 +214,7 @@ fn run_touches(
         };
         let touched = FinishedTouch {
             count,
-            touch: &touch,
+            touch: &outcome.touch,
             row: &touch_row,
             views: &row.views,
             belief: &belief,

@@ -4,13 +4,11 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::experiment::trial::{TrialEvent, TrialObserver, view};
-use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::planner::PlannerFactory;
-use palpate_explore::probe::{Probe, SweptVolume, Touch};
+use palpate_explore::probe::{Outcome, Probe, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
-use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Approach;
 use palpate_ros::recording::{self, Recording, RecordingBackend, RecordingMetadata, TrialEnd};
 use palpate_ros::view::TFMessage;
@@ -157,8 +155,8 @@ pub struct ResumedProbe<'a> {
     made: std::vec::IntoIter<TouchRow>,
     finger: Finger,
     probe: &'a mut dyn Probe,
-    /// Last touch, if it was made before the interruption, and the far end of its approach.
-    last: Option<(TouchRow, Point3<f64>)>,
+    /// Last touch, if it was made before the interruption.
+    last: Option<TouchRow>,
     /// Simulator or robot time at the interruption.
     begun_s: f64,
     /// Fault that ended the last touch.
@@ -176,39 +174,25 @@ impl<'a> ResumedProbe<'a> {
 }
 
 impl Probe for ResumedProbe<'_> {
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        self.last = self.made.next().map(|row| (row, approach.p_far_w));
-        match &self.last {
-            Some((row, _)) => Ok(row.touch(-approach.direction_w().into_inner())),
-            None => {
-                let touch = self.probe.touch(approach);
-                self.fault = touch.as_ref().err().cloned();
-                touch
-            }
+    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
+        self.last = self.made.next();
+        let Some(row) = &self.last else {
+            let outcome = self.probe.execute(approach);
+            self.fault = outcome.as_ref().err().cloned();
+            return outcome;
+        };
+        let mut outcome = row.outcome(&self.finger, -approach.direction_w().into_inner());
+        // Without a stored tip, only the passage of the finger is known.
+        if outcome.swept.is_none() {
+            let finger = self.finger.with_pitch(row.target.pitch_deg());
+            outcome.swept = finger.map(|finger| SweptVolume { finger, p_wt: approach.p_far_w });
         }
-    }
-
-    fn swept_volume(&self) -> Option<SweptVolume> {
-        match &self.last {
-            // Without a stored tip, only the passage of the finger is known.
-            Some((row, p_far_w)) => {
-                let p_wt = row.tip.map_or(*p_far_w, Point3::from);
-                Some(SweptVolume { finger: self.finger.with_pitch(row.target.pitch_deg())?, p_wt })
-            }
-            None => self.probe.swept_volume(),
-        }
-    }
-
-    fn doubt(&self) -> Option<Doubt> {
-        match &self.last {
-            Some((row, _)) => row.doubt,
-            None => self.probe.doubt(),
-        }
+        Ok(outcome)
     }
 
     fn time_s(&self) -> Option<f64> {
         match &self.last {
-            Some((row, _)) => row.time_s,
+            Some(row) => row.time_s,
             None => self.probe.time_s().map(|time_s| self.begun_s + time_s),
         }
     }

@@ -7,7 +7,8 @@ use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::Fallback;
-use palpate_explore::probe::{Contact, Touch};
+use palpate_explore::probe::{Contact, Outcome, SweptVolume, Touch};
+use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Target;
 use palpate_explore::view::{RigidError, SeenSurface};
@@ -201,6 +202,15 @@ impl TouchRow {
             None if self.overload => Touch::Overload,
             None => Touch::Miss,
         }
+    }
+
+    /// Returns what the touch of this `finger` has shown, as far as its row has it; `against_w` as
+    /// for [`touch`](Self::touch).
+    pub fn outcome(&self, finger: &Finger, against_w: Vector3<f64>) -> Outcome {
+        let finger = finger.with_pitch(self.target.pitch_deg());
+        let swept =
+            finger.zip(self.tip).map(|(finger, tip)| SweptVolume { finger, p_wt: tip.into() });
+        Outcome { swept, doubt: self.doubt, ..self.touch(against_w).into() }
     }
 
     /// Returns the further points of a contact as a row has them.

@@ -2,7 +2,7 @@
 
 use super::looks::TOUCH_S;
 use palpate_explore::planner::stroke::StrokeOffer;
-use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::probe::{Outcome, Probe};
 use palpate_explore::task::{Target, Task};
 
 /// Strokes of a trial.
@@ -37,12 +37,12 @@ impl<'a> Strokes<'a> {
     }
 
     /// Adds a touch at `target`.
-    pub(super) fn add(&mut self, target: &Target, touch: &Touch) {
+    pub(super) fn add(&mut self, target: &Target, outcome: &Outcome) {
         self.count += 1;
         if let Some(last) = &self.last {
             self.travelled_m += self.task.region().travel_m(last, target);
         }
-        if let (Touch::Contact(contact), true) = (touch, target.slide_m() > 0.0) {
+        if let (Some(contact), true) = (outcome.contact(), target.slide_m() > 0.0) {
             let points = contact.points().zip(&contact.patch);
             self.slid_m += points.map(|(from, to)| (to.p_wc - from.p_wc).norm()).sum::<f64>();
         }

@@ -40,13 +40,10 @@ pub(super) fn verify(
         else {
             break;
         };
-        let touch = probe.touch(&approach);
-        let touch =
-            touch.map_err(|fault| format!("verification touch {}: {fault}", rows.len() + 1))?;
-        let p_wc = match &touch {
-            Touch::Contact(contact) => Some(contact.p_wc),
-            Touch::Miss | Touch::Overload => None,
-        };
+        let outcome = probe.execute(&approach);
+        let outcome =
+            outcome.map_err(|fault| format!("verification touch {}: {fault}", rows.len() + 1))?;
+        let p_wc = outcome.contact().map(|contact| contact.p_wc);
         let error = p_wc.and_then(|p_wc| signed_distance(belief, &p_wc));
         let first = again.and_then(|at| touches[at].contact).map(Point3::from);
         let before = error.zip(first.and_then(|first| signed_distance(belief, &first)));
@@ -56,7 +53,7 @@ pub(super) fn verify(
             predicted_m,
             predicted_sd_m,
             contact: p_wc.map(|p_wc| p_wc.coords.into()),
-            overload: touch == Touch::Overload,
+            overload: outcome.touch == Touch::Overload,
             error_m: error.map(|(error_m, _)| error_m),
             sd_m: error.map(|(_, sd_m)| sd_m),
             band_m: p_wc.and_then(|p_wc| band_m(belief.height_field()?, &p_wc)),

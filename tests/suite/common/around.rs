@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::trial::row::TrialRow;
-use palpate::explore::probe::{Contact, SweptVolume, Touch};
+use palpate::explore::probe::{Contact, Outcome, SweptVolume, Touch};
 use palpate::explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
@@ -69,5 +69,5 @@ pub fn meet(
     let radius_m = belief.scope().radius_m;
     let swept = SweptVolume { finger: Finger { radius_m, ..Finger::default() }, p_wt };
     let approach = approach(belief, aim);
-    belief.observe(aim, &approach, (&touch, Some(&swept)));
+    belief.observe(aim, &approach, &Outcome { swept: Some(swept), ..touch.into() });
 }

@@ -9,7 +9,7 @@ pub use height_field::HeightField;
 pub use quantiles::BAND;
 
 use super::gp_settings::GpSettings;
-use super::probe::{SweptVolume, Touch};
+use super::probe::Outcome;
 use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use crate::recognition::ObjectHypotheses;
 use crate::robot::Finger;
@@ -64,21 +64,16 @@ impl Belief {
         }
     }
 
-    /// Adds a touch at `target` that followed `approach`, and the volume it swept; the belief
-    /// changes at the next [`refit`](Self::refit).
-    pub fn observe(
-        &mut self,
-        target: &Target,
-        approach: &Approach,
-        (touch, swept): (&Touch, Option<&SweptVolume>),
-    ) {
+    /// Adds what a touch at `target` that followed `approach` has shown; the belief changes at the
+    /// next [`refit`](Self::refit).
+    pub fn observe(&mut self, target: &Target, approach: &Approach, outcome: &Outcome) {
         if let Some(hypotheses) = &mut self.hypotheses {
-            hypotheses.observe(approach, (touch, swept));
+            hypotheses.observe(approach, outcome);
         }
         match (&mut self.surface, target.aim()) {
-            (SurfaceBelief::HeightField(field), _) => field.observe_target(target, (touch, swept)),
+            (SurfaceBelief::HeightField(field), _) => field.observe_target(target, outcome),
             (SurfaceBelief::ImplicitSurface(surface), Some(aim)) => {
-                surface.observe(aim, approach, (touch, swept));
+                surface.observe(aim, approach, outcome);
             }
             (SurfaceBelief::ImplicitSurface(_), None) => {}
         }

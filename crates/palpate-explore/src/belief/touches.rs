@@ -1,7 +1,7 @@
 //! Observations that a belief takes from touches and strokes.
 
 use super::HeightField;
-use crate::probe::{Contact, SweptVolume, Touch};
+use crate::probe::{Contact, Outcome, SweptVolume, Touch};
 use crate::task::Target;
 use crate::task::stroke::FIRST_SOURCE;
 use nalgebra::Vector3;
@@ -29,24 +29,20 @@ const STROKE_STEP: f64 = 0.03;
 const STROKE_FITTED: usize = 3;
 
 impl HeightField {
-    /// Adds a touch or stroke at `target` and the volume that it swept; nothing for a target that
-    /// is not a place of a zone. The belief changes at the next [`refit`](Self::refit).
-    pub fn observe_target(
-        &mut self,
-        target: &Target,
-        (touch, swept): (&Touch, Option<&SweptVolume>),
-    ) {
+    /// Adds what a touch or stroke at `target` has shown; nothing for a target that is not a place
+    /// of a zone. The belief changes at the next [`refit`](Self::refit).
+    pub fn observe_target(&mut self, target: &Target, outcome: &Outcome) {
         let Some(place) = target.place() else { return };
         if target.slide_m() > 0.0 {
-            return self.observe_stroke(place, (touch, swept));
+            return self.observe_stroke(place, outcome);
         }
-        self.observe(place, touch);
-        swept.into_iter().for_each(|swept| self.observe_swept(swept));
+        self.observe(place, &outcome.touch);
+        outcome.swept.iter().for_each(|swept| self.observe_swept(swept));
     }
 
     /// Adds a stroke that began at `target` with the volume swept by then, thinned.
-    fn observe_stroke(&mut self, target: &[f64], (touch, swept): (&Touch, Option<&SweptVolume>)) {
-        let thinned = match touch {
+    fn observe_stroke(&mut self, target: &[f64], outcome: &Outcome) {
+        let thinned = match &outcome.touch {
             Touch::Contact(contact) => {
                 Touch::Contact(contact.thinned(STROKE_STEP * self.zone.widest_m()))
             }
@@ -54,7 +50,7 @@ impl HeightField {
         };
         let number = FIRST_SOURCE + self.targets.len();
         self.observe_points((target, &thinned), STROKE_FITTED, Some(number));
-        let Some(swept) = swept else { return };
+        let Some(swept) = &outcome.swept else { return };
         self.observe_swept(swept);
         if let Touch::Contact(contact) = &thinned {
             let finger = &swept.finger;

@@ -79,28 +79,52 @@ impl Contact {
     }
 }
 
+/// All that one touch has shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// End of the touch.
+    pub touch: Touch,
+    /// Volume that it found free; `None` if unknown.
+    pub swept: Option<SweptVolume>,
+    /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the contact, and what
+    /// its sensor located; `None` for a probe without a finger, or without a contact.
+    pub sensed: Option<(Isometry3<f64>, SensedContact)>,
+    /// Reason why the touch is less certain than usual, or why its contact was not located.
+    pub doubt: Option<Doubt>,
+}
+
+impl Outcome {
+    /// Returns the contact, if the touch made one.
+    pub fn contact(&self) -> Option<&Contact> {
+        match &self.touch {
+            Touch::Contact(contact) => Some(contact),
+            Touch::Miss | Touch::Overload => None,
+        }
+    }
+}
+
+impl From<Touch> for Outcome {
+    /// Creates the outcome of a touch of which only its end is known.
+    fn from(touch: Touch) -> Self {
+        Self { touch, swept: None, sensed: None, doubt: None }
+    }
+}
+
 /// A robot, real or simulated, that can make touches.
 pub trait Probe: Send {
     /// Follows `approach` until contact, and retracts.
     ///
     /// # Errors
     /// If the backend reports a fault, or a coordinate of the approach is not finite.
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault>;
+    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault>;
 
-    /// The volume found free by the last touch; `None` if unknown.
-    fn swept_volume(&self) -> Option<SweptVolume> {
-        None
-    }
-
-    /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the last contact, and
-    /// what its sensor located; `None` for a probe without a finger, or before a contact.
-    fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
-        None
-    }
-
-    /// Reason why the last touch is less certain than usual, or why its contact was not located.
-    fn doubt(&self) -> Option<Doubt> {
-        None
+    /// Follows `approach` as [`execute`](Self::execute) does, and returns the end of the touch
+    /// alone.
+    ///
+    /// # Errors
+    /// Those of [`execute`](Self::execute).
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        Ok(self.execute(approach)?.touch)
     }
 
     /// Time since the start of the backend, s; `None` for a probe that does not move.

@@ -4,7 +4,7 @@ use super::evidence::{Evidence, NoiseModel, TouchEvidence, ViewEvidence, before_
 use super::library::{Library, LibraryObject};
 use super::particles::{Model, Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
-use crate::probe::{SweptVolume, Touch};
+use crate::probe::Outcome;
 use crate::robot::sensor::GelPad;
 use crate::task::{Approach, Target, Task};
 use crate::view::SeenSurface;
@@ -234,8 +234,8 @@ impl ObjectHypotheses {
     }
 
     /// Takes in a touch; nothing after an overload.
-    pub(crate) fn observe(&mut self, approach: &Approach, touched: (&Touch, Option<&SweptVolume>)) {
-        let evidence = TouchEvidence::new(approach, touched, (self.slack_m, self.pad.as_ref()));
+    pub(crate) fn observe(&mut self, approach: &Approach, outcome: &Outcome) {
+        let evidence = TouchEvidence::new(approach, outcome, (self.slack_m, self.pad.as_ref()));
         self.take_in(evidence.map(Evidence::Touch));
     }
 

@@ -271,7 +271,7 @@ pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::{Contact, SweptVolume, Touch};
+    use crate::probe::{Contact, Outcome, SweptVolume, Touch};
     use crate::recognition::evidence::TouchEvidence;
     use crate::recognition::pose_prior::Turn;
     use crate::robot::Finger;
@@ -292,8 +292,9 @@ mod tests {
                 let approach = ball.approach(&aim, &finger, 0.01, 0.0);
                 let touch = Touch::Contact(Contact::new(aim.p_w, normal_w));
                 let p_wt = aim.p_w + normal_w * finger.radius_m;
-                let swept = SweptVolume { finger: finger.clone(), p_wt };
-                let evidence = TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None));
+                let swept = Some(SweptVolume { finger: finger.clone(), p_wt });
+                let outcome = Outcome { swept, ..touch.into() };
+                let evidence = TouchEvidence::new(&approach, &outcome, (0.0, None));
                 Arc::new(Evidence::Touch(evidence.unwrap()))
             })
             .collect()

@@ -168,17 +168,17 @@ pub fn register(
     let mut touches = Vec::with_capacity(of);
     let (mut made_count, mut ended) = (0, None);
     for (i, approach) in design.approaches.iter().enumerate() {
-        let ending = match probe.touch(approach) {
-            Ok(ending) => ending,
+        let outcome = match probe.execute(approach) {
+            Ok(outcome) => outcome,
             Err(fault) => {
                 ended = Some((i + 1, fault));
                 break;
             }
         };
-        made(&ending);
+        made(&outcome.touch);
         made_count += 1;
-        if let Touch::Contact(_) = &ending {
-            let (x_wt, sensed) = probe.sensed().ok_or_else(|| {
+        if outcome.contact().is_some() {
+            let (x_wt, sensed) = outcome.sensed.as_ref().ok_or_else(|| {
                 InputError::new("this probe does not report the pose of its finger at contact")
             })?;
             let points = std::iter::once(sensed).chain(&sensed.patch);

@@ -5,7 +5,7 @@ use super::evidence::{CameraPose, PriorMean, TouchEvidence};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
-use crate::probe::{SweptVolume, Touch};
+use crate::probe::{Outcome, Touch};
 use crate::task::{Aim, Approach, Ball};
 use crate::view::{Offer, RigidError, SeenSurface, View};
 use nalgebra::{Point3, UnitVector3};
@@ -100,23 +100,18 @@ impl ImplicitSurface {
         Self { scope, settings, kernel, evidence, asked, fit, start, surface }
     }
 
-    /// Adds a touch at `aim` that followed `approach`, and the volume it swept; the belief changes
-    /// at the next [`refit`](Self::refit).
-    pub fn observe(
-        &mut self,
-        aim: &Aim,
-        approach: &Approach,
-        (touch, swept): (&Touch, Option<&SweptVolume>),
-    ) {
+    /// Adds what a touch at `aim` that followed `approach` has shown; the belief changes at the next
+    /// [`refit`](Self::refit).
+    pub fn observe(&mut self, aim: &Aim, approach: &Approach, outcome: &Outcome) {
         self.asked.push(*aim);
         let apart_m = STROKE_STEP * self.scope.ball.radius_m;
-        let places = self.settings.free_space_samples;
-        match touch {
+        let (places, swept) = (self.settings.free_space_samples, outcome.swept.as_ref());
+        match &outcome.touch {
             Touch::Contact(contact) if approach.slide_w.is_some() => {
                 let thinned = Touch::Contact(contact.thinned(apart_m));
                 self.evidence.observe(approach, &thinned, swept, places);
             }
-            _ => self.evidence.observe(approach, touch, swept, places),
+            touch => self.evidence.observe(approach, touch, swept, places),
         }
     }
 

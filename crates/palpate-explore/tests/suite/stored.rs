@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::gp_settings::GpSettings;
-use palpate_explore::probe::{Contact, SweptVolume, Touch};
+use palpate_explore::probe::{Contact, Outcome, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::{Aim, Ball, Region, Target, Task, Zone};
@@ -38,7 +38,8 @@ fn beliefs(task: &Task, count: usize, centre_w: Point3<f64>, gp: &GpSettings) ->
             _ => Touch::Contact(Contact::new(p_wc, outward)),
         };
         let swept = SweptVolume { finger: finger.clone(), p_wt: p_wc + outward * finger.radius_m };
-        belief.observe(&target, &approach, (&touch, (i != 2).then_some(&swept)));
+        let swept = (i != 2).then_some(swept);
+        belief.observe(&target, &approach, &Outcome { swept, ..touch.into() });
         belief.refit().unwrap();
         all.push(belief.clone());
     }

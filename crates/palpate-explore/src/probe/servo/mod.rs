@@ -8,7 +8,7 @@ mod slide;
 mod trajectory;
 mod zone_reach;
 
-use super::{Contact, Probe, SweptVolume, Touch, check_finite};
+use super::{Contact, Outcome, Probe, SweptVolume, Touch, check_finite};
 use crate::backend::{Backend, Command, Fault};
 use crate::control::{Controller, Goal, posture};
 use crate::robot::Robot;
@@ -55,11 +55,6 @@ pub struct Servo {
     /// Part of the last command that a real robot applied.
     applied_ratio: f64,
     q: Vec<f64>,
-    swept: Option<SweptVolume>,
-    /// Pose of the tip at the reading of the last contact, and that contact.
-    sensed: Option<(Isometry3<f64>, SensedContact)>,
-    /// Doubt about the last touch.
-    doubt: Option<Doubt>,
     /// Reach of an arm, which checks each path around an object before moving.
     reach: Option<ArmReach>,
     /// Force per depth by which the finger yields, N/m, if the scene allows strokes.
@@ -95,9 +90,6 @@ impl Servo {
             rested_s: 0.0,
             applied_ratio: 1.0,
             q,
-            swept: None,
-            sensed: None,
-            doubt: None,
             reach,
             yields_n_m: None,
         })
@@ -376,31 +368,36 @@ impl Servo {
 
     /// Stops at the point of detection, settles and reads the contact. The overrun while the servos
     /// stop the finger is reversed, so that the depth does not depend on them.
-    fn read(
-        &mut self,
-        approach: &Approach,
-        tared: &Isometry3<f64>,
-    ) -> Result<Option<Contact>, Fault> {
+    fn read(&mut self, approach: &Approach, tared: &Isometry3<f64>) -> Result<Located, Fault> {
         let mut held = self.x_wt();
         // A force that locates the contact must remain while it is read.
         let is_pressed = self.robot.yields() || !self.body.capabilities().tactile;
         if is_pressed && self.settings.press_m > 0.0 {
             if self.settle(held)?.is_some() {
-                return Ok(None);
+                return Ok(Located::default());
             }
-            let Some(pressed) = self.press(approach, held)? else { return Ok(None) };
+            let Some(pressed) = self.press(approach, held)? else {
+                return Ok(Located::default());
+            };
             held = pressed;
         }
         if self.settle(held)?.is_some() || self.rest(held, self.settings.frames)?.is_some() {
-            return Ok(None);
+            return Ok(Located::default());
         }
         let x_wt = self.x_wt();
         let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
         let located = self.monitor.contact(&self.robot.finger, moved_m);
-        self.doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
-        self.sensed = located.ok().map(|sensed| (x_wt, sensed));
-        Ok(self.sensed.as_ref().map(|(x_wt, sensed)| Contact::sensed(x_wt, sensed)))
+        let doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
+        Ok(Located { sensed: located.ok().map(|sensed| (x_wt, sensed)), doubt })
     }
+}
+
+/// What the sensor located, with the pose of the tip at its reading, and its doubt; neither at an
+/// overload.
+#[derive(Default)]
+struct Located {
+    sensed: Option<(Isometry3<f64>, SensedContact)>,
+    doubt: Option<Doubt>,
 }
 
 /// End of a movement along a path.
@@ -445,9 +442,8 @@ const SILENCE_S: f64 = 0.15;
 
 impl Probe for Servo {
     /// Moves the centre of the fingertip's hemisphere to the stand-off and along the approach.
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
         check_finite(approach)?;
-        self.doubt = None;
         let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
         match &approach.obstacle {
@@ -464,18 +460,23 @@ impl Probe for Servo {
         let ahead_w = approach.direction_w();
         let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
         let finger = self.robot.finger.clone();
-        self.swept = Some(SweptVolume { finger, p_wt: reached_w.into() });
+        let swept = Some(SweptVolume { finger, p_wt: reached_w.into() });
+        let mut located = Located::default();
         let mut trail = None;
         let touch = match end {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
-            Some(ApproachEnd::Contact) => match self.read(approach, &above)? {
-                Some(mut contact) => {
-                    trail = self.slide(approach, &mut contact, &above)?;
-                    Touch::Contact(contact)
+            Some(ApproachEnd::Contact) => {
+                located = self.read(approach, &above)?;
+                match &located.sensed {
+                    Some((x_wt, sensed)) => {
+                        let mut contact = Contact::sensed(x_wt, sensed);
+                        trail = self.slide(approach, &mut contact, &above)?;
+                        Touch::Contact(contact)
+                    }
+                    None => Touch::Overload,
                 }
-                None => Touch::Overload,
-            },
+            }
         };
         let has_left = match &trail {
             Some(trail) => self.leave_stroke(approach, trail, &above)?,
@@ -487,19 +488,8 @@ impl Probe for Servo {
             let back = Isometry3::from_parts(back_w.into(), above.rotation);
             self.move_straight("the retract position", back, travel_m_s, false)?;
         }
-        Ok(touch)
-    }
-
-    fn swept_volume(&self) -> Option<SweptVolume> {
-        self.swept.clone()
-    }
-
-    fn sensed(&self) -> Option<&(Isometry3<f64>, SensedContact)> {
-        self.sensed.as_ref()
-    }
-
-    fn doubt(&self) -> Option<Doubt> {
-        self.doubt
+        let Located { sensed, doubt } = located;
+        Ok(Outcome { touch, swept, sensed, doubt })
     }
 
     fn time_s(&self) -> Option<f64> {

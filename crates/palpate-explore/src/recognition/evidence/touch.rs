@@ -12,7 +12,7 @@
 //! deviations, so that at a large one all poses are equal.
 
 use super::likelihood::{LogLikelihood, NoiseModel, Residual, Terms, inflation};
-use crate::probe::{Contact, SweptVolume, Touch};
+use crate::probe::{Contact, Outcome, Touch};
 use crate::recognition::library::{LibraryObject, Nearest};
 use crate::robot::Finger;
 use crate::robot::sensor::GelPad;
@@ -79,10 +79,10 @@ impl TouchEvidence {
     /// may have a pad; `None` after an overload, and without a hull.
     pub fn new(
         approach: &Approach,
-        (touch, swept): (&Touch, Option<&SweptVolume>),
+        outcome: &Outcome,
         (slack_m, pad): (f64, Option<&GelPad>),
     ) -> Option<Self> {
-        let swept = swept?;
+        let (touch, swept) = (&outcome.touch, outcome.swept.as_ref()?);
         let ahead_w = approach.direction_w();
         let finger = &swept.finger;
         // The hull starts outside of the region, and the tip ends where it was at contact.
@@ -236,6 +236,7 @@ fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::probe::SweptVolume;
     use crate::recognition::pose_prior::moved;
     use crate::task::{Aim, Ball};
     use nalgebra::Vector6;
@@ -267,8 +268,8 @@ mod tests {
             }
             false => Touch::Miss,
         };
-        let swept = SweptVolume { finger, p_wt };
-        TouchEvidence::new(&approach, (&touch, Some(&swept)), (0.0, None)).unwrap()
+        let swept = Some(SweptVolume { finger, p_wt });
+        TouchEvidence::new(&approach, &Outcome { swept, ..touch.into() }, (0.0, None)).unwrap()
     }
 
     /// The angle between normals is that of the rotation, for opposite ones too.
