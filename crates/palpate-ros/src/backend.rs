@@ -61,10 +61,13 @@ impl RosBackend {
 
     /// Commands zero velocity, latches a fault and returns the latched one.
     fn fault(&self, mut cause: LinkFault) -> Fault {
-        // Otherwise the last command would remain valid until it expires. An arm of another program
-        // receives nothing.
-        let was_engaged = self.lab.mailbox.latest().is_engaged;
-        if was_engaged {
+        let (was_engaged, has_commanded) = {
+            let heard = self.lab.mailbox.latest();
+            (heard.is_engaged, heard.commanded.is_some())
+        };
+        // Otherwise the last velocity would remain valid until it expires, even after a hold of an
+        // instant. An arm of another program receives nothing.
+        if was_engaged || has_commanded && !self.lab.settings().sends_trajectories() {
             self.lab.command(&self.still.qdot);
         }
         // No command goes to an arm that was stopped by hand: even a zero velocity could release
