@@ -447,11 +447,11 @@ fn too_few_contacts_are_refused() {
     assert!(foreseen.unwrap().undetermined.len() >= 11);
     struct Nothing;
     impl palpate::explore::probe::Probe for Nothing {
-        fn touch(
+        fn execute(
             &mut self,
             _: &palpate::task::Approach,
-        ) -> Result<palpate::explore::probe::Touch, palpate::backend::Fault> {
-            Ok(palpate::explore::probe::Touch::Miss)
+        ) -> Result<palpate::explore::probe::Outcome, palpate::backend::Fault> {
+            Ok(palpate::explore::probe::Touch::Miss.into())
         }
     }
     let design = RegistrationDesign {
