@@ -131,7 +131,7 @@ impl Scene {
 pub(crate) struct TouchData {
     /// Approach of the finger.
     pub(crate) approach: Approach,
-    /// What the touch has shown.
+    /// Outcome of the touch.
     pub(crate) outcome: probe::Outcome,
 }
 

@@ -79,7 +79,7 @@ impl Contact {
     }
 }
 
-/// All that one touch has shown.
+/// Result of a touch with all that it has shown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// End of the touch.

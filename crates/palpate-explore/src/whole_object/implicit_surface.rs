@@ -100,8 +100,8 @@ impl ImplicitSurface {
         Self { scope, settings, kernel, evidence, asked, fit, start, surface }
     }
 
-    /// Adds what a touch at `aim` that followed `approach` has shown; the belief changes at the next
-    /// [`refit`](Self::refit).
+    /// Adds what a touch at `aim` that followed `approach` has shown; the belief changes at the
+    /// next [`refit`](Self::refit).
     pub fn observe(&mut self, aim: &Aim, approach: &Approach, outcome: &Outcome) {
         self.asked.push(*aim);
         let apart_m = STROKE_STEP * self.scope.ball.radius_m;

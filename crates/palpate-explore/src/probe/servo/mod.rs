@@ -392,8 +392,8 @@ impl Servo {
     }
 }
 
-/// What the sensor located, with the pose of the tip at its reading, and its doubt; neither at an
-/// overload.
+/// Contact that the sensor located, with the pose of the tip at its reading, and its doubt; neither
+/// at an overload.
 #[derive(Default)]
 struct Located {
     sensed: Option<(Isometry3<f64>, SensedContact)>,
