@@ -99,7 +99,7 @@ install-clusters:
 TOUCHES := 20
 UR_TOUCHES := 24
 UR_ENDS := 20
-OVER_TOPICS := lab:: lab_camera:: lab_live:: lab_recognition:: lab_strokes:: lab_faults:: lab_ur:: lab_ur_driver:: lab_fr3::
+OVER_TOPICS := lab:: lab_camera:: lab_live:: lab_recognition:: lab_strokes:: lab_faults:: lab_ur:: lab_ur_driver:: lab_fr3:: lab_planning_scene::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 NO_NAMESPACE := no permission for a network namespace (unshare --map-root-user --net)
 LAB_TESTS = cargo test --locked -p palpate --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
