@@ -156,12 +156,14 @@ fn the_loop_loses_nothing_at_250_hz() {
         }
     };
     let link = Link::open(open, period, take, || None).unwrap();
+    link.open_commands();
     let topic = CommandTopic { max_age_s: 0.02, ..CommandTopic::default() };
     let names =
         JointNames::new(["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from).into());
     let send = || link.send(names.command(pace::now_s(), &[0.0; 7], &topic));
-    // Waits for discovery.
+    let waiting = Instant::now();
     while answers.lock().unwrap().is_empty() {
+        assert!(waiting.elapsed().as_secs() < 20, "no answer: discovery takes too long");
         send();
         sleep(Duration::from_millis(50));
     }
