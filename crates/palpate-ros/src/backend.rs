@@ -65,10 +65,17 @@ impl RosBackend {
             let heard = self.lab.mailbox.latest();
             (heard.is_engaged, heard.commanded.is_some())
         };
-        // Otherwise the last velocity would remain valid until it expires, even after a hold of an
-        // instant. An arm of another program receives nothing.
+        // Otherwise the last velocity stays valid until it expires, and moves the arm again after a
+        // short hold. An arm of another program receives nothing.
         if was_engaged || has_commanded && !self.lab.settings().sends_trajectories() {
             self.lab.command(&self.still.qdot);
+        }
+        // A driver that has stopped is silent or repeats itself; its controllers have the reason.
+        if was_engaged
+            && !matches!(cause, LinkFault::Arm(_))
+            && let Some(reason) = self.lab.ended_driver()
+        {
+            cause = reason;
         }
         // No command goes to an arm that was stopped by hand: even a zero velocity could release
         // its brakes again.
@@ -83,20 +90,11 @@ impl RosBackend {
                 let refusal = heard.status.as_ref().and_then(ArmStatus::refusal);
                 cause = refusal.map_or(cause, LinkFault::Arm);
             }
-        }
-        // A driver that has stopped is silent or repeats itself; its controllers have the reason.
-        let is_ended = self.lab.settings().driver().lifeline.is_some();
-        if is_ended
-            && was_engaged
-            && !matches!(cause, LinkFault::Arm(_))
-            && let Some(reason) = self.lab.lost_controller()
-        {
-            cause = reason;
-        }
-        // The activation of a controller would recover from the error by itself, without an
-        // operator (`initializeTorqueInterface` in `franka_hardware/src/robot.cpp`).
-        if is_ended && matches!(cause, LinkFault::Arm(_)) {
-            *self.lab.hand_back() = None;
+            // The activation of a controller would recover from the error by itself, without an
+            // operator (`initializeTorqueInterface` in `franka_hardware/src/robot.cpp`).
+            if self.lab.settings().driver().lifeline.is_some() {
+                *self.lab.hand_back() = None;
+            }
         }
         let cause = self.lab.latch().get_or_insert(cause).clone();
         Fault::Link { time_s: self.time_s(), cause }

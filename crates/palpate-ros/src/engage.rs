@@ -2,7 +2,7 @@
 //! commands, and its frames are those of the model.
 
 use super::arm::{POLL_INTERVAL, RosArm};
-use super::controllers::{Switch, switch_to};
+use super::controllers::{Controller, Switch, switch_to};
 use super::receiver::LatestMessages;
 use super::service::Service;
 use super::settings::BackendKind;
@@ -141,14 +141,25 @@ impl RosArm {
         Ok(())
     }
 
+    /// Returns the fault of a driver that has stopped, if its controllers show that.
+    pub(super) fn ended_driver(&self) -> Option<LinkFault> {
+        self.settings().driver().lifeline?;
+        let all = self.call_within(&Service::ListControllers, ASK_S).ok()?.controllers;
+        self.ended_among(&all)
+    }
+
+    fn ended_among(&self, all: &[Controller]) -> Option<LinkFault> {
+        let (name, words) = self.settings().driver().lifeline?;
+        let is_off = all.iter().any(|one| one.name == name && !one.is_active());
+        is_off.then(|| LinkFault::Arm(words.into()))
+    }
+
     /// Returns the fault of a controller that another program switched off.
     pub(super) fn lost_controller(&self) -> Option<LinkFault> {
         self.settings().driver().modes?;
         let all = self.call_within(&Service::ListControllers, ASK_S).ok()?.controllers;
-        let lifeline = self.settings().driver().lifeline;
-        let is_off = |name| all.iter().any(|one| one.name == name && !one.is_active());
-        if let Some((_, words)) = lifeline.filter(|(name, _)| is_off(*name)) {
-            return Some(LinkFault::Arm(words.into()));
+        if let Some(fault) = self.ended_among(&all) {
+            return Some(fault);
         }
         let own = self.settings().controller();
         if all.iter().any(|one| one.name == own && one.is_active()) {
