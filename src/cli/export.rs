@@ -349,7 +349,7 @@ fn mesh(run: &Run, args: &Args, replay: &BeliefReplay, grid: usize) -> PointClou
     let deviations_m: Vec<f64> = predictions.iter().map(|p| p.variance.sqrt()).collect();
     let largest_m = deviations_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let colour = |deviation_m: f64| style::deviation_rgb(deviation_m / largest_m);
-    let joined = grid_triangles(grid)
+    let joined = grid_triangles(grid, grid)
         .filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
     PointCloud {
         comments: vec![

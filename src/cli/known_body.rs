@@ -26,10 +26,14 @@ fn radius(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn numbers(text: &str) -> Result<[f64; 3], String> {
+    array(text).ok_or("allowed are three numbers, as in 0,-0.65,0.5".into())
+}
+
+/// Reads numbers between commas, at most 1000 each.
+pub(super) fn array<const N: usize>(text: &str) -> Option<[f64; N]> {
     let parsed: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    let found = parsed.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
-    let finite = found.filter(|numbers| numbers.iter().all(|number| number.abs() <= 1e3));
-    finite.ok_or("allowed are three numbers, as in 0,-0.65,0.5".into())
+    let found = parsed.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+    found.filter(|numbers| numbers.iter().all(|number| number.abs() <= 1e3))
 }
 
 impl KnownBodyArgs {

@@ -1,7 +1,7 @@
 //! Command `palpate serve`.
 
 use super::find::{EXPERIMENTS, SCENES, find, is_experiment};
-use super::known_body::KnownBodyArgs;
+use super::known_body::{KnownBodyArgs, array};
 use super::prepare::{prepare_environment, prepare_simulator};
 use super::progress::stop_on_interrupt;
 use super::terminal::{Outcome, Verbosity, print};
@@ -92,13 +92,11 @@ fn injection(text: &str) -> Result<Injection, String> {
 
 /// Reads a pose as position and rotation vector.
 fn pose(text: &str) -> Result<Isometry3<f64>, String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, z, rx, ry, rz]) if [x, y, z, rx, ry, rz].iter().all(|part| part.is_finite()) => {
-            Ok(Isometry3::new(Vector3::new(x, y, z), Vector3::new(rx, ry, rz)))
-        }
-        _ => Err("allowed are six numbers X,Y,Z,RX,RY,RZ, as in 0,0,0.12,0,0,0".into()),
-    }
+    let found = array(text);
+    let pose = found.map(|[x, y, z, rx, ry, rz]| {
+        Isometry3::new(Vector3::new(x, y, z), Vector3::new(rx, ry, rz))
+    });
+    pose.ok_or("allowed are six numbers X,Y,Z,RX,RY,RZ, as in 0,0,0.12,0,0,0".into())
 }
 
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {

@@ -11,13 +11,8 @@ Events (--event NAME@T[+FOR], s): reflex, user_stopped, guiding, locked (modes; 
 stops, until an operator recovers at the end), take_controllers, goal, joints_silent, wrench_silent, wrench_constant,
 state_silent.
 """
-import argparse
-import gc
-import json
 import random
-import signal
 import struct
-import sys
 import time
 from collections import Counter
 from dataclasses import dataclass
@@ -26,7 +21,7 @@ import control_model as shared
 import franka_messages as messages
 import franka_model as model
 import ur_driver
-from ur_driver import JOINT_NOISE, MotionObserver, emit, numbers, plane, stamp
+from ur_driver import JOINT_NOISE, MotionObserver, emit, stamp
 
 EVENTS = (*model.MODES, "take_controllers", "goal", "joints_silent", "wrench_silent", "wrench_constant", "state_silent")
 TAKER = "joint_impedance_example_controller"
@@ -83,6 +78,7 @@ class RobotState:
 
 class Driver(ur_driver.Driver):
     """Publishes and serves what franka_ros2 and robot_state_publisher do."""
+    longest_periods = 2.0
 
     def __init__(self, options):
         self.options, release, prefix = options, options.release, options.prefix
@@ -92,7 +88,7 @@ class Driver(ur_driver.Driver):
         self.joints = [prefix + joint for joint in kinematics.joints]
         self.order = list(range(7))
         tool = shared.from_rotation_vector(options.tcp[3:]), tuple(options.tcp[:3])
-        self.robot = model.Robot(kinematics, list(options.start), tool, tuple(options.tip), options.radius,
+        self.robot = model.Robot(kinematics, list(options.start), tool, tuple(options.tip or options.tcp[:3]), options.radius,
                                  options.plane, options.stiffness)
         self.p, self.d = model.gains(rows)
         self.manager = shared.ControllerManager(rows, release, prefix, self.joints, options.active)
@@ -227,75 +223,11 @@ class Driver(ur_driver.Driver):
             controller.is_holding, controller.goal = False, shared.EXECUTING
             self.goals[controller.name] = time.time()
 
-    def run(self):
-        """Runs the cycles until the end; a cycle that begins more than a period late is an overrun."""
-        period, stops = 1.0 / self.options.rate, []
-        for name in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(name, lambda *_: stops.append(True))
-        signal.signal(signal.SIGUSR1, lambda *_: self.motion.mark("mark"))
-        begun = last = due = time.monotonic()
-        overruns, longest = 0, 0.0
-        gc.freeze()
-        while not stops and (clock := time.monotonic()) - begun < self.options.seconds:
-            late = clock - due
-            overruns, longest = overruns + (late > period), max(longest, late)
-            due = clock if late > 10.0 * period else due
-            since = self.motion.moved if self.options.from_motion else begun
-            self.cycle(time.time(), clock, min(max(clock - last, 1e-4), 2.0 * period),
-                       -1.0 if since is None else clock - since)
-            last, due = clock, due + period
-            time.sleep(max(0.0, due - time.monotonic()))
-        robot = self.robot
-        emit("ended", ended=dict(
-            calls=self.calls, accepted=self.accepted, dropped=self.dropped, q=dict(zip(self.joints, robot.q)),
-            active=self.manager.active(), farthest_rad=robot.far_rad, farthest_m=robot.far_m, peak_force_n=robot.peak,
-            cycles=self.cycles, rate_hz=self.cycles / max(time.monotonic() - begun, 1e-9), overruns=overruns,
-            latest_ms=1e3 * longest))
 
-
-# Command line
-
-def event(text):
-    name, _, when = text.partition("@")
-    at, _, span = when.partition("+")
-    if name not in EVENTS or not at:
-        raise argparse.ArgumentTypeError(f"{text}: NAME@T[+FOR] with one of {', '.join(EVENTS)}")
-    return name, float(at), float(span or "inf")
-
-
-def parse(arguments):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("domain", type=int, nargs="?")
-    parser.add_argument("seconds", type=float, nargs="?")
-    parser.add_argument("--self-test", action="store_true")
-    parser.add_argument("--release", choices=("humble", "jazzy"), default="jazzy")
-    parser.add_argument("--active", type=lambda text: [name for name in text.split(",") if name], metavar="NAME,…",
-                        help="controllers of the arm that are active at start (default: as launched)")
-    parser.add_argument("--tcp", type=numbers(6), default=(0.0,) * 6, metavar="x,y,z,rx,ry,rz",
-                        help="end effector (F_T_EE) in the flange, m, and rotation vector, rad")
-    parser.add_argument("--tip", type=numbers(3), default=(0.0,) * 3, metavar="x,y,z",
-                        help="fingertip's centre in the flange, m")
-    parser.add_argument("--radius", type=float, default=0.005, help="of the fingertip, m")
-    parser.add_argument("--plane", type=plane, metavar="y=-0.66", help="a surface in the frame base, m")
-    parser.add_argument("--stiffness", type=float, default=3000.0, help="of the surface, N/m")
-    parser.add_argument("--start", type=numbers(7), default=(0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398),
-                        help="joints at start from fr3_joint1, rad")
-    parser.add_argument("--rate", type=float, default=RATE, help="cycles per second")
-    parser.add_argument("--prefix", default="", help="arm_prefix with its underscore")
-    parser.add_argument("--namespace", default="")
-    parser.add_argument("--from-motion", action="store_true", help="times of events count from the first movement")
-    parser.add_argument("--event", type=event, action="append", default=[], metavar="NAME@T[+FOR]")
-    options = parser.parse_args(arguments)
-    if not options.self_test and options.seconds is None:
-        parser.error("DOMAIN and SECONDS are required")
-    return options
+def parser():
+    return ur_driver.command_line(__doc__, ("humble", "jazzy"), EVENTS,
+                                  (0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398), RATE)
 
 
 if __name__ == "__main__":
-    chosen = parse(sys.argv[1:])
-    if chosen.self_test:
-        import franka_driver_test
-        franka_driver_test.run()
-        print(json.dumps({"self_test": "passed"}))
-    else:
-        Driver(chosen).run()
+    ur_driver.main(parser(), Driver, "franka_driver_test")

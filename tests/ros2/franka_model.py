@@ -61,6 +61,7 @@ class Robot:
         self.is_controlled, self.is_stopped = False, False
         self.pose = kinematics.flange(self.q)
         self.start, self.far_rad, self.far_m, self.contact, self.peak = self.pose[1], 0.0, 0.0, 0.0, 0.0
+        self.ignored = 0  # setpoints: a limit of the arm is an error instead
 
     def mode(self):
         """Returns the mode and its errors; rule mode_during_control: an error ends the control."""

@@ -15,12 +15,12 @@ rtde_loss, take_controllers, goal, wrench_silent, wrench_constant, joints_silent
 """
 import argparse
 import gc
+import importlib
 import json
 import math
 import random
 import re
 import signal
-import sys
 import time
 from collections import Counter, deque
 from dataclasses import dataclass
@@ -117,6 +117,7 @@ class ControllerStopper:
 
 class Driver:
     """Publishes and serves what ur_robot_driver and robot_state_publisher do, and a BioTac."""
+    longest_periods = math.inf  # of the robot's time in a cycle
 
     def __init__(self, options):
         self.options, release, prefix = options, options.release, options.prefix
@@ -458,11 +459,9 @@ class Driver:
             late = clock - due
             overruns, longest = overruns + (late > period), max(longest, late)
             due = clock if late > 10.0 * period else due
-            if self.options.from_motion and self.motion.moved is None:
-                elapsed = -1.0
-            else:
-                elapsed = clock - (self.motion.moved if self.options.from_motion else begun)
-            self.cycle(time.time(), clock, max(clock - last, 1e-4), elapsed)
+            since = self.motion.moved if self.options.from_motion else begun
+            self.cycle(time.time(), clock, min(max(clock - last, 1e-4), self.longest_periods * period),
+                       -1.0 if since is None else clock - since)
             last, due = clock, due + period
             time.sleep(max(0.0, due - time.monotonic()))
         robot = self.robot
@@ -498,12 +497,14 @@ def numbers(count):
     return parse
 
 
-def event(text):
-    name, _, when = text.partition("@")
-    at, _, span = when.partition("+")
-    if name not in EVENTS or not at:
-        raise argparse.ArgumentTypeError(f"{text}: NAME@T[+FOR] with one of {', '.join(EVENTS)}")
-    return name, float(at), float(span or "inf")
+def event_of(events):
+    def parse(text):
+        name, _, when = text.partition("@")
+        at, _, span = when.partition("+")
+        if name not in events or not at:
+            raise argparse.ArgumentTypeError(f"{text}: NAME@T[+FOR] with one of {', '.join(events)}")
+        return name, float(at), float(span or "inf")
+    return parse
 
 
 def plane(text):
@@ -513,42 +514,52 @@ def plane(text):
     return "xyz".index(axis), float(coordinate)
 
 
-def parse(arguments):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def command_line(about, releases, events, start, rate):
+    """Returns the options that the drivers of all arms have."""
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("domain", type=int, nargs="?")
     parser.add_argument("seconds", type=float, nargs="?")
     parser.add_argument("--self-test", action="store_true")
-    parser.add_argument("--release", choices=("humble", "jazzy", "kilted", "lyrical"), default="jazzy")
+    parser.add_argument("--release", choices=releases, default="jazzy")
     parser.add_argument("--active", type=lambda text: [name for name in text.split(",") if name], metavar="NAME,…",
-                        help="motion controllers that are active at start (default: as launched)")
+                        help="controllers of the arm that are active at start (default: as launched)")
     parser.add_argument("--tcp", type=numbers(6), default=(0.0,) * 6, metavar="x,y,z,rx,ry,rz",
-                        help="TCP in the flange, m, and rotation vector, rad")
-    parser.add_argument("--tip", type=numbers(3), metavar="x,y,z", help="fingertip's centre in the flange (TCP)")
+                        help="TCP or end effector in the flange, m, and rotation vector, rad")
+    parser.add_argument("--tip", type=numbers(3), metavar="x,y,z",
+                        help="fingertip's centre in the flange, m (default: the TCP)")
     parser.add_argument("--radius", type=float, default=0.007, help="of the fingertip, m")
     parser.add_argument("--plane", type=plane, metavar="y=-0.66", help="a surface in the frame base, m")
     parser.add_argument("--stiffness", type=float, default=3000.0, help="of the surface, N/m")
-    parser.add_argument("--start", type=numbers(6), default=(0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0),
-                        help="joints at start from shoulder_pan_joint, rad")
-    parser.add_argument("--lag", type=float, default=0.03, help="time constant of the servo, s; rule servo_lookahead")
-    parser.add_argument("--rate", type=float, default=model.UPDATE_RATE, help="cycles per second")
-    parser.add_argument("--mock", action="store_true", help="mock hardware")
-    parser.add_argument("--prefix", default="", help="tf_prefix")
+    parser.add_argument("--start", type=numbers(len(start)), default=start, help="joints at start from the base on, rad")
+    parser.add_argument("--rate", type=float, default=rate, help="cycles per second")
+    parser.add_argument("--prefix", default="", help="of joints and frames, e.g. ur5e_")
     parser.add_argument("--namespace", default="")
-    parser.add_argument("--dh-error", nargs="?", const="calibrated", choices=("calibrated", "uncalibrated"),
-                        help="other lengths (2 mm) and angles (0.3 deg); the description follows if calibrated")
-    parser.add_argument("--event", type=event, action="append", default=[], metavar="NAME@T[+FOR]")
+    parser.add_argument("--event", type=event_of(events), action="append", default=[], metavar="NAME@T[+FOR]")
     parser.add_argument("--from-motion", action="store_true", help="times of events count from the first movement")
-    options = parser.parse_args(arguments)
-    if not options.self_test and options.seconds is None:
+    return parser
+
+
+def main(parser, driver, test):
+    """Runs a driver, or the self-tests of its module `test`."""
+    options = parser.parse_args()
+    if options.self_test:
+        importlib.import_module(test).run()
+        print(json.dumps({"self_test": "passed"}))
+    elif options.seconds is None:
         parser.error("DOMAIN and SECONDS are required")
-    return options
+    else:
+        driver(options).run()
+
+
+def parser():
+    made = command_line(__doc__, ("humble", "jazzy", "kilted", "lyrical"), EVENTS,
+                        (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0), model.UPDATE_RATE)
+    made.add_argument("--lag", type=float, default=0.03, help="time constant of the servo, s; rule servo_lookahead")
+    made.add_argument("--mock", action="store_true", help="mock hardware")
+    made.add_argument("--dh-error", nargs="?", const="calibrated", choices=("calibrated", "uncalibrated"),
+                      help="other lengths (2 mm) and angles (0.3 deg); the description follows if calibrated")
+    return made
 
 
 if __name__ == "__main__":
-    chosen = parse(sys.argv[1:])
-    if chosen.self_test:
-        import ur_driver_test
-        ur_driver_test.run()
-        print(json.dumps({"self_test": "passed"}))
-    else:
-        Driver(chosen).run()
+    main(parser(), Driver, "ur_driver_test")

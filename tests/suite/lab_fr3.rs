@@ -2,71 +2,25 @@
 //! `tests/ros2/franka_driver.py`, on another implementation of DDS, run in a network namespace by
 //! `make test-ros2`.
 
-use crate::common::lab::{Network, TwinProcess, count, row};
-use palpate::experiment::Experiment;
-use palpate::experiment::trial::row::TrialRow;
+use crate::common::driver::{driver, off_mm, passes_its_own_tests, refused, said, touch};
+use crate::common::lab::{Network, count};
 use serde_json::json;
-use std::path::Path;
-use std::process::{Command, Output};
 use std::thread::sleep;
 use std::time::Duration;
 
 const EXPERIMENT: &str = "experiments/real_fr3_ros2.toml";
 
-/// Surface in front of the arm, m along y of its base.
-const PLANE_Y_M: f64 = -0.62;
-
-/// Stiffness of the surface, N/m: aluminium and a force sensor (`docs/finger.md`).
-const STIFFNESS_N_M: f64 = 20_000.0;
-
-/// Force from which on the experiment detects a contact, N.
-const DETECTION_N: f64 = 5.0;
-
-/// Starts the peer: an arm with its driver at the home of the experiment, with a ball in front of a
-/// plane.
-fn driver(network: &Network, options: &[&str]) -> TwinProcess {
-    let experiment = Experiment::load(Path::new(EXPERIMENT), &[]).unwrap();
-    let finger = &experiment.scene.finger;
-    let chain = experiment.scene.arm.as_ref().unwrap().chain().unwrap();
-    let comma = |values: &[f64]| {
-        let texts: Vec<String> = values.iter().map(|value| format!("{value:.6}")).collect();
-        texts.join(",")
-    };
-    let tip = chain.tool.translation.vector;
-    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
-    let domain = network.settings.domain.unwrap_or_default();
-    command.args(["tests/ros2/franka_driver.py", &domain.to_string(), "600"]);
-    command.arg(format!("--start={}", comma(chain.start())));
-    command.arg(format!("--tip={}", comma(tip.as_slice())));
-    command.arg(format!("--radius={}", finger.radius_m));
-    command.arg(format!("--plane=y={PLANE_Y_M}"));
-    command.arg(format!("--stiffness={STIFFNESS_N_M}"));
-    TwinProcess::spawn(command.args(options))
-}
+/// Script of the peer.
+const PEER: &str = "franka_driver.py";
 
 fn network(number: u16) -> Network {
     Network::of(number, EXPERIMENT)
 }
 
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Distances, mm, of a row's contacts from the plane, less what the surface yields to the detected
-/// force.
-fn off_mm(row: &TrialRow) -> Vec<f64> {
-    let yielded_m = DETECTION_N / STIFFNESS_N_M;
-    let contact = |y_m: f64| 1e3 * (y_m - (PLANE_Y_M - yielded_m)).abs();
-    row.touches.iter().map(|touch| contact(touch.contact.unwrap()[1])).collect()
-}
-
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_peer_of_an_fr3_passes_its_own_tests() {
-    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
-    let output = command.args(["tests/ros2/franka_driver.py", "--self-test"]).output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
-    assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "{\"self_test\": \"passed\"}");
+    passes_its_own_tests(PEER);
 }
 
 /// The contacts lie on the surface whatever the release, end effector, prefix and namespace, and
@@ -88,14 +42,9 @@ fn an_fr3_touches_where_the_surface_is() {
         ),
     ] {
         let network = network(number);
-        let twin = driver(&network, &options);
+        let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let mut run = network.run("random", touches, folder.path());
-        let output = run.args(sets.iter().flat_map(|set| ["--set", set])).output().unwrap();
-        assert!(output.status.success(), "{}", said(&output));
-        let row = row(folder.path());
-        assert_eq!((&row.failure, row.touches.len()), (&None, touches as usize));
-        let off_mm = off_mm(&row);
+        let off_mm = off_mm(&network, &touch(&network, touches, folder.path(), &sets));
         println!("{options:?}: off by {off_mm:.3?} mm");
         assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
         let ended = twin.end();
@@ -129,7 +78,7 @@ fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
         let network = network(142 + i as u16);
         let event_at = format!("{event}@0.5+3");
         let options = ["--release", release, "--from-motion", "--event", &event_at];
-        let twin = driver(&network, &options);
+        let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
         let set = format!("backend.release=\"{release}\"");
         let run = || {
@@ -171,12 +120,10 @@ fn an_fr3_that_is_not_ready_is_refused() {
         let event_at = format!("{event}@0");
         let active = if event == "goal" { "fr3_arm_controller" } else { "" };
         let active = format!("--active={active}");
-        let twin = driver(&network, &[&active, "--event", &event_at]);
+        let twin = driver(PEER, &network, &[&active, "--event", &event_at]);
         let folder = tempfile::tempdir().unwrap();
-        let output = network.run("random", 1, folder.path()).output().unwrap();
-        let message = said(&output);
+        let message = refused(&mut network.run("random", 1, folder.path()));
         println!("{event}: {}", message.lines().next().unwrap_or_default());
-        assert_eq!(output.status.code(), Some(2), "{event}: {message}");
         assert!(message.contains(words), "{event}: {message}");
         let ended = twin.end();
         assert_eq!(ended["calls"]["/controller_manager/switch_controller"], json!(null), "{ended}");
@@ -192,7 +139,7 @@ fn controllers_of_an_fr3_are_left_as_they_were() {
         (158, "cartesian_pose_example_controller", true),
     ] {
         let network = network(number);
-        let twin = driver(&network, &[&format!("--active={before}")]);
+        let twin = driver(PEER, &network, &[&format!("--active={before}")]);
         let folder = tempfile::tempdir().unwrap();
         let output = network.run("random", 1, folder.path()).output().unwrap();
         assert_eq!(output.status.success(), !is_refused, "{}", said(&output));

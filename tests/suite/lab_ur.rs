@@ -54,7 +54,8 @@ fn touched_as_in_the_simulator(network: &Network, options: &[&str]) {
         1e3 * worst_m
     );
     // On a steep surface a late tick moves the contact; one such contact is allowed.
-    assert!(off_m[off_m.len() - 2] < 3e-4 && worst_m < 6e-4, "{off_m:?}");
+    let others_m = &off_m[..off_m.len() - 1];
+    assert!(others_m.iter().all(|off_m| *off_m < 3e-4) && worst_m < 6e-4, "{off_m:?}");
 }
 
 /// An arm whose planner is killed, stopped or cut off comes to rest by itself, no touch is lost,

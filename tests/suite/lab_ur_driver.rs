@@ -1,90 +1,32 @@
 //! Tests of a UR5e behind `ur_robot_driver` as its sources describe it: `tests/ros2/ur_driver.py`,
 //! on another implementation of DDS, run in a network namespace by `make test-ros2`.
 
+use crate::common::driver::{driver, off_mm, passes_its_own_tests, refused, said, touch};
 use crate::common::lab::{
-    BALL_EXPERIMENT, End, Network, TwinProcess, count, end_planners_marked, row, signal,
+    BALL_EXPERIMENT, End, Network, TwinProcess, count, end_planners_marked, signal,
 };
 use palpate::backend::{Backend, Command as Motion};
 use palpate::experiment::Experiment;
-use palpate::experiment::trial::row::TrialRow;
 use palpate::ros::arm::RosArm;
 use palpate::ros::service::Service;
 use palpate::ros::settings::BackendSettings;
 use serde_json::{Value, json};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Surface in front of the arm, m along y of its base.
-const PLANE_Y_M: f64 = -0.62;
-
-/// Stiffness of the surface, N/m: aluminium and a force sensor (`docs/finger.md`).
-const STIFFNESS_N_M: f64 = 20_000.0;
-
-/// Options of an arm that stands at the home of the experiment, with a ball in front of a plane.
-fn stage() -> Vec<String> {
-    let home = "1.18490,-1.72124,1.67796,0.04328,1.18490,-1.57080";
-    let plane = format!("y={PLANE_Y_M}");
-    let stiffness = STIFFNESS_N_M.to_string();
-    let pairs = [
-        ["--start", home],
-        ["--tip", "0,0,0.12"],
-        ["--radius", "0.005"],
-        ["--plane", &plane],
-        ["--stiffness", &stiffness],
-    ];
-    pairs.into_iter().flatten().map(String::from).collect()
-}
-
-/// Command of the peer: an arm with its driver, for `seconds`.
-fn peer(network: &Network, seconds: u32, options: &[&str]) -> Command {
-    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
-    let domain = network.settings.domain.unwrap_or_default();
-    command.args(["tests/ros2/ur_driver.py", &domain.to_string(), &seconds.to_string()]);
-    command.args(stage()).args(options);
-    command
-}
-
-fn driver(network: &Network, options: &[&str]) -> TwinProcess {
-    TwinProcess::spawn(&mut peer(network, 600, options))
-}
+/// Script of the peer.
+const PEER: &str = "ur_driver.py";
 
 fn network(number: u16) -> Network {
     Network::of(number, BALL_EXPERIMENT)
 }
 
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Runs so many touches with settings; the run must succeed.
-fn touch(network: &Network, touches: u32, out: &Path, sets: &[&str]) -> TrialRow {
-    let mut run = network.run("random", touches, out);
-    run.args(sets.iter().flat_map(|set| ["--set", set]));
-    let output = run.output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
-    let row = row(out);
-    assert_eq!((&row.failure, row.touches.len()), (&None, touches as usize));
-    row
-}
-
-/// Distances, mm, of a row's contacts from the plane, less what the surface yields to the detected
-/// force.
-fn off_mm(row: &TrialRow, detection_n: f64) -> Vec<f64> {
-    let yielded_m = detection_n / STIFFNESS_N_M;
-    let contact = |y_m: f64| 1e3 * (y_m - (PLANE_Y_M - yielded_m)).abs();
-    let contacts = row.touches.iter().map(|touch| contact(touch.contact.unwrap()[1]));
-    contacts.collect()
-}
-
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn the_peer_passes_its_own_tests() {
-    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
-    let output = command.args(["tests/ros2/ur_driver.py", "--self-test"]).output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
-    assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "{\"self_test\": \"passed\"}");
+    passes_its_own_tests(PEER);
 }
 
 /// The contacts lie on the surface whatever the release, tool centre point, prefix and namespace.
@@ -107,9 +49,9 @@ fn a_ur_touches_where_the_surface_is() {
         ),
     ] {
         let network = network(number);
-        let twin = driver(&network, &options);
+        let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets), 8.0);
+        let off_mm = off_mm(&network, &touch(&network, touches, folder.path(), &sets));
         println!("{options:?}: off by {off_mm:.3?} mm");
         assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
         let ended = twin.end();
@@ -125,12 +67,10 @@ fn a_ur_touches_where_the_surface_is() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_calibrated_ur_touches_where_the_surface_is() {
     let network = network(103);
-    let twin = driver(&network, &["--dh-error"]);
+    let twin = driver(PEER, &network, &["--dh-error"]);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
-    let output = network.run("random", 1, &out).output().unwrap();
-    let words = said(&output);
-    assert_eq!(output.status.code(), Some(2), "{words}");
+    let words = refused(&mut network.run("random", 1, &out));
     assert!(words.contains("arm.calibration") && words.contains("doctor --arm"), "{words}");
     assert_eq!(twin.last(|event| event == "moving"), None, "{words}");
     let model = folder.path().join("robot.urdf");
@@ -148,7 +88,7 @@ fn a_calibrated_ur_touches_where_the_surface_is() {
     }
     let calibrated = format!("scene.arm.calibration=\"{}\"", model.display());
     let row = touch(&network, count("PALPATE_UR_TOUCHES", 6), &out, &[&calibrated]);
-    let off_mm = off_mm(&row, 8.0);
+    let off_mm = off_mm(&network, &row);
     println!("calibrated: off by {off_mm:.3?} mm");
     assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
     twin.end();
@@ -189,7 +129,7 @@ fn failures_of_a_ur_bring_it_to_rest() {
     let mut problems = Vec::new();
     for (i, (name, words)) in STOPS.iter().enumerate() {
         let network = network(110 + i as u16);
-        let twin = driver(&network, &["--from-motion", "--event", &format!("{name}@0.5+3")]);
+        let twin = driver(PEER, &network, &["--from-motion", "--event", &format!("{name}@0.5+3")]);
         let folder = tempfile::tempdir().unwrap();
         let output = network.run("random", 1, folder.path()).output().unwrap();
         let message = said(&output);
@@ -214,7 +154,7 @@ fn failures_of_a_ur_bring_it_to_rest() {
 fn a_ur_without_its_explorer_comes_to_rest() {
     for (number, end) in [(122, End::Kill), (123, End::Stop), (124, End::Cut)] {
         let network = network(number);
-        let twin = driver(&network, &[]);
+        let twin = driver(PEER, &network, &[]);
         let folder = tempfile::tempdir().unwrap();
         let run = |touches| {
             let mut run = network.run("random", touches, folder.path());
@@ -240,9 +180,9 @@ fn a_ur_without_its_explorer_comes_to_rest() {
 fn a_paused_ur_is_waited_for() {
     for (number, event) in [(125, "pause@0.5+2"), (126, "slow@0.2")] {
         let network = network(number);
-        let twin = driver(&network, &["--from-motion", "--event", event]);
+        let twin = driver(PEER, &network, &["--from-motion", "--event", event]);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&touch(&network, 2, folder.path(), &[]), 8.0);
+        let off_mm = off_mm(&network, &touch(&network, 2, folder.path(), &[]));
         assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{event}: {off_mm:?}");
         twin.end();
     }
@@ -253,7 +193,7 @@ fn a_paused_ur_is_waited_for() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_second_explorer_is_refused_and_the_first_goes_on() {
     let network = network(127);
-    let twin = driver(&network, &[]);
+    let twin = driver(PEER, &network, &[]);
     let [first_out, second_out] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let mut first = network.run("random", 4, first_out.path());
     let first = first.stderr(Stdio::piped()).spawn().unwrap();
@@ -264,9 +204,7 @@ fn a_second_explorer_is_refused_and_the_first_goes_on() {
     };
     let before = switches(&twin);
     for clear in [&[][..], &["--clear-fault"]] {
-        let second = network.run("random", 2, second_out.path()).args(clear).output().unwrap();
-        let words = said(&second);
-        assert_eq!(second.status.code(), Some(2), "{words}");
+        let words = refused(network.run("random", 2, second_out.path()).args(clear));
         assert!(words.contains("command"), "{words}");
         println!("{}", words.lines().next().unwrap_or_default());
     }
@@ -281,11 +219,9 @@ fn a_second_explorer_is_refused_and_the_first_goes_on() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_rehearsal_needs_no_forces() {
     let network = network(128);
-    let twin = driver(&network, &["--mock"]);
+    let twin = driver(PEER, &network, &["--mock"]);
     let folder = tempfile::tempdir().unwrap();
-    let output = network.run("random", 2, folder.path()).output().unwrap();
-    let words = said(&output);
-    assert_eq!(output.status.code(), Some(2), "{words}");
+    let words = refused(&mut network.run("random", 2, folder.path()));
     assert!(words.contains("--dry"), "{words}");
     assert_eq!(twin.last(|event| event == "moving"), None, "{words}");
     let output = network.run("random", 2, folder.path()).arg("--dry").output().unwrap();
@@ -296,7 +232,8 @@ fn a_rehearsal_needs_no_forces() {
     assert!(ended["farthest_m"].as_f64().unwrap() > 0.005, "{ended}");
 }
 
-/// What the driver is set up for otherwise is named, nothing moves, and its controllers stay.
+/// A driver with another setup is refused by the name of what differs: nothing moves, and its
+/// controllers stay as they are.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
@@ -309,12 +246,10 @@ fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
         (134, vec!["--event", "program_stop@0"], "External Control"),
     ] {
         let network = network(number);
-        let twin = driver(&network, &options);
+        let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let output = network.run("random", 1, folder.path()).output().unwrap();
-        let message = said(&output);
+        let message = refused(&mut network.run("random", 1, folder.path()));
         println!("{options:?}: {}", message.lines().next().unwrap_or_default());
-        assert_eq!(output.status.code(), Some(2), "{options:?}: {message}");
         assert!(message.contains(words), "{options:?}: {message}");
         assert_eq!(twin.last(|event| event == "moving"), None, "{options:?}: {message}");
         let ended = twin.end();
@@ -331,7 +266,7 @@ fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
 fn the_controller_that_was_active_is_active_again() {
     let network = network(135);
     let before = "forward_velocity_controller";
-    let arm = driver(&network, &["--active", before]);
+    let arm = driver(PEER, &network, &["--active", before]);
     let experiment = Experiment::load(Path::new(BALL_EXPERIMENT), &[]).unwrap();
     let chain = experiment.scene.arm.unwrap().chain().unwrap();
     let patient = BackendSettings { connect_timeout_s: 8.0, ..network.settings.clone() };

@@ -136,7 +136,7 @@ const KEYS: [&str; 10] = [
 ];
 
 /// Names of the topics without settings, in their order.
-const FIXED: [&str; 9] = [
+const FIXED: [&str; 8] = [
     "/palpate/markers",
     "/palpate/points",
     "/tf_static",
@@ -145,7 +145,6 @@ const FIXED: [&str; 9] = [
     "follow_joint_trajectory/_action/status",
     "robot_description",
     "/clock",
-    "/collision_object",
 ];
 
 /// Default name and age limit, s, of each topic with settings, as used by drivers
@@ -317,8 +316,8 @@ impl Topics {
             Topic::SafetyMode => (&self.safety_mode.name, f64::INFINITY),
             Topic::ProgramRunning => (&self.program_running.name, f64::INFINITY),
             Topic::SpeedScaling => (&self.speed_scaling.name, self.speed_scaling.max_age_s),
-            Topic::CollisionObject if self.collision_object.is_some() => {
-                (self.collision_object.as_deref().unwrap_or_default(), f64::INFINITY)
+            Topic::CollisionObject => {
+                (self.collision_object.as_deref().unwrap_or("/collision_object"), f64::INFINITY)
             }
             Topic::FrankaState => (&self.franka_state.name, self.franka_state.max_age_s),
             other => (FIXED[other as usize - USUAL.len()], f64::INFINITY),

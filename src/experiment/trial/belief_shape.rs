@@ -114,7 +114,7 @@ fn draw(
     let points: Vec<Point> = points_w.iter().map(|p_w| (*p_w).into()).collect();
     let order: Vec<usize> = match zone.z_m {
         None => (0..PER_SIDE).filter(|&i| known[i]).collect(),
-        Some(_) => grid_triangles(PER_SIDE)
+        Some(_) => grid_triangles(PER_SIDE, PER_SIDE)
             .filter(|corners| corners.iter().all(|&i| known[i]))
             .flatten()
             .collect(),

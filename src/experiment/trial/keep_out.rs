@@ -5,6 +5,7 @@ use crate::experiment::simulation::Simulation;
 use nalgebra::Point3;
 use palpate_explore::backend::interlock::InterlockSettings;
 use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
+use palpate_explore::task::zone::grid_triangles;
 use palpate_explore::whole_object::ImplicitSurface;
 use palpate_geometry::solids::{Triangles, box_mesh, sphere_mesh};
 use palpate_gp::math::normal::BAND_95;
@@ -92,7 +93,9 @@ fn below_heights(field: &HeightField) -> Option<Triangles> {
     };
     let tops_z = points_z(&|i| tops_m[i]);
     let bases_z = points_z(&|_| y_m[1] - BASE_M);
-    let triangles = closed(grid(columns, tops_z.len() / columns), tops_z.len() as u32);
+    let top = grid_triangles(columns, tops_z.len() / columns);
+    let top = top.map(|corners| corners.map(|corner| corner as u32)).collect();
+    let triangles = closed(top, tops_z.len() as u32);
     let x_wz = zone.x_wz();
     Some((tops_z.into_iter().chain(bases_z).map(|p_z| x_wz * p_z).collect(), triangles))
 }
@@ -122,16 +125,6 @@ fn lifted(fine_m: &[f64], [columns, rows]: [usize; 2]) -> impl Iterator<Item = f
     let heights_m: Vec<f64> =
         (0..lifts_m.len()).map(|point| fine_m[at(point % columns, point / columns)]).collect();
     heights_m.into_iter().zip(lifts_m).map(|(height_m, lift_m)| height_m + lift_m)
-}
-
-/// Returns the triangles between `columns` × `rows` points, columns first, counter-clockwise as
-/// seen by the approaching finger.
-fn grid(columns: usize, rows: usize) -> Vec<[u32; 3]> {
-    let cells = (1..rows).flat_map(|k| (1..columns).map(move |i| k * columns + i));
-    let cells = cells.map(|at| [at, at - 1, at - columns, at - columns - 1].map(|at| at as u32));
-    cells
-        .flat_map(|[here, before, below, both]| [[both, before, here], [both, here, below]])
-        .collect()
 }
 
 /// Closes a surface by its copy, whose vertices follow the `count` own ones, and walls between the

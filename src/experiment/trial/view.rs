@@ -53,7 +53,7 @@ pub(super) fn limits(simulation: &Simulation) -> Marker {
 pub fn show(arm: &RosArm, simulation: &Simulation, event: &TrialEvent) {
     let markers = match event {
         TrialEvent::Next(next) => {
-            // Later, the belief is that of the last touch.
+            // Later solids are sent at the end of each touch.
             if next.count == 1 {
                 arm.show_solids(|| keep_out(simulation, next.belief));
             }

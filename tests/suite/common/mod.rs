@@ -2,6 +2,8 @@
 
 pub mod around;
 pub mod counting;
+#[cfg(feature = "mujoco")]
+pub mod driver;
 pub mod fake;
 pub mod fault_injector;
 pub mod hub;

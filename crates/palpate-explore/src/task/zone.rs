@@ -187,12 +187,13 @@ impl Zone {
     }
 }
 
-/// Returns the triangles between the places of a [`grid`](Zone::grid) with `per_side` places along
-/// each of two sides, as indices, counter-clockwise as seen by the approaching finger.
-pub fn grid_triangles(per_side: usize) -> impl Iterator<Item = [usize; 3]> {
-    let cells = (1..per_side).flat_map(move |j| (1..per_side).map(move |i| j * per_side + i));
+/// Returns the triangles between `columns` × `rows` places, the columns varying fastest, as of a
+/// [`grid`](Zone::grid) over two sides: indices, counter-clockwise as seen by the approaching
+/// finger.
+pub fn grid_triangles(columns: usize, rows: usize) -> impl Iterator<Item = [usize; 3]> {
+    let cells = (1..rows).flat_map(move |j| (1..columns).map(move |i| j * columns + i));
     cells.flat_map(move |here| {
-        let [before, below, both] = [here - 1, here - per_side, here - per_side - 1];
+        let [before, below, both] = [here - 1, here - columns, here - columns - 1];
         [[both, before, here], [both, here, below]]
     })
 }

@@ -1,0 +1,78 @@
+//! Arms with their drivers as the drivers' sources describe them (`tests/ros2/*_driver.py`), on
+//! another implementation of DDS, in front of a plane.
+
+use super::lab::{Network, TwinProcess, row};
+use palpate::experiment::Experiment;
+use palpate::experiment::trial::row::TrialRow;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Surface in front of the arm, m along y of its base.
+const PLANE_Y_M: f64 = -0.62;
+
+/// Stiffness of the surface, N/m: aluminium and a force sensor (`docs/finger.md`).
+const STIFFNESS_N_M: f64 = 20_000.0;
+
+fn script(script: &str) -> Command {
+    let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
+    command.arg(format!("tests/ros2/{script}"));
+    command
+}
+
+/// Starts the driver of a script at the home of the network's experiment, with its fingertip in
+/// front of the plane.
+pub fn driver(name: &str, network: &Network, options: &[&str]) -> TwinProcess {
+    let scene = Experiment::load(Path::new(network.experiment), &[]).unwrap().scene;
+    let chain = scene.arm.as_ref().unwrap().chain().unwrap();
+    let comma = |values: &[f64]| {
+        let texts: Vec<String> = values.iter().map(|value| format!("{value:.6}")).collect();
+        texts.join(",")
+    };
+    let mut command = script(name);
+    command.args([&network.settings.domain.unwrap_or_default().to_string(), "600"]);
+    command.arg(format!("--start={}", comma(chain.start())));
+    command.arg(format!("--tip={}", comma(chain.tool.translation.vector.as_slice())));
+    command.arg(format!("--radius={}", scene.finger.radius_m));
+    command.arg(format!("--plane=y={PLANE_Y_M}"));
+    command.arg(format!("--stiffness={STIFFNESS_N_M}"));
+    TwinProcess::spawn(command.args(options))
+}
+
+/// Runs the tests of a script's own parts, which need no network.
+pub fn passes_its_own_tests(name: &str) {
+    let output = script(name).arg("--self-test").output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "{\"self_test\": \"passed\"}");
+}
+
+/// Returns the messages of a command.
+pub fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Runs a command that must be refused; returns its messages.
+pub fn refused(run: &mut Command) -> String {
+    let output = run.output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{run:?}: {}", said(&output));
+    said(&output)
+}
+
+/// Makes so many touches with settings; the run must succeed.
+pub fn touch(network: &Network, touches: u32, out: &Path, sets: &[&str]) -> TrialRow {
+    let mut run = network.run("random", touches, out);
+    run.args(sets.iter().flat_map(|set| ["--set", set]));
+    let output = run.output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let row = row(out);
+    assert_eq!((&row.failure, row.touches.len()), (&None, touches as usize));
+    row
+}
+
+/// Distances, mm, of a row's contacts from the plane, less what the surface yields to the detected
+/// force.
+pub fn off_mm(network: &Network, row: &TrialRow) -> Vec<f64> {
+    let touch = Experiment::load(Path::new(network.experiment), &[]).unwrap().scene.touch;
+    let surface_m = PLANE_Y_M - touch.detection_n / STIFFNESS_N_M;
+    let contact = |y_m: f64| 1e3 * (y_m - surface_m).abs();
+    row.touches.iter().map(|touch| contact(touch.contact.unwrap()[1])).collect()
+}
