@@ -12,7 +12,7 @@ use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
 use anyhow::Context;
-use palpate_explore::probe::Touch;
+use palpate_explore::evidence::Outcome as TouchOutcome;
 use palpate_explore::registration::{RegistrationDesign, register};
 use palpate_gp::math::seed;
 use palpate_ros::settings::{BackendKind, BackendSettings};
@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
     };
     let bar = progress_bar(talk, "register", "touches", of as u64, 0);
-    let made = &mut |_: &Touch| step(talk, &bar);
+    let made = &mut |_: &TouchOutcome| step(talk, &bar);
     let found = register(&mut *probe, &robot, touch, (&body, &design), made)?;
     bar.finish_and_clear();
     let before = scene.arm.as_ref().and_then(|arm| arm.correction());

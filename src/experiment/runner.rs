@@ -255,7 +255,7 @@ pub fn run_real(
                 }
                 TrialEvent::Finished(touched) => touched,
             };
-            let time_s = touched.row.time_s.unwrap_or_default();
+            let time_s = touched.row.outcome.time_s.unwrap_or_default();
             progress(Progress::Touch);
             let observed = observer(event);
             if let Some(made) = made.get(touched.count as usize - 1) {

@@ -257,7 +257,7 @@ impl<'a> FilmLayout<'a> {
         &self,
         row: &TrialRow,
     ) -> impl Iterator<Item = (Swatch, &'static str)> + use<> {
-        let is_missed = row.touches.iter().any(|touch| touch.contact.is_none());
+        let is_missed = row.touches.iter().any(|touch| touch.contact().is_none());
         touch_entries().into_iter().chain(is_missed.then_some(MISS))
     }
 

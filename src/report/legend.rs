@@ -90,7 +90,7 @@ impl FigureLayout {
 /// Returns the legend entry of missed touches, if there are any.
 pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
     let mut touches = run.rows.iter().flat_map(|row| &row.touches);
-    let is_missed = touches.any(|touch| touch.contact.is_none());
+    let is_missed = touches.any(|touch| touch.contact().is_none());
     is_missed.then_some(MISS)
 }
 

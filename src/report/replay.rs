@@ -8,7 +8,6 @@ use crate::report::canvas::{Canvas, PointPx};
 use crate::report::style;
 use crate::report::table::digits;
 use anyhow::{Context, ensure};
-use nalgebra::Point3;
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -59,17 +58,13 @@ impl<'a> BeliefReplay<'a> {
         let finger = &experiment.scene.finger;
         let belief = HeightField::new(zone.clone(), experiment.gp.clone());
         let mut belief = belief.with_finger(finger.clone());
-        for view in row.views.iter().filter(|view| view.after < count) {
-            belief.observe_seen(view.seen.clone());
-        }
         for touch in touches {
             let is_place = |it: &&[f64]| it.len() == zone.dimension();
             touch.target.place().filter(is_place).with_context(|| {
                 format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
-            let outcome = touch.outcome(finger, -zone.ahead_w().into_inner());
-            belief.observe_target(&touch.target, &outcome);
         }
+        row.actions(count).for_each(|(target, outcome)| belief.observe(target, outcome));
         belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };
         Ok(Some(Self {
@@ -195,7 +190,7 @@ pub fn row<'a>(run: &'a Run, planner: &str) -> Option<&'a TrialRow> {
 
 /// Returns the place (x) or (x, z) of a touch and its height above the datum; `None` for a miss.
 pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
-    let p_wc = Point3::from(touch.contact?);
+    let p_wc = touch.contact()?;
     Some((zone.place(&p_wc), zone.height_m(&p_wc)))
 }
 

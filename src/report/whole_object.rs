@@ -91,7 +91,7 @@ pub fn sequences(
             sequence.touches.push(SolidTouch {
                 aim_w: aim.p_w,
                 along_w: *aim.direction_w,
-                contact_w: touch.contact.map(Point3::from),
+                contact_w: touch.contact(),
                 is_initial: i < initial_touches,
             });
         }
@@ -164,18 +164,7 @@ pub fn belief(
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
     let scope = ExplorationSetup::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
-    for view in row.views.iter().filter(|view| view.after < count) {
-        belief.observe_seen(view.seen.clone());
-    }
-    for touch in touches {
-        // The roll of the finger does not change its path.
-        let standoff_m = scene.touch.standoff_m;
-        let approach = ball.approach_to(&touch.target, &scene.finger, standoff_m, 0.0);
-        let (aim, approach) = (touch.target.aim().zip(approach))
-            .context("the target has no direction, which a whole object needs")?;
-        let outcome = touch.outcome(&scene.finger, -approach.direction_w().into_inner());
-        belief.observe(aim, &approach, &outcome);
-    }
+    row.actions(count).for_each(|(target, outcome)| belief.observe(target, outcome));
     belief.condition(before, fit)?;
     Ok(Some(belief))
 }

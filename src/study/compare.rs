@@ -157,7 +157,7 @@ fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     }
     ObjectResult {
         scores: logs.into_iter().filter_map(score).collect(),
-        miss_share: share(|touch| touch.contact.is_none() && !touch.overload),
+        miss_share: share(|touch| touch.is_miss()),
         fallback_share: share(|touch| touch.fallback.is_some()),
         travel_m: some_mean(travels.collect()),
         coverage: at_end(|touch| touch.metrics.as_ref()?.coverage),

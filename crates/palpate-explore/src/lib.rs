@@ -52,6 +52,7 @@ pub mod backend;
 pub mod band;
 pub mod belief;
 pub mod control;
+pub mod evidence;
 mod free_space;
 pub mod gp_settings;
 pub mod planner;

@@ -4,8 +4,9 @@ use super::row::ViewRow;
 use crate::experiment::experiment::Experiment;
 use crate::sim::Environment;
 use palpate_explore::belief::Belief;
+use palpate_explore::evidence::{End, Evidence, Outcome};
 use palpate_explore::probe::Probe;
-use palpate_explore::task::Region;
+use palpate_explore::task::{Region, Target};
 use palpate_explore::view::{Offer, SeenSurface, View};
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
@@ -46,11 +47,14 @@ impl<'a> Looks<'a> {
     ) -> Result<ViewRow, String> {
         let purpose = format!("view {number}");
         let mut random = seed::stream(self.experiment.seed, self.trial.into(), &purpose);
-        let seen = observe(self.environment, number, &mut random, belief);
+        let seen = seen(self.environment, number, &mut random);
         let seen = seen.map_err(|error| error.to_string())?;
+        let target = Target::Look { camera: number };
+        let outcome = Outcome::new(End::Looked, vec![Evidence::Seen(seen)]);
+        belief.observe(&target, &outcome);
         self.taken.push(number);
         probe.rest(self.look_s());
-        Ok(ViewRow { after, seen, error: None })
+        Ok(ViewRow { after, target, outcome, error: None })
     }
 
     /// Returns the looks that a planner may ask for after `after` touches.
@@ -89,27 +93,24 @@ pub(in crate::experiment) fn check(
         _ => u32::MAX,
     };
     let places = places.min(1 + camera.further.len() as u32);
-    let finger = (&scene.finger, scene.effects.skin.is_some());
     for number in (0..places).filter(|number| camera.at(*number as usize).file.is_some()) {
         let mut random = seed::stream(experiment.seed, 0, "check of a view");
-        let mut belief = Belief::new(environment.task(), finger, &experiment.gp, &experiment.space);
-        observe(environment, number, &mut random, &mut belief)?;
+        seen(environment, number, &mut random)?;
     }
     Ok(())
 }
 
-/// Adds view `number` to a belief.
+/// Returns what view `number` shows of the region.
 ///
 /// # Errors
 /// If the view cannot be read, or shows nothing of the region.
-fn observe(
+fn seen(
     environment: &Environment,
     number: u32,
     random: &mut impl Rng,
-    belief: &mut Belief,
 ) -> Result<SeenSurface, InputError> {
     let view = environment.look(number as usize, random)?;
-    let seen = belief.observe_view(&view);
+    let seen = SeenSurface::of_region(&view, environment.task().region());
     if seen.is_empty() {
         let camera = environment.scene().camera.as_ref().map(|camera| camera.at(number as usize));
         let file = camera.and_then(|camera| camera.file.clone());
@@ -119,7 +120,7 @@ fn observe(
             None => error,
         });
     }
-    Ok(seen.clone())
+    Ok(seen)
 }
 
 /// Describes a view of which a belief takes nothing.

@@ -27,7 +27,7 @@ use crate::sim::finger::effects::gel::GelEffect;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::{Belief, SurfaceBelief};
 use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
-use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::probe::Probe;
 use palpate_explore::recognition::{Library, ObjectHypotheses, RecognitionSettings};
 use palpate_explore::task::{Approach, Target, Task};
 use palpate_gp::covariance::CovarianceError;
@@ -40,8 +40,6 @@ use std::sync::Arc;
 pub struct FinishedTouch<'a> {
     /// Number of the touch, from 1.
     pub count: u32,
-    /// Outcome of the touch.
-    pub touch: &'a Touch,
     /// The touch's part of the trial's row.
     pub row: &'a TouchRow,
     /// Views so far.
@@ -140,10 +138,6 @@ fn run_touches(
     let start = start.ok_or("no planner for the initial touches")?;
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
-    // Rows contain contact normals and tips if the belief uses them.
-    let writes_normals = experiment.gp.normals || is_around;
-    let uses_tips = experiment.gp.free_space || experiment.gp.band.learned().is_some();
-    let writes_tips = uses_tips || is_around;
     let mut looks = Looks::new(experiment, &truth.environment, row.trial);
     let mut strokes = Strokes::new(task);
     for number in 0..experiment.views {
@@ -180,25 +174,13 @@ fn run_touches(
             approach = approach_to(task, &other, count)?;
             plan = Plan { target: other, sd_m: None, fallback: Some(Fallback::Operator) };
         }
-        let outcome = probe.execute(&approach);
+        let outcome = probe.touch(&approach);
         let outcome = outcome.map_err(|fault| format!("touch {count}: {fault}"))?;
-        belief.observe(&plan.target, &approach, &outcome);
+        belief.observe(&plan.target, &outcome);
         strokes.add(&plan.target, &outcome);
-        let contact = outcome.contact();
-        let is_written = writes_tips || outcome.touch == Touch::Miss;
-        let swept = outcome.swept.as_ref().filter(|_| is_written);
         let mut touch_row = TouchRow {
             target: plan.target,
-            contact: contact.map(|contact| contact.p_wc.coords.into()),
-            overload: outcome.touch == Touch::Overload,
-            normal: contact
-                .filter(|contact| contact.has_normal && (writes_normals || contact.sd_m.is_some()))
-                .map(|contact| contact.normal_w.into()),
-            contact_sd_m: contact.and_then(|contact| contact.sd_m),
-            patch: contact.map(TouchRow::patch_of).unwrap_or_default(),
-            doubt: outcome.doubt,
-            tip: swept.map(|swept| swept.p_wt.coords.into()),
-            time_s: probe.time_s(),
+            outcome,
             planned_sd_m: plan.sd_m,
             fallback: plan.fallback,
             fit: None,
@@ -214,7 +196,6 @@ fn run_touches(
         };
         let touched = FinishedTouch {
             count,
-            touch: &outcome.touch,
             row: &touch_row,
             views: &row.views,
             belief: &belief,

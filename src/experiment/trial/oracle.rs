@@ -45,9 +45,9 @@ impl GroundTruth {
     fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
         let mut probe = exact_probe(Arc::clone(&self.environment));
         let approach = self.environment.task().approach(target)?;
-        let outcome = probe.execute(&approach).ok()?;
+        let outcome = probe.touch(&approach).ok()?;
         let mut after = belief.clone();
-        after.observe(target, &approach, &outcome);
+        after.observe(target, &outcome);
         Some(after)
     }
 

@@ -1,8 +1,9 @@
 //! Strokes that a scene allows, and what a touch has cost so far.
 
 use super::looks::TOUCH_S;
+use palpate_explore::evidence::{Outcome, Source};
 use palpate_explore::planner::stroke::StrokeOffer;
-use palpate_explore::probe::{Outcome, Probe};
+use palpate_explore::probe::Probe;
 use palpate_explore::task::{Target, Task};
 
 /// Strokes of a trial.
@@ -42,9 +43,10 @@ impl<'a> Strokes<'a> {
         if let Some(last) = &self.last {
             self.travelled_m += self.task.region().travel_m(last, target);
         }
-        if let (Some(contact), true) = (outcome.contact(), target.slide_m() > 0.0) {
-            let points = contact.points().zip(&contact.patch);
-            self.slid_m += points.map(|(from, to)| (to.p_wc - from.p_wc).norm()).sum::<f64>();
+        if let Some(points) =
+            outcome.surface_points().filter(|it| it.source == Some(Source::Stroke))
+        {
+            self.slid_m += points.length_m();
         }
         self.last = Some(target.clone());
     }

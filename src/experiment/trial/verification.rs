@@ -5,8 +5,9 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use nalgebra::Point3;
 use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
+use palpate_explore::evidence::End;
 use palpate_explore::planner::sample::target_from_fractions;
-use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::probe::Probe;
 use palpate_explore::task::{Target, Task};
 use palpate_explore::whole_object::surface::steepness;
 use palpate_gp::math::seed;
@@ -40,12 +41,12 @@ pub(super) fn verify(
         else {
             break;
         };
-        let outcome = probe.execute(&approach);
+        let outcome = probe.touch(&approach);
         let outcome =
             outcome.map_err(|fault| format!("verification touch {}: {fault}", rows.len() + 1))?;
         let p_wc = outcome.contact().map(|contact| contact.p_wc);
         let error = p_wc.and_then(|p_wc| signed_distance(belief, &p_wc));
-        let first = again.and_then(|at| touches[at].contact).map(Point3::from);
+        let first = again.and_then(|at| touches[at].contact());
         let before = error.zip(first.and_then(|first| signed_distance(belief, &first)));
         rows.push(VerificationRow {
             target,
@@ -53,7 +54,7 @@ pub(super) fn verify(
             predicted_m,
             predicted_sd_m,
             contact: p_wc.map(|p_wc| p_wc.coords.into()),
-            overload: outcome.touch == Touch::Overload,
+            overload: outcome.end == End::Overload,
             error_m: error.map(|(error_m, _)| error_m),
             sd_m: error.map(|(_, sd_m)| sd_m),
             band_m: p_wc.and_then(|p_wc| band_m(belief.height_field()?, &p_wc)),
@@ -166,7 +167,7 @@ fn radical_inverse(mut i: u32, base: u32) -> f64 {
 /// Returns `count` touches with contact, evenly spaced from the first to the last; repeats them in
 /// turn if there are fewer.
 fn repeated(touches: &[TouchRow], count: u32) -> Vec<usize> {
-    let met: Vec<usize> = (0..touches.len()).filter(|&i| touches[i].contact.is_some()).collect();
+    let met: Vec<usize> = (0..touches.len()).filter(|&i| touches[i].contact().is_some()).collect();
     let count = count as usize;
     match met.len() {
         0 => Vec::new(),

@@ -3,7 +3,7 @@
 use crate::experiment::runner::thread_pool;
 use crate::sim::simulator::Simulator;
 use palpate_explore::backend::Fault;
-use palpate_explore::probe::Touch;
+use palpate_explore::evidence::Outcome;
 use palpate_explore::task::Zone;
 use palpate_input::error::InputError;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -42,7 +42,7 @@ pub fn scan(
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),
-) -> Result<Option<Vec<Result<Touch, Fault>>>, InputError> {
+) -> Result<Option<Vec<Result<Outcome, Fault>>>, InputError> {
     let task = simulator.environment().task();
     let row = |(j, targets): (usize, &[Vec<f64>])| {
         if stop.load(Ordering::Relaxed) {

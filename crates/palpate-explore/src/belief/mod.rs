@@ -8,13 +8,13 @@ mod touches;
 pub use height_field::HeightField;
 pub use quantiles::BAND;
 
+use super::evidence::Outcome;
 use super::gp_settings::GpSettings;
-use super::probe::Outcome;
 use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use crate::recognition::ObjectHypotheses;
 use crate::robot::Finger;
-use crate::task::{Approach, Region, Target, Task};
-use crate::view::{RigidError, SeenSurface, View};
+use crate::task::{Region, Target, Task};
+use crate::view::RigidError;
 use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -64,32 +64,16 @@ impl Belief {
         }
     }
 
-    /// Adds what a touch at `target` that followed `approach` has shown; the belief changes at the
-    /// next [`refit`](Self::refit).
-    pub fn observe(&mut self, target: &Target, approach: &Approach, outcome: &Outcome) {
+    /// Adds what an action at `target` has shown; the belief changes at the next
+    /// [`refit`](Self::refit).
+    pub fn observe(&mut self, target: &Target, outcome: &Outcome) {
         if let Some(hypotheses) = &mut self.hypotheses {
-            hypotheses.observe(approach, outcome);
+            hypotheses.observe(outcome);
         }
-        match (&mut self.surface, target.aim()) {
-            (SurfaceBelief::HeightField(field), _) => field.observe_target(target, outcome),
-            (SurfaceBelief::ImplicitSurface(surface), Some(aim)) => {
-                surface.observe(aim, approach, outcome);
-            }
-            (SurfaceBelief::ImplicitSurface(_), None) => {}
+        match &mut self.surface {
+            SurfaceBelief::HeightField(field) => field.observe(target, outcome),
+            SurfaceBelief::ImplicitSurface(surface) => surface.observe(target, outcome),
         }
-    }
-
-    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
-    /// it shows.
-    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        let seen = match &mut self.surface {
-            SurfaceBelief::HeightField(field) => field.observe_view(view),
-            SurfaceBelief::ImplicitSurface(surface) => surface.observe_view(view),
-        };
-        if let Some(hypotheses) = &mut self.hypotheses {
-            hypotheses.observe_view(seen);
-        }
-        seen
     }
 
     /// Returns the error of the camera's pose in each view, after a fit.

@@ -2,6 +2,7 @@
 //! of the next touch.
 
 use crate::belief::{Belief, HeightField, SurfaceBelief};
+use crate::evidence::Evidence;
 use crate::task::Target;
 use crate::view::Offer;
 use crate::whole_object::ImplicitSurface;
@@ -47,7 +48,7 @@ fn in_zone(field: &HeightField, offers: &[Offer], place: &[f64]) -> Option<Gains
     let gain = |offer: &Offer| {
         let seen = field.imagined(offer, &places).filter(|seen| !seen.is_empty())?;
         let mut after = field.clone();
-        after.observe_seen(seen);
+        after.add(&Evidence::Seen(seen));
         after.condition(fit).ok()?;
         Some(before - variance(&after)?)
     };
@@ -73,7 +74,7 @@ fn around(surface: &ImplicitSurface, offers: &[Offer], p_w: &Point3<f64>) -> Opt
         let seen = surface.imagined(offer, points.iter().copied().zip(normals.iter().copied()));
         let seen = seen.filter(|seen| !seen.is_empty())?;
         let mut after = surface.clone();
-        after.observe_seen(seen);
+        after.add(&Evidence::Seen(seen));
         after.condition(Some(fit), fit).ok()?;
         Some(before - variance(&after)?)
     };

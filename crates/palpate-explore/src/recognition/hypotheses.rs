@@ -1,13 +1,14 @@
 //! Hypotheses about object and pose, and *none of these*.
 
-use super::evidence::{Evidence, NoiseModel, TouchEvidence, ViewEvidence, before_m, hull};
 use super::library::{Library, LibraryObject};
+use super::measurement::{
+    Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull,
+};
 use super::particles::{Model, Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
-use crate::probe::Outcome;
+use crate::evidence::Outcome;
 use crate::robot::sensor::GelPad;
 use crate::task::{Approach, Target, Task};
-use crate::view::SeenSurface;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_input::config::{Rules, Validate};
 use rand::{Rng, RngExt};
@@ -150,7 +151,7 @@ pub struct ObjectHypotheses {
     /// Error that all contacts have in common.
     offset_m: f64,
     pad: Option<GelPad>,
-    evidence: Vec<Arc<Evidence>>,
+    evidence: Vec<Arc<Measurement>>,
     objects: Vec<ObjectPosterior>,
     near: Vec<ObjectPosterior>,
 }
@@ -217,7 +218,7 @@ impl ObjectHypotheses {
     fn model<'a>(
         &'a self,
         number: usize,
-        evidence: &'a [Arc<Evidence>],
+        evidence: &'a [Arc<Measurement>],
         noise: NoiseModel,
     ) -> Model<'a> {
         Model { object: &self.library.objects()[number], prior: &self.prior, evidence, noise }
@@ -233,18 +234,18 @@ impl ObjectHypotheses {
         &self.task
     }
 
-    /// Takes in a touch; nothing after an overload.
-    pub(crate) fn observe(&mut self, approach: &Approach, outcome: &Outcome) {
-        let evidence = TouchEvidence::new(approach, outcome, (self.slack_m, self.pad.as_ref()));
-        self.take_in(evidence.map(Evidence::Touch));
+    /// Updates the posterior by what an action has shown; nothing after an overload, or by a view
+    /// that shows nothing.
+    pub fn observe(&mut self, outcome: &Outcome) {
+        let measurement = match outcome.seen() {
+            Some(seen) => ViewMeasurement::new(seen).map(Measurement::View),
+            None => TouchMeasurement::new(outcome, self.slack_m, self.pad.as_ref())
+                .map(Measurement::Touch),
+        };
+        self.push(measurement);
     }
 
-    /// Takes in a view; nothing if it shows nothing.
-    pub(crate) fn observe_view(&mut self, seen: &SeenSurface) {
-        self.take_in(ViewEvidence::new(seen).map(Evidence::View));
-    }
-
-    fn take_in(&mut self, evidence: Option<Evidence>) {
+    fn push(&mut self, evidence: Option<Measurement>) {
         let Some(evidence) = evidence else { return };
         self.evidence.push(Arc::new(evidence));
         self.update_all();
@@ -404,7 +405,7 @@ impl ObjectHypotheses {
         let object: &LibraryObject = &self.library.objects()[hypothesis.object];
         let (ahead_w, before_m) = (approach.direction_w(), before_m(finger));
         let start_w = approach.p_near_w - ahead_w.scale(before_m);
-        let hull = hull(finger, approach, start_w);
+        let hull = hull(finger, &approach.r_wt(), start_w);
         let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + finger.radius_m;
         let hit = object.sweep(&hypothesis.x_wo, (&hull, &ahead_w), way_m)?;
         let p_wt = start_w + ahead_w.scale(hit.travel_m);

@@ -35,6 +35,11 @@ pub enum Target {
         /// Way of the finger across the approach, in `W`, m.
         way_w: Vector3<f64>,
     },
+    /// A look of a camera.
+    Look {
+        /// Number of the camera's place.
+        camera: u32,
+    },
 }
 
 impl Target {
@@ -43,7 +48,7 @@ impl Target {
         match self {
             Self::Place(place) => Some(place),
             Self::Tilted { place, .. } | Self::Stroke { place, .. } => Some(place),
-            Self::Aim(_) | Self::StrokeAround { .. } => None,
+            Self::Aim(_) | Self::StrokeAround { .. } | Self::Look { .. } => None,
         }
     }
 
@@ -98,6 +103,7 @@ impl Target {
             Self::Tilted { place: [x, z], pitch_deg } => vec![*x, *z, *pitch_deg],
             Self::Stroke { place: [x, z], to: [u, v] } => vec![*x, *z, *u, *v],
             Self::Aim(aim) => aim.numbers().to_vec(),
+            Self::Look { camera } => vec![f64::from(*camera)],
             Self::StrokeAround { aim, way_w } => {
                 aim.numbers().iter().chain(way_w).copied().collect()
             }
@@ -229,6 +235,11 @@ enum TargetOut {
         /// Way of the slide across the approach, in `W`, m.
         way_w: [f64; 3],
     },
+    /// A look of a camera.
+    Look {
+        /// Number of the camera's place.
+        camera: u32,
+    },
 }
 
 impl From<Target> for TargetOut {
@@ -240,6 +251,7 @@ impl From<Target> for TargetOut {
             Target::Aim(Aim { p_w, direction_w: ahead_w }) => {
                 Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
             }
+            Target::Look { camera } => Self::Look { camera },
             Target::StrokeAround { aim, way_w } => Self::StrokeAround {
                 p_w: aim.p_w.into(),
                 ahead_w: aim.direction_w.into_inner().into(),
@@ -267,6 +279,7 @@ impl TryFrom<TargetIn> for Target {
                 Ok(Self::Tilted { place, pitch_deg })
             }
             TargetIn::Written(TargetOut::Stroke { place, to }) => Ok(Self::Stroke { place, to }),
+            TargetIn::Written(TargetOut::Look { camera }) => Ok(Self::Look { camera }),
             TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
                 Aim::along(p_w, ahead_w).map(Self::Aim).ok_or_else(|| no_direction(ahead_w))
             }

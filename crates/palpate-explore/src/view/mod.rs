@@ -4,6 +4,7 @@
 //! [`thin`] turns the thousands of points of a [`View`] into a few hundred surface elements. A
 //! [`SeenSurface`] is the evidence that a belief takes from them.
 
+pub(crate) mod look;
 mod offer;
 mod register;
 mod reject;
