@@ -59,7 +59,7 @@ fn main() -> anyhow::Result<()> {
             let is_chosen = (BEGIN..CHOSEN).contains(&count);
             let plan = if is_chosen { planner.plan(&belief) } else { other.plan(&belief) }?;
             let Some(approach) = task.approach(&plan.target) else { continue };
-            belief.observe(&plan.target, &approach, &probe.execute(&approach)?);
+            belief.observe(&plan.target, &probe.touch(&approach)?);
             count += 1;
             let is_near = count + UPDATED > last;
             if count > CHOSEN && !is_near {

@@ -70,9 +70,9 @@ fn main() -> anyhow::Result<()> {
                 }
                 let approach = task.approach(&plan.target);
                 let approach = approach.ok_or_else(|| anyhow::anyhow!("out of reach"))?;
-                let outcome = probe.execute(&approach)?;
+                let outcome = probe.touch(&approach)?;
                 let begun = Instant::now();
-                belief.observe(&plan.target, &approach, &outcome);
+                belief.observe(&plan.target, &outcome);
                 if let Some(curve) = AT.iter().position(|at| *at == touch) {
                     seconds[curve].push(begun.elapsed().as_secs_f64());
                 }

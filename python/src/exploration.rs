@@ -7,9 +7,10 @@ use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
 use palpate::experiment::trial;
 use palpate::explore::belief::SurfaceBelief;
+use palpate::explore::evidence::{Contact, Evidence};
 use palpate::explore::planner::sample::random_aim;
 use palpate::explore::planner::uniform;
-use palpate::explore::probe::{Contact, Probe};
+use palpate::explore::probe::Probe;
 use palpate::explore::recognition::Library;
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
@@ -314,12 +315,13 @@ impl Episode {
         let task = self.world.task();
         let mut met = None;
         if let Some(approach) = task.approach(target) {
-            let mut outcome = self.probe.execute(&approach)?;
+            let mut outcome = self.probe.touch(&approach)?;
             let recognises = self.world.library.is_some();
             if self.how.believes || self.how.reward != Reward::None || recognises {
-                let is_used = self.world.is_around() || recognises;
-                outcome.swept = outcome.swept.filter(|_| is_used);
-                self.known.observe(target, &approach, &outcome);
+                if !self.world.is_around() && !recognises {
+                    outcome.evidence.retain(|evidence| !matches!(evidence, Evidence::Free(_)));
+                }
+                self.known.observe(target, &outcome);
             }
             met = outcome.contact().cloned();
         }

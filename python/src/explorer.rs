@@ -38,11 +38,11 @@ impl Exploration {
 
     /// Makes a touch at a target and fits the belief.
     fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
-        let (touch, values) = self.scene.get().touched(py, target.clone())?;
+        let (touch, outcome) = self.scene.get().touched(py, target.clone())?;
         let fitted = py.detach(|| {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(target) = Target::from_numbers(&target) {
-                known.observe(&target, &values.approach, &values.outcome);
+                known.observe(&target, &outcome);
             }
             known.refit().map(|_| ())
         });

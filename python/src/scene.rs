@@ -10,13 +10,14 @@ use crate::zone::Zone;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use palpate::backend::Fault;
 use palpate::config::Loader;
+use palpate::explore::evidence::{Contact, Outcome};
 use palpate::explore::probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::sim;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
-use palpate::task::{self, Approach};
+use palpate::task;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -90,11 +91,11 @@ impl Scene {
         task.zone().ok_or_else(|| errors::not_around(name, "ball, mesh()"))
     }
 
-    /// Makes a touch at a target; also returns the approach and the swept volume.
+    /// Makes a touch at a target; also returns its outcome.
     ///
     /// # Errors
     /// `ValueError` for an invalid target, `SimulationError` for a fault of the backend.
-    pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, TouchData)> {
+    pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, Outcome)> {
         let task = self.environment().task();
         let known = task::Target::from_numbers(&target).filter(|at| task.contains(at));
         let Some(approach) = known.and_then(|at| task.approach(&at)) else {
@@ -110,29 +111,16 @@ impl Scene {
                 Some(probe) => probe,
                 none => none.insert(self.simulator.probe(self.seed)?),
             };
-            Ok::<_, Fault>((probe.execute(&approach)?, probe.time_s()))
+            Ok::<_, Fault>((probe.touch(&approach)?, probe.time_s()))
         });
         let (found, time_s) = touched.map_err(errors::scene)?;
-        let outcome = match &found.touch {
-            probe::Touch::Contact(_) => OUTCOMES[0],
-            probe::Touch::Miss => OUTCOMES[1],
-            probe::Touch::Overload => OUTCOMES[2],
-        };
         let contact = found.contact().cloned();
         let place = (task.zone())
             .zip(contact.as_ref())
             .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
-        let values = TouchData { approach, outcome: found };
-        Ok((Touch { target, outcome, contact, place, time_s }, values))
+        let outcome = found.end.name();
+        Ok((Touch { target, outcome, contact, place, time_s }, found))
     }
-}
-
-/// Data of a touch that a belief is updated with.
-pub(crate) struct TouchData {
-    /// Approach of the finger.
-    pub(crate) approach: Approach,
-    /// Outcome of the touch.
-    pub(crate) outcome: probe::Outcome,
 }
 
 #[pymethods]
@@ -326,7 +314,7 @@ pub(crate) struct Touch {
     /// located).
     #[pyo3(get)]
     outcome: &'static str,
-    contact: Option<probe::Contact>,
+    contact: Option<Contact>,
     place: Option<(Vec<f64>, f64)>,
     /// Simulator or robot time since its start, seconds; None without motion.
     #[pyo3(get)]
@@ -375,7 +363,7 @@ impl Touch {
         pickle::check(&version, "Touch")?;
         let outcome = OUTCOMES.into_iter().find(|known| *known == outcome);
         let contact = contact.map(|json| serde_json::from_str(&json)).transpose();
-        let contact: Option<probe::Contact> = contact.map_err(errors::other)?;
+        let contact: Option<Contact> = contact.map_err(errors::other)?;
         Ok(Self { target, outcome: outcome.unwrap_or_default(), contact, place, time_s })
     }
 

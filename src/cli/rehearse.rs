@@ -7,7 +7,7 @@ use crate::experiment::Experiment;
 use anyhow::{Context, bail};
 use palpate_explore::backend::pace;
 use palpate_explore::belief::Belief;
-use palpate_explore::planner;
+use palpate_explore::planner::{self, Offer};
 use palpate_gp::math::seed;
 use palpate_input::format::counted;
 use std::sync::atomic::Ordering;
@@ -44,7 +44,7 @@ pub(super) fn run(
     let finger = (&scene.finger, scene.effects.skin.is_some());
     let belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
     while followed < experiment.touches && !stop.load(Ordering::Relaxed) {
-        let target = planner.plan(&belief)?.target;
+        let target = planner.plan(&belief, &Offer::default())?.target;
         let approach = task.approach(&target).context("no approach of a target")?;
         let passed_s = servo.rehearse(&approach)?;
         followed += 1;

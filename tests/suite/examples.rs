@@ -9,8 +9,8 @@ mod own_planner;
 #[path = "../../examples/own_sensor.rs"]
 mod own_sensor;
 
+use crate::common::shipped::contact;
 use palpate::experiment::statistics::summary::representative_value;
-use palpate::explore::probe::Touch;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 
@@ -70,10 +70,8 @@ fn every_arm_touches_like_a_stage() {
         let task = simulator.environment().task();
         let mut probe = simulator.probe(1).unwrap();
         let places = [[-0.02, 0.48], [0.0, 0.5], [0.02, 0.52]];
-        places.map(|place| match probe.touch(&task.approach(&place.into()).unwrap()).unwrap() {
-            Touch::Contact(contact) => contact.p_wc,
-            other => panic!("{other:?}"),
-        })
+        places
+            .map(|place| contact(probe.touch(&task.approach(&place.into()).unwrap()).unwrap()).p_wc)
     };
     let stage = touched(&["effects={skin={}}"]);
     for (model, simulator) in [

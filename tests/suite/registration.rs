@@ -449,9 +449,9 @@ fn too_few_contacts_are_refused() {
     impl palpate::explore::probe::Probe for Nothing {
         fn execute(
             &mut self,
-            _: &palpate::task::Approach,
-        ) -> Result<palpate::explore::probe::Outcome, palpate::backend::Fault> {
-            Ok(palpate::explore::probe::Touch::Miss.into())
+            _: &palpate::task::Action,
+        ) -> Result<palpate::explore::evidence::Outcome, palpate::backend::Fault> {
+            Ok(palpate::explore::evidence::End::Miss.into())
         }
     }
     let design = RegistrationDesign {

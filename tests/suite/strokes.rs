@@ -1,16 +1,17 @@
 //! Strokes: laws of a slide along known surfaces, and surfaces along which a finger cannot slide.
 
 use crate::common::program::folder;
-use crate::common::shipped::{contact, environment};
+use crate::common::shipped::environment;
 use crate::common::tap::{Tap, forces_n};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Reading;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
+use palpate::explore::evidence::Contact;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner::stroke::{StrokeOffer, best};
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
-use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::probe::Probe;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Target, Zone};
@@ -91,9 +92,10 @@ fn slide(environment: &Arc<Environment>, x: f64, to: f64) -> (Vec<Contact>, Vec<
     let mut servo = simulator.servo(Box::new(body), 0).unwrap();
     let target = Target::Stroke { place: [x, MIDDLE_M], to: [to, MIDDLE_M] };
     let approach = environment.task().approach(&target).unwrap();
-    let touched = contact(servo.touch(&approach).unwrap());
+    let outcome = servo.touch(&approach).unwrap();
+    assert!(outcome.contact().is_some(), "{outcome:?}");
     let forces_n = forces_n(&readings.lock().unwrap());
-    (touched.points().cloned().collect(), forces_n)
+    (outcome.points().to_vec(), forces_n)
 }
 
 /// Height of a front at `x`, by linear interpolation.
@@ -215,11 +217,13 @@ fn exact_and_moving_probe_slide_along_the_same_line() {
     let target = Target::Stroke { place: [-0.02, 0.47], to: [0.02, 0.53] };
     let [exact, moving] = [exact, moving].map(|environment| {
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
-        contact(probe.touch(&environment.task().approach(&target).unwrap()).unwrap())
+        let outcome = probe.touch(&environment.task().approach(&target).unwrap()).unwrap();
+        assert!(outcome.contact().is_some(), "{outcome:?}");
+        outcome.points()[1..].to_vec()
     });
-    assert!(exact.patch.len() > 50 && moving.patch.len() > 40);
-    for point in &moving.patch {
-        let nearest = exact.patch.iter().map(|other| (other.p_wc - point.p_wc).norm());
+    assert!(exact.len() > 50 && moving.len() > 40);
+    for point in &moving {
+        let nearest = exact.iter().map(|other| (other.p_wc - point.p_wc).norm());
         // Samples are a millimetre apart on slopes of up to two.
         assert!(nearest.fold(f64::INFINITY, f64::min) < 1.5e-3, "{}", point.p_wc);
     }
@@ -236,7 +240,7 @@ fn a_row_with_strokes_is_replayed() {
     let row = simulation.trial(raster, 0);
     assert_eq!(row.failure, None);
     let last = &row.touches[5];
-    assert!(matches!(last.target, Target::Stroke { .. }) && last.patch.len() > 20);
+    assert!(matches!(last.target, Target::Stroke { .. }) && last.outcome.points().len() > 21);
     let mut belief = Belief::new(
         simulation.task(),
         (&simulation.experiment().scene.finger, false),
@@ -244,9 +248,7 @@ fn a_row_with_strokes_is_replayed() {
         &simulation.experiment().space,
     );
     for touch in &row.touches {
-        let approach = simulation.task().approach(&touch.target).unwrap();
-        let against_w = -approach.direction_w().into_inner();
-        belief.observe(&touch.target, &approach, &touch.touch(against_w).into());
+        belief.observe(&touch.target, &touch.outcome);
     }
     let found = belief.refit().unwrap().hyperparameters.length_scales.clone();
     let written = &last.fit.as_ref().unwrap().hyperparameters.length_scales;
@@ -321,19 +323,16 @@ fn strokes_around_an_object_are_on_its_surface() {
         let mut belief = Belief::new(simulation.task(), finger, settings.0, settings.1);
         let (mut strokes, mut points) = (0, 0);
         for (count, touch) in row.touches.iter().enumerate() {
-            let approach = simulation.task().approach(&touch.target).unwrap();
             let length_m = touch.target.slide_m();
             strokes += usize::from(length_m > 0.0);
-            assert!(length_m < 0.06 + 1e-9 && (length_m > 0.0 || touch.patch.is_empty()));
-            for [x, y, z, ..] in &touch.patch {
-                let p_w = Point3::new(*x, *y, *z);
-                let off_m = (bvh.closest_point(&p_w).point - p_w).norm();
+            let points_w = touch.outcome.points();
+            assert!(length_m < 0.06 + 1e-9 && (length_m > 0.0 || points_w.len() < 2));
+            for Contact { p_wc: p_w, .. } in points_w.iter().skip(1) {
+                let off_m = (bvh.closest_point(p_w).point - p_w).norm();
                 assert!(off_m < 1e-9 && p_w.z > lowest_m, "{name}: {p_w}, {off_m}");
                 points += 1;
             }
-            let against_w = -approach.direction_w().into_inner();
-            let outcome = touch.outcome(finger.0, against_w);
-            belief.observe(&touch.target, &approach, &outcome);
+            belief.observe(&touch.target, &touch.outcome);
             if count >= 2 {
                 belief.refit().unwrap();
             }
@@ -364,7 +363,7 @@ proptest! {
         for (fractions, height) in &touches {
             let place = zone.at(fractions);
             let p_wc: Point3<f64> = zone.point(&place, *height);
-            field.observe(&place, &Touch::Contact(Contact::new(p_wc, Vector3::y())));
+            field.observe(&place.into(), &Contact::new(p_wc, Vector3::y()).into());
         }
         field.refit().unwrap();
         let [tap_s, speed_m_s] = [[3.0, 0.02], [1e-6, 1e-6], [10.0, 1e6]][extreme];

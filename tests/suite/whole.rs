@@ -7,7 +7,7 @@ use palpate::experiment::simulation::Simulation;
 use palpate::experiment::statistics::equal_error::equal_errors;
 use palpate::experiment::store::Run;
 use palpate::experiment::store::resolved;
-use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::experiment::truth::Truth;
 use palpate::explore::belief::Belief;
 use palpate::explore::planner;
@@ -87,8 +87,8 @@ fn a_sphere_is_found() {
 fn a_torus_keeps_its_hole() {
     let simulation = simulation(torus, "planners = [\"active\"]\ntouches = 45");
     let row = trial(&simulation, "active");
-    let inside = row.touches.iter().filter_map(|touch| touch.contact);
-    let inside = inside.filter(|[x, _, z]| x.hypot(*z) < 0.038).count();
+    let inside = row.touches.iter().filter_map(TouchRow::contact);
+    let inside = inside.filter(|p_w| p_w.x.hypot(p_w.z) < 0.038).count();
     assert!(inside >= 3, "{inside} contacts inside the hole");
     let mesh = surface(&simulation, &row).mesh(64).unwrap();
     // Along its axis there is no intersection, and across it two with the ring.

@@ -194,6 +194,11 @@ impl Silhouette {
         Self { zone: zone.clone(), seen }
     }
 
+    /// Creates the silhouette of a surface that is present everywhere.
+    pub fn everywhere() -> Self {
+        Self { zone: Zone::new([0.0, 1.0], None), seen: None }
+    }
+
     /// Whether a swept volume was observed.
     pub fn is_known(&self) -> bool {
         self.seen.is_some()

@@ -1,80 +1,75 @@
 //! Looks of the scene's camera: those before the touches, and those that a planner asks for.
 
-use super::row::ViewRow;
 use crate::experiment::experiment::Experiment;
 use crate::sim::Environment;
-use palpate_explore::belief::Belief;
+use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Evidence, Outcome};
 use palpate_explore::probe::Probe;
-use palpate_explore::task::{Region, Target};
-use palpate_explore::view::{Offer, SeenSurface, View};
+use palpate_explore::task::{Action, Region};
+use palpate_explore::view::{LookOffer, SeenSurface, View};
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
 use rand::Rng;
 
-/// Time of a touch of a probe that does not move, and of the first touch, s.
-// heuristic: a simulated PA-10 takes five to eight.
-pub(super) const TOUCH_S: f64 = 6.0;
-
-/// Camera of a trial.
-pub(super) struct Looks<'a> {
-    experiment: &'a Experiment,
+/// Probe with the camera of a trial's scene.
+pub(super) struct CameraProbe<'a> {
+    probe: &'a mut dyn Probe,
     environment: &'a Environment,
-    trial: u32,
+    /// Seed of the experiment and number of the trial.
+    seed: (u64, u32),
+    /// Largest number of views that a planner may add to; none if it may not look.
+    most: Option<usize>,
     /// Numbers of the views so far.
     taken: Vec<u32>,
 }
 
-impl<'a> Looks<'a> {
+impl<'a> CameraProbe<'a> {
     pub(super) fn new(
-        experiment: &'a Experiment,
+        experiment: &Experiment,
         environment: &'a Environment,
         trial: u32,
+        probe: &'a mut dyn Probe,
     ) -> Self {
-        Self { experiment, environment, trial, taken: Vec::new() }
-    }
-
-    /// Takes view `number` after `after` touches and adds it to the belief.
-    ///
-    /// # Errors
-    /// If the view cannot be read, or shows nothing of the region.
-    pub(super) fn look(
-        &mut self,
-        (number, after): (u32, u32),
-        probe: &mut dyn Probe,
-        belief: &mut Belief,
-    ) -> Result<ViewRow, String> {
-        let purpose = format!("view {number}");
-        let mut random = seed::stream(self.experiment.seed, self.trial.into(), &purpose);
-        let seen = seen(self.environment, number, &mut random);
-        let seen = seen.map_err(|error| error.to_string())?;
-        let target = Target::Look { camera: number };
-        let outcome = Outcome::new(End::Looked, vec![Evidence::Seen(seen)]);
-        belief.observe(&target, &outcome);
-        self.taken.push(number);
-        probe.rest(self.look_s());
-        Ok(ViewRow { after, target, outcome, error: None })
-    }
-
-    /// Returns the looks that a planner may ask for after `after` touches.
-    pub(super) fn offers(&self, probe: &dyn Probe, after: u32) -> Vec<Offer> {
-        let most = self.experiment.views + self.experiment.further_views;
-        if self.experiment.further_views == 0 || self.taken.len() >= most as usize {
-            return Vec::new();
-        }
-        let mean_s = probe.time_s().map(|time_s| (time_s - self.looked_s()) / f64::from(after));
-        let touch_s = mean_s.filter(|_| after > 0).unwrap_or(TOUCH_S);
-        self.environment.offers(&self.taken, touch_s)
-    }
-
-    /// Time of the looks so far, s.
-    pub(super) fn looked_s(&self) -> f64 {
-        self.look_s() * self.taken.len() as f64
+        let further = experiment.further_views;
+        let most = (further > 0).then_some((experiment.views + further) as usize);
+        Self { probe, environment, seed: (experiment.seed, trial), most, taken: Vec::new() }
     }
 
     fn look_s(&self) -> f64 {
         self.environment.scene().camera.as_ref().map_or(0.0, |camera| camera.look_s)
+    }
+}
+
+impl Probe for CameraProbe<'_> {
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        let Action::Look { camera } = action else { return self.probe.execute(action) };
+        let (seed, trial) = self.seed;
+        let mut random = seed::stream(seed, trial.into(), &format!("view {camera}"));
+        let seen = seen(self.environment, *camera, &mut random)?;
+        self.taken.push(*camera);
+        self.probe.rest(self.look_s());
+        let outcome = Outcome::new(End::Looked, vec![Evidence::Seen(seen)]);
+        Ok(Outcome { time_s: self.time_s(), ..outcome })
+    }
+
+    fn looks(&self) -> Vec<LookOffer> {
+        match self.most {
+            Some(most) if self.taken.len() < most => self.environment.looks(&self.taken),
+            _ => Vec::new(),
+        }
+    }
+
+    fn looked_s(&self) -> f64 {
+        self.look_s() * self.taken.len() as f64
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        self.probe.time_s()
+    }
+
+    fn rest(&mut self, time_s: f64) {
+        self.probe.rest(time_s);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};
-use palpate_explore::planner::Fallback;
+use palpate_explore::planner::{Fallback, Plan};
 use palpate_explore::task::Target;
 use palpate_explore::view::RigidError;
 use palpate_gp::fit::Fit;
@@ -169,6 +169,23 @@ impl TrialRow {
 }
 
 impl TouchRow {
+    /// Creates the row of a touch before the fit.
+    pub(super) fn new(plan: Plan, outcome: Outcome) -> Self {
+        Self {
+            target: plan.target,
+            // What a sensor located is in the evidence.
+            outcome: Outcome { sensed: None, ..outcome },
+            planned_sd_m: plan.sd_m,
+            fallback: plan.fallback,
+            fit: None,
+            jitter: 0.0,
+            metrics: None,
+            silhouette: None,
+            shape: None,
+            recognition: None,
+        }
+    }
+
     /// Whether the finger met nothing, and was not stopped by the force limit.
     pub fn is_miss(&self) -> bool {
         self.outcome.end == End::Miss

@@ -11,7 +11,7 @@ use palpate_explore::belief::HeightField;
 use palpate_explore::evidence::{Contact, End, Outcome};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
-use palpate_explore::planner::{PlannerFactory, PlanningSettings};
+use palpate_explore::planner::{Offer, PlannerFactory, PlanningSettings};
 use palpate_explore::probe::Probe;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_explore::robot::finger::{Frame, TipMotion};
@@ -74,7 +74,7 @@ pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
     let Some(entry) = planner::by_name("sobol") else { return Vec::new() };
     let random = seed::stream(seed, 0, "targets");
     let mut sobol = entry.make(&PlanningSettings::default(), random);
-    (0..count).filter_map(|_| Some(sobol.plan(&belief).ok()?.target)).collect()
+    (0..count).filter_map(|_| Some(sobol.plan(&belief, &Offer::default()).ok()?.target)).collect()
 }
 
 /// Results of the touches of one trial.

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::trial::row::TrialRow;
-use palpate::explore::probe::{Contact, Outcome, SweptVolume, Touch};
+use palpate::explore::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
 use palpate::explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
@@ -13,7 +13,7 @@ use palpate::robot::Finger;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::task::touch::TouchSettings;
-use palpate::task::{Aim, Approach, Ball, Task};
+use palpate::task::{Aim, Approach, Ball, Target, Task};
 use std::sync::Arc;
 
 /// A field with one value per point, negative inside, metres.
@@ -64,10 +64,11 @@ pub fn meet(
     met: Option<(Point3<f64>, Vector3<f64>)>,
     p_wt: Point3<f64>,
 ) {
-    let touch =
-        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact::new(p_wc, normal_w)));
+    let end = if met.is_some() { End::Contact } else { End::Miss };
     let radius_m = belief.scope().radius_m;
-    let swept = SweptVolume { finger: Finger { radius_m, ..Finger::default() }, p_wt };
-    let approach = approach(belief, aim);
-    belief.observe(aim, &approach, &Outcome { swept: Some(swept), ..touch.into() });
+    let finger = Finger { radius_m, ..Finger::default() };
+    let free = FreeVolume::new(finger, &approach(belief, aim), p_wt, end);
+    let points = met.map(|(p_wc, normal_w)| Evidence::Points(Contact::new(p_wc, normal_w).into()));
+    let evidence = points.into_iter().chain([Evidence::Free(free)]).collect();
+    belief.observe(&Target::Aim(*aim), &Outcome::new(end, evidence));
 }

@@ -7,7 +7,7 @@ use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
 use crate::view::look::{SEEN_NORMAL_Y_MIN, field_gradient};
-use crate::view::{Offer, RigidError, SeenSurface};
+use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -109,7 +109,7 @@ impl HeightField {
 
     /// Returns what a look would show at `places` if the surface is the mean; `None` before the
     /// first fit.
-    pub fn imagined(&self, offer: &Offer, places: &[Vec<f64>]) -> Option<SeenSurface> {
+    pub fn imagined(&self, offer: &LookOffer, places: &[Vec<f64>]) -> Option<SeenSurface> {
         let (posterior, zone) = (self.surface.as_ref()?, &self.zone);
         let scratch = &mut Scratch::default();
         let mut point = |place: &Vec<f64>| {

@@ -6,6 +6,7 @@ pub mod servo;
 use crate::backend::Fault;
 use crate::evidence::Outcome;
 use crate::task::{Action, Approach};
+use crate::view::LookOffer;
 
 /// A robot, real or simulated, that executes actions.
 pub trait Probe: Send {
@@ -24,6 +25,16 @@ pub trait Probe: Send {
         self.execute(&Action::Touch(*approach))
     }
 
+    /// Returns the looks of a camera that it can make now.
+    fn looks(&self) -> Vec<LookOffer> {
+        Vec::new()
+    }
+
+    /// Time of the looks so far, s.
+    fn looked_s(&self) -> f64 {
+        0.0
+    }
+
     /// Time since the start of the backend, s; `None` for a probe that does not move.
     fn time_s(&self) -> Option<f64> {
         None
@@ -31,6 +42,50 @@ pub trait Probe: Send {
 
     /// Adds `time_s` in which the robot rested, e.g. while a camera looked.
     fn rest(&mut self, _time_s: f64) {}
+}
+
+impl<P: Probe + ?Sized> Probe for &mut P {
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        (**self).execute(action)
+    }
+
+    fn looks(&self) -> Vec<LookOffer> {
+        (**self).looks()
+    }
+
+    fn looked_s(&self) -> f64 {
+        (**self).looked_s()
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        (**self).time_s()
+    }
+
+    fn rest(&mut self, time_s: f64) {
+        (**self).rest(time_s);
+    }
+}
+
+impl<P: Probe + ?Sized> Probe for Box<P> {
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        (**self).execute(action)
+    }
+
+    fn looks(&self) -> Vec<LookOffer> {
+        (**self).looks()
+    }
+
+    fn looked_s(&self) -> f64 {
+        (**self).looked_s()
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        (**self).time_s()
+    }
+
+    fn rest(&mut self, time_s: f64) {
+        (**self).rest(time_s);
+    }
 }
 
 /// Returns the approach of a touch, all of whose coordinates are finite.

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Target of the next touch, as selected by a planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(into = "TargetOut", try_from = "TargetIn")]
-#[schemars(with = "TargetOut")]
+#[serde(into = "StoredTarget", try_from = "StoredTarget")]
+#[schemars(with = "StoredTarget")]
 pub enum Target {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
@@ -50,6 +50,13 @@ impl Target {
             Self::Tilted { place, .. } | Self::Stroke { place, .. } => Some(place),
             Self::Aim(_) | Self::StrokeAround { .. } | Self::Look { .. } => None,
         }
+    }
+
+    /// Returns the point that a touch aims at, in the domain of beliefs: the place of a zone, or x,
+    /// y and z in `W`.
+    pub fn point(&self) -> Option<Vec<f64>> {
+        let aimed = || self.aim().map(|aim| aim.p_w.coords.as_slice());
+        Some(self.place().or_else(aimed)?.into())
     }
 
     /// Returns the place of a zone where the finger leaves the surface, if nothing stops it.
@@ -202,7 +209,7 @@ impl Aim {
 /// A target as written in a row.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum TargetOut {
+enum StoredTarget {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
     /// The place of a zone, touched with another pitch of the finger.
@@ -242,7 +249,7 @@ enum TargetOut {
     },
 }
 
-impl From<Target> for TargetOut {
+impl From<Target> for StoredTarget {
     fn from(target: Target) -> Self {
         match target {
             Target::Place(place) => Self::Place(place),
@@ -261,34 +268,21 @@ impl From<Target> for TargetOut {
     }
 }
 
-/// A target as read from a row: version 0.1 wrote its numbers without a name.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum TargetIn {
-    Written(TargetOut),
-    Numbers(Vec<f64>),
-}
-
-impl TryFrom<TargetIn> for Target {
+impl TryFrom<StoredTarget> for Target {
     type Error = String;
 
-    fn try_from(read: TargetIn) -> Result<Self, String> {
+    fn try_from(read: StoredTarget) -> Result<Self, String> {
         match read {
-            TargetIn::Written(TargetOut::Place(place)) => Ok(Self::Place(place)),
-            TargetIn::Written(TargetOut::Tilted { place, pitch_deg }) => {
-                Ok(Self::Tilted { place, pitch_deg })
-            }
-            TargetIn::Written(TargetOut::Stroke { place, to }) => Ok(Self::Stroke { place, to }),
-            TargetIn::Written(TargetOut::Look { camera }) => Ok(Self::Look { camera }),
-            TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
+            StoredTarget::Place(place) => Ok(Self::Place(place)),
+            StoredTarget::Tilted { place, pitch_deg } => Ok(Self::Tilted { place, pitch_deg }),
+            StoredTarget::Stroke { place, to } => Ok(Self::Stroke { place, to }),
+            StoredTarget::Look { camera } => Ok(Self::Look { camera }),
+            StoredTarget::Aim { p_w, ahead_w } => {
                 Aim::along(p_w, ahead_w).map(Self::Aim).ok_or_else(|| no_direction(ahead_w))
             }
-            TargetIn::Written(TargetOut::StrokeAround { p_w, ahead_w, way_w }) => {
+            StoredTarget::StrokeAround { p_w, ahead_w, way_w } => {
                 Self::stroke_around(p_w, ahead_w, way_w).ok_or_else(|| no_direction(ahead_w))
             }
-            TargetIn::Numbers(numbers) => Self::from_numbers(&numbers).ok_or_else(|| {
-                format!("a target has 1, 2, 3, 4, 6 or 9 numbers, not {}", numbers.len())
-            }),
         }
     }
 }

@@ -12,7 +12,7 @@ mod seen;
 mod sight;
 mod thin;
 
-pub use offer::Offer;
+pub use offer::LookOffer;
 pub use seen::{CorrectedElement, ERRORS, RigidError, SeenSurface, corrected_pose};
 pub use sight::{DepthMap, Sight};
 pub use thin::{SurfaceElement, thin};

@@ -7,7 +7,7 @@ use super::settings::SpatialGpSettings;
 use super::surface::Surface;
 use crate::evidence::{End, Evidence, Outcome};
 use crate::task::{Aim, Ball, Target};
-use crate::view::{Offer, RigidError, SeenSurface};
+use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -116,7 +116,7 @@ impl ImplicitSurface {
     /// `None` before the first fit.
     pub fn imagined(
         &self,
-        offer: &Offer,
+        offer: &LookOffer,
         points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
     ) -> Option<SeenSurface> {
         let surface = self.surface()?;
