@@ -11,7 +11,7 @@ mod curves;
 use curves::{Curve, draw, print, seconds};
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
 use palpate::sim::probe::exact_probe;
@@ -52,12 +52,17 @@ fn main() -> anyhow::Result<()> {
     let mut choice = curve("choice of the next touch", "#d55e00", 2.0);
     let mut mesh = curve("mesh, 64 cells along a side", "#e69f00", 1.0);
     let mut count = 0;
+    let offer = Offer::default();
     for last in COUNTS {
         let n = last as f64;
         let (mut search_s, mut extension_s) = (None, None);
         while count < last {
             let is_chosen = (BEGIN..CHOSEN).contains(&count);
-            let plan = if is_chosen { planner.plan(&belief) } else { other.plan(&belief) }?;
+            let plan = if is_chosen {
+                planner.plan(&belief, &offer)
+            } else {
+                other.plan(&belief, &offer)
+            }?;
             let Some(approach) = task.approach(&plan.target) else { continue };
             belief.observe(&plan.target, &probe.touch(&approach)?);
             count += 1;
@@ -66,8 +71,9 @@ fn main() -> anyhow::Result<()> {
                 continue;
             }
             let begun = Instant::now();
-            let factorisations = belief.refit()?.factorisations;
+            belief.refit()?;
             let updated_s = Some(begun.elapsed().as_secs_f64());
+            let factorisations = belief.fit().map_or(0, |fit| fit.factorisations);
             match factorisations {
                 0 => extension_s = updated_s,
                 1 => {}
@@ -78,7 +84,7 @@ fn main() -> anyhow::Result<()> {
         extended.values.extend(extension_s.map(|seconds| (n, seconds)));
         eprintln!("{count} touches");
         let chosen = seconds(|| {
-            let _ = black_box(planner.plan(&belief));
+            let _ = black_box(planner.plan(&belief, &offer));
         });
         choice.values.push((n, chosen));
         let meshed = seconds(|| {

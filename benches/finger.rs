@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::{Contact, End, Evidence, Outcome};
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
@@ -189,7 +189,7 @@ fn patches(_: &mut Criterion) {
             let begin = Instant::now();
             let is_fitted = belief.refit().is_ok();
             let middle = begin.elapsed().as_secs_f64();
-            black_box((is_fitted, planner.plan(&belief.into()).is_ok()));
+            black_box((is_fitted, planner.plan(&belief.into(), &Offer::default()).is_ok()));
             [middle, begin.elapsed().as_secs_f64()]
         });
         made.fold([f64::INFINITY; 2], |least, s| [least[0].min(s[0]), least[1].min(s[1])])

@@ -12,7 +12,7 @@ use curves::{Curve, draw_over, print};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::recognition::{ObjectHypotheses, RecognitionSettings};
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
@@ -64,7 +64,7 @@ fn main() -> anyhow::Result<()> {
             let mut probe = drawn.probe(trial)?;
             for touch in 1..=TOUCHES {
                 let begun = Instant::now();
-                let plan = planner.plan(&belief)?;
+                let plan = planner.plan(&belief, &Offer::default())?;
                 if touch > 1 {
                     seconds[3].push(begun.elapsed().as_secs_f64());
                 }

@@ -4,7 +4,7 @@
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::Evidence;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::view::SeenSurface;
 use palpate::math::seed::stream;
 use palpate::sim::probe::exact_probe;
@@ -78,7 +78,9 @@ fn measure(name: &str, environment: Arc<Environment>, settings: [GpSettings; 2])
         let fit_s = fastest(|| field.clone().refit().is_ok());
         let belief = field.into();
         let plan_s = fastest(|| {
-            (active.make)(&Default::default(), stream(1, 0, "active")).plan(&belief).is_ok()
+            (active.make)(&Default::default(), stream(1, 0, "active"))
+                .plan(&belief, &Offer::default())
+                .is_ok()
         });
         [fit_s, plan_s]
     });

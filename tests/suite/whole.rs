@@ -10,8 +10,8 @@ use palpate::experiment::store::resolved;
 use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::experiment::truth::Truth;
 use palpate::explore::belief::Belief;
-use palpate::explore::planner;
 use palpate::explore::planner::Planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::whole_object::{ImplicitSurface, Surface};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
@@ -133,7 +133,7 @@ fn make(name: &str, random: ChaCha8Rng) -> Box<dyn Planner> {
 }
 
 fn plan(planner: &mut Box<dyn Planner>, belief: &ImplicitSurface) -> Aim {
-    *planner.plan(&Belief::from(belief.clone())).unwrap().target.aim().unwrap()
+    *planner.plan(&Belief::from(belief.clone()), &Offer::default()).unwrap().target.aim().unwrap()
 }
 
 /// Another size gives the same result up to rounding.

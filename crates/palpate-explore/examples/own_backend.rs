@@ -9,8 +9,8 @@ use palpate_explore::backend::{
 };
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::gp_settings::GpSettings;
-use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
+use palpate_explore::planner::{self, Offer};
 use palpate_explore::probe::Probe;
 use palpate_explore::probe::servo::Servo;
 use palpate_explore::robot::arm::Chain;
@@ -110,7 +110,7 @@ pub fn explore(touches: usize) -> Result<(HeightField, f64), Box<dyn std::error:
     for count in 0..touches {
         let target = match count {
             0 => zone.at(&[0.3, 0.6]).into(),
-            _ => planner.plan(&Belief::from(belief.clone()))?.target,
+            _ => planner.plan(&Belief::from(belief.clone()), &Offer::default())?.target,
         };
         let approach = task.approach(&target).ok_or("not in the zone")?;
         let outcome = servo.touch(&approach)?;

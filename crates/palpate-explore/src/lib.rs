@@ -26,7 +26,7 @@
 //! use palpate_explore::belief::{Belief, HeightField};
 //! use palpate_explore::evidence::{Contact, Outcome};
 //! use palpate_explore::gp_settings::GpSettings;
-//! use palpate_explore::planner::{self, PlanningSettings};
+//! use palpate_explore::planner::{self, Offer, PlanningSettings};
 //! use palpate_explore::task::{Region, Zone};
 //! use palpate_gp::math::seed;
 //!
@@ -45,7 +45,7 @@
 //! let active = planner::by_name("active").expect("it is there");
 //! let random = seed::stream(1, 0, "planner");
 //! let mut planner = (active.make)(&PlanningSettings::default(), random);
-//! let plan = planner.plan(&Belief::from(heights))?;
+//! let plan = planner.plan(&Belief::from(heights), &Offer::default())?;
 //! assert!(Region::from(zone).contains(&plan.target));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -78,7 +78,7 @@ fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Targ
         let axes = [2, 3].into_iter().zip(&shifts);
         axes.map(|(base, shift)| (radical_inverse(i, base) + shift).fract()).collect()
     };
-    (0..count).map(|_| target_from_fractions(&**belief, &mut next)).collect()
+    (0..count).map(|_| target_from_fractions(belief.surface(), &mut next)).collect()
 }
 
 /// Radical inverse of `i` in `base`: its digits mirrored at the radix point.

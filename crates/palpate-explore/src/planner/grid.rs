@@ -21,7 +21,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
         // Remaining nodes of this level, the next one last, as fractions in 0..1.
         let mut rest: Vec<Vec<f64>> = Vec::new();
         Box::new(move |belief: &Belief| {
-            let target = target_from_fractions(&**belief, |dimension| {
+            let target = target_from_fractions(belief.surface(), |dimension| {
                 loop {
                     match rest.pop() {
                         Some(node) => break node,

@@ -87,7 +87,7 @@ impl Planner for InformationPlanner {
         for number in 0..CANDIDATES {
             let is_random = (number as f64) < RANDOM_SHARE * CANDIDATES as f64;
             let target = match is_random {
-                true => random_target(&**belief, &mut self.rng),
+                true => random_target(belief.surface(), &mut self.rng),
                 false => self.on_a_surface(belief, hypotheses, &drawn),
             };
             let Some(gain) = self.information(hypotheses, &drawn, &target) else { continue };
@@ -95,7 +95,7 @@ impl Planner for InformationPlanner {
                 best = (gain, Some(target));
             }
         }
-        let target = best.1.unwrap_or_else(|| random_target(&**belief, &mut self.rng));
+        let target = best.1.unwrap_or_else(|| random_target(belief.surface(), &mut self.rng));
         Ok(Plan::at(target))
     }
 }
@@ -111,7 +111,7 @@ impl InformationPlanner {
     ) -> Target {
         let hypothesis = &drawn[self.rng.random_range(0..drawn.len())];
         let p_w = hypotheses.surface_point_w(hypothesis, self.rng.random_range(0..usize::MAX / 2));
-        let random = random_target(&**belief, &mut self.rng);
+        let random = random_target(belief.surface(), &mut self.rng);
         belief.region().touch_of(random, p_w)
     }
 

@@ -11,6 +11,6 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     needs_library: false,
     plans_strokes: false,
     make: |_, mut rng| {
-        Box::new(move |belief: &Belief| Ok(Plan::at(random_target(&**belief, &mut rng))))
+        Box::new(move |belief: &Belief| Ok(Plan::at(random_target(belief.surface(), &mut rng))))
     },
 };

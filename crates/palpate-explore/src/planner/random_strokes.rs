@@ -24,7 +24,7 @@ struct RandomStrokes {
 
 impl Planner for RandomStrokes {
     fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
-        let tap = random_target(&**belief, &mut self.rng);
+        let tap = random_target(belief.surface(), &mut self.rng);
         let target = match &offer.stroke {
             Some(strokes) => self.stroke(belief, strokes, tap),
             None => tap,
@@ -41,7 +41,7 @@ impl RandomStrokes {
             let stroke = Target::StrokeAround { aim: *aim, way_w };
             return if belief.reaches(&stroke) { stroke } else { tap };
         }
-        let other = random_target(&**belief, &mut self.rng);
+        let other = random_target(belief.surface(), &mut self.rng);
         match (tap.place(), other.place()) {
             (Some([x, z]), Some([u, v])) => {
                 let length_m = (u - x).hypot(v - z);

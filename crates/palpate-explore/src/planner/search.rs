@@ -66,7 +66,7 @@ impl Search {
 
     /// Returns a plan at a random target, for a belief without data.
     pub fn anywhere(&mut self, belief: &Belief) -> Plan {
-        Plan::at(random_target(&**belief, &mut self.rng))
+        Plan::at(random_target(belief.surface(), &mut self.rng))
     }
 
     /// Plans a touch where `score` is largest: at a place of a zone, or at one of the candidates on

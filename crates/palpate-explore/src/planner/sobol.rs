@@ -15,7 +15,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     make: |_, mut rng| {
         let (seed, mut index) = (rng.random(), 0);
         Box::new(move |belief: &Belief| {
-            let target = target_from_fractions(&**belief, |count| {
+            let target = target_from_fractions(belief.surface(), |count| {
                 let at = fractions(count, index, seed);
                 index += 1;
                 at

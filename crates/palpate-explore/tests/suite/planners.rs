@@ -5,7 +5,7 @@ use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::evidence::{Contact, End};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
-use palpate_explore::planner::{Fallback, PLANNERS, Plan, PlannerEntry, PlanningSettings};
+use palpate_explore::planner::{Fallback, Offer, PLANNERS, Plan, PlannerEntry, PlanningSettings};
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 use palpate_gp::kernel::SquaredExponential;
@@ -42,7 +42,7 @@ struct InZone(Box<dyn planner::Planner>);
 
 impl InZone {
     fn plan(&mut self, belief: &HeightField) -> Plan {
-        self.0.plan(&Belief::from(belief.clone())).unwrap()
+        self.0.plan(&Belief::from(belief.clone()), &Offer::default()).unwrap()
     }
 }
 
@@ -105,7 +105,7 @@ fn every_planner_stays_in_the_zone_and_repeats_itself() {
 fn a_planner_that_needs_a_library_says_so_without_one() {
     let belief = Belief::from(belief(&SQUARE, 3, 4, 2));
     for entry in PLANNERS.iter().filter(|entry| entry.needs_library) {
-        let error = make(entry.name).0.plan(&belief).unwrap_err();
+        let error = make(entry.name).0.plan(&belief, &Offer::default()).unwrap_err();
         assert!(error.reason.contains("library"), "{}: {}", entry.name, error.reason);
     }
 }
