@@ -133,7 +133,7 @@ impl<'a, R: BufRead> Stepper<'a, R> {
                     Err(error) => error.to_string(),
                 },
                 Ok(Answer::Elsewhere(numbers)) => {
-                    let target = Target::from_numbers(&numbers);
+                    let target = task.region().target(&numbers);
                     let fits = target.filter(|target| {
                         let is_inside = task.region().contains(target);
                         is_inside && task.approach(target).is_some()

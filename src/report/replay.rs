@@ -7,7 +7,7 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::report::canvas::{Canvas, PointPx};
 use crate::report::style;
 use crate::report::table::digits;
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -51,21 +51,10 @@ impl<'a> BeliefReplay<'a> {
     ) -> anyhow::Result<Option<Self>> {
         let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
         let Some(last) = touches.last() else { return Ok(None) };
-        let (Some(fit), Some(zone)) = (&last.fit, &experiment.scene.zone) else {
+        let belief = row.belief(experiment, count)?;
+        let Some(belief) = belief.as_ref().and_then(|belief| belief.height_field()).cloned() else {
             return Ok(None);
         };
-        let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let finger = &experiment.scene.finger;
-        let belief = HeightField::new(zone.clone(), experiment.gp.clone());
-        let mut belief = belief.with_finger(finger.clone());
-        for touch in touches {
-            let is_place = |it: &&[f64]| it.len() == zone.dimension();
-            touch.target.place().filter(is_place).with_context(|| {
-                format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
-            })?;
-        }
-        row.actions(count).for_each(|(target, outcome)| belief.observe(target, outcome));
-        belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };
         Ok(Some(Self {
             belief,

@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// An exploration: a probe executes actions of a task, and a belief observes their outcomes.
 pub struct Episode<'a> {
-    task: &'a Task,
+    task: Task,
     probe: Box<dyn Probe + 'a>,
     belief: Belief,
     last: Option<Target>,
@@ -38,8 +38,14 @@ struct Spent {
 
 impl<'a> Episode<'a> {
     /// Creates an episode without actions.
-    pub fn new(task: &'a Task, belief: Belief, probe: impl Probe + 'a) -> Self {
-        Self { task, probe: Box::new(probe), belief, last: None, spent: Spent::default() }
+    pub fn new(task: &Task, belief: Belief, probe: impl Probe + 'a) -> Self {
+        Self {
+            task: task.clone(),
+            probe: Box::new(probe),
+            belief,
+            last: None,
+            spent: Spent::default(),
+        }
     }
 
     /// Belief after the last fit, with all evidence.
@@ -106,9 +112,15 @@ impl<'a> Episode<'a> {
         }
         let is_inside = self.task.region().contains(target);
         let approach = self.task.approach(target).filter(|_| is_inside);
-        approach.map(Action::Touch).ok_or_else(|| {
+        let approach = approach.ok_or_else(|| {
             let beyond = self.task.region().outside();
             InputError::new(format!("planned at {:?}, {beyond}", target.numbers()))
+        })?;
+        Ok(match target {
+            Target::Custom { name, parameters, .. } => {
+                Action::Custom { name: name.clone(), approach, parameters: parameters.clone() }
+            }
+            _ => Action::Touch(approach),
         })
     }
 

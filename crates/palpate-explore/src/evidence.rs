@@ -11,6 +11,7 @@ use crate::view::SeenSurface;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Result of an action with all that it has shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,6 +27,9 @@ pub struct Outcome {
     /// Reason why a contact is less certain than usual, or was not located.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<Doubt>,
+    /// Further quantities that a custom action has measured, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measured: BTreeMap<String, f64>,
     /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the contact, and what
     /// its sensor located; `None` for a probe without a finger, or without a contact.
     #[serde(skip)]
@@ -61,7 +65,7 @@ impl End {
 impl Outcome {
     /// Creates the outcome of an action without a time and a doubt.
     pub fn new(end: End, evidence: Vec<Evidence>) -> Self {
-        Self { end, evidence, time_s: None, doubt: None, sensed: None }
+        Self { end, evidence, time_s: None, doubt: None, measured: BTreeMap::new(), sensed: None }
     }
 
     /// Returns the points of the surface, the point of contact first; none without contact.

@@ -8,19 +8,20 @@ pub mod planner_names;
 pub mod recorded_trial;
 pub mod replay;
 pub mod row;
+mod row_belief;
 mod verification;
 pub mod view;
 
 pub(super) use oracle::{GroundTruth, OracleFactory};
 
 use self::belief_shape::{BelievedShape, shape};
-use self::looks::CameraProbe;
 use self::row::{TouchRow, TrialRow, ViewRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use crate::sim::Environment;
+use crate::sim::camera::probe::CameraProbe;
 use crate::sim::finger::effects::gel::GelEffect;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
@@ -131,13 +132,19 @@ fn run_touches(
     let start = start.ok_or("no planner for the initial touches")?;
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
-    let camera = CameraProbe::new(experiment, &truth.environment, row.trial, probe);
+    let most = match experiment.further_views {
+        0 => 0,
+        further => (experiment.views + further) as usize,
+    };
+    let seeds = [experiment.seed, row.trial.into()];
+    let camera = CameraProbe::new(probe, &truth.environment, seeds).with_offers(most);
     let mut episode = Episode::new(task, belief, camera);
     for camera in 0..experiment.views {
         row.views.push(look(&mut episode, Target::Look { camera }, 0)?);
     }
     if experiment.views > 0 {
         episode.fit().map_err(|error| format!("fit after the views: {error}"))?;
+        row.views.iter_mut().for_each(|view| view.fit = episode.belief().fit().cloned());
     }
     for count in 1..=experiment.touches {
         let failed = |error: &dyn Display| format!("touch {count}: {error}");
@@ -149,8 +156,10 @@ fn run_touches(
                 let plan =
                     planner.plan(episode.belief(), &offer).map_err(|error| failed(&error))?;
                 let Target::Look { .. } = plan.target else { break plan };
-                row.views.push(look(&mut episode, plan.target, count - 1)?);
+                let mut view = look(&mut episode, plan.target, count - 1)?;
                 episode.fit().map_err(|error| format!("fit before touch {count}: {error}"))?;
+                view.fit = episode.belief().fit().cloned();
+                row.views.push(view);
             }
         };
         let mut action = episode.action(&plan.target).map_err(|error| failed(&error))?;
@@ -206,7 +215,7 @@ fn initial_belief(experiment: &Experiment, truth: &GroundTruth, random: &mut Cha
 fn look(episode: &mut Episode, target: Target, after: u32) -> Result<ViewRow, String> {
     let action = episode.action(&target).map_err(|error| error.to_string())?;
     let outcome = episode.execute(&target, &action).map_err(|fault| fault.to_string())?;
-    Ok(ViewRow { after, target, outcome, error: None })
+    Ok(ViewRow { after, target, outcome, fit: None, error: None })
 }
 
 /// Returns the hypotheses about the object of an environment before the first touch.

@@ -53,6 +53,9 @@ pub struct ViewRow {
     pub target: Target,
     /// Surface that it shows, thinned.
     pub outcome: Outcome,
+    /// Fit after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
     /// Error of the camera's pose after the last touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<RigidError>,

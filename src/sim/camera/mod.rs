@@ -3,6 +3,7 @@
 mod file;
 mod intrinsics;
 mod pcd;
+pub mod probe;
 pub mod settings;
 
 pub use settings::CameraSettings;

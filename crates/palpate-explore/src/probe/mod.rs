@@ -91,7 +91,8 @@ impl<P: Probe + ?Sized> Probe for Box<P> {
 /// Returns the approach of a touch, all of whose coordinates are finite.
 ///
 /// # Errors
-/// [`Fault::Refused`] if a coordinate is not finite; a fault of a missing camera for a look.
+/// [`Fault::Refused`] if a coordinate is not finite; a fault of a missing camera or action for
+/// another action than a touch.
 pub fn checked_approach(action: &Action) -> Result<&Approach, Fault> {
     match action {
         Action::Touch(approach) if approach.is_finite() => Ok(approach),
@@ -101,5 +102,6 @@ pub fn checked_approach(action: &Action) -> Result<&Approach, Fault> {
             Err(Fault::Refused { values })
         }
         Action::Look { .. } => Err(Fault::lacks("a camera")),
+        Action::Custom { name, .. } => Err(Fault::lacks(&format!("the action `{name}`"))),
     }
 }

@@ -77,6 +77,20 @@ impl Region {
         }
     }
 
+    /// Returns the tap with these coordinates: (x) or (x, z) of a zone; x, y and z of a point and of
+    /// a direction around an object. `None` for another count, and for an aim without a direction.
+    pub fn target(&self, coordinates: &[f64]) -> Option<Target> {
+        match (self, coordinates) {
+            (Self::Zone(zone), _) if coordinates.len() == zone.dimension() => {
+                Some(coordinates.into())
+            }
+            (Self::Ball(_), &[x, y, z, u, v, w]) => {
+                Aim::along([x, y, z], [u, v, w]).map(Target::Aim)
+            }
+            _ => None,
+        }
+    }
+
     /// Straight-line distance between two targets, m: from where the finger leaves a place of the
     /// zone, or between the points where the finger leaves and enters the ball. 0 if one is not a
     /// target of the region.

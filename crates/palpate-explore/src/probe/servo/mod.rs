@@ -488,7 +488,8 @@ impl Probe for Servo {
         let free = FreeVolume::new(finger, approach, reached_w.into(), end);
         let evidence = points.map(Evidence::Points).into_iter().chain([Evidence::Free(free)]);
         let Located { sensed, doubt } = located;
-        Ok(Outcome { end, evidence: evidence.collect(), time_s: self.time_s(), doubt, sensed })
+        let outcome = Outcome::new(end, evidence.collect());
+        Ok(Outcome { time_s: self.time_s(), doubt, sensed, ..outcome })
     }
 
     fn time_s(&self) -> Option<f64> {
