@@ -1,4 +1,4 @@
-//! Space over a zone where the object may be: up to the end of the band around the believed surface.
+//! Space over a zone where the object may be: up to the end of the band around the surface.
 
 use super::HeightField;
 use crate::task::zone::grid_triangles;

@@ -76,8 +76,8 @@ pub fn by_name(name: &str) -> Option<&'static PlannerEntry> {
     PLANNERS.iter().find(|entry| entry.name == name)
 }
 
-/// Returns the factory of a built-in planner that is offered only some kinds of actions: `active(tap,
-/// look)`. `None` for another name.
+/// Returns the factory of a built-in planner that is offered only some kinds of actions:
+/// `active(tap, look)`. `None` for another name.
 pub fn restricted(name: &str) -> Option<Box<dyn PlannerFactory>> {
     let (base, actions) = name.strip_suffix(')')?.split_once('(')?;
     let (entry, actions) = (by_name(base)?, ActionKind::parse(actions)?);
