@@ -180,7 +180,7 @@ impl Experiment {
         let total = jobs.len();
         let run = || runner::run_in_memory(&simulation, jobs, threads, stop, &tick);
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
-        let new = accepted(&simulation, &rows, &why, (old.as_ref(), is_partial), &rules);
+        let new = accepted(&simulation, &rows, &why, old.as_ref(), is_partial, &rules);
         let text = new.map_err(errors::other)?.text().map_err(errors::other)?;
         write_whole(&path, &text).map_err(errors::other)?;
         Ok(None)
@@ -322,7 +322,7 @@ impl RunCallbacks {
         let total = done.len() + jobs.len();
         let outcome = self.watched(py, total, || {
             let tick = |progress: Progress| self.count(&progress);
-            runner::run(simulation, (&mut folder, jobs), threads, &self.is_stopped, None, &tick)
+            runner::run(simulation, &mut folder, jobs, threads, &self.is_stopped, None, &tick)
         });
         folder.sort(experiment).map_err(errors::run)?;
         outcome?.map_err(errors::run)?;
