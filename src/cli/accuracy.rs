@@ -143,7 +143,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let (mut levels, mut effects, mut orders) = (None, None, Vec::new());
     if has_levels {
         let effort = effort(args, LEVEL_TOUCHES, false);
-        let compared = compare(Variant::levels(&scene), effort, args.tolerance, (talk, &stop))?;
+        let compared = compare(Variant::levels(&scene), effort, args.tolerance, talk, &stop)?;
         if !is_stopped() {
             orders = compared.orders(&scene)?;
         }
@@ -164,7 +164,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     if has_effects && !is_stopped() {
         let scene = if args.full { with_all_effects(&scene) } else { scene.clone() };
         let effort = effort(args, EFFECT_TOUCHES, true);
-        let compared = compare(Variant::effects(&scene), effort, args.tolerance, (talk, &stop))?;
+        let compared = compare(Variant::effects(&scene), effort, args.tolerance, talk, &stop)?;
         let within = compared
             .criterion
             .map_or(String::new(), |it| format!(", within {}", criterion_text(it)));
@@ -188,7 +188,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
             Criterion::Verdict(_) => (None, None),
         };
         let fresh = args.held_out.or(fresh.filter(|_| !is_verdict));
-        let confirm = |selected| compared.confirm(selected, origin, fresh);
+        let confirm = |(selected, scene)| compared.confirm(selected, scene, origin, fresh);
         cheapest = selected.map(confirm).transpose()?;
     }
     let study = serde_json::json!({
@@ -242,17 +242,18 @@ fn compare(
     variants: Vec<(Variant, Scene)>,
     effort: MeasurementCounts,
     criterion: Option<Criterion>,
-    (talk, stop): (Verbosity, &AtomicBool),
+    talk: Verbosity,
+    stop: &AtomicBool,
 ) -> anyhow::Result<AccuracyComparison> {
     let bar = progress_bar(talk, "accuracy", "variants", variants.len() as u64, 0);
     let mut variants = variants.into_iter();
-    let Some(reference) = variants.next() else {
+    let Some((reference, scene)) = variants.next() else {
         bail!("no variant of the scene can be simulated")
     };
-    let mut comparison = AccuracyComparison::new(reference, effort, criterion)?;
+    let mut comparison = AccuracyComparison::new(reference, scene, effort, criterion)?;
     step(talk, &bar);
-    for variant in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
-        comparison.add(variant)?;
+    for (variant, scene) in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
+        comparison.add(variant, scene)?;
         step(talk, &bar);
     }
     bar.finish_and_clear();
