@@ -9,6 +9,7 @@ use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::rehearse;
 use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
+use crate::experiment::Simulation;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, RealRun, Shard};
 use crate::experiment::statistics::analysis::Analysis;
@@ -108,6 +109,27 @@ impl Args {
     /// Options of a run with additional planners, all others at their defaults.
     pub(super) fn of(planners: &[String], threads: u16, fresh: bool) -> Self {
         Self { planner: planners.to_vec(), threads, fresh, ..Self::default() }
+    }
+
+    /// Checks that the options apply to a simulation or a real arm.
+    fn check(&self, simulation: &Simulation) -> anyhow::Result<()> {
+        let simulator = simulation.experiment().scene.simulator;
+        if self.record && !simulator.moves_finger() && !simulation.is_real() {
+            let body = simulator.name();
+            bail!(
+                "--record: simulator = \"{body}\" does not move, so there is nothing to record; allowed are \
+                 \"kinematic\" and \"dynamic\""
+            );
+        }
+        if self.step && !simulation.is_real() {
+            bail!(
+                "--step: a simulation needs no operator; allowed with backend.kind = \"ros2\", \"ros1\""
+            );
+        }
+        if self.shard.is_some() && simulation.is_real() {
+            bail!("--shard: a real arm runs one trial at a time; remove --shard");
+        }
+        Ok(())
     }
 
     /// Whether an operator is asked before each touch of a real arm.
@@ -299,21 +321,7 @@ pub(super) fn run_missing(
     let simulation = prepare_simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own);
     let experiment = simulation.experiment();
-    if args.record && !experiment.scene.simulator.moves_finger() && !simulation.is_real() {
-        let body = experiment.scene.simulator.name();
-        bail!(
-            "--record: simulator = \"{body}\" does not move, so there is nothing to record; allowed are \
-             \"kinematic\" and \"dynamic\""
-        );
-    }
-    if args.step && !simulation.is_real() {
-        bail!(
-            "--step: a simulation needs no operator; allowed with backend.kind = \"ros2\", \"ros1\""
-        );
-    }
-    if args.shard.is_some() && simulation.is_real() {
-        bail!("--shard: a real arm runs one trial at a time; remove --shard");
-    }
+    args.check(&simulation)?;
     let path = out.unwrap_or_else(|| {
         PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
     });
