@@ -124,7 +124,7 @@ impl Field {
         }
     }
 
-    /// Hull of two balls with these centres and radii, neither within the other: its exact distance.
+    /// Hull of two balls with these centres and radii, neither in the other: its exact distance.
     ///
     /// It is the union of balls of radius `r_a - s t` at `a + t u`, where u is the unit axis and s
     /// the sine of the half angle; the distance is minimal over t at `t = h - q s / c`, for a point
