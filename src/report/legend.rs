@@ -59,8 +59,8 @@ pub struct FigureLayout {
 }
 
 impl FigureLayout {
-    /// Creates a drawing of `size` with a legend of `legend_px`, drawn in a group of `attributes`, and
-    /// a distance of `step` between panels. The drawing grows, and `first` moves down, by the
+    /// Creates a drawing of `size` with a legend of `legend_px`, drawn in a group of `attributes`,
+    /// and a distance of `step` between panels. The drawing grows, and `first` moves down, by the
     /// legend's additional rows.
     pub fn new<'a>(
         [width, height]: [f64; 2],

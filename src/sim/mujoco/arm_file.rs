@@ -119,8 +119,8 @@ impl ArmFile<'_> {
         chain
     }
 
-    /// Adds the links of the chain to `tip`, still without shapes and masses. Returns its joints and,
-    /// for each body of the chain, the number of joints that move it.
+    /// Adds the links of the chain to `tip`, still without shapes and masses. Returns its joints
+    /// and, for each body of the chain, the number of joints that move it.
     fn add_links(
         &self,
         tip: usize,
