@@ -44,7 +44,9 @@ pub(super) fn grid(text: &str) -> Result<Grid, String> {
 pub(super) fn scan(
     path: &Path,
     args: &ScanArgs,
-    (out, grid, force): (Option<&Path>, Option<Grid>, Overwrite),
+    out: Option<&Path>,
+    grid: Option<Grid>,
+    force: Overwrite,
     talk: Verbosity,
 ) -> anyhow::Result<Outcome> {
     let scene = Scene::load(path, &args.set)?;
@@ -63,8 +65,8 @@ pub(super) fn scan(
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
     let simulator = prepare_simulator(&environment, talk)?;
     let targets = scan::targets(zone, grid);
-    let (rows, threads) = ((targets.as_slice(), grid[0]), args.threads.into());
-    let touches = scan::scan(&simulator, rows, threads, &stop, &|| step(talk, &bar))?;
+    let threads = args.threads.into();
+    let touches = scan::scan(&simulator, &targets, grid[0], threads, &stop, &|| step(talk, &bar))?;
     bar.finish_and_clear();
     let Some(touches) = touches else { return Ok(Outcome::Interrupted) };
 
@@ -86,7 +88,7 @@ pub(super) fn scan(
     write_whole(&folder.join("cloud.ply"), cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), csv(&targets, &touches))?;
     let height_m = |place: &[f64]| environment.true_height_m(place);
-    if let Some(svg) = drawing::picture((zone, mesh, &height_m), &cloud.points) {
+    if let Some(svg) = drawing::picture(zone, mesh, &height_m, &cloud.points) {
         files::write(&folder.join("scan.svg"), &svg)?;
     }
     let faults = touches.iter().filter(|touch| touch.is_err()).count();

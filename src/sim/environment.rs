@@ -294,7 +294,7 @@ impl Environment {
                 let standoff_m = self.task.touch().standoff_m;
                 let around_m = ball.keep_out(finger, standoff_m).radius_m + CLEARANCE_M;
                 let home_w = ball.centre_w + Vector3::y() * around_m;
-                stage_with_wrist((ball.centre_w, around_m), home_w, finger.r_at())
+                stage_with_wrist(ball.centre_w, around_m, home_w, finger.r_at())
             }
             Region::Zone(zone) => {
                 let [near_m, _] = self.task.depth_m();

@@ -103,7 +103,7 @@ fn small() -> BenchmarkResult {
         let path = folder.path().join(&case.label);
         let (mut rows, done) = RunFolder::open(&path, &simulation, "unknown", false).unwrap();
         let jobs = runner::missing_jobs(&simulation, &done).unwrap();
-        runner::run(&simulation, (&mut rows, jobs), 0, &AtomicBool::new(false), None, &|_| ())
+        runner::run(&simulation, &mut rows, jobs, 0, &AtomicBool::new(false), None, &|_| ())
             .unwrap();
         rows.sort(simulation.experiment()).unwrap();
         runs.push((case.label.clone(), Run::read(&path).unwrap()));

@@ -71,7 +71,7 @@ fn an_own_planner_is_one_of_the_experiments() {
     let (mut rows, done) = rows_of(&simulation, folder.path(), false).unwrap();
     let jobs = runner::missing_jobs(&simulation, &done).unwrap();
     let stop = AtomicBool::new(false);
-    runner::run(&simulation, (&mut rows, jobs), 0, &stop, None, &|_| ()).unwrap();
+    runner::run(&simulation, &mut rows, jobs, 0, &stop, None, &|_| ()).unwrap();
     rows.sort(experiment).unwrap();
     let run = Run::read(folder.path()).unwrap();
     let names: Vec<_> = run.rows.iter().map(|row| row.planner.as_str()).collect();

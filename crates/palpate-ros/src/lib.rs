@@ -116,7 +116,7 @@ pub fn look(settings: &BackendSettings, topics: &CameraTopics) -> Result<Cloud, 
     let variable = |name: &str| std::env::var(name).ok();
     let is_ros2 = settings.kind == BackendKind::Ros2;
     let note = is_ros2.then(|| network::discovery_note(variable)).flatten();
-    first.cloud(topics, (&published, note))
+    first.cloud(topics, &published, note)
 }
 
 /// Returns the error of a kind of backend without topics, or whose transport this build lacks.

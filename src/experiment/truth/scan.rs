@@ -38,7 +38,8 @@ pub fn targets(zone: &Zone, [columns, rows]: [usize; 2]) -> Vec<Vec<f64>> {
 /// If the threads cannot be started.
 pub fn scan(
     simulator: &Simulator,
-    (targets, columns): (&[Vec<f64>], usize),
+    targets: &[Vec<f64>],
+    columns: usize,
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),

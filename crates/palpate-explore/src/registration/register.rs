@@ -161,7 +161,8 @@ pub fn register(
     probe: &mut dyn Probe,
     robot: &Robot,
     touch: &TouchSettings,
-    (body, design): (&CalibrationBody, &RegistrationDesign),
+    body: &CalibrationBody,
+    design: &RegistrationDesign,
     made: &mut dyn FnMut(&Outcome),
 ) -> Result<RegistrationResult, InputError> {
     let of = design.approaches.len();
