@@ -4,6 +4,7 @@ use super::prepare::{prepare_arm, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::Experiment;
+use crate::experiment::backend_settings::arm_tables;
 use anyhow::{Context, bail};
 use palpate_explore::backend::pace;
 use palpate_explore::belief::Belief;
@@ -25,12 +26,11 @@ pub(super) fn run(
     experiment.backend.dry = true;
     let mut simulation = prepare_simulation(experiment, talk)?;
     if !simulation.is_real() {
-        bail!(
-            "--dry: a simulation touches without risk; allowed with backend.kind = \"ros2\", \"ros1\", \"franka\""
-        );
+        bail!("--dry: a simulation touches without risk; allowed with {}", arm_tables());
     }
-    let arm = simulation.connect()?;
-    arm.map_or(Ok(()), |arm| prepare_arm(&arm, clears_fault))?;
+    if let Some(arm) = simulation.connect()? {
+        prepare_arm(&arm, &simulation.experiment().backend.start_checks, clears_fault)?;
+    }
     let body = simulation.backend(None)?.context("the arm does not move")?;
     let mut servo = simulation.servo(body, simulation.body_seed(0))?;
     let experiment = simulation.experiment();

@@ -9,6 +9,7 @@ use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::rehearse;
 use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
+use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
@@ -304,9 +305,7 @@ pub(super) fn run_missing(
         );
     }
     if args.step && !simulation.is_real() {
-        bail!(
-            "--step: a simulation needs no operator; allowed with backend.kind = \"ros2\", \"ros1\""
-        );
+        bail!("--step: a simulation needs no operator; allowed with {}", arm_tables());
     }
     if args.shard.is_some() && simulation.is_real() {
         bail!("--shard: a real arm runs one trial at a time; remove --shard");

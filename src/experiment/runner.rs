@@ -1,6 +1,5 @@
 //! Execution of trials × planners: simulated trials in parallel, those of a real arm in sequence.
 
-use crate::experiment::real_arm::RealArm;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
 use crate::experiment::trial::planner_names::HUMAN;
@@ -235,7 +234,7 @@ pub fn run_real(
         let mut keep = |event: &TrialEvent| {
             // Touches made before an interruption are not shown again, except the last.
             let is_shown = event.count() as usize >= made.len();
-            if let Some(arm) = simulation.arm().and_then(RealArm::ros).filter(|_| is_shown) {
+            if let Some(arm) = simulation.arm().filter(|_| is_shown) {
                 trial::view::show(arm, simulation, event);
             }
             let touched = match event {

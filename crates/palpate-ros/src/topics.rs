@@ -92,7 +92,7 @@ impl Topic {
     /// Topics of the explorer for viewers.
     pub const VIEWED: [Self; 3] = [Self::Markers, Self::Points, Self::Frames];
 
-    /// Topics with settings in `[backend.topics]`.
+    /// Topics with settings in the table `topics`.
     pub const SET: [Self; 10] = [
         Self::Joints,
         Self::Wrench,
@@ -115,7 +115,7 @@ impl Topic {
         }
     }
 
-    /// Returns the topic's key in `[backend.topics]`, if it has settings there.
+    /// Returns the topic's key in the table `topics`, if it has settings there.
     pub fn key(self) -> &'static str {
         KEYS.get(self as usize).copied().unwrap_or_default()
     }
@@ -264,7 +264,7 @@ latched_settings!(RobotModeTopic, Topic::RobotMode);
 latched_settings!(SafetyModeTopic, Topic::SafetyMode);
 latched_settings!(ProgramRunningTopic, Topic::ProgramRunning);
 
-/// Table `[backend.topics]`: topics of the arm.
+/// Table `topics`: topics of the arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Topics {

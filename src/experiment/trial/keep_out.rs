@@ -3,13 +3,13 @@
 
 use crate::experiment::simulation::Simulation;
 use nalgebra::Point3;
+use palpate_explore::backend::arm::KeepOutSolid;
 use palpate_explore::backend::interlock::InterlockSettings;
 use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
 use palpate_explore::task::zone::grid_triangles;
 use palpate_explore::whole_object::ImplicitSurface;
 use palpate_geometry::solids::{Triangles, box_mesh, sphere_mesh};
 use palpate_gp::math::normal::BAND_95;
-use palpate_ros::planning_scene::KeepOutSolid;
 use std::collections::HashSet;
 use std::f64::consts::{PI, SQRT_2};
 
