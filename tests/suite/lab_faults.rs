@@ -31,7 +31,7 @@ impl FaultScenario {
         let folder = tempfile::tempdir().unwrap();
         let mut run = network.run("random", 2, folder.path());
         sets.iter().for_each(|set| {
-            run.args(["--set", &set]);
+            run.args(["--set", set]);
         });
         let explorer = run.stderr(Stdio::piped()).spawn().unwrap();
         Self { network, twin, explorer, folder }
