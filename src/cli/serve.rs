@@ -11,7 +11,7 @@ use crate::sim::{Scene, known_body};
 use anyhow::{Context, bail};
 use nalgebra::{Isometry3, Vector3};
 use palpate_explore::backend::arm::Connector;
-use palpate_explore::robot::sensor::SensorKind;
+use palpate_explore::robot::sensor::Signal;
 use palpate_ros::connect;
 use palpate_ros::network::discovery_note;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
@@ -123,9 +123,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let is_biotac = effects.fluid.is_some() && effects.electrodes.is_some();
     let (is_there, needed) = match settings.topics.tactile.message {
         TactileMessage::None => (true, ""),
-        TactileMessage::Flag => {
-            (scene.sensor.kind == SensorKind::Contact, "sensor.kind = \"contact\"")
-        }
+        TactileMessage::Flag => (scene.sensor.signal() == Some(Signal::Flag), "[sensor.contact]"),
         TactileMessage::Depth => (effects.gel.is_some(), "[effects.gel]"),
         TactileMessage::Hand | TactileMessage::Fingers => {
             (is_biotac, "[effects.skin], [effects.fluid] and [effects.electrodes]")

@@ -59,9 +59,7 @@ macro_rules! backend_settings {
                 take_former_keys(loader)?;
                 $(
                     let table = concat!("backend.", stringify!($table));
-                    if loader.value(table) == Some(&Value::Boolean(false)) {
-                        loader.take(table);
-                    }
+                    loader.take_false(table);
                     if loader.has_value(table) {
                         <$settings>::prepare(loader, table)?;
                     }

@@ -11,7 +11,7 @@ use palpate_input::error::InputError;
 pub fn check(experiment: &Experiment, is_known: bool) -> Result<(), InputError> {
     let (scene, interlocks) = (&experiment.scene, &experiment.backend.interlocks);
     let Some((table, arm)) = experiment.backend.arm() else { return Ok(()) };
-    arm.check_sensor(scene.sensor.kind)?;
+    arm.check_sensor(&scene.sensor)?;
     let mut needed = match &scene.whole_object {
         _ if is_known => Vec::new(),
         Some(around) => vec![

@@ -11,7 +11,7 @@ use palpate_explore::recognition::PosePrior;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::robot::finger::profile::Profile;
-use palpate_explore::robot::sensor::{SensorKind, SensorSettings};
+use palpate_explore::robot::sensor::{SensorSettings, Signal};
 use palpate_explore::task::WholeObject;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::zone::Zone;
@@ -263,8 +263,8 @@ impl Validate for Scene {
         let allowed = "none: strokes are along a zone with x_m and z_m, or around a whole object";
         let is_curve = self.whole_object.is_none() && !is_flat;
         given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
-        let has_pad = self.effects.gel.is_some() || self.sensor.kind == SensorKind::DepthPatch;
-        let allowed = "no stroke with [effects.gel] or sensor.kind = \"depth_patch\": the points of the \
+        let has_pad = self.effects.gel.is_some() || self.sensor.signal() == Some(Signal::Depth);
+        let allowed = "no stroke with [effects.gel] or [sensor.depth_patch]: the points of the \
                        pad's patch and of the stroke's path share one list";
         given(rules, "touch.stroke", self.touch.stroke.is_some() && has_pad, allowed);
         let body = self.simulator.name();
@@ -340,22 +340,25 @@ impl Validate for Scene {
         let is_twofold = effects.gel.is_some() && is_other;
         let allowed = "either this or [effects.skin] or [effects.rigid_tip], not both";
         given(rules, "effects.gel", is_twofold, allowed);
-        let kind = self.sensor.kind;
-        let named = format!("\"{}\"", kind.name());
-        rules.require(
-            "sensor.kind",
-            &named,
-            kind == SensorKind::Automatic || self.simulator.moves_finger(),
-            || format!("\"automatic\", because simulator = \"{body}\" has no sensor"),
-        );
-        let is_blind = kind == SensorKind::ForceTorqueTip && effects.wrench.is_none();
-        rules.require("sensor.kind", &named, !is_blind, || {
-            "another kind, or a table [effects.wrench]: the tip is on a force/torque sensor".into()
-        });
-        let is_blind = kind == SensorKind::DepthPatch && effects.gel.is_none();
-        rules.require("sensor.kind", &named, !is_blind, || {
-            "another kind, or a table [effects.gel]: the pad that gives the depths".into()
-        });
+        rules.table("sensor", &self.sensor);
+        if let Some((name, kind)) = self.sensor.kind() {
+            let key = format!("sensor.{name}");
+            rules.require(&key, "(given)", self.simulator.moves_finger(), || {
+                format!("no table, because simulator = \"{body}\" has no sensor")
+            });
+            let (is_blind, allowed) = match kind.signal() {
+                Signal::Wrench => (
+                    effects.wrench.is_none(),
+                    "another sensor, or a table [effects.wrench]: the tip is on a force/torque sensor",
+                ),
+                Signal::Depth => (
+                    effects.gel.is_none(),
+                    "another sensor, or a table [effects.gel]: the pad that gives the depths",
+                ),
+                Signal::Flag => (false, ""),
+            };
+            rules.require(&key, "(given)", !is_blind, || allowed.into());
+        }
         let bumps = self.simulator != SimulatorKind::Dynamic && self.effects.collision.is_some();
         let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
         given(rules, "effects.collision", bumps, allowed);
@@ -433,7 +436,7 @@ impl Scene {
         if self.simulator != SimulatorKind::Kinematic || self.effects != Effects::default() {
             return Cow::Borrowed(&self.effects);
         }
-        Cow::Owned(Effects::minimal(self.sensor.kind))
+        Cow::Owned(Effects::minimal(self.sensor.signal()))
     }
 
     /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin or
@@ -509,6 +512,7 @@ impl Scene {
     pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
         loader.read_former_keys(prefix, &FORMER_KEYS)?;
         loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
+        SensorSettings::prepare(loader, &format!("{prefix}sensor"))?;
         CameraSettings::resolve(loader, &format!("{prefix}camera"))?;
         sensor::load(loader, &format!("{prefix}effects"))
     }

@@ -9,7 +9,7 @@ use palpate_explore::backend::arm::{Arm, Connector, KeepOutSolid};
 use palpate_explore::backend::interlock::StartCheckSettings;
 use palpate_explore::backend::{Backend, Fault, LinkFault};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
-use palpate_explore::robot::sensor::SensorKind;
+use palpate_explore::robot::sensor::{SensorSettings, Signal};
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::error::InputError;
 use std::sync::Arc;
@@ -72,28 +72,32 @@ impl Connector for RosSettings {
         Ok(RosArm::connect_over(&settings, chain)?)
     }
 
-    fn check_sensor(&self, sensor: SensorKind) -> Result<(), InputError> {
+    fn check_sensor(&self, sensor: &SensorSettings) -> Result<(), InputError> {
         let message = self.topics.tactile.message;
-        let allowed = match sensor {
-            SensorKind::DepthPatch => "\"sensor_msgs/msg/Image\"",
-            SensorKind::Contact => "\"std_msgs/msg/Bool\", or \"none\" for contact by force",
-            SensorKind::ForceTorqueTip => "\"none\", or the type of a sensor that detects contact",
-            SensorKind::Automatic => "a BioTac's, or \"none\" for the force/torque sensor alone",
-        };
-        let fits = match sensor {
-            SensorKind::DepthPatch => message == TactileMessage::Depth,
-            SensorKind::Contact => matches!(message, TactileMessage::Flag | TactileMessage::None),
-            SensorKind::ForceTorqueTip => true,
-            SensorKind::Automatic => message.is_of_biotac() || message == TactileMessage::None,
+        let is_none = message == TactileMessage::None;
+        let (fits, allowed) = match sensor.signal() {
+            Some(Signal::Depth) => (message == TactileMessage::Depth, "\"sensor_msgs/msg/Image\""),
+            Some(Signal::Flag) => (
+                message == TactileMessage::Flag || is_none,
+                "\"std_msgs/msg/Bool\", or \"none\" for contact by force",
+            ),
+            Some(Signal::Wrench) => return Ok(()),
+            None => (
+                message.is_of_biotac() || is_none,
+                "a BioTac's, or \"none\" for the force/torque sensor alone",
+            ),
         };
         if fits {
             return Ok(());
         }
-        let name = self.topics.type_name(Topic::Tactile);
+        let table = sensor.kind().map_or_else(
+            || "without a table in [sensor]".into(),
+            |(name, _)| format!("with [sensor.{name}]"),
+        );
         Err(InputError::new(format!(
-            "{} = \"{name}\"; with sensor.kind = \"{}\" allowed is {allowed}",
+            "{} = \"{}\"; {table} allowed is {allowed}",
             self.key("topics.tactile.type"),
-            sensor.name()
+            self.topics.type_name(Topic::Tactile)
         )))
     }
 

@@ -175,10 +175,10 @@ pub enum TactileMessage {
     /// Message of a Shadow hand.
     #[serde(rename = "sr_robot_msgs/msg/BiotacAll")]
     Fingers,
-    /// Whether a switch at the tip is closed, for `sensor.kind = "contact"`.
+    /// Whether a switch at the tip is closed, for `[sensor.contact]`.
     #[serde(rename = "std_msgs/msg/Bool")]
     Flag,
-    /// Depths of a pad in metres, `32FC1`, for `sensor.kind = "depth_patch"`.
+    /// Depths of a pad in metres, `32FC1`, for `[sensor.depth_patch]`.
     #[serde(rename = "sensor_msgs/msg/Image")]
     Depth,
     /// No samples: a force/torque sensor alone locates or detects the contacts.

@@ -3,7 +3,7 @@
 use super::interlock::StartCheckSettings;
 use super::{Backend, Fault, LinkFault};
 use crate::robot::arm::{ArmSettings, Chain};
-use crate::robot::sensor::SensorKind;
+use crate::robot::sensor::SensorSettings;
 use nalgebra::{Isometry3, Point3};
 use palpate_input::config::{ConfigError, Loader, Validate};
 use palpate_input::error::InputError;
@@ -38,7 +38,7 @@ pub trait Connector: Validate {
     ///
     /// # Errors
     /// If it has other ones, with those that fit.
-    fn check_sensor(&self, _sensor: SensorKind) -> Result<(), InputError> {
+    fn check_sensor(&self, _sensor: &SensorSettings) -> Result<(), InputError> {
         Ok(())
     }
 

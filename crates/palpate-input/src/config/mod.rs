@@ -154,6 +154,13 @@ impl Loader {
         Err(self.not_allowed(key, &value.to_string(), &allowed))
     }
 
+    /// Removes the dotted key of an optional table that is `false`.
+    pub fn take_false(&mut self, key: &str) {
+        if self.value(key) == Some(&Value::Boolean(false)) {
+            self.take(key);
+        }
+    }
+
     /// Takes the list of former names that were read, each with the present one.
     pub fn take_former_names(&mut self) -> Vec<String> {
         std::mem::take(&mut self.former_names)
