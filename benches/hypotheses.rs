@@ -16,6 +16,7 @@ use palpate::explore::planner::{self, Offer};
 use palpate::explore::recognition::{ObjectHypotheses, RecognitionSettings};
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
+use palpate::robot::sensor::TipSurface;
 use std::path::Path;
 use std::time::Instant;
 
@@ -52,11 +53,12 @@ fn main() -> anyhow::Result<()> {
                 library.clone(),
                 scene.pose.clone().unwrap_or_default(),
                 settings,
-                (task, false, None),
+                task,
+                &TipSurface::Rigid,
                 &mut stream(1, trial.into(), "hypotheses"),
             );
             let (gp, space) = (GpSettings::default(), SpatialGpSettings::default());
-            let mut belief = Belief::new(task, (&scene.finger, false), &gp, &space)
+            let mut belief = Belief::new(task, &TipSurface::Rigid, &gp, &space)
                 .with_hypotheses(Some(hypotheses));
             let entry = planner::by_name("object_information");
             let entry = entry.ok_or_else(|| anyhow::anyhow!("no planner"))?;

@@ -46,7 +46,6 @@ pub mod study;
 
 pub use palpate_explore as explore;
 pub use palpate_explore::{backend, robot, task};
-#[cfg(feature = "franka")]
 pub use palpate_franka as franka;
 pub use palpate_geometry as geometry;
 pub use palpate_gp as gp;

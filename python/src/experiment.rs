@@ -240,8 +240,8 @@ impl Experiment {
         simulation.simulator().check_reach().map_err(errors::scene)?;
         if simulation.is_real() {
             return Err(errors::scene(
-                "backend.kind: only the program (palpate run) moves a real arm, with an operator present; \
-                 allowed here is \"simulated\"",
+                "[backend]: only the program (palpate run) moves a real arm, with an operator present; \
+                 allowed here is a simulation",
             ));
         }
         Ok(simulation.with_planners(makers))

@@ -13,8 +13,8 @@ pub(crate) use palpate::explore::belief::Belief as Known;
 /// Returns an empty belief for `environment` with default settings.
 pub(crate) fn empty_belief(environment: &Environment) -> Known {
     let scene = environment.scene();
-    let finger = (&scene.finger, scene.effects.skin.is_some());
-    Known::new(environment.task(), finger, &GpSettings::default(), &SpatialGpSettings::default())
+    let surface = scene.effects.surface();
+    Known::new(environment.task(), &surface, &GpSettings::default(), &SpatialGpSettings::default())
 }
 
 /// Number of values of a target of `known`.

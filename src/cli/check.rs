@@ -6,6 +6,7 @@ use super::output::Overwrite;
 use super::prepare::{planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Outcome, Verbosity, print};
+use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, Simulation};
@@ -108,7 +109,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     }
     let simulation = prepare_simulation(experiment, talk)?.with_planners(own);
     if simulation.is_real() {
-        bail!("backend.kind: a check runs in simulation; allowed is \"simulated\"");
+        bail!("[backend]: a check runs in simulation; allowed is none of {}", arm_tables());
     }
     let stop = stop_on_interrupt("trials")?;
     if let Some(why) = &args.accept {

@@ -6,7 +6,7 @@ use super::host::Host;
 use super::terminal::{Line, Outcome, State, print};
 use crate::experiment::Experiment;
 use palpate_ros::network::{discovery_note, network};
-use palpate_ros::settings::BackendSettings;
+use palpate_ros::settings::RosSettings;
 use std::fs;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ fn ros2(variable: &impl Fn(&str) -> Option<String>) -> Line {
         return ("ROS 2", State::Absent, "build with the feature ros2".into());
     }
     let note = discovery_note(variable).map_or(String::new(), |note| format!("; {note}"));
-    match network(&BackendSettings::default(), variable, &[]) {
+    match network(&RosSettings::default(), variable, &[]) {
         Ok((domain, None)) => {
             ("ROS 2", State::Ok, format!("domain {domain}, all network interfaces{note}"))
         }
@@ -169,7 +169,7 @@ fn ros1(variable: &impl Fn(&str) -> Option<String>) -> Line {
         return ("ROS 1", State::Absent, "build with the feature ros1".into());
     }
     let master =
-        variable("ROS_MASTER_URI").unwrap_or_else(|| BackendSettings::default().master.clone());
+        variable("ROS_MASTER_URI").unwrap_or_else(|| RosSettings::default().master.clone());
     let host = master.trim_start_matches("http://").trim_end_matches('/');
     let mut addresses = host.to_socket_addrs().into_iter().flatten();
     let is_open = addresses

@@ -3,12 +3,12 @@
 use super::terminal::{Line, State};
 use crate::experiment::Experiment;
 use crate::sim::Environment;
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use nalgebra::Point3;
 use palpate_explore::robot::arm::Chain;
 use palpate_input::files;
 use palpate_ros::listen::{Heard, Report, listen};
-use palpate_ros::settings::{BackendKind, BackendSettings};
+use palpate_ros::settings::RosSettings;
 use palpate_ros::topics::Topic;
 use std::path::Path;
 use std::time::Duration;
@@ -19,12 +19,12 @@ const SPAN: Duration = Duration::from_secs(10);
 /// Listens to the arm of an experiment and returns a line for each topic, service and frame; writes
 /// the URDF that the driver publishes to `save`. Nothing is commanded.
 pub(super) fn lines(experiment: &Experiment, save: Option<&Path>) -> anyhow::Result<Vec<Line>> {
-    let settings = &experiment.backend;
-    ensure!(
-        settings.kind == BackendKind::Ros2 || settings.kind == BackendKind::Ros1,
-        "--arm: backend.kind = \"{}\" has no topics; allowed are \"ros2\", \"ros1\"",
-        settings.kind.name()
-    );
+    let backend = &experiment.backend;
+    let settings = backend.ros().with_context(|| {
+        let found =
+            backend.arm().map_or("a simulation".into(), |(name, _)| format!("[backend.{name}]"));
+        format!("--arm: {found} has no topics; allowed are [backend.ros2], [backend.ros1]")
+    })?;
     let arm = experiment.scene.arm.as_ref().context("--arm: the scene has no [arm]")?;
     let chain = arm.chain_of(&Environment::arm_model(arm)?.0)?;
     let names = settings.joint_names(&chain);
@@ -36,7 +36,7 @@ pub(super) fn lines(experiment: &Experiment, save: Option<&Path>) -> anyhow::Res
         settings.further_topics().filter_map(|topic| further_line(topic, settings, &report)),
     );
     lines.extend(service_lines(settings, names.names(), &report));
-    lines.extend(frame_lines(settings, &chain, &report));
+    lines.extend(frame_lines((settings, backend.start_checks.model_m), &chain, &report));
     if let Some(path) = save {
         let text = report.description.as_deref().with_context(|| {
             let name = settings.topics.name(Topic::Description);
@@ -49,7 +49,7 @@ pub(super) fn lines(experiment: &Experiment, save: Option<&Path>) -> anyhow::Res
 }
 
 /// Returns the line of a topic without which the arm is not moved.
-fn topic_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Line {
+fn topic_line(topic: Topic, settings: &RosSettings, report: &Report) -> Line {
     let (name, type_name) = (settings.topics.name(topic), settings.topics.type_name(topic));
     let silent = Heard::default();
     let heard = report.topics.get(&topic).unwrap_or(&silent);
@@ -77,9 +77,7 @@ fn topic_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Line
         () if is_latched || settings.use_sim_time => (State::Ok, None),
         () if is_late => (
             State::Wrong,
-            Some(
-                "its stamps are not of this clock; synchronise the clocks, or set backend.use_sim_time",
-            ),
+            Some("its stamps are not of this clock; synchronise the clocks, or set use_sim_time"),
         ),
         () if is_slow => (State::Wrong, Some("too slow for its max_age_s")),
         () if topic == Topic::Wrench && heard.is_constant => {
@@ -105,7 +103,10 @@ fn missing(topic: Topic, name: &str, type_name: &str, is_latched: bool, report: 
     let expected = format!("{name} ({type_name})");
     match same.first() {
         Some(other) if other.type_name != type_name => {
-            format!("{name} has the type {}, not {type_name}; see backend.topics", other.type_name)
+            format!(
+                "{name} has the type {}, not {type_name}; see its topics in [backend]",
+                other.type_name
+            )
         }
         Some(other) if is_latched && !other.is_kept => {
             format!(
@@ -127,7 +128,7 @@ fn missing(topic: Topic, name: &str, type_name: &str, is_latched: bool, report: 
             match alike.as_slice() {
                 [] => format!("no publisher of {expected}; start the driver in the same domain"),
                 found => format!(
-                    "no publisher of {expected}; of this type are {}: see backend.topics",
+                    "no publisher of {expected}; of this type are {}: see its topics in [backend]",
                     found.join(", ")
                 ),
             }
@@ -135,7 +136,7 @@ fn missing(topic: Topic, name: &str, type_name: &str, is_latched: bool, report: 
     }
 }
 
-fn command_line(settings: &BackendSettings, report: &Report) -> Line {
+fn command_line(settings: &RosSettings, report: &Report) -> Line {
     let topics = &settings.topics;
     let name = format!("{} ({})", topics.name(Topic::Command), topics.type_name(Topic::Command));
     let other = report.publishers.iter().any(|one| one.topic == topics.name(Topic::Command));
@@ -147,7 +148,7 @@ fn command_line(settings: &BackendSettings, report: &Report) -> Line {
 }
 
 /// Returns the line of a topic that is read if it is there.
-fn further_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Option<Line> {
+fn further_line(topic: Topic, settings: &RosSettings, report: &Report) -> Option<Line> {
     let name = settings.topics.name(topic);
     let heard = report.topics.get(&topic).map_or(0, |heard| heard.count);
     match topic {
@@ -162,7 +163,7 @@ fn further_line(topic: Topic, settings: &BackendSettings, report: &Report) -> Op
     }
 }
 
-fn service_lines(settings: &BackendSettings, names: &[String], report: &Report) -> Vec<Line> {
+fn service_lines(settings: &RosSettings, names: &[String], report: &Report) -> Vec<Line> {
     let namespace = settings.topics.namespace();
     let mut lines: Vec<Line> = Vec::new();
     for service in settings.driver().services {
@@ -183,8 +184,11 @@ fn service_lines(settings: &BackendSettings, names: &[String], report: &Report) 
                 .collect();
             let is_there = all.iter().any(|one| one.name == own);
             let state = if is_there { State::Ok } else { State::Wrong };
-            let lacks =
-                if is_there { String::new() } else { format!("no {own}; set backend.release; ") };
+            let lacks = if is_there {
+                String::new()
+            } else {
+                format!("no {own}; set backend.ros2.release; ")
+            };
             lines.push(("controllers", state, format!("{lacks}{}", states.join(", "))));
         }
         Some(Err(words)) => lines.push(("controllers", State::Wrong, words.clone())),
@@ -193,12 +197,16 @@ fn service_lines(settings: &BackendSettings, names: &[String], report: &Report) 
     lines
 }
 
-/// Compares the driver's frames with the arm's model.
-fn frame_lines(settings: &BackendSettings, chain: &Chain, report: &Report) -> Vec<Line> {
+/// Compares the driver's frames with the arm's model; the fingertips may differ by `allowed_m`.
+fn frame_lines(
+    (settings, allowed_m): (&RosSettings, f64),
+    chain: &Chain,
+    report: &Report,
+) -> Vec<Line> {
     let Some(flange) = settings.flange_frame() else { return Vec::new() };
     let base = settings.base_frame();
     let Some(found) = report.frames.pose(&flange, &base) else {
-        let words = format!("no {base} and {flange} on /tf; see backend.prefix");
+        let words = format!("no {base} and {flange} on /tf; see backend.ros2.prefix");
         return vec![("frames", State::Wrong, words)];
     };
     let mut lines = Vec::new();
@@ -207,7 +215,7 @@ fn frame_lines(settings: &BackendSettings, chain: &Chain, report: &Report) -> Ve
         let off_m = (found * tip - chain.flange_at(&q) * tip).norm();
         let words =
             format!("{base} to {flange}: the fingertip is {:.2} mm from the model's", 1e3 * off_m);
-        lines.push(match off_m > settings.start_checks.model_m {
+        lines.push(match off_m > allowed_m {
             true => (
                 "frames",
                 State::Wrong,

@@ -65,7 +65,8 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let mut simulation = prepare_simulation(experiment, talk)?;
     let stop = stop_on_interrupt("touches")?;
     if let Some(arm) = simulation.connect()? {
-        prepare_arm(&arm, args.clear_fault)?;
+        let start_checks = &simulation.experiment().backend.start_checks;
+        prepare_arm(&arm, start_checks, args.clear_fault)?;
     }
     let planner = simulation.planner(&args.planner).context("this program has no such planner")?;
     let (arm, mut last) = (simulation.arm(), None);
@@ -74,7 +75,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         let stopped = Fault::Stopped { time_s: touched.row.outcome.time_s.unwrap_or_default() };
         if let Some(found) = &touched.row.recognition {
             let _ = print(&line(touched.count, found));
-            if let Some(arm) = arm.and_then(|arm| arm.ros()) {
+            if let Some(arm) = arm {
                 arm.show_object(&pose(found.pose.position_m, found.pose.rotation_deg));
             }
             let is_sure = found.confidence() >= args.sure;

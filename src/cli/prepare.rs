@@ -3,12 +3,13 @@
 use super::find::is_experiment;
 use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
-use crate::experiment::real_arm::RealArm;
 use crate::experiment::store::Journal;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, bail, ensure};
+use palpate_explore::backend::arm::Arm;
+use palpate_explore::backend::interlock::StartCheckSettings;
 use palpate_input::config::ConfigError;
 use palpate_input::format::counted;
 use std::path::Path;
@@ -116,13 +117,20 @@ pub(super) fn connect_arm(
             folder.display(),
         );
     }
-    simulation.connect()?.map_or(Ok(()), |arm| prepare_arm(&arm, clears_fault))
+    match simulation.connect()? {
+        Some(arm) => prepare_arm(&arm, &simulation.experiment().backend.start_checks, clears_fault),
+        None => Ok(()),
+    }
 }
 
 /// Checks that a real arm may be moved; first clears faults latched on the robot if `clear_fault`.
-pub(super) fn prepare_arm(arm: &RealArm, clear_fault: bool) -> anyhow::Result<()> {
+pub(super) fn prepare_arm(
+    arm: &Arc<dyn Arm>,
+    settings: &StartCheckSettings,
+    clear_fault: bool,
+) -> anyhow::Result<()> {
     if clear_fault {
         arm.clear_fault()?;
     }
-    Ok(arm.check_start()?)
+    Ok(Arc::clone(arm).check_start(settings)?)
 }

@@ -7,7 +7,7 @@ use super::prepare::{prepare_arm, prepare_simulator};
 use super::progress::{progress_bar, step};
 use super::register_cloud::{CloudArgs, register_cloud};
 use super::terminal::{Outcome, Verbosity, print};
-use crate::experiment::real_arm::RealArm;
+use crate::experiment::backend_settings::BackendSettings;
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
@@ -15,7 +15,6 @@ use anyhow::Context;
 use palpate_explore::evidence::Outcome as TouchOutcome;
 use palpate_explore::registration::{RegistrationDesign, register};
 use palpate_gp::math::seed;
-use palpate_ros::settings::{BackendKind, BackendSettings};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -93,11 +92,11 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     )?;
     design.check()?;
     let simulator = prepare_simulator(&environment, talk)?;
-    let mut probe = match settings.kind {
-        BackendKind::Simulated => simulator.probe(args.seed)?,
-        _ => {
-            let arm = RealArm::connect(&settings, &robot.chain)?;
-            prepare_arm(&arm, args.clear_fault)?;
+    let mut probe = match settings.arm() {
+        None => simulator.probe(args.seed)?,
+        Some((_, connector)) => {
+            let arm = connector.connect(&robot.chain, settings.dry)?;
+            prepare_arm(&arm, &settings.start_checks, args.clear_fault)?;
             Box::new(simulator.servo_within(arm.backend(), args.seed, &settings.interlocks)?)
         }
     };

@@ -4,6 +4,7 @@ use super::prepare::{prepare_arm, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::terminal::{Outcome, Verbosity, print};
 use crate::experiment::Experiment;
+use crate::experiment::backend_settings::arm_tables;
 use anyhow::{Context, bail};
 use palpate_explore::backend::pace;
 use palpate_explore::belief::Belief;
@@ -25,12 +26,11 @@ pub(super) fn run(
     experiment.backend.dry = true;
     let mut simulation = prepare_simulation(experiment, talk)?;
     if !simulation.is_real() {
-        bail!(
-            "--dry: a simulation touches without risk; allowed with backend.kind = \"ros2\", \"ros1\", \"franka\""
-        );
+        bail!("--dry: a simulation touches without risk; allowed with {}", arm_tables());
     }
-    let arm = simulation.connect()?;
-    arm.map_or(Ok(()), |arm| prepare_arm(&arm, clears_fault))?;
+    if let Some(arm) = simulation.connect()? {
+        prepare_arm(&arm, &simulation.experiment().backend.start_checks, clears_fault)?;
+    }
     let body = simulation.backend(None)?.context("the arm does not move")?;
     let mut servo = simulation.servo(body, simulation.body_seed(0))?;
     let experiment = simulation.experiment();
@@ -41,8 +41,7 @@ pub(super) fn run(
     let begun_s = pace::now_s();
     let mut followed = 0;
     let (task, scene) = (simulation.task(), &experiment.scene);
-    let finger = (&scene.finger, scene.effects.skin.is_some());
-    let belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
+    let belief = Belief::new(task, &scene.effects.surface(), &experiment.gp, &experiment.space);
     while followed < experiment.touches && !stop.load(Ordering::Relaxed) {
         let target = planner.plan(&belief, &Offer::default())?.target;
         let approach = task.approach(&target).context("no approach of a target")?;

@@ -10,6 +10,7 @@ use super::rehearse;
 use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
 use crate::experiment::Simulation;
+use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner::{self, Progress, RealRun, Shard};
 use crate::experiment::statistics::analysis::Analysis;
@@ -122,9 +123,7 @@ impl Args {
             );
         }
         if self.step && !simulation.is_real() {
-            bail!(
-                "--step: a simulation needs no operator; allowed with backend.kind = \"ros2\", \"ros1\""
-            );
+            bail!("--step: a simulation needs no operator; allowed with {}", arm_tables());
         }
         if self.shard.is_some() && simulation.is_real() {
             bail!("--shard: a real arm runs one trial at a time; remove --shard");

@@ -10,12 +10,13 @@ use crate::sim::finger::effects::wrench::WrenchEffect;
 use crate::sim::{Scene, known_body};
 use anyhow::{Context, bail};
 use nalgebra::{Isometry3, Vector3};
-use palpate_explore::robot::sensor::SensorKind;
+use palpate_explore::backend::arm::Connector;
+use palpate_explore::robot::sensor::Signal;
 use palpate_ros::connect;
 use palpate_ros::network::discovery_note;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
 use palpate_ros::server::serve::{Injection, SimulatedRobotServer, services};
-use palpate_ros::settings::BackendKind;
+use palpate_ros::settings::{RosSettings, RosVersion};
 use palpate_ros::topics::{Endpoint, TactileMessage, Topic};
 use serde_json::json;
 use std::path::PathBuf;
@@ -52,7 +53,7 @@ pub(super) struct Args {
     body: KnownBodyArgs,
     /// Transport [default: the experiment's, or ros2].
     #[arg(long, value_name = "ros2|ros1", value_parser = kind)]
-    kind: Option<BackendKind>,
+    kind: Option<RosVersion>,
     /// ROS 2 domain [default: the experiment's, ROS_DOMAIN_ID, or 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
@@ -72,8 +73,8 @@ pub(super) struct Args {
     set: Vec<String>,
 }
 
-pub(super) fn kind(text: &str) -> Result<BackendKind, String> {
-    let kinds = [BackendKind::Ros2, BackendKind::Ros1];
+pub(super) fn kind(text: &str) -> Result<RosVersion, String> {
+    let kinds = [RosVersion::Ros2, RosVersion::Ros1];
     kinds.into_iter().find(|kind| kind.name() == text).ok_or("allowed are ros2, ros1".into())
 }
 
@@ -100,12 +101,11 @@ fn pose(text: &str) -> Result<Isometry3<f64>, String> {
 }
 
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
-    let mut experiment = experiment(args)?;
-    let scene = &mut experiment.scene;
+    let experiment = experiment(args)?;
+    let settings = settings(args, &experiment)?;
+    let mut scene = experiment.scene;
     // The robot always publishes forces; a trial in simulation may need none.
     scene.effects.wrench.get_or_insert_with(WrenchEffect::default);
-    let settings = experiment.backend.clone();
-    let scene = experiment.scene;
     let environment = match args.body.body()? {
         Some(body) => Arc::new(known_body::environment(&scene, &body)?),
         None => prepare_environment(scene, talk)?,
@@ -123,9 +123,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let is_biotac = effects.fluid.is_some() && effects.electrodes.is_some();
     let (is_there, needed) = match settings.topics.tactile.message {
         TactileMessage::None => (true, ""),
-        TactileMessage::Flag => {
-            (scene.sensor.kind == SensorKind::Contact, "sensor.kind = \"contact\"")
-        }
+        TactileMessage::Flag => (scene.sensor.signal() == Some(Signal::Flag), "[sensor.contact]"),
         TactileMessage::Depth => (effects.gel.is_some(), "[effects.gel]"),
         TactileMessage::Hand | TactileMessage::Fingers => {
             (is_biotac, "[effects.skin], [effects.fluid] and [effects.electrodes]")
@@ -133,10 +131,11 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     };
     if !is_there {
         let (path, name) = (args.path.display(), settings.topics.type_name(Topic::Tactile));
-        bail!("{path}: backend.topics.tactile.type = \"{name}\" needs {needed} in the scene");
+        let key = settings.key("topics.tactile.type");
+        bail!("{path}: {key} = \"{name}\" needs {needed} in the scene");
     }
     let stop = stop_on_interrupt("ticks")?;
-    if settings.kind == BackendKind::Ros2 {
+    if settings.version == Some(RosVersion::Ros2) {
         discovery_note(|name| std::env::var(name).ok()).iter().for_each(|note| talk.note(note));
     }
     let open = connect(&settings, Endpoint::Arm, services(settings.profile))?;
@@ -146,7 +145,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
             .context("cannot start the simulated robot")?;
     if let Some(x_fs) = args.tcp {
         if settings.driver().flange_frame.is_none() {
-            bail!("--tcp: a driver with frames is required, as with backend.profile = \"ur\"");
+            bail!("--tcp: a driver with frames is required, as with backend.ros2.profile = \"ur\"");
         }
         twin.set_tool_centre(x_fs);
     }
@@ -166,16 +165,25 @@ const TOUCHES: u32 = 1;
 
 fn experiment(args: &Args) -> anyhow::Result<Experiment> {
     let path = find(&args.path, EXPERIMENTS).or_else(|_| find(&args.path, SCENES))?;
-    let mut experiment = match is_experiment(&path) {
+    Ok(match is_experiment(&path) {
         true => Experiment::load(&path, &args.set)?,
         false => {
             Experiment::with_defaults(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES)
         }
+    })
+}
+
+/// Returns the settings of the topics: those of the experiment's arm, or the usual ones of ROS 2.
+fn settings(args: &Args, experiment: &Experiment) -> anyhow::Result<RosSettings> {
+    let backend = &experiment.backend;
+    let mut settings = match (backend.ros(), backend.arm()) {
+        (None, Some((name, _))) => {
+            bail!("[backend.{name}] has no topics; allowed are [backend.ros2], [backend.ros1]")
+        }
+        (given, _) => given.cloned().unwrap_or_default(),
     };
-    let backend = &mut experiment.backend;
-    backend.domain = args.domain.or(backend.domain);
-    let usual = || Some(backend.kind).filter(|kind| *kind != BackendKind::Simulated);
-    backend.kind = args.kind.or_else(usual).unwrap_or(BackendKind::Ros2);
-    backend.complete(experiment.scene.arm.as_ref());
-    Ok(experiment)
+    settings.version = args.kind.or(settings.version).or(Some(RosVersion::Ros2));
+    settings.domain = args.domain.or(settings.domain);
+    settings.complete(experiment.scene.arm.as_ref());
+    Ok(settings)
 }

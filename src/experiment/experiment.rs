@@ -4,6 +4,7 @@
 //! a finished run: new trials and planners are added to the existing rows. Rows of trials or
 //! planners that are no longer listed are kept but not shown.
 
+use crate::experiment::backend_settings::BackendSettings;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::report_settings::{ReportSettings, TOUCHES_MAX};
 use crate::experiment::trial::planner_names::{self, ORACLE};
@@ -18,8 +19,6 @@ use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::arm::model::JointModel;
 use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
-use palpate_ros::driver::Profile;
-use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -207,15 +206,12 @@ impl Experiment {
         }
         // Version 0.1 wrote settings of planners that were removed.
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
-        take_former_keys(&mut loader)?;
-        Profile::fill_in(&mut loader);
+        BackendSettings::prepare(&mut loader)?;
         let former_names = loader.take_former_names();
         let mut experiment: Self = loader.finish()?;
         experiment.scene.former_names = former_names;
         experiment.scene.effects.legacy_keys = legacy_keys;
-        if experiment.backend.kind != BackendKind::Simulated {
-            experiment.backend.complete(experiment.scene.arm.as_ref());
-        }
+        experiment.backend.complete(experiment.scene.arm.as_ref());
         experiment.scene.arm.iter_mut().for_each(ArmSettings::complete);
         Ok(experiment)
     }
@@ -356,6 +352,21 @@ impl Experiment {
         }
     }
 
+    /// Checks the number of the joints' names in messages.
+    fn check_joints(&self, rules: &mut Rules) {
+        let Some((table, connector)) = self.backend.arm() else { return };
+        let named = connector.joints().len();
+        let arm = self.scene.arm.as_ref().filter(|_| named > 0);
+        // An unreadable model is reported where the arm is built.
+        if let Some((model, _)) = arm.and_then(|arm| arm.model().ok()) {
+            let (key, joints) = (format!("backend.{table}.joints"), model.joint.len());
+            rules.require(&key, format!("{named} names"), named == joints, || {
+                let usual: Vec<&str> = model.joint.iter().map(JointModel::name).collect();
+                format!("{joints} names, from the base on, as in {usual:?}")
+            });
+        }
+    }
+
     /// Checks the settings that do not apply around a whole object.
     fn check_whole_object(&self, rules: &mut Rules) {
         if self.scene.whole_object.is_none() {
@@ -407,7 +418,7 @@ impl Validate for Experiment {
             rules.one_of(&format!("planners[{i}]"), name, &planner_names::allowed_names(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
-            let is_seen = name != ORACLE || self.backend.kind == BackendKind::Simulated;
+            let is_seen = name != ORACLE || !self.backend.is_real();
             rules.require(&format!("planners[{i}]"), name, is_seen, || {
                 "other planners, or a simulated backend: the oracle needs the ground truth".into()
             });
@@ -443,15 +454,7 @@ impl Validate for Experiment {
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
         rules.table("backend", &self.backend);
-        let arm = self.scene.arm.as_ref().filter(|_| !self.backend.joints.is_empty());
-        // An unreadable model is reported where the arm is built.
-        if let Some((model, _)) = arm.and_then(|arm| arm.model().ok()) {
-            let [named, joints] = [self.backend.joints.len(), model.joint.len()];
-            rules.require("backend.joints", format!("{named} names"), named == joints, || {
-                let usual: Vec<&str> = model.joint.iter().map(JointModel::name).collect();
-                format!("{joints} names, from the base on, as in {usual:?}")
-            });
-        }
+        self.check_joints(rules);
         if let Some(truth) = &self.truth {
             rules.table("truth", truth);
         }

@@ -20,11 +20,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod backend_settings;
 #[allow(clippy::module_inception)]
 pub mod experiment;
 pub mod measure;
 pub mod notice;
-pub mod real_arm;
 pub mod real_robot;
 pub mod report_settings;
 pub mod runner;

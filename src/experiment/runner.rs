@@ -1,6 +1,5 @@
 //! Execution of trials × planners: simulated trials in parallel, those of a real arm in sequence.
 
-use crate::experiment::real_arm::RealArm;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
 use crate::experiment::trial::planner_names::HUMAN;
@@ -305,7 +304,7 @@ impl StoredTrial<'_, '_> {
         // Touches made before an interruption are not shown again, except the last.
         let is_shown = event.count() as usize >= self.made.len();
         let simulation = self.run.simulation;
-        if let Some(arm) = simulation.arm().and_then(RealArm::ros).filter(|_| is_shown) {
+        if let Some(arm) = simulation.arm().filter(|_| is_shown) {
             trial::view::show(arm, simulation, event);
         }
         let made = self.made.get(event.count() as usize - 1);

@@ -3,7 +3,6 @@
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
-use crate::experiment::real_arm::RealArm;
 use crate::experiment::real_robot;
 use crate::experiment::trial::looks;
 use crate::experiment::trial::row::TrialRow;
@@ -12,6 +11,7 @@ use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::library::{LoadedLibrary, OBJECT, TrueObject};
 use crate::sim::simulator::Simulator;
+use palpate_explore::backend::arm::Arm;
 use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
 use palpate_explore::backend::{Backend, Fault, LinkFault};
 use palpate_explore::planner::{self, PlannerFactory};
@@ -21,7 +21,6 @@ use palpate_explore::recognition::Library;
 use palpate_explore::task::Task;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
-use palpate_ros::settings::BackendKind;
 use rand::RngExt;
 use std::sync::Arc;
 
@@ -32,7 +31,7 @@ pub struct Simulation {
     simulator: Simulator,
     truth: Arc<GroundTruth>,
     /// Connected arm that replaces the simulated robot.
-    arm: Option<RealArm>,
+    arm: Option<Arc<dyn Arm>>,
     /// Notice about a scanned ground truth.
     scan_notice: Option<String>,
     /// Planners that are not built in: the oracle, and added ones.
@@ -67,14 +66,14 @@ impl Simulation {
             library.check_poses(&experiment.scene)?;
         }
         real_robot::check(&experiment, false)?;
-        if experiment.backend.kind != BackendKind::Simulated {
+        let is_real = experiment.backend.is_real();
+        if is_real {
             // A simulation takes this from the mesh.
             if let Some(zone) = &mut experiment.scene.zone {
                 zone.datum_y_m.get_or_insert(0.0);
             }
         }
-        let is_simulated = experiment.backend.kind == BackendKind::Simulated;
-        let is_drawn = is_simulated && experiment.scene.object.is_none();
+        let is_drawn = !is_real && experiment.scene.object.is_none();
         if let Some(library) = library.as_ref().filter(|_| is_drawn) {
             return Self::with_library(experiment, library, None);
         }
@@ -273,25 +272,26 @@ impl Simulation {
 
     /// Whether the experiment uses a real arm.
     pub fn is_real(&self) -> bool {
-        self.experiment.backend.kind != BackendKind::Simulated
+        self.experiment.backend.is_real()
     }
 
     /// Connects to the experiment's arm; returns `None` for a simulated one.
     ///
     /// # Errors
     /// If the arm cannot be reached, or is not ready to be moved.
-    pub fn connect(&mut self) -> Result<Option<RealArm>, LinkFault> {
-        if self.is_real() {
+    pub fn connect(&mut self) -> Result<Option<Arc<dyn Arm>>, LinkFault> {
+        let backend = &self.experiment.backend;
+        if let Some((_, arm)) = backend.arm() {
             let lacks = || LinkFault::Arm("the scene has no object to touch".into());
             let chain = self.environment().chain().ok_or_else(lacks)?;
-            self.arm = Some(RealArm::connect(&self.experiment.backend, &chain)?);
+            self.arm = Some(arm.connect(&chain, backend.dry)?);
         }
         Ok(self.arm.clone())
     }
 
     /// Returns the connected arm, if any.
-    pub fn arm(&self) -> Option<&RealArm> {
-        self.arm.as_ref()
+    pub fn arm(&self) -> Option<&dyn Arm> {
+        self.arm.as_deref()
     }
 
     /// Returns the backend of a trial, which a view may show: the connected arm or the simulated
@@ -301,7 +301,7 @@ impl Simulation {
     /// If no arm is connected, or memory for the simulator's state is missing.
     pub fn backend(&self, view: Option<&LiveView>) -> Result<Option<Box<dyn Backend>>, Fault> {
         let body = match &self.arm {
-            Some(arm) => Some(arm.backend()),
+            Some(arm) => Some(Arc::clone(arm).backend()),
             None if self.is_real() => return Err(Fault::lacks("a connection to the arm")),
             None => self.simulator.body()?,
         };

@@ -6,7 +6,6 @@ use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::sim::finger::Fingertip;
-use crate::sim::finger::effects::gel::GelEffect;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
@@ -15,6 +14,7 @@ use palpate_explore::robot::arm::parts::{ArmParts, Gaps};
 use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
+use palpate_explore::robot::sensor::SensorModel;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
 use palpate_explore::view::{LookOffer, View};
 use palpate_geometry::bvh::MeshBvh;
@@ -590,8 +590,7 @@ fn whole_object_task(
 /// Returns the robot of a scene, whose finger `chain` carries.
 pub(super) fn robot(scene: &Scene, chain: Chain) -> Robot {
     let effects = &scene.effects;
-    let accuracy = effects.wrench.as_ref().map(WrenchEffect::accuracy);
-    let robot = Robot::new(chain, scene.finger.clone(), effects.skin.is_some());
-    let pad = effects.gel.as_ref().map(GelEffect::pad);
-    Robot { sensor: scene.sensor.kind, accuracy, pad, ..robot }
+    let wrench = effects.wrench.as_ref().map(WrenchEffect::accuracy);
+    let sensor = SensorModel { settings: scene.sensor.clone(), surface: effects.surface(), wrench };
+    Robot { chain, finger: scene.finger.clone(), sensor }
 }

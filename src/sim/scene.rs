@@ -11,7 +11,7 @@ use palpate_explore::recognition::PosePrior;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::finger::Finger;
 use palpate_explore::robot::finger::profile::Profile;
-use palpate_explore::robot::sensor::{SensorKind, SensorSettings};
+use palpate_explore::robot::sensor::{SensorSettings, Signal};
 use palpate_explore::task::WholeObject;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::zone::Zone;
@@ -302,8 +302,8 @@ impl Scene {
         let allowed = "none: strokes are along a zone with x_m and z_m, or around a whole object";
         let is_curve = self.whole_object.is_none() && !self.is_flat();
         forbid_given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
-        let has_pad = self.effects.gel.is_some() || self.sensor.kind == SensorKind::DepthPatch;
-        let allowed = "no stroke with [effects.gel] or sensor.kind = \"depth_patch\": the points of the \
+        let has_pad = self.effects.gel.is_some() || self.sensor.signal() == Some(Signal::Depth);
+        let allowed = "no stroke with [effects.gel] or [sensor.depth_patch]: the points of the \
                        pad's patch and of the stroke's path share one list";
         forbid_given(rules, "touch.stroke", self.touch.stroke.is_some() && has_pad, allowed);
     }
@@ -400,22 +400,24 @@ impl Scene {
     /// Checks that the scene has the channels that the sensor needs.
     fn check_sensor(&self, rules: &mut Rules) {
         let (effects, body) = (self.effective_effects(), self.simulator.name());
-        let kind = self.sensor.kind;
-        let named = format!("\"{}\"", kind.name());
-        rules.require(
-            "sensor.kind",
-            &named,
-            kind == SensorKind::Automatic || self.simulator.moves_finger(),
-            || format!("\"automatic\", because simulator = \"{body}\" has no sensor"),
-        );
-        let is_blind = kind == SensorKind::ForceTorqueTip && effects.wrench.is_none();
-        rules.require("sensor.kind", &named, !is_blind, || {
-            "another kind, or a table [effects.wrench]: the tip is on a force/torque sensor".into()
+        rules.table("sensor", &self.sensor);
+        let Some((name, kind)) = self.sensor.kind() else { return };
+        let key = format!("sensor.{name}");
+        rules.require(&key, "(given)", self.simulator.moves_finger(), || {
+            format!("no table, because simulator = \"{body}\" has no sensor")
         });
-        let is_blind = kind == SensorKind::DepthPatch && effects.gel.is_none();
-        rules.require("sensor.kind", &named, !is_blind, || {
-            "another kind, or a table [effects.gel]: the pad that gives the depths".into()
-        });
+        let (is_blind, allowed) = match kind.signal() {
+            Signal::Wrench => (
+                effects.wrench.is_none(),
+                "another sensor, or a table [effects.wrench]: the tip is on a force/torque sensor",
+            ),
+            Signal::Depth => (
+                effects.gel.is_none(),
+                "another sensor, or a table [effects.gel]: the pad that gives the depths",
+            ),
+            Signal::Flag => (false, ""),
+        };
+        rules.require(&key, "(given)", !is_blind, || allowed.into());
     }
 
     /// Checks that contact is detected: above the noise, and before the skin is compressed.
@@ -494,7 +496,7 @@ impl Scene {
         if self.simulator != SimulatorKind::Kinematic || self.effects != Effects::default() {
             return Cow::Borrowed(&self.effects);
         }
-        Cow::Owned(Effects::minimal(self.sensor.kind))
+        Cow::Owned(Effects::minimal(self.sensor.signal()))
     }
 
     /// Returns whether the finger collides with the object in MuJoCo; this is so if no skin or
@@ -570,6 +572,7 @@ impl Scene {
     pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
         loader.read_former_keys(prefix, &FORMER_KEYS)?;
         loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
+        SensorSettings::prepare(loader, &format!("{prefix}sensor"))?;
         CameraSettings::resolve(loader, &format!("{prefix}camera"))?;
         sensor::load(loader, &format!("{prefix}effects"))
     }

@@ -9,7 +9,7 @@ use crate::sim::finger::{ContactLoad, Fingertip, FingertipState};
 use nalgebra::{Isometry3, Point3};
 use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
 use palpate_explore::robot::finger::TipMotion;
-use palpate_explore::robot::sensor::SensorKind;
+use palpate_explore::robot::sensor::Signal;
 use palpate_gp::math::seed;
 use std::sync::Arc;
 
@@ -74,7 +74,7 @@ impl SimulatedFinger {
             registration_error: misplaced,
             load: ContactLoad::default(),
             p_wt: Point3::origin(),
-            has_sensor: scene.sensor.kind != SensorKind::Automatic
+            has_sensor: scene.sensor.kind().is_some()
                 || effects.fluid.is_some() && effects.electrodes.is_some(),
             environment,
         })
@@ -117,10 +117,10 @@ impl SimulatedFinger {
         reading.samples.extend(self.true_contact().map(Sample::Ideal));
         let scene = self.environment.scene();
         // The arm that carries a pad notices a load beside it.
-        let felt = match scene.sensor.kind {
-            SensorKind::Contact => Some(self.load.force_n.norm() > scene.touch.detection_n),
-            SensorKind::DepthPatch => Some(self.load.is_core_loaded),
-            SensorKind::Automatic | SensorKind::ForceTorqueTip => None,
+        let felt = match scene.sensor.signal() {
+            Some(Signal::Flag) => Some(self.load.force_n.norm() > scene.touch.detection_n),
+            Some(Signal::Depth) => Some(self.load.is_core_loaded),
+            Some(Signal::Wrench) | None => None,
         };
         reading.samples.extend(felt.map(Sample::Flag));
         reading.wrench =

@@ -30,15 +30,12 @@ pub struct SensorKit {
 /// own; the others are as large as usual. Forces at contact are five standard deviations of the
 /// sensor's noise or more.
 pub const KITS: [SensorKit; 8] = [
-    SensorKit {
-        name: "biotac",
-        sets: &["effects={skin={},fluid={},electrodes={}}", "sensor={kind=\"automatic\"}"],
-    },
+    SensorKit { name: "biotac", sets: &["effects={skin={},fluid={},electrodes={}}", "sensor={}"] },
     SensorKit {
         name: "gelsight_mini",
         sets: &[
             "effects={sensor=\"gelsight_mini\",gel={}}",
-            "sensor={kind=\"depth_patch\"}",
+            "sensor={depth_patch={}}",
             "finger.radius_m=0.012",
             "touch.press_m=0.0005",
         ],
@@ -47,7 +44,7 @@ pub const KITS: [SensorKit; 8] = [
         name: "digit",
         sets: &[
             "effects={sensor=\"digit\",gel={}}",
-            "sensor={kind=\"depth_patch\"}",
+            "sensor={depth_patch={}}",
             "finger.radius_m=0.0125",
             "touch.press_m=0.0005",
         ],
@@ -56,7 +53,7 @@ pub const KITS: [SensorKit; 8] = [
         name: "ball_ati_gamma",
         sets: &[
             "effects={sensor=\"ati_gamma\",rigid_tip={},wrench={}}",
-            "sensor={kind=\"force_torque_tip\"}",
+            "sensor={force_torque_tip={}}",
             "finger.radius_m=0.005",
             "touch.detection_n=0.5",
             "touch.press_m=0.0002",
@@ -66,7 +63,7 @@ pub const KITS: [SensorKit; 8] = [
         name: "ball_ati_mini40",
         sets: &[
             "effects={sensor=\"ati_mini40\",rigid_tip={},wrench={}}",
-            "sensor={kind=\"force_torque_tip\"}",
+            "sensor={force_torque_tip={}}",
             "finger.radius_m=0.005",
             "touch.detection_n=0.5",
             "touch.press_m=0.0002",
@@ -76,7 +73,7 @@ pub const KITS: [SensorKit; 8] = [
         name: "ball_ur5e",
         sets: &[
             "effects={sensor=\"ur5e\",rigid_tip={},wrench={}}",
-            "sensor={kind=\"force_torque_tip\"}",
+            "sensor={force_torque_tip={}}",
             "finger.radius_m=0.005",
             "touch.detection_n=8",
             "touch.press_m=0.0002",
@@ -86,7 +83,7 @@ pub const KITS: [SensorKit; 8] = [
         name: "ball_fr3",
         sets: &[
             "effects={sensor=\"fr3\",rigid_tip={},wrench={}}",
-            "sensor={kind=\"force_torque_tip\"}",
+            "sensor={force_torque_tip={}}",
             "finger.radius_m=0.005",
             "touch.detection_n=5",
             "touch.press_m=0.0002",
@@ -96,7 +93,7 @@ pub const KITS: [SensorKit; 8] = [
         name: "contact",
         sets: &[
             "effects={rigid_tip={}}",
-            "sensor={kind=\"contact\"}",
+            "sensor={contact={}}",
             "finger.radius_m=0.005",
             "touch.detection_n=0.5",
         ],

@@ -12,7 +12,7 @@ use palpate::explore::view::{
 };
 use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
-use palpate::ros::settings::BackendKind;
+use palpate::ros::settings::RosSettings;
 use palpate::sim::Environment;
 use palpate::sim::probe::exact_probe;
 use palpate_geometry::bvh::MeshBvh;
@@ -551,7 +551,7 @@ fn a_real_robot_needs_a_real_view() {
     let camera = format!("{PLACE} }}");
     let scene = scene("container.toml", &[&camera]);
     let mut experiment = Experiment::with_defaults(&scene, &["active"], 1, 2);
-    experiment.backend.kind = BackendKind::Ros2;
+    experiment.backend.ros2 = Some(RosSettings::default());
     let refused =
         |experiment: &Experiment| real_robot::check(experiment, false).unwrap_err().to_string();
     assert!(!refused(&experiment).contains("scene.camera.file"));

@@ -232,7 +232,7 @@ fn nothing_is_written_through_a_symbolic_link() {
         symlink(&outside, &file).unwrap();
         let arguments = match name {
             "trials.jsonl" => [&again[..], &["--fresh"]].concat(),
-            _ => vec!["run", "small.toml", "--out", "run", "--set", "backend.kind=\"ros2\""],
+            _ => vec!["run", "small.toml", "--out", "run", "--set", "backend.ros2={}"],
         };
         let output = palpate(folder.path(), &arguments);
         assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));

@@ -20,11 +20,11 @@ says = \"it works\"
 touches = 3
 measures = [\"rmse_m\"]
 
-[backend]
+[backend.ros2]
 patience_s = 7.0
 [backend.interlocks]
 frozen_s = 0.5
-[backend.topics.joints]
+[backend.ros2.topics.joints]
 age_s = 0.3
 ";
 

@@ -42,8 +42,7 @@ trials = 1
 initial_touches = 2
 touches = 3
 grid = 9
-[backend]
-kind = "franka"
+[backend.franka]
 address = "127.0.0.1"
 realtime = false
 [backend.interlocks]
@@ -88,8 +87,8 @@ impl Rig {
         {
             fs::write(path(name), text).unwrap();
         }
-        let kind = "backend.kind=\"simulated\"".to_owned();
-        let experiment = Experiment::load(&path("franka.toml"), &[kind]).unwrap();
+        let mut experiment = Experiment::load(&path("franka.toml"), &[]).unwrap();
+        experiment.backend.franka = None;
         let simulation = Simulation::new(experiment).unwrap();
         let chain = simulation.environment().chain().unwrap();
         let scene = simulation.environment().scene();

@@ -85,7 +85,7 @@ fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
         "backend.interlocks.workspace_m=[[-1.0, 1.0], [-1.2, 0.6], [0.0, 1.8]]",
     ];
     let run = |experiment: &'static str, sets: &[&str]| {
-        let kind = "backend.kind=\"ros2\"";
+        let kind = "backend.ros2={}";
         let sets = [kind].into_iter().chain(sets.iter().copied()).flat_map(|set| ["--set", set]);
         let arguments: Vec<&str> =
             ["run", experiment, "--out", out].into_iter().chain(sets).collect();
@@ -123,14 +123,7 @@ fn a_folder_that_may_not_be_used_is_refused_before_the_arm_is_looked_for() {
     let sets = crate::common::lab::CELL.iter().flat_map(|&set| ["--set", set]);
     let arguments: Vec<&str> = ["run", experiment, "--out", out.to_str().unwrap()]
         .into_iter()
-        .chain([
-            "--set",
-            "backend.kind=\"ros2\"",
-            "--set",
-            "touches=5",
-            "--set",
-            "initial_touches=5",
-        ])
+        .chain(["--set", "backend.ros2={}", "--set", "touches=5", "--set", "initial_touches=5"])
         .chain(sets)
         .collect();
     let run = || stderr(&palpate(Path::new(env!("CARGO_MANIFEST_DIR")), &arguments));

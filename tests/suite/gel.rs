@@ -272,7 +272,7 @@ fn what_a_pad_cannot_locate_is_named() {
 /// A kinematic finger with a pad touches the container where it is, and says so with a patch.
 #[test]
 fn a_pad_touches_the_container() {
-    let sets = ["simulator=\"kinematic\"", "sensor.kind=\"depth_patch\"", "touch.press_m=0.0005"];
+    let sets = ["simulator=\"kinematic\"", "sensor.depth_patch={}", "touch.press_m=0.0005"];
     let environment = environment("container.toml", &sets);
     let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
     let target = environment.task().zone().unwrap().at(&[0.6, 0.5]);
@@ -293,7 +293,7 @@ fn a_pad_touches_the_container() {
 fn a_pad_replaces_the_skin() {
     let digit = scene(
         "container_finger.toml",
-        &["sensor.kind=\"depth_patch\"", "effects={sensor=\"digit\", gel={}}"],
+        &["sensor.depth_patch={}", "effects={sensor=\"digit\", gel={}}"],
     );
     assert_eq!(digit.effects.gel.unwrap().dome_m, 0.06);
 }

@@ -1,13 +1,14 @@
 //! Tests of the solids that arms of other programs avoid: closed, and around the true surface.
 
 use nalgebra::Point3;
+use palpate::backend::arm::KeepOutSolid;
 use palpate::experiment::trial::TrialEvent;
 use palpate::experiment::trial::keep_out::{TABLE, object, table};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::backend::interlock::InterlockSettings;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::ros::planning_scene::{CollisionObject, KeepOutSolid};
+use palpate::ros::planning_scene::CollisionObject;
 use std::collections::HashMap;
 use std::path::Path;
 

@@ -13,7 +13,7 @@ use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
 use palpate::ros::link::Link;
 use palpate::ros::service::Service;
-use palpate::ros::settings::{BackendKind, BackendSettings, MappingKind};
+use palpate::ros::settings::{MappingKind, RosSettings, RosVersion};
 use palpate::ros::topics::{CommandTopic, Endpoint};
 use palpate::ros::transport::{Delivery, Packet};
 use serde_json::Value;
@@ -113,13 +113,14 @@ fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
         (13, "hand", "biotac_sensors/msg/BioTacHand"),
         (14, "fingers", "sr_robot_msgs/msg/BiotacAll"),
     ] {
+        let network = Network::new(number);
+        let table = network.settings.key("topics.tactile");
         let text = format!(
             "name = \"peer\"\nplanners = [\"active\"]\ntrials = 1\ninitial_touches = 1\ntouches = 1\ngrid = 5\n\
-             scene = {scene:?}\n[backend.topics.tactile]\ntype = \"{type_name}\"\n"
+             scene = {scene:?}\n[{table}]\ntype = \"{type_name}\"\n"
         );
         let path = folder.path().join(format!("{peer}.toml"));
         fs::write(&path, text).unwrap();
-        let network = Network::new(number);
         let twin = TwinProcess::new(&network, path.to_str().unwrap(), &[]);
         let output = network.peer("touch", &[peer]).output().unwrap();
         let values = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -243,25 +244,22 @@ fn a_run_that_was_halted_goes_on() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_of_another_implementation_is_heard_and_answers() {
     let network = Network::new(16);
-    if network.settings.kind != BackendKind::Ros2 {
+    if network.settings.version != Some(RosVersion::Ros2) {
         return;
     }
     let arm = network.peer("arm", &["14"]).stdout(Stdio::piped()).spawn().unwrap();
     // The status was published before any subscriber existed.
     sleep(Duration::from_millis(1500));
     let chain = ArmSettings::default().chain().unwrap();
-    let on_change = BackendSettings { status_on_change: true, ..network.settings.clone() };
+    let on_change = RosSettings { status_on_change: true, ..network.settings.clone() };
     let lab = RosArm::connect_over(&on_change, &chain).unwrap();
     for service in Service::COMMON {
         lab.call(&service).unwrap_or_else(|fault| panic!("{}: {fault}", service.name("/pa10")));
     }
     drop(lab);
     // The wrong mapping gets no answer, and the message names the setting.
-    let other = BackendSettings {
-        service_mapping: MappingKind::Enhanced,
-        connect_timeout_s: 2.0,
-        ..on_change
-    };
+    let other =
+        RosSettings { service_mapping: MappingKind::Enhanced, connect_timeout_s: 2.0, ..on_change };
     let lab = RosArm::connect_over(&other, &chain).unwrap();
     let fault = lab.call(&Service::Hold).unwrap_err().to_string();
     assert!(
@@ -301,16 +299,16 @@ fn multicast_members(device: &str) -> u32 {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn only_the_named_interfaces_are_used() {
     let network = Network::new(17);
-    if network.settings.kind != BackendKind::Ros2 {
+    if network.settings.version != Some(RosVersion::Ros2) {
         return;
     }
-    let set = ["--set", "backend.interfaces=[\"lo\"]"];
+    let set = ["--set", "backend.ros2.interfaces=[\"lo\"]"];
     let counts = || ["lo", "dds0"].map(multicast_members);
     let before = counts();
     let twin = TwinProcess::new(&network, EXPERIMENT, &set);
     let with_lo = counts();
     assert!(with_lo[0] > before[0] && with_lo[1] == before[1], "{before:?} {with_lo:?}");
-    let settings = BackendSettings { interfaces: vec!["lo".into()], ..network.settings.clone() };
+    let settings = RosSettings { interfaces: vec!["lo".into()], ..network.settings.clone() };
     let lab = RosArm::connect_over(&settings, &ArmSettings::default().chain().unwrap()).unwrap();
     assert_eq!(counts()[1], before[1]);
     drop((lab, twin));
@@ -318,8 +316,7 @@ fn only_the_named_interfaces_are_used() {
         let twin = TwinProcess::new(&network, EXPERIMENT, &[]);
         assert!(counts()[1] > before[1], "without a setting all are used");
         drop(twin);
-        let unknown =
-            BackendSettings { interfaces: vec!["wlan7".into()], ..network.settings.clone() };
+        let unknown = RosSettings { interfaces: vec!["wlan7".into()], ..network.settings.clone() };
         let fault =
             RosArm::connect_over(&unknown, &ArmSettings::default().chain().unwrap()).err().unwrap();
         assert!(

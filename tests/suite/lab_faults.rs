@@ -214,11 +214,12 @@ fn a_second_publisher_of_commands_stops_the_arm() {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_that_speaks_otherwise_is_not_moved() {
-    let set = "backend.topics.tactile.type=\"sr_robot_msgs/msg/BiotacAll\"";
     let network = Network::new(56);
+    let key = network.settings.key("topics.tactile.type");
+    let set = format!("{key}=\"sr_robot_msgs/msg/BiotacAll\"");
     let twin = TwinProcess::new(&network, EXPERIMENT, &[]);
     let folder = tempfile::tempdir().unwrap();
-    let output = network.run("random", 1, folder.path()).args(["--set", set]).output().unwrap();
+    let output = network.run("random", 1, folder.path()).args(["--set", &set]).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("/biotac_pub"), "{said}");

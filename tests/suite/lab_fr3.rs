@@ -35,9 +35,9 @@ fn an_fr3_touches_where_the_surface_is() {
             141,
             vec!["--release", "humble", "--namespace", "/NS_1", "--prefix", "left_", "--active="],
             vec![
-                "backend.release=\"humble\"",
-                "backend.prefix=\"left_\"",
-                "backend.topics.namespace=\"/NS_1\"",
+                "backend.ros2.release=\"humble\"",
+                "backend.ros2.prefix=\"left_\"",
+                "backend.ros2.topics.namespace=\"/NS_1\"",
             ],
         ),
     ] {
@@ -80,7 +80,7 @@ fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
         let options = ["--release", release, "--from-motion", "--event", &event_at];
         let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let set = format!("backend.release=\"{release}\"");
+        let set = format!("backend.ros2.release=\"{release}\"");
         let run = || {
             let mut run = network.run("random", 2, folder.path());
             run.args(["--set", &set]);

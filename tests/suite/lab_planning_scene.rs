@@ -15,7 +15,7 @@ use std::time::Duration;
 const TOUCHES: u32 = 6;
 
 /// Setting that publishes the objects.
-const TOPIC: [&str; 2] = ["--set", "backend.topics.collision_object=\"/collision_object\""];
+const TOPIC: [&str; 2] = ["--set", "backend.ros2.topics.collision_object=\"/collision_object\""];
 
 /// Another program gets object and table at the start and after each touch, closed and in the
 /// frame of the base; the object contains the contacts and the true surface.
@@ -48,8 +48,8 @@ fn a_planning_scene_has_the_object_and_the_table() {
         assert_eq!((&stored(number)["id"], &stored(number)["frame"]), (&id.into(), &"base".into()));
     }
 
-    let experiment =
-        Experiment::load(Path::new(UR_EXPERIMENT), &["backend.kind=\"simulated\"".into()]).unwrap();
+    let mut experiment = Experiment::load(Path::new(UR_EXPERIMENT), &[]).unwrap();
+    experiment.backend.ros2 = None;
     let simulation = Simulation::new(experiment).unwrap();
     let x_wb = simulation.environment().chain().unwrap().base;
     let last = stored(count - 2);

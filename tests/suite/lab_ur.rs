@@ -42,8 +42,9 @@ fn touched_as_in_the_simulator(network: &Network, options: &[&str]) {
     assert_eq!((&row.failure, row.touches.len()), (&None, touches as usize));
 
     let [touches, initial_touches] = touch_sets(touches);
-    let sets = ["backend.kind=\"simulated\"".into(), touches, initial_touches];
-    let experiment = Experiment::load(Path::new(network.experiment), &sets).unwrap();
+    let sets = [touches, initial_touches];
+    let mut experiment = Experiment::load(Path::new(network.experiment), &sets).unwrap();
+    experiment.backend.ros2 = None;
     let simulation = Simulation::new(experiment).unwrap();
     let off_m = contacts_off_m(&simulation, &row);
     let [median_m, worst_m] = median_and_worst(&off_m);

@@ -9,7 +9,7 @@ use palpate::backend::{Backend, Command as Motion};
 use palpate::experiment::Experiment;
 use palpate::ros::arm::RosArm;
 use palpate::ros::service::Service;
-use palpate::ros::settings::BackendSettings;
+use palpate::ros::settings::RosSettings;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Stdio;
@@ -37,14 +37,18 @@ fn a_ur_touches_where_the_surface_is() {
     let turned = "0.01,-0.03,0.15,0.4,-0.5,0.8";
     for (number, options, sets) in [
         (100, vec!["--release", "jazzy", "--tcp", "0,0,0.12,0,0,0"], vec![]),
-        (101, vec!["--release", "lyrical", "--tcp", turned], vec!["backend.release=\"lyrical\""]),
+        (
+            101,
+            vec!["--release", "lyrical", "--tcp", turned],
+            vec!["backend.ros2.release=\"lyrical\""],
+        ),
         (
             102,
             vec!["--release", "humble", "--namespace", "/ur5e", "--prefix", "ur5e_"],
             vec![
-                "backend.release=\"humble\"",
-                "backend.prefix=\"ur5e_\"",
-                "backend.topics.namespace=\"/ur5e\"",
+                "backend.ros2.release=\"humble\"",
+                "backend.ros2.prefix=\"ur5e_\"",
+                "backend.ros2.topics.namespace=\"/ur5e\"",
             ],
         ),
     ] {
@@ -239,7 +243,7 @@ fn a_rehearsal_needs_no_forces() {
 fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
     let passthrough = "passthrough_trajectory_controller";
     for (number, options, words) in [
-        (129, vec!["--release", "humble"], "backend.release"),
+        (129, vec!["--release", "humble"], "backend.ros2.release"),
         (130, vec!["--release", "lyrical"], "release = \"lyrical\""),
         (131, vec!["--active", passthrough], passthrough),
         (133, vec!["--event", "estop@0"], "emergency stop"),
@@ -269,7 +273,7 @@ fn the_controller_that_was_active_is_active_again() {
     let arm = driver(PEER, &network, &["--active", before]);
     let experiment = Experiment::load(Path::new(BALL_EXPERIMENT), &[]).unwrap();
     let chain = experiment.scene.arm.unwrap().chain().unwrap();
-    let patient = BackendSettings { connect_timeout_s: 8.0, ..network.settings.clone() };
+    let patient = RosSettings { connect_timeout_s: 8.0, ..network.settings.clone() };
     let lab = RosArm::connect_over(&patient, &chain).unwrap();
     lab.call(&Service::ZeroFtSensor).unwrap();
     let mut body = lab.backend();

@@ -15,6 +15,7 @@ mod arm_mjcf;
 mod arm_urdf;
 mod around_commands;
 mod backend;
+mod backend_settings;
 mod band;
 mod bench;
 mod benchmark;

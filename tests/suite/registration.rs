@@ -18,7 +18,7 @@ use palpate::math::least_squares::{NARROWER, Problem, fit};
 use palpate::math::pose::{parts, pose};
 use palpate::math::seed;
 use palpate::robot::arm::{ArmSettings, stage::stage};
-use palpate::robot::sensor::Wrench;
+use palpate::robot::sensor::{GelPad, TipSurface, Wrench};
 use palpate::robot::{Finger, Robot};
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Scene, known_body};
@@ -332,7 +332,7 @@ fn registered(
 const BALL_TIP: [&str; 5] = [
     "simulator=\"kinematic\"",
     "finger={ radius_m = 0.0075, length_m = 0.02 }",
-    "sensor.kind=\"force_torque_tip\"",
+    "sensor.force_torque_tip={}",
     "touch.detection_n=0.5",
     "effects={ sensor = \"ati_gamma\", rigid_tip = {}, friction = {}, wrench = {} }",
 ];
@@ -397,14 +397,17 @@ fn a_pad_finds_its_mount_and_the_scale_of_its_depths() {
     let sets = [
         "simulator=\"kinematic\"",
         "finger={ radius_m = 0.01, length_m = 0.02 }",
-        "sensor.kind=\"depth_patch\"",
+        "sensor.depth_patch={}",
         "touch.press_m=0.0005",
         "effects={ sensor = \"gelsight_mini\", gel = { scale = 1.12, scale_sd = 0 }, \
          registration = { true_tool_position_m = [0.0012, -0.0012, 0.001], \
          true_tool_rotation_deg = [1.2, -1.2, 1.0], finger_position_sd_m = 0, \
          finger_attitude_sd_deg = 0, object_position_sd_m = 0, object_attitude_sd_deg = 0 } }",
     ];
-    let unscaled = |robot: &mut Robot| robot.pad.as_mut().unwrap().scale = 1.0;
+    let unscaled = |robot: &mut Robot| {
+        let pad = robot.sensor.pad().cloned().unwrap();
+        robot.sensor.surface = TipSurface::Pad(GelPad { scale: 1.0, ..pad });
+    };
     let (found, _) = registered(&sets, 14, unscaled);
     let scale = found.pad_scale.unwrap();
     let scale_sd = scale * found.sds[10];

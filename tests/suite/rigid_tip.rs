@@ -284,8 +284,8 @@ fn a_bare_contact_is_at_the_foremost_point() {
 #[test]
 fn every_sensor_touches_the_container() {
     for (sets, worst_m) in [
-        (&["sensor.kind=\"force_torque_tip\"", "touch.detection_n=0.5"][..], 1e-3),
-        (&["sensor.kind=\"contact\"", "touch.detection_n=0.5"], 4e-3),
+        (&["sensor.force_torque_tip={}", "touch.detection_n=0.5"][..], 1e-3),
+        (&["sensor.contact={}", "touch.detection_n=0.5"], 4e-3),
     ] {
         let sets = [sets, &["simulator=\"kinematic\""]].concat();
         let environment = environment("container.toml", &sets);
@@ -309,7 +309,7 @@ fn every_sensor_touches_the_container() {
 fn a_ball_tip_on_a_moving_arm_touches_the_container() {
     let sets = [
         "simulator=\"dynamic\"",
-        "sensor.kind=\"force_torque_tip\"",
+        "sensor.force_torque_tip={}",
         "touch.detection_n=0.5",
         "effects={ sensor = \"ati_gamma\", rigid_tip = {}, friction = {}, wrench = {} }",
     ];
@@ -336,7 +336,7 @@ fn a_ball_tip_on_a_moving_arm_touches_the_container() {
 fn an_unknown_normal_stays_unknown_in_a_row() {
     let against = Vector3::y();
     for (kind, has_normal) in [("contact", false), ("force_torque_tip", true)] {
-        let kind = format!("sensor.kind=\"{kind}\"");
+        let kind = format!("sensor.{kind}={{}}");
         let sets = ["simulator=\"kinematic\"", "touch.detection_n=0.5", &kind];
         let mut experiment =
             Experiment::with_defaults(&scene("container.toml", &sets), &["random"], 1, 2);

@@ -10,7 +10,6 @@ use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::frame::ELECTRODES;
 use palpate::robot::finger::{Finger, Frame};
-use palpate::sim::Environment;
 use palpate::sim::finger::effects::creep::{CreepEffect, RelaxationState};
 use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, impedance_ohm};
 use palpate::sim::finger::effects::fluid::{FluidEffect, VibrationEffect};
@@ -18,6 +17,8 @@ use palpate::sim::finger::effects::variation::{SensorVariation, VariationEffect}
 use palpate::sim::finger::recording::Recordings;
 use palpate::sim::finger::{ContactLoad, Effects, Fingertip, FingertipState};
 use palpate::sim::simulated_finger::SimulatedFinger;
+use palpate::sim::{Environment, Scene};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Frames of a finger without contact.
@@ -210,4 +211,29 @@ fn silicone_relaxes_and_a_cycle_costs_work() {
     let [fast, middle, slow] = [1e-3, 4.0, 4e3].map(lost_j);
     assert!(middle > 0.01 * stored_j && middle < 0.2 * stored_j, "{middle}");
     assert!(fast < 0.1 * middle && slow < 0.1 * middle, "{fast} {middle} {slow}");
+}
+
+#[test]
+fn the_table_of_a_sensor_selects_it() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_ur5e_ball.toml");
+    let load = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        Scene::load(&path, &sets).map_err(|error| error.to_string())
+    };
+    let name = |sets: &[&str]| load(sets).unwrap().sensor.kind().map(|(name, _)| name);
+    assert_eq!(name(&[]), Some("force_torque_tip"));
+    assert_eq!(name(&["sensor.force_torque_tip=false"]), None);
+    assert_eq!(name(&["sensor={contact={}}"]), Some("contact"));
+    let two = load(&["sensor.contact={}"]).unwrap_err();
+    assert!(two.contains("`sensor.contact`") && two.contains("`force_torque_tip`"), "{two}");
+    for (kind, place) in [
+        ("contact", "[sensor.contact]"),
+        ("automatic", "without a table"),
+        ("finger", "depth_patch"),
+    ] {
+        let error = load(&[&format!("sensor.kind={kind}")]).unwrap_err();
+        assert!(error.contains("`sensor.kind`") && error.contains(place), "{error}");
+    }
+    let blind = load(&["sensor={depth_patch={}}"]).unwrap_err();
+    assert!(blind.contains("`sensor.depth_patch`") && blind.contains("[effects.gel]"), "{blind}");
 }

@@ -12,6 +12,7 @@ use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use palpate::explore::planner::{StrokeOffer, stroke::best};
 use palpate::explore::probe::Probe;
+use palpate::robot::sensor::TipSurface;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Target, Zone};
@@ -243,7 +244,7 @@ fn a_row_with_strokes_is_replayed() {
     assert!(matches!(last.target, Target::Stroke { .. }) && last.outcome.points().len() > 21);
     let mut belief = Belief::new(
         simulation.task(),
-        (&simulation.experiment().scene.finger, false),
+        &TipSurface::Rigid,
         &simulation.experiment().gp,
         &simulation.experiment().space,
     );
@@ -320,8 +321,7 @@ fn strokes_around_an_object_are_on_its_surface() {
         let row = simulation.trial(simulation.planner(name).unwrap(), 0);
         assert_eq!(row.failure, None, "{name}");
         let settings = (&simulation.experiment().gp, &simulation.experiment().space);
-        let finger = (&simulation.experiment().scene.finger, false);
-        let mut belief = Belief::new(simulation.task(), finger, settings.0, settings.1);
+        let mut belief = Belief::new(simulation.task(), &TipSurface::Rigid, settings.0, settings.1);
         let (mut strokes, mut points) = (0, 0);
         for (count, touch) in row.touches.iter().enumerate() {
             let length_m = touch.target.slide_m();

@@ -4,18 +4,18 @@
 use crate::common::hub::Hub;
 #[cfg(feature = "mujoco")]
 use crate::common::rig::ARM;
-use crate::common::rig::{Rig, STAGE, patient};
+use crate::common::rig::{Rig, RigSettings, STAGE, patient};
 use palpate::backend::{Backend, Command};
 use palpate::explore::evidence::End;
 use palpate::ros::arm::RosArm;
 use palpate::ros::driver::Profile;
 use palpate::ros::server::serve::services;
 use palpate::ros::service::Service;
-use palpate::ros::settings::BackendSettings;
+use palpate::ros::settings::RosSettings;
 use palpate::ros::topics::{CommandMessage, Endpoint, TactileMessage};
 
 /// Compares the contact over topics with that of the body itself at the same place.
-fn compare(scene: &str, settings: BackendSettings) {
+fn compare(scene: &str, settings: RigSettings) {
     let rig = Rig::new(scene, settings, &[]);
     let place = [0.4, 0.55];
     let touches = rig.touch(&rig.lab().unwrap(), &[place]);
@@ -48,10 +48,11 @@ fn an_arm_behind_topics_touches_where_the_body_itself_does() {
 #[test]
 fn other_drivers_and_other_names_touch_there_too() {
     let mut settings = patient();
-    settings.topics.tactile.message = TactileMessage::Fingers;
-    settings.topics.command.message = CommandMessage::Velocities;
-    settings.joints = ["slide_1", "slide_2", "slide_3"].map(String::from).to_vec();
-    settings.finger = 3;
+    let ros = &mut settings.ros;
+    ros.topics.tactile.message = TactileMessage::Fingers;
+    ros.topics.command.message = CommandMessage::Velocities;
+    ros.joints = ["slide_1", "slide_2", "slide_3"].map(String::from).to_vec();
+    ros.finger = 3;
     compare(STAGE, settings);
 }
 
@@ -78,8 +79,8 @@ fn a_second_explorer_is_refused_and_the_first_goes_on() {
 
 #[test]
 fn joints_of_other_names_are_named() {
-    let rig = Rig::new(STAGE, BackendSettings::default(), &[]);
-    let mut settings = BackendSettings { connect_timeout_s: 0.3, ..BackendSettings::default() };
+    let rig = Rig::new(STAGE, RosSettings::default(), &[]);
+    let mut settings = RosSettings { connect_timeout_s: 0.3, ..RosSettings::default() };
     settings.joints = ["A", "B", "C"].map(String::from).to_vec();
     let hub = rig.hub.clone();
     let connect = Box::new(move || Ok(Box::new(hub.end(Endpoint::Explorer)) as _));
@@ -92,7 +93,7 @@ fn joints_of_other_names_are_named() {
 
 #[test]
 fn nobody_there_is_said_with_names_and_types() {
-    let settings = BackendSettings { connect_timeout_s: 0.1, ..BackendSettings::default() };
+    let settings = RosSettings { connect_timeout_s: 0.1, ..RosSettings::default() };
     let chain = palpate::robot::arm::ArmSettings::default().chain().unwrap();
     let connect = Box::new(|| Ok(Box::new(Hub::default().end(Endpoint::Explorer)) as _));
     let error = RosArm::connect(&settings, &chain, connect).map(|_| ()).unwrap_err().to_string();

@@ -11,7 +11,7 @@ use crate::common::rig::{Rig, STAGE, patient};
 use palpate::backend::pace;
 use palpate::explore::evidence::End;
 use palpate::ros::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
-use palpate::ros::settings::BackendSettings;
+use palpate::ros::settings::RosSettings;
 use palpate::ros::status::ArmStatus;
 #[cfg(feature = "mujoco")]
 use palpate::task::Target;
@@ -25,7 +25,10 @@ const ENDED: &[(&[&str], &str)] = &[
     (&["nan"], "is NaN"),
     (&["swapped_names"], "beyond its speed limit"),
     (&["future"], "in the future"),
-    (&["unstamped"], "its stamp is zero, so its age is unknown; stamp it, or set backend.accept"),
+    (
+        &["unstamped"],
+        "its stamp is zero, so its age is unknown; stamp it, or set backend.ros2.accept",
+    ),
     (&["backward"], BACKWARD),
     (&["no_joints"], "no new message on /joint_states"),
     (&["no_wrench"], "no new message on /ft_sensor/wrench"),
@@ -73,7 +76,7 @@ fn the_explorer_says_what_failed() {
                 let is_aged = ["no_joints", "no_wrench", "no_tactile", "backward"];
                 let settings = match is_aged.contains(&names[0]) {
                     true => {
-                        BackendSettings { connect_timeout_s: 20.0, ..BackendSettings::default() }
+                        RosSettings { connect_timeout_s: 20.0, ..RosSettings::default() }.into()
                     }
                     false => patient(),
                 };
@@ -128,7 +131,8 @@ fn a_hold_or_stop_of_an_instant_ends_the_run() {
 
 #[test]
 fn messages_without_stamps_are_taken_where_that_is_set() {
-    let settings = BackendSettings { accept_unstamped: true, ..patient() };
+    let mut settings = patient();
+    settings.ros.accept_unstamped = true;
     let rig = Rig::new(STAGE, settings, &[("unstamped", 0.0, None)]);
     let touches = rig.touch(&rig.lab().unwrap(), &[[0.5, 0.5]]);
     let end = touches[0].as_ref().map(|outcome| outcome.end);
@@ -234,7 +238,7 @@ fn travel(speed_m_s: f64) -> [String; 2] {
 fn rig(speed_m_s: f64, failures: &[(&str, f64, Option<f64>)]) -> Rig {
     let sets = travel(speed_m_s);
     let sets = sets.each_ref().map(String::as_str);
-    Rig::with(ARM, &sets, BackendSettings::default(), failures)
+    Rig::with(ARM, &sets, RosSettings::default(), failures)
 }
 
 /// Injects one failure after another while the dynamic arm moves.
@@ -297,7 +301,7 @@ fn a_stroke_without_commands_stops_soon_and_its_force_falls() {
     for speed in [0.02, 0.04] {
         let mut tries = (0..MEASURED).map(|_| {
             let stroke = format!("touch.stroke={{speed_m_s={speed},force_n=1.0}}");
-            let rig = Rig::with(ARM, &[&stroke], BackendSettings::default(), &[]);
+            let rig = Rig::with(ARM, &[&stroke], RosSettings::default(), &[]);
             let lab = rig.lab().unwrap();
             let (touches, at_s) = std::thread::scope(|scope| {
                 let touches =

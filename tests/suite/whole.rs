@@ -16,7 +16,7 @@ use palpate::explore::whole_object::{ImplicitSurface, Surface};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
-use palpate::report::{findings, whole_object};
+use palpate::report::findings;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Target};
@@ -52,10 +52,8 @@ fn last_share(row: &TrialRow) -> f64 {
 
 /// The surface after the touches of a row.
 fn surface(simulation: &Simulation, row: &TrialRow) -> Surface {
-    let belief = whole_object::belief(simulation.experiment(), row, row.touches.len() as u32)
-        .unwrap()
-        .unwrap();
-    belief.surface().unwrap().clone()
+    let belief = row.belief(simulation.experiment(), row.touches.len() as u32).unwrap().unwrap();
+    belief.implicit_surface().unwrap().surface().unwrap().clone()
 }
 
 /// Any planner finds a ball to a thousandth of its diagonal with twenty touches, with its volume,

@@ -4,15 +4,16 @@ use super::link::{Link, TURN};
 use super::message::Time;
 use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::network::discovery_note;
-use super::planning_scene::{CollisionObject, KeepOutSolid};
+use super::planning_scene::CollisionObject;
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
 use super::service::{Answer, Service};
-use super::settings::{BackendKind, BackendSettings};
+use super::settings::{RosSettings, RosVersion};
 use super::topics::{Endpoint, Topic};
 use super::transport::{Connect, Packet, cannot_open};
 use super::view::{MarkerArray, TFMessage};
 use nalgebra::Isometry3;
-use palpate_explore::backend::interlock::check_start;
+use palpate_explore::backend::arm::KeepOutSolid;
+use palpate_explore::backend::interlock::{StartCheckSettings, check_start};
 use palpate_explore::backend::{Fault, LinkFault, pace};
 use palpate_explore::robot::arm::Chain;
 use palpate_input::error::InputError;
@@ -56,7 +57,7 @@ impl RosArm {
     ///
     /// # Errors
     /// The errors of [`connect`](Self::connect), and an error if this build lacks the transport.
-    pub fn connect_over(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
+    pub fn connect_over(settings: &RosSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
         let services = settings.driver().services.to_vec();
         let open = super::connect(settings, Endpoint::Explorer, services)?;
         Self::connect(settings, chain, open)
@@ -68,7 +69,7 @@ impl RosArm {
     /// If the transport cannot be opened, a topic has no messages, or there is another publisher of
     /// commands.
     pub fn connect(
-        settings: &BackendSettings,
+        settings: &RosSettings,
         chain: &Chain,
         connect: Connect,
     ) -> Result<Arc<Self>, LinkFault> {
@@ -101,20 +102,22 @@ impl RosArm {
     ///
     /// # Errors
     /// The first check that fails.
-    pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
+    pub fn check_start(self: &Arc<Self>, settings: &StartCheckSettings) -> Result<(), Fault> {
         let failed = |cause| Fault::Link { time_s: 0.0, cause };
         let zero_wrench = self.settings().driver().zero_wrench.as_ref();
         if let Some(service) = zero_wrench.filter(|_| !self.settings().dry) {
             self.call(service).map_err(failed)?;
         }
-        check_start(&mut self.backend(), &self.chain, &self.settings().start_checks, 0)?;
-        self.check_model().map_err(failed)
+        check_start(&mut self.backend(), &self.chain, settings, 0)?;
+        self.check_model(settings.model_m).map_err(failed)
     }
 
     /// Publishes a message for viewers, if this transport has its topic.
     pub fn show(&self, packet: impl Into<Packet>) {
         let packet = packet.into();
-        if self.settings().kind == BackendKind::Ros2 && Topic::VIEWED.contains(&packet.topic()) {
+        if self.settings().version == Some(RosVersion::Ros2)
+            && Topic::VIEWED.contains(&packet.topic())
+        {
             self.link.send(packet);
         }
     }
@@ -132,11 +135,12 @@ impl RosArm {
         self.show(shown.clone());
     }
 
-    /// Publishes solids that other programs' arms avoid, if `backend.topics.collision_object` is
-    /// set. They replace those of the same names, and stay after the end: so does the object.
-    pub fn show_solids(&self, solids: impl FnOnce() -> Vec<KeepOutSolid>) {
+    /// Publishes solids that other programs' arms avoid, if `topics.collision_object` is set. They
+    /// replace those of the same names, and stay after the end: so does the object.
+    pub fn show_solids(&self, solids: &dyn Fn() -> Vec<KeepOutSolid>) {
         let settings = self.settings();
-        if settings.kind != BackendKind::Ros2 || settings.topics.collision_object.is_none() {
+        if settings.version != Some(RosVersion::Ros2) || settings.topics.collision_object.is_none()
+        {
             return;
         }
         let (frame, x_wb) = (settings.base_frame(), self.chain.base);
@@ -160,7 +164,7 @@ impl RosArm {
         self.show(frames);
     }
 
-    pub(super) fn settings(&self) -> &BackendSettings {
+    pub(super) fn settings(&self) -> &RosSettings {
         &self.mailbox.settings
     }
 
@@ -198,9 +202,10 @@ impl RosArm {
                     false => format!("no server ({}) found in {timeout_s} s", service.type_name()),
                     true => format!(
                         "a server was found, but did not answer within {timeout_s} s; check that \
-                         {}backend.service_mapping fits its DDS implementation",
+                         {}backend.ros2.service_mapping fits its DDS implementation",
                         match service.depends_on_release() {
-                            true => "backend.release is that of the driver's computer, and that ",
+                            true =>
+                                "backend.ros2.release is that of the driver's computer, and that ",
                             false => "",
                         }
                     ),
@@ -248,7 +253,7 @@ impl RosArm {
             if missing.is_empty() {
                 return Ok(());
             }
-            let BackendSettings { connect_timeout_s, topics, .. } = self.settings();
+            let RosSettings { connect_timeout_s, topics, .. } = self.settings();
             if begun.elapsed().as_secs_f64() > *connect_timeout_s {
                 let name =
                     |topic: Topic| format!("{} ({})", topics.name(topic), topics.type_name(topic));
@@ -261,15 +266,16 @@ impl RosArm {
                 {
                     more += &format!(" {words}");
                 }
-                if self.settings().kind == BackendKind::Ros2
+                if self.settings().version == Some(RosVersion::Ros2)
                     && let Some(note) = discovery_note(|name| std::env::var(name).ok())
                 {
                     more += &format!(" {note}");
                 }
                 return Err(InputError::new(format!(
                     "no message within {connect_timeout_s} s on {}; check that the arm's driver runs in the same \
-                     domain and that [backend.topics] has its names and types.{more}",
-                    names.join(", ")
+                     domain and that [{}] has its names and types.{more}",
+                    names.join(", "),
+                    self.settings().key("topics")
                 ))
                 .into());
             }

@@ -101,10 +101,10 @@ pub fn switch_to(
 fn missing(own: &str, all: &[Controller]) -> InputError {
     let names: Vec<&str> = all.iter().map(|one| one.name.as_str()).collect();
     let problem = InputError::new(format!("the controller manager has no controller {own}"))
-        .allowed(format!("as in backend.topics.command.name: {}", names.join(", ")));
+        .allowed(format!("as in backend.ros2.topics.command.name: {}", names.join(", ")));
     // The driver of Lyrical has one trajectory controller, which scales its speed itself.
     match own == "scaled_joint_trajectory_controller" && names.contains(&PLAIN_CONTROLLER) {
-        true => problem.remedy("set backend.release = \"lyrical\""),
+        true => problem.remedy("set backend.ros2.release = \"lyrical\""),
         false => problem,
     }
 }

@@ -5,7 +5,7 @@ use super::arm::{POLL_INTERVAL, RosArm};
 use super::controllers::{Controller, Switch, switch_to};
 use super::receiver::LatestMessages;
 use super::service::Service;
-use super::settings::BackendKind;
+use super::settings::RosVersion;
 use super::status::ArmStatus;
 use super::topics::Topic;
 use nalgebra::{Isometry3, Point3};
@@ -34,7 +34,7 @@ impl RosArm {
     /// If another program commands the arm, nothing receives commands, or a service is refused.
     pub(super) fn engage(&self) -> Result<(), LinkFault> {
         let is_first = !self.mailbox.latest().is_engaged;
-        if is_first && self.settings().kind == BackendKind::Ros2 {
+        if is_first && self.settings().version == Some(RosVersion::Ros2) {
             sleep(DISCOVERY.saturating_sub(self.opened.elapsed()));
         }
         self.check_sole(&self.mailbox.latest())?;
@@ -65,7 +65,7 @@ impl RosArm {
     fn open_commands(&self) {
         let is_new = self.link.publisher_count(Topic::Command) == 0;
         self.link.open_commands();
-        if is_new && self.settings().kind != BackendKind::Simulated {
+        if is_new && self.settings().version.is_some() {
             sleep(MATCHING);
         }
     }
@@ -130,9 +130,10 @@ impl RosArm {
                 let topics = &self.settings().topics;
                 return Err(InputError::new(format!(
                     "nothing subscribes to {} ({}); check that the driver's controller of this name is \
-                     loaded, and backend.topics.command",
+                     loaded, and {}",
                     topics.name(Topic::Command),
-                    topics.type_name(Topic::Command)
+                    topics.type_name(Topic::Command),
+                    self.settings().key("topics.command")
                 ))
                 .into());
             }
@@ -190,12 +191,12 @@ impl RosArm {
     }
 
     /// Compares the frames of the driver with those of the model, and finds the frame of the
-    /// force/torque sensor. The arm is at rest.
+    /// force/torque sensor. The arm is at rest, and the fingertips may differ by `allowed_m`.
     ///
     /// # Errors
     /// If the fingertip would be elsewhere by the driver's model of the robot, or a frame is
     /// missing.
-    pub(super) fn check_model(&self) -> Result<(), LinkFault> {
+    pub(super) fn check_model(&self, allowed_m: f64) -> Result<(), LinkFault> {
         let Some(flange) = self.settings().flange_frame() else { return Ok(()) };
         let base = self.settings().base_frame();
         let heard = self.mailbox.latest();
@@ -204,13 +205,12 @@ impl RosArm {
         let Some(other) = heard.frames.pose(&flange, &base) else {
             return Err(InputError::new(format!(
                 "no frames {base} and {flange} on /tf; check that robot_state_publisher runs, and \
-                 backend.prefix and backend.base_frame"
+                 backend.ros2.prefix and backend.ros2.base_frame"
             ))
             .into());
         };
         let tip = |flange: &Isometry3<f64>| flange * tool * Point3::origin();
-        let (off_m, allowed_m) =
-            ((tip(&own) - tip(&other)).norm(), self.settings().start_checks.model_m);
+        let off_m = (tip(&own) - tip(&other)).norm();
         if off_m > allowed_m {
             return Err(InputError::new(format!(
                 "by the driver's frames the fingertip is {:.1} mm from where the arm's model has it; \

@@ -28,6 +28,7 @@
 pub mod arm;
 mod backend;
 pub mod camera;
+mod connector;
 pub mod control_message;
 pub mod controllers;
 pub mod definition;
@@ -63,7 +64,7 @@ use palpate_input::error::InputError;
 #[cfg(feature = "ros1")]
 pub use ros1::disable_tls_certificates;
 use service::Service;
-use settings::{BackendKind, BackendSettings};
+use settings::{RosSettings, RosVersion};
 use topics::Endpoint;
 use transport::Connect;
 
@@ -73,23 +74,23 @@ use transport::Connect;
 /// # Errors
 /// If this build lacks the transport.
 pub fn connect(
-    settings: &BackendSettings,
+    settings: &RosSettings,
     side: Endpoint,
     services: Vec<Service>,
 ) -> Result<Connect, InputError> {
     let owned = settings.clone();
-    match settings.kind {
+    match settings.version {
         #[cfg(feature = "ros2")]
-        BackendKind::Ros2 => Ok(Box::new(move || {
+        Some(RosVersion::Ros2) => Ok(Box::new(move || {
             Ok(Box::new(ros2::Ros2::open(&owned, side, services)?) as Box<dyn transport::Transport>)
         })),
         #[cfg(feature = "ros1")]
-        BackendKind::Ros1 => Ok(Box::new(move || {
+        Some(RosVersion::Ros1) => Ok(Box::new(move || {
             Ok(Box::new(ros1::Ros1::open(&owned, side, services)?) as Box<dyn transport::Transport>)
         })),
-        kind => {
+        version => {
             drop((owned, side, services));
-            Err(no_transport(kind))
+            Err(no_transport(version))
         }
     }
 }
@@ -98,36 +99,33 @@ pub fn connect(
 ///
 /// # Errors
 /// If none arrives within the time, its message is invalid, or this build lacks the transport.
-pub fn look(settings: &BackendSettings, topics: &CameraTopics) -> Result<Cloud, InputError> {
+pub fn look(settings: &RosSettings, topics: &CameraTopics) -> Result<Cloud, InputError> {
     let mut first = FirstMessages::default();
     let mut take = |message| first.take(message);
-    let listened = match settings.kind {
+    let listened = match settings.version {
         #[cfg(feature = "ros2")]
-        BackendKind::Ros2 => ros2::camera::listen(settings, topics, &mut take),
+        Some(RosVersion::Ros2) => ros2::camera::listen(settings, topics, &mut take),
         #[cfg(feature = "ros1")]
-        BackendKind::Ros1 => ros1::camera::listen(settings, topics, &mut take),
-        kind => {
+        Some(RosVersion::Ros1) => ros1::camera::listen(settings, topics, &mut take),
+        version => {
             // Without a transport nothing else names its type.
             let _: &mut dyn FnMut(CameraMessage) -> bool = &mut take;
-            Err(no_transport(kind))
+            Err(no_transport(version))
         }
     };
     let published: Vec<String> = listened?;
     let variable = |name: &str| std::env::var(name).ok();
-    let is_ros2 = settings.kind == BackendKind::Ros2;
+    let is_ros2 = settings.version == Some(RosVersion::Ros2);
     let note = is_ros2.then(|| network::discovery_note(variable)).flatten();
     first.cloud(topics, &published, note)
 }
 
-/// Returns the error of a kind of backend without topics, or whose transport this build lacks.
-fn no_transport(kind: BackendKind) -> InputError {
-    let name = kind.name();
-    InputError::new(match kind {
-        BackendKind::Simulated | BackendKind::Franka => {
-            format!("kind = \"{name}\" has no topics; allowed are \"ros2\", \"ros1\"")
-        }
-        BackendKind::Ros1 | BackendKind::Ros2 => format!(
-            "kind = \"{name}\" needs a build with the feature `{name}`: \
+/// Returns the error of settings without a version of ROS, or whose transport this build lacks.
+fn no_transport(version: Option<RosVersion>) -> InputError {
+    InputError::new(match version.map(RosVersion::name) {
+        None => "no version of ROS; allowed are \"ros2\", \"ros1\"".into(),
+        Some(name) => format!(
+            "[backend.{name}] needs a build with the feature `{name}`: \
              cargo build --release --features {name}"
         ),
     })

@@ -5,7 +5,7 @@ use super::frames::FrameTree;
 use super::joints::JointNames;
 use super::link::Link;
 use super::service::Service;
-use super::settings::BackendSettings;
+use super::settings::RosSettings;
 use super::topics::{Endpoint, Topic};
 use super::transport::{Delivery, Packet, Publisher};
 use palpate_explore::backend::pace;
@@ -89,7 +89,7 @@ type Answers = Vec<(Service, Result<Vec<Controller>, String>)>;
 /// # Errors
 /// If the transport cannot be opened.
 pub fn listen(
-    settings: &BackendSettings,
+    settings: &RosSettings,
     names: Option<&JointNames>,
     span: Duration,
 ) -> Result<Report, InputError> {
@@ -134,7 +134,9 @@ pub fn listen(
         controllers = answers.pop().map(|(_, answer)| answer);
     }
     let silent = || match found(&Service::ListControllers) {
-        true => "it does not answer; check backend.release and backend.service_mapping".into(),
+        true => {
+            "it does not answer; check backend.ros2.release and backend.ros2.service_mapping".into()
+        }
         false => "no server".into(),
     };
     let controllers = lists.then(|| controllers.unwrap_or_else(|| Err(silent())));
@@ -164,7 +166,7 @@ impl Report {
                         let heard = self.topics.entry(topic).or_default();
                         if heard.count == 0 {
                             heard.problem = Some(format!(
-                                "its joints {:?} are not the arm's, {:?}; see backend.joints and backend.prefix",
+                                "its joints {:?} are not the arm's, {:?}; see joints and prefix in its table of [backend]",
                                 message.name,
                                 names.names()
                             ));

@@ -1,6 +1,6 @@
 //! Domain, network interfaces and discovery of ROS 2, from settings or from the ROS environment.
 
-use super::settings::{BackendSettings, DOMAIN_MAX};
+use super::settings::{DOMAIN_MAX, RosSettings};
 use std::net::{IpAddr, Ipv4Addr};
 
 /// Returns the DDS domain and the addresses of the interfaces for multicast and announcements
@@ -12,7 +12,7 @@ use std::net::{IpAddr, Ipv4Addr};
 /// # Errors
 /// If a variable has an invalid value, or an interface does not exist, as a message.
 pub fn network(
-    settings: &BackendSettings,
+    settings: &RosSettings,
     variable: impl Fn(&str) -> Option<String>,
     interfaces: &[(String, Vec<IpAddr>)],
 ) -> Result<(u16, Option<Vec<IpAddr>>), String> {
@@ -48,7 +48,7 @@ pub fn network(
             let other = other.unwrap_or_default();
             return Err(format!(
                 "ROS_AUTOMATIC_DISCOVERY_RANGE is {other:?}; allowed are LOCALHOST, SUBNET, \
-                 SYSTEM_DEFAULT; or name interfaces in backend.interfaces"
+                 SYSTEM_DEFAULT; or name interfaces in backend.ros2.interfaces"
             ));
         }
     };
@@ -59,7 +59,7 @@ pub fn network(
 const VALUE_MAX: usize = 60;
 
 /// Remedy of a file of a DDS vendor, which may list peers and interfaces.
-const FILE_REMEDY: &str = "Palpate does not read this file. Name its interfaces in backend.interfaces. If it lists peers or forbids \
+const FILE_REMEDY: &str = "Palpate does not read this file. Name its interfaces in backend.ros2.interfaces. If it lists peers or forbids \
                            multicast, list this computer in the driver's file.";
 
 /// Environment variables of ROS 2 and of DDS vendors that Palpate does not support, with remedies.
@@ -72,7 +72,7 @@ const UNSUPPORTED: [(&str, &str); 7] = [
         "ROS_STATIC_PEERS",
         "Palpate finds other computers by multicast. Put both in one subnet, or list this computer in \
          ROS_STATIC_PEERS of the driver. If discovery is limited to LOCALHOST, also name the interface in \
-         backend.interfaces.",
+         backend.ros2.interfaces.",
     ),
     ("ROS_DISCOVERY_SERVER", "Palpate uses no discovery server. Start the driver without one."),
     ("FASTRTPS_DEFAULT_PROFILES_FILE", FILE_REMEDY),
@@ -122,7 +122,7 @@ fn find(wanted: &str, interfaces: &[(String, Vec<IpAddr>)]) -> Result<Vec<IpAddr
         (None, _) => {
             let known: Vec<&str> = connected.map(|(name, _)| name.as_str()).collect();
             Err(format!(
-                "backend.interfaces: {wanted:?} is not an interface with an IPv4 address on this machine; allowed are {}",
+                "backend.ros2.interfaces: {wanted:?} is not an interface with an IPv4 address on this machine; allowed are {}",
                 known.join(", ")
             ))
         }
@@ -147,7 +147,7 @@ mod tests {
     type Found = Result<(u16, Option<Vec<IpAddr>>), String>;
 
     fn read(settings: &str, variables: &[(&str, &str)]) -> Found {
-        let settings: BackendSettings = toml::from_str(settings).unwrap();
+        let settings: RosSettings = toml::from_str(settings).unwrap();
         let variable = |name: &str| {
             let found = variables.iter().find(|(other, _)| *other == name);
             found.map(|(_, value)| (*value).to_owned())
@@ -187,7 +187,7 @@ mod tests {
             ("ROS_STATIC_PEERS", "10.0.0.7;arm.local", "one subnet"),
             ("ROS_DISCOVERY_SERVER", "10.0.0.7:11811", "without one"),
             ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", "rmw_fastrtps_cpp or rmw_cyclonedds_cpp"),
-            ("CYCLONEDDS_URI", "file:///etc/cyclone.xml", "backend.interfaces"),
+            ("CYCLONEDDS_URI", "file:///etc/cyclone.xml", "backend.ros2.interfaces"),
             ("FASTRTPS_DEFAULT_PROFILES_FILE", "fast.xml", "list this computer"),
             ("FASTDDS_DEFAULT_PROFILES_FILE", "fast.xml", "list this computer"),
             ("ROS_SECURITY_ENABLE", "true", "ROS_SECURITY_ENABLE=false"),

@@ -8,7 +8,8 @@
 
 use super::definition::{Definition, HasDefinition, messages};
 use super::message::{Header, Point, Pose};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
+use palpate_explore::backend::arm::KeepOutSolid;
 use serde::{Deserialize, Serialize};
 
 messages! {
@@ -98,17 +99,6 @@ messages! {
         /// Number of the operation; 0 adds the object, or replaces the one of this name.
         byte operation,
     }
-}
-
-/// A closed surface whose inside arms of other programs avoid.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KeepOutSolid {
-    /// Name.
-    pub id: &'static str,
-    /// Vertices in `W`, m.
-    pub vertices_w: Vec<Point3<f64>>,
-    /// Triangles, with corners counter-clockwise from outside.
-    pub triangles: Vec<[u32; 3]>,
 }
 
 impl CollisionObject {

@@ -8,7 +8,7 @@ use super::frames::FrameTree;
 use super::joints::JointNames;
 use super::message::{Time, WrenchStamped};
 use super::service::{Answer, Service};
-use super::settings::{BackendSettings, CLOCK_AHEAD_S};
+use super::settings::{CLOCK_AHEAD_S, RosSettings};
 use super::status::ArmStatus;
 use super::tactile;
 use super::topics::{Endpoint, Topic};
@@ -97,14 +97,14 @@ pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
 pub struct TopicReceiver {
     /// Names of the arm's joints in its messages.
     pub names: JointNames,
-    /// Table `[backend]` of the experiment.
-    pub settings: BackendSettings,
+    /// Settings of the connection.
+    pub settings: RosSettings,
     heard: Mutex<LatestMessages>,
 }
 
 impl TopicReceiver {
     /// Creates a receiver without messages.
-    pub fn new(names: JointNames, settings: BackendSettings) -> Self {
+    pub fn new(names: JointNames, settings: RosSettings) -> Self {
         let since = Some(Instant::now());
         let heard = LatestMessages { since, speed_scale: 1.0, ..LatestMessages::default() };
         Self { names, settings, heard: Mutex::new(heard) }
@@ -360,8 +360,11 @@ impl TopicReceiver {
                 true => Ok(true),
                 false => Err(self.refuse(
                     topic,
-                    "its stamp is zero, so its age is unknown; stamp it, or set \
-                     backend.accept_unstamped = true to count its age from receipt",
+                    format!(
+                        "its stamp is zero, so its age is unknown; stamp it, or set {} = true to count \
+                         its age from receipt",
+                        self.settings.key("accept_unstamped")
+                    ),
                 )),
             };
         }

@@ -1,4 +1,4 @@
-//! Settings of the backend: table `[backend]`.
+//! Settings of an arm behind ROS topics: tables `[backend.ros2]` and `[backend.ros1]`.
 
 use super::controllers::Switch;
 use super::driver::{Driver, Profile, Release};
@@ -6,36 +6,26 @@ use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
 use super::service::Service;
 use super::topics::{CommandMessage, TactileMessage, Topic, Topics};
-use palpate_explore::backend::interlock::{FORMER_KEYS, InterlockSettings, StartCheckSettings};
-use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
-use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
+use palpate_explore::robot::arm::Chain;
+use palpate_input::config::{Rules, Validate, is_default};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use toml::Value;
+use serde::{Deserialize, Deserializer, Serialize};
 
-/// Kind of backend that makes the touches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BackendKind {
-    /// The simulator of the scene.
-    #[default]
-    Simulated,
-    /// A real or simulated arm behind ROS 2 topics.
+/// Version of ROS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RosVersion {
+    /// ROS 2, by DDS.
     Ros2,
-    /// A real or simulated arm behind ROS 1 topics.
+    /// ROS 1, with a master.
     Ros1,
-    /// A Franka FR3 by the Franka Control Interface.
-    Franka,
 }
 
-impl BackendKind {
-    /// Returns the name of this kind in settings files.
+impl RosVersion {
+    /// Returns the name of this version in settings files.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Simulated => "simulated",
             Self::Ros2 => "ros2",
             Self::Ros1 => "ros1",
-            Self::Franka => "franka",
         }
     }
 }
@@ -55,12 +45,13 @@ pub enum MappingKind {
     Basic,
 }
 
-/// Table `[backend]` of an experiment; except for `kind` it applies to an arm behind topics only.
+/// Table `[backend.ros2]` or `[backend.ros1]` of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct BackendSettings {
-    /// Kind of backend: simulated, or an arm behind ROS topics.
-    pub kind: BackendKind,
+pub struct RosSettings {
+    /// Version of ROS, by the name of the table; `None` for another transport.
+    #[serde(skip)]
+    pub version: Option<RosVersion>,
     /// Driver of the arm: one for Palpate, `ur_robot_driver` or `franka_ros2`.
     pub profile: Profile,
     /// ROS 2 release on the driver's computer, which decides its controllers and the layout of its
@@ -69,7 +60,7 @@ pub struct BackendSettings {
     /// Prefix of the driver's joints and frames, e.g. `"ur5e_"`.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub prefix: String,
-    /// Whether nothing is touched, so that joint states are enough; set by `--dry` only.
+    /// Whether nothing is touched, so that joint states are enough.
     #[serde(skip)]
     pub dry: bool,
     /// Whether topics that no touch needs are received, too.
@@ -82,11 +73,6 @@ pub struct BackendSettings {
     /// required for velocities where the driver has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub watchdog_s: Option<f64>,
-    /// Address of the control box of a Franka arm, e.g. `"172.16.0.2"`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub address: Option<String>,
-    /// Whether a Franka arm is refused without a real-time kernel.
-    pub realtime: bool,
     /// ROS 2 domain; default: the environment's `ROS_DOMAIN_ID`, or 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub domain: Option<u16>,
@@ -118,12 +104,6 @@ pub struct BackendSettings {
     /// Force/torque sensor read over UDP instead of its topic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub net_ft: Option<NetFtSettings>,
-    /// Interlock limits, for real and simulated robots.
-    #[serde(skip_serializing_if = "is_default")]
-    pub interlocks: InterlockSettings,
-    /// Start checks of arm and sensors.
-    #[serde(skip_serializing_if = "is_default")]
-    pub start_checks: StartCheckSettings,
     /// Topics of the arm.
     pub topics: Topics,
 }
@@ -138,12 +118,12 @@ const RATE_MAX_HZ: f64 = 500.0;
 // heuristic: at 0.1 m/s the tip moves 15 mm.
 const WATCHDOG_MAX_S: f64 = 0.15;
 
-impl Default for BackendSettings {
+impl Default for RosSettings {
     /// Returns the defaults; all are heuristics, except the rate, which is the usual rate of joint
     /// states.
     fn default() -> Self {
         Self {
-            kind: BackendKind::Simulated,
+            version: None,
             profile: Profile::Palpate,
             release: Release::Jazzy,
             prefix: String::new(),
@@ -151,8 +131,6 @@ impl Default for BackendSettings {
             hears_all: false,
             use_sim_time: false,
             watchdog_s: None,
-            address: None,
-            realtime: true,
             domain: None,
             interfaces: Vec::new(),
             service_mapping: MappingKind::Auto,
@@ -165,8 +143,6 @@ impl Default for BackendSettings {
             accept_unstamped: false,
             status_on_change: false,
             net_ft: None,
-            start_checks: StartCheckSettings::default(),
-            interlocks: InterlockSettings::default(),
             topics: Topics::default(),
         }
     }
@@ -176,70 +152,28 @@ impl Default for BackendSettings {
 // heuristic: several times the NTP offset between clocks of a local network.
 pub const CLOCK_AHEAD_S: f64 = 0.005;
 
-/// Keys of version 0.1 without an effect on a run.
-const UNUSED_KEYS: [&str; 6] = [
-    "start_checks.near",
-    "topics.joints.rate_hz",
-    "topics.wrench.rate_hz",
-    "topics.tactile.rate_hz",
-    "topics.status.rate_hz",
-    "topics.command.rate_hz",
-];
-
-/// Keys of version 0.1 in `[backend]`, and their present names.
-const RENAMED_KEYS: [[&str; 2]; 11] = [
-    ["patience_s", "connect_timeout_s"],
-    ["gates", "start_checks"],
-    ["interlocks.joint_silence_s", "interlocks.joint_timeout_s"],
-    ["interlocks.wrench_silence_s", "interlocks.wrench_timeout_s"],
-    ["interlocks.frame_silence_s", "interlocks.frame_timeout_s"],
-    ["interlocks.frozen_s", "interlocks.stuck_s"],
-    ["topics.joints.age_s", "topics.joints.max_age_s"],
-    ["topics.wrench.age_s", "topics.wrench.max_age_s"],
-    ["topics.tactile.age_s", "topics.tactile.max_age_s"],
-    ["topics.status.age_s", "topics.status.max_age_s"],
-    ["topics.command.age_s", "topics.command.max_age_s"],
-];
-
-/// Renames or removes from the experiment in `loader` the keys that version 0.1 read in
-/// `[backend]`, and wrote with their defaults.
+/// Reads the table `[backend.ros2]`.
 ///
 /// # Errors
-/// If one has a value other than the present constant: a limit of an arm does not change without
-/// notice.
-pub fn take_former_keys(loader: &mut Loader) -> Result<(), ConfigError> {
-    loader.read_former_keys("backend.", &RENAMED_KEYS)?;
-    UNUSED_KEYS.iter().for_each(|key| drop(loader.take(&format!("backend.{key}"))));
-    let numbers = FORMER_KEYS.into_iter().chain([("clock_ahead_s", CLOCK_AHEAD_S)]);
-    let numbers = numbers.map(|(key, number)| (key.to_owned(), Value::Float(number)));
-    let types = [Topic::Joints, Topic::Wrench, Topic::Status].map(|topic| {
-        let type_name = Topics::default().type_name(topic);
-        (format!("topics.{}.type", topic.key()), Value::String(type_name.into()))
-    });
-    for (key, constant) in numbers.chain(types) {
-        let key = format!("backend.{key}");
-        let Some(value) = loader.take(&key) else { continue };
-        let is_same = match value.as_integer() {
-            Some(whole) => Some(whole as f64) == constant.as_float(),
-            None => value == constant,
-        };
-        if !is_same {
-            let allowed = format!("{constant}, which is now a constant; remove the key");
-            return Err(loader.not_allowed(&key, &value.to_string(), &allowed));
-        }
-    }
-    Ok(())
+/// If it cannot be read.
+pub fn ros2<'de, D: Deserializer<'de>>(table: D) -> Result<Option<RosSettings>, D::Error> {
+    let read = RosSettings::deserialize(table)?;
+    Ok(Some(RosSettings { version: Some(RosVersion::Ros2), ..read }))
 }
 
-impl BackendSettings {
-    /// Sets omitted values from the model of `arm`, or from that of the default arm for a stage; an
-    /// unreadable model is reported with the scene, where it is built.
-    pub fn complete(&mut self, arm: Option<&ArmSettings>) {
-        if self.topics.namespace.is_none() {
-            let arm = arm.cloned().unwrap_or_default();
-            let model = ArmModel::load(&arm.model).ok();
-            self.topics.namespace = model.map(|model| model.namespace);
-        }
+/// Reads the table `[backend.ros1]`.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn ros1<'de, D: Deserializer<'de>>(table: D) -> Result<Option<RosSettings>, D::Error> {
+    let read = RosSettings::deserialize(table)?;
+    Ok(Some(RosSettings { version: Some(RosVersion::Ros1), ..read }))
+}
+
+impl RosSettings {
+    /// Returns the dotted key of a setting of this table.
+    pub fn key(&self, name: &str) -> String {
+        format!("backend.{}.{name}", self.version.unwrap_or(RosVersion::Ros2).name())
     }
 
     /// Returns the description of the arm's driver.
@@ -332,15 +266,12 @@ impl BackendSettings {
     }
 }
 
-impl Validate for BackendSettings {
+impl Validate for RosSettings {
     fn check(&self, rules: &mut Rules) {
         if let Some(domain) = self.domain {
             rules.number("domain", domain.into(), 0.0..=DOMAIN_MAX.into());
         }
-        let is_named = self.kind != BackendKind::Franka || self.address.is_some();
-        rules.require("address", "missing", is_named, || {
-            "the address of the control box, e.g. \"172.16.0.2\"".into()
-        });
+        self.check_version(rules);
         let is_address = self.master.starts_with("http://") && self.master.len() > 7;
         rules.require("master", format!("\"{}\"", self.master), is_address, || {
             "an address, e.g. \"http://127.0.0.1:11311\"".into()
@@ -351,14 +282,10 @@ impl Validate for BackendSettings {
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
         if self.profile != Profile::Palpate {
-            let (is_ros1, name) = (self.kind == BackendKind::Ros1, self.profile.name());
-            rules.require("profile", format!("\"{name}\""), !is_ros1, || {
-                "\"palpate\" over ROS 1".into()
-            });
             let velocities = self.topics.command.message == CommandMessage::Velocities;
             let is_safe = !velocities || self.watchdog_s.is_some();
             rules.require("topics.command.type", "std_msgs/msg/Float64MultiArray", is_safe, || {
-                "trajectory_msgs/msg/JointTrajectory, unless backend.watchdog_s says after which \
+                "trajectory_msgs/msg/JointTrajectory, unless backend.ros2.watchdog_s says after which \
                  time a watchdog stops the arm: the driver keeps the last velocity for ever"
                     .into()
             });
@@ -376,8 +303,31 @@ impl Validate for BackendSettings {
         if let Some(net_ft) = &self.net_ft {
             rules.table("net_ft", net_ft);
         }
-        rules.table("interlocks", &self.interlocks);
-        rules.table("start_checks", &self.start_checks);
         rules.table("topics", &self.topics);
+    }
+}
+
+impl RosSettings {
+    /// Checks that the settings of the other version of ROS are not given.
+    fn check_version(&self, rules: &mut Rules) {
+        let usual = Self::default();
+        let is_ros2_only = [
+            ("profile", self.profile == usual.profile),
+            ("release", self.release == usual.release),
+            ("domain", self.domain.is_none()),
+            ("interfaces", self.interfaces.is_empty()),
+            ("service_mapping", self.service_mapping == usual.service_mapping),
+        ];
+        let is_ros1_only = [("master", self.master == usual.master)];
+        let (others, other) = match self.version {
+            Some(RosVersion::Ros1) => (&is_ros2_only[..], RosVersion::Ros2),
+            Some(RosVersion::Ros2) => (&is_ros1_only[..], RosVersion::Ros1),
+            None => return,
+        };
+        for (key, is_usual) in others {
+            rules.require(key, "(given)", *is_usual, || {
+                format!("its default: it belongs to [backend.{}]", other.name())
+            });
+        }
     }
 }

@@ -92,7 +92,7 @@ impl Topic {
     /// Topics of the explorer for viewers.
     pub const VIEWED: [Self; 3] = [Self::Markers, Self::Points, Self::Frames];
 
-    /// Topics with settings in `[backend.topics]`.
+    /// Topics with settings in the table `topics`.
     pub const SET: [Self; 10] = [
         Self::Joints,
         Self::Wrench,
@@ -115,7 +115,7 @@ impl Topic {
         }
     }
 
-    /// Returns the topic's key in `[backend.topics]`, if it has settings there.
+    /// Returns the topic's key in the table `topics`, if it has settings there.
     pub fn key(self) -> &'static str {
         KEYS.get(self as usize).copied().unwrap_or_default()
     }
@@ -175,10 +175,10 @@ pub enum TactileMessage {
     /// Message of a Shadow hand.
     #[serde(rename = "sr_robot_msgs/msg/BiotacAll")]
     Fingers,
-    /// Whether a switch at the tip is closed, for `sensor.kind = "contact"`.
+    /// Whether a switch at the tip is closed, for `[sensor.contact]`.
     #[serde(rename = "std_msgs/msg/Bool")]
     Flag,
-    /// Depths of a pad in metres, `32FC1`, for `sensor.kind = "depth_patch"`.
+    /// Depths of a pad in metres, `32FC1`, for `[sensor.depth_patch]`.
     #[serde(rename = "sensor_msgs/msg/Image")]
     Depth,
     /// No samples: a force/torque sensor alone locates or detects the contacts.
@@ -264,7 +264,7 @@ latched_settings!(RobotModeTopic, Topic::RobotMode);
 latched_settings!(SafetyModeTopic, Topic::SafetyMode);
 latched_settings!(ProgramRunningTopic, Topic::ProgramRunning);
 
-/// Table `[backend.topics]`: topics of the arm.
+/// Table `topics`: topics of the arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Topics {

@@ -2,10 +2,10 @@
 //! its believed surface, and the table.
 
 use crate::experiment::simulation::Simulation;
+use palpate_explore::backend::arm::KeepOutSolid;
 use palpate_explore::backend::interlock::InterlockSettings;
 use palpate_explore::belief::Belief;
 use palpate_geometry::solids::box_mesh;
-use palpate_ros::planning_scene::KeepOutSolid;
 
 /// Name of the object's solid.
 pub const OBJECT: &str = "palpate_object";

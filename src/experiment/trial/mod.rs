@@ -22,7 +22,6 @@ use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use crate::sim::Environment;
 use crate::sim::camera::probe::CameraProbe;
-use crate::sim::finger::effects::gel::GelEffect;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::episode::Episode;
@@ -198,13 +197,12 @@ fn run_touches(
 
 /// Returns the belief of a trial before its first action.
 fn initial_belief(experiment: &Experiment, truth: &GroundTruth, random: &mut ChaCha8Rng) -> Belief {
-    let scene = truth.environment.scene();
-    let finger = (&scene.finger, scene.effects.skin.is_some());
+    let surface = truth.environment.scene().effects.surface();
     let hypotheses = truth.library.as_ref().map(|library| {
         let settings = experiment.recognition.clone();
         hypotheses(&truth.environment, Arc::clone(&library.known), settings, random)
     });
-    let belief = Belief::new(truth.environment.task(), finger, &experiment.gp, &experiment.space);
+    let belief = Belief::new(truth.environment.task(), &surface, &experiment.gp, &experiment.space);
     belief.with_hypotheses(hypotheses)
 }
 
@@ -226,10 +224,9 @@ pub fn hypotheses(
     random: &mut ChaCha8Rng,
 ) -> ObjectHypotheses {
     let scene = environment.scene();
-    let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
-    let finger = (environment.task(), scene.effects.skin.is_some(), pad);
     let prior = scene.pose.clone().unwrap_or_default();
-    ObjectHypotheses::new(library, prior, settings, finger, random)
+    let (task, surface) = (environment.task(), scene.effects.surface());
+    ObjectHypotheses::new(library, prior, settings, task, &surface, random)
 }
 
 /// Fits the belief after `count` touches and writes it, with its errors, to the last touch's row.

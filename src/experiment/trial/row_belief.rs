@@ -58,6 +58,6 @@ fn initial(experiment: &Experiment) -> Result<Option<Belief>, InputError> {
         InputError::new("the scene has no ball of [whole_object]; resolved.toml is incomplete")
     })?;
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
-    let scope = ExplorationSetup::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
+    let scope = ExplorationSetup::new(ball, &task, &scene.effects.surface());
     Ok(Some(ImplicitSurface::new(scope, experiment.space.clone()).into()))
 }

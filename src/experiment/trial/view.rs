@@ -4,9 +4,11 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::keep_out::{keep_out, table_sides_m};
 use crate::experiment::trial::{NextTouch, TrialEvent};
 use nalgebra::Point3;
+use palpate_explore::backend::arm::Arm;
 use palpate_ros::arm::RosArm;
 use palpate_ros::recording::{ColorRGBA, Marker, Point, Shape};
 use palpate_ros::view::{MarkerArray, PointCloud2};
+use std::any::Any;
 
 /// Diameter of an arrow's shaft and width of a line, m; a heuristic.
 const SIZE_M: f64 = 2e-3;
@@ -50,22 +52,28 @@ pub(super) fn limits(simulation: &Simulation) -> Marker {
 
 /// Publishes the shapes that change with `event` to the viewers of `arm`, and to programs that
 /// avoid them.
-pub fn show(arm: &RosArm, simulation: &Simulation, event: &TrialEvent) {
+pub fn show(arm: &dyn Arm, simulation: &Simulation, event: &TrialEvent) {
+    // Markers and clouds are messages of ROS.
+    let viewers = (arm as &dyn Any).downcast_ref::<RosArm>();
     let markers = match event {
         TrialEvent::Next(next) => {
             // Later solids are sent at the end of each touch.
             if next.count == 1 {
-                arm.show_solids(|| keep_out(simulation, next.belief));
+                arm.show_solids(&|| keep_out(simulation, next.belief));
             }
             vec![approach(next), limits(simulation)]
         }
         TrialEvent::Finished(touched) => {
             let believed = touched.shape();
-            arm.show(PointCloud2::new(&believed.points));
-            arm.show_solids(|| keep_out(simulation, touched.belief));
+            if let Some(viewers) = viewers {
+                viewers.show(PointCloud2::new(&believed.points));
+            }
+            arm.show_solids(&|| keep_out(simulation, touched.belief));
             believed.markers.to_vec()
         }
     };
     // A later reader gets the last message only, so each has all shapes.
-    arm.show_shapes(MarkerArray { markers });
+    if let Some(viewers) = viewers {
+        viewers.show_shapes(MarkerArray { markers });
+    }
 }

@@ -10,6 +10,7 @@ use palpate::explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialG
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::robot::Finger;
+use palpate::robot::sensor::TipSurface;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::task::touch::TouchSettings;
@@ -51,7 +52,7 @@ pub fn belief_with(settings: SpatialGpSettings, ball_m: f64, radius_m: f64) -> I
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
     let task = Task::new(ball, TouchSettings::default(), &finger).unwrap();
-    ImplicitSurface::new(ExplorationSetup::new(ball, &task, (&finger, false)), settings)
+    ImplicitSurface::new(ExplorationSetup::new(ball, &task, &TipSurface::Rigid), settings)
 }
 
 pub fn approach(belief: &ImplicitSurface, aim: &Aim) -> Approach {

@@ -4,8 +4,9 @@
 use palpate::backend::pace;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::backend::arm::Connector;
 use palpate::robot::arm::ArmSettings;
-use palpate::ros::settings::{BackendKind, BackendSettings};
+use palpate::ros::settings::{RosSettings, RosVersion};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -34,8 +35,8 @@ pub const CELL: [&str; 3] = [
 
 /// An isolated network: a ROS 2 domain, or a ROS 1 master.
 pub struct Network {
-    /// Settings of `[backend]` for this network.
-    pub settings: BackendSettings,
+    /// Settings of the arm for this network.
+    pub settings: RosSettings,
     /// Experiment that is run.
     pub experiment: &'static str,
     master: Option<Child>,
@@ -44,22 +45,25 @@ pub struct Network {
 impl Network {
     /// Creates the ROS 2 network with this number, of the arm of an experiment.
     pub fn of(number: u16, experiment: &'static str) -> Self {
-        let domain = format!("backend.domain={number}");
-        let settings = Experiment::load(Path::new(experiment), &[domain]).unwrap().backend;
+        let domain = format!("backend.ros2.domain={number}");
+        let backend = Experiment::load(Path::new(experiment), &[domain]).unwrap().backend;
+        let settings = backend.ros2.unwrap();
         Self { settings, experiment, master: None }
     }
 
     /// Creates the network with this number.
     pub fn new(number: u16) -> Self {
-        let mut settings = BackendSettings { domain: Some(number), ..Default::default() };
+        let mut settings = RosSettings::default();
         settings.complete(Some(&ArmSettings::default()));
         let is_first = std::env::var("PALPATE_ROS").is_ok_and(|name| name == "ros1");
         if !is_first {
-            settings.kind = BackendKind::Ros2;
+            settings.version = Some(RosVersion::Ros2);
+            settings.domain = Some(number);
             return Self { settings, experiment: EXPERIMENT, master: None };
         }
         let port = 11311 + number;
-        (settings.kind, settings.master) = (BackendKind::Ros1, format!("http://127.0.0.1:{port}"));
+        settings.version = Some(RosVersion::Ros1);
+        settings.master = format!("http://127.0.0.1:{port}");
         let master = Command::new("rosmaster")
             .args(["--core", "-p", &port.to_string()])
             .stdout(Stdio::null())
@@ -75,17 +79,13 @@ impl Network {
     }
 
     /// Settings as `--set` options.
-    fn sets(&self) -> [String; 6] {
-        let BackendSettings { kind, domain, master, .. } = &self.settings;
-        [
-            "--set",
-            &format!("backend.kind=\"{}\"", kind.name())[..],
-            "--set",
-            &format!("backend.domain={}", domain.unwrap_or_default()),
-            "--set",
-            &format!("backend.master=\"{master}\""),
-        ]
-        .map(String::from)
+    fn sets(&self) -> [String; 2] {
+        let RosSettings { version, domain, master, .. } = &self.settings;
+        let set = match version {
+            Some(RosVersion::Ros1) => format!("backend.ros1.master=\"{master}\""),
+            _ => format!("backend.ros2.domain={}", domain.unwrap_or_default()),
+        };
+        ["--set".into(), set]
     }
 
     /// Command `palpate` on this network.
@@ -108,8 +108,10 @@ impl Network {
     /// An independent peer.
     pub fn peer(&self, what: &str, more: &[&str]) -> Command {
         let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
-        match self.settings.kind {
-            BackendKind::Ros1 => command.args(["tests/ros1/peer.py", what, &self.settings.master]),
+        match self.settings.version {
+            Some(RosVersion::Ros1) => {
+                command.args(["tests/ros1/peer.py", what, &self.settings.master])
+            }
             _ => command.args([
                 "tests/ros2/peer.py",
                 what,

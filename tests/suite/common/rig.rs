@@ -3,6 +3,8 @@
 
 use crate::common::hub::{Hub, Memory};
 use nalgebra::{Point3, Vector3};
+use palpate::backend::arm::Connector;
+use palpate::backend::interlock::InterlockSettings;
 use palpate::backend::pace;
 use palpate::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
 use palpate::error::InputError;
@@ -14,7 +16,7 @@ use palpate::ros::arm::RosArm;
 use palpate::ros::server::failure::by_name;
 use palpate::ros::server::serve::{Event, Injection, SimulatedRobotServer};
 use palpate::ros::service::{Answer, Service};
-use palpate::ros::settings::BackendSettings;
+use palpate::ros::settings::RosSettings;
 use palpate::ros::topics::{Endpoint, Topic};
 use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use palpate::sim::finger::effects::wrench::WrenchEffect;
@@ -37,7 +39,8 @@ pub type Track = Arc<Mutex<Vec<(f64, Point3<f64>, f64)>>>;
 /// A simulated robot in a thread, and its connection.
 pub struct Rig {
     pub simulator: Simulator,
-    pub settings: BackendSettings,
+    pub settings: RosSettings,
+    interlocks: InterlockSettings,
     pub hub: Hub,
     #[cfg_attr(not(feature = "mujoco"), allow(dead_code))]
     pub events: Arc<Mutex<Vec<(f64, Event)>>>,
@@ -155,7 +158,7 @@ pub struct Rest {
 impl Rig {
     pub fn new(
         scene: &str,
-        settings: BackendSettings,
+        settings: impl Into<RigSettings>,
         failures: &[(&str, f64, Option<f64>)],
     ) -> Self {
         Self::with(scene, &[], settings, failures)
@@ -164,13 +167,13 @@ impl Rig {
     pub fn with(
         scene: &str,
         sets: &[&str],
-        settings: BackendSettings,
+        settings: impl Into<RigSettings>,
         failures: &[(&str, f64, Option<f64>)],
     ) -> Self {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
         let mut scene = Scene::load(Path::new(scene), &sets).unwrap();
         scene.effects.wrench = Some(WrenchEffect::default());
-        let mut settings = settings;
+        let RigSettings { ros: mut settings, interlocks } = settings.into();
         settings.complete(Some(&ArmSettings::default()));
         let simulator = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let (hub, stop) = (Hub::default(), Arc::new(AtomicBool::new(false)));
@@ -204,7 +207,7 @@ impl Rig {
                 .unwrap();
         });
         let (thread, wire) = (Some(thread), Wire::default());
-        Self { simulator, settings, hub, stop, thread, events, track, wire }
+        Self { simulator, settings, interlocks, hub, stop, thread, events, track, wire }
     }
 
     pub fn lab(&self) -> Result<Arc<RosArm>, LinkFault> {
@@ -228,7 +231,7 @@ impl Rig {
     ) -> Vec<Result<Outcome, Fault>> {
         let task = self.simulator.environment().task();
         let body = Box::new(lab.backend());
-        let mut servo = match self.simulator.servo_within(body, 0, &self.settings.interlocks) {
+        let mut servo = match self.simulator.servo_within(body, 0, &self.interlocks) {
             Ok(servo) => servo,
             Err(fault) => return vec![Err(fault)],
         };
@@ -324,12 +327,25 @@ impl Drop for Rig {
     }
 }
 
+/// Settings of an arm and its interlocks.
+#[derive(Default)]
+pub struct RigSettings {
+    pub ros: RosSettings,
+    pub interlocks: InterlockSettings,
+}
+
+impl From<RosSettings> for RigSettings {
+    fn from(settings: RosSettings) -> Self {
+        Self { ros: settings, ..Self::default() }
+    }
+}
+
 /// Settings for busy machines: age limits are not under test.
-pub fn patient() -> BackendSettings {
-    let mut settings = BackendSettings { connect_timeout_s: 20.0, ..BackendSettings::default() };
+pub fn patient() -> RigSettings {
+    let mut settings = RosSettings { connect_timeout_s: 20.0, ..RosSettings::default() };
     let topics = &mut settings.topics;
     (topics.joints.max_age_s, topics.wrench.max_age_s, topics.tactile.max_age_s) = (0.4, 0.4, 0.4);
     (topics.status.max_age_s, topics.command.max_age_s) = (1.0, 0.3);
-    settings.interlocks.wrench_timeout_s = 0.5;
-    settings
+    let interlocks = InterlockSettings { wrench_timeout_s: 0.5, ..InterlockSettings::default() };
+    RigSettings { ros: settings, interlocks }
 }

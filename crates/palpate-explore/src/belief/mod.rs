@@ -19,7 +19,7 @@ use super::evidence::Outcome;
 use super::gp_settings::GpSettings;
 use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use crate::recognition::ObjectHypotheses;
-use crate::robot::Finger;
+use crate::robot::sensor::TipSurface;
 use crate::task::{Region, Target, Task};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -48,20 +48,19 @@ enum StoredBelief {
 }
 
 impl Belief {
-    /// Creates a belief without data for `task`; `finger` with its error in common for contacts of
-    /// a soft finger.
+    /// Creates a belief without data for `task` and a tip with this `surface`.
     pub fn new(
         task: &Task,
-        (finger, is_soft): (&Finger, bool),
+        surface: &TipSurface,
         gp: &GpSettings,
         space: &SpatialGpSettings,
     ) -> Self {
         match task.region() {
             Region::Zone(zone) => {
-                HeightField::new(zone.clone(), gp.clone()).with_finger(finger.clone()).into()
+                HeightField::new(zone.clone(), gp.clone()).with_finger(task.finger().clone()).into()
             }
             Region::Ball(ball) => {
-                let scope = ExplorationSetup::new(*ball, task, (finger, is_soft));
+                let scope = ExplorationSetup::new(*ball, task, surface);
                 ImplicitSurface::new(scope, space.clone()).into()
             }
         }

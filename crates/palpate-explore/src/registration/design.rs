@@ -94,7 +94,7 @@ const INTO_M: f64 = 2e-4;
 /// Mean travel of the finger from the pressure threshold until it is read: the frames that must
 /// agree, half a frame for the first, and the press.
 pub fn pressed_m(robot: &Robot, touch: &TouchSettings) -> f64 {
-    if !robot.is_soft {
+    if !robot.sensor.is_soft() {
         return 0.0;
     }
     let frames = f64::from(touch.detection.frames) - 0.5;

@@ -148,15 +148,15 @@ struct Sample {
 impl FingerOutline {
     /// Creates the outline: a BioTac's for a soft finger, the hull for a rigid one.
     pub fn new(robot: &Robot) -> Self {
-        let profile = match robot.is_soft {
+        let profile = match robot.sensor.is_soft() {
             true => Profile::biotac(&robot.finger),
             false => Profile::capsule(&robot.finger),
         };
         let (length_m, radius_m) = (profile.length_m, profile.radius_m);
         let steps = [(length_m + radius_m) / ALONG as f64, TAU / AROUND as f64];
-        let pad = robot.pad.clone().map(|pad| (pad, GelPad::x_tp(&robot.finger)));
+        let pad = robot.sensor.pad().cloned().map(|pad| (pad, GelPad::x_tp(&robot.finger)));
         let points = Vec::new();
-        let mut outline = Self { points, profile, is_soft: robot.is_soft, pad, steps };
+        let mut outline = Self { points, profile, is_soft: robot.sensor.is_soft(), pad, steps };
         let places = (0..ALONG).flat_map(|i| (0..AROUND).map(move |j| (i as f64, j as f64)));
         let samples = places.map(|(i, j)| {
             let place = [(i + 0.5) * steps[0] - length_m, j * steps[1] - PI];

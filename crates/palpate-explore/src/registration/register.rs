@@ -230,7 +230,7 @@ pub fn conclude(
     // A tip that is larger than stated touches earlier: a negative indentation.
     let [give, gain, _] = SENSING_PARAMETERS;
     let is_known = !robot.yields() && !undetermined.contains(&give);
-    let pad = robot.pad.as_ref().filter(|_| !undetermined.contains(&gain));
+    let pad = robot.sensor.pad().filter(|_| !undetermined.contains(&gain));
     let loads: Vec<_> = (touches.iter())
         .filter_map(|touch| {
             let HandEyeEstimate { correction, body, indentation_m, .. } = &fitted.state;

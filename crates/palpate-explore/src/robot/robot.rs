@@ -2,7 +2,7 @@
 
 use super::arm::{Chain, LinkCapsule, RobotPart};
 use super::finger::Finger;
-use super::sensor::{GelPad, SensorKind, WrenchAccuracy};
+use super::sensor::{SensorModel, TipSurface};
 use nalgebra::Point3;
 
 /// An arm with a finger.
@@ -12,26 +12,20 @@ pub struct Robot {
     pub chain: Chain,
     /// The finger's geometry.
     pub finger: Finger,
-    /// Whether the finger has a soft skin.
-    pub is_soft: bool,
-    /// Kind of the finger's sensor.
-    pub sensor: SensorKind,
-    /// Accuracy of the force/torque sensor, if known.
-    pub accuracy: Option<WrenchAccuracy>,
-    /// Pad of a `depth_patch`.
-    pub pad: Option<GelPad>,
+    /// The fingertip's sensor.
+    pub sensor: SensorModel,
 }
 
 impl Robot {
     /// Creates a robot with the sensors that its backend has.
     pub fn new(chain: Chain, finger: Finger, is_soft: bool) -> Self {
-        let sensor = SensorKind::Automatic;
-        Self { chain, finger, is_soft, sensor, accuracy: None, pad: None }
+        let surface = if is_soft { TipSurface::Skin } else { TipSurface::Rigid };
+        Self { chain, finger, sensor: SensorModel { surface, ..SensorModel::default() } }
     }
 
     /// Whether the fingertip yields, so that it can be pressed further on contact.
     pub fn yields(&self) -> bool {
-        self.is_soft || self.pad.is_some()
+        self.sensor.surface != TipSurface::Rigid
     }
 
     /// Returns the collision capsules of its arm, adapter and finger.

@@ -5,6 +5,7 @@ use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::robot::Finger;
+use palpate_explore::robot::sensor::TipSurface;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::{Aim, Ball, Region, Target, Task, Zone};
 use palpate_explore::whole_object::{ImplicitSurface, SpatialGpSettings};
@@ -18,7 +19,7 @@ fn restored(belief: &Belief) -> Belief {
 /// or overloads.
 fn beliefs(task: &Task, count: usize, centre_w: Point3<f64>, gp: &GpSettings) -> Vec<Belief> {
     let finger = Finger::default();
-    let mut belief = Belief::new(task, (&finger, true), gp, &SpatialGpSettings::default());
+    let mut belief = Belief::new(task, &TipSurface::Skin, gp, &SpatialGpSettings::default());
     let mut all = vec![belief.clone()];
     for i in 0..count {
         let share = |step: f64| (i as f64 * step).fract();

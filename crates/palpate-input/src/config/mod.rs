@@ -137,6 +137,30 @@ impl Loader {
         }
     }
 
+    /// Removes the dotted key of a setting that is now a constant.
+    ///
+    /// # Errors
+    /// If it has another value than `constant`.
+    pub fn take_constant(&mut self, key: &str, constant: &Value) -> Result<(), ConfigError> {
+        let Some(value) = self.take(key) else { return Ok(()) };
+        let is_same = match value.as_integer() {
+            Some(whole) => Some(whole as f64) == constant.as_float(),
+            None => value == *constant,
+        };
+        if is_same {
+            return Ok(());
+        }
+        let allowed = format!("{constant}, which is now a constant; remove the key");
+        Err(self.not_allowed(key, &value.to_string(), &allowed))
+    }
+
+    /// Removes the dotted key of an optional table that is `false`.
+    pub fn take_false(&mut self, key: &str) {
+        if self.value(key) == Some(&Value::Boolean(false)) {
+            self.take(key);
+        }
+    }
+
     /// Takes the list of former names that were read, each with the present one.
     pub fn take_former_names(&mut self) -> Vec<String> {
         std::mem::take(&mut self.former_names)

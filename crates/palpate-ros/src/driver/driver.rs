@@ -27,7 +27,8 @@ pub struct Driver {
     pub further: &'static [Topic],
     /// Services of the arm.
     pub services: &'static [Service],
-    /// Settings of the experiment that differ from the usual defaults.
+    /// Settings of the experiment that differ from the usual defaults; `topics` are those of the
+    /// arm's table.
     pub defaults: fn(Release, CommandMessage) -> Vec<(&'static str, Value)>,
     /// Frame of the robot's base.
     pub base_frame: &'static str,

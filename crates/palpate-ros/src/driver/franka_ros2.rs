@@ -75,10 +75,10 @@ fn defaults(_: Release, _: CommandMessage) -> Vec<(&'static str, Value)> {
     vec![
         ("scene.touch.settle_s", SETTLE_S.into()),
         ("backend.interlocks.tracking_lag_s", TRACKING_LAG_S.into()),
-        ("backend.topics.namespace", "".into()),
-        ("backend.topics.joints.name", "franka/joint_states".into()),
-        ("backend.topics.wrench.name", WRENCH.into()),
-        ("backend.topics.command.name", "fr3_arm_controller/joint_trajectory".into()),
+        ("topics.namespace", "".into()),
+        ("topics.joints.name", "franka/joint_states".into()),
+        ("topics.wrench.name", WRENCH.into()),
+        ("topics.command.name", "fr3_arm_controller/joint_trajectory".into()),
     ]
 }
 

@@ -45,18 +45,21 @@ impl Profile {
         }
     }
 
-    /// Fills in the settings of the driver that the experiment in `loader` selects.
-    pub fn fill_in(loader: &mut Loader) {
+    /// Fills in the settings of the driver that the table with the dotted key `table` selects.
+    pub fn fill_in(loader: &mut Loader, table: &str) {
         fn read<T: for<'de> Deserialize<'de> + Default>(loader: &Loader, key: &str) -> T {
             let value = loader.value(key).cloned();
             // A value that is not allowed is reported with the other settings.
             value.and_then(|value| value.try_into().ok()).unwrap_or_default()
         }
-        let profile: Self = read(loader, "backend.profile");
-        let release = read(loader, "backend.release");
-        let command = read(loader, "backend.topics.command.type");
+        let profile: Self = read(loader, &format!("{table}.profile"));
+        let release = read(loader, &format!("{table}.release"));
+        let command = read(loader, &format!("{table}.topics.command.type"));
         for (key, value) in (profile.driver().defaults)(release, command) {
-            loader.set_default(key, value);
+            match key.strip_prefix("topics.") {
+                Some(name) => loader.set_default(&format!("{table}.topics.{name}"), value),
+                None => loader.set_default(key, value),
+            }
         }
     }
 }

@@ -76,10 +76,10 @@ fn defaults(release: Release, command: CommandMessage) -> Vec<(&'static str, Val
     vec![
         ("scene.touch.settle_s", SETTLE_S.into()),
         ("backend.interlocks.tracking_lag_s", TRACKING_LAG_S.into()),
-        ("backend.topics.namespace", "".into()),
-        ("backend.topics.joints.name", "joint_states".into()),
-        ("backend.topics.wrench.name", "force_torque_sensor_broadcaster/wrench".into()),
-        ("backend.topics.command.name", command.into()),
+        ("topics.namespace", "".into()),
+        ("topics.joints.name", "joint_states".into()),
+        ("topics.wrench.name", "force_torque_sensor_broadcaster/wrench".into()),
+        ("topics.command.name", command.into()),
     ]
 }
 

@@ -3,7 +3,7 @@
 use super::wire::SequencedMessage;
 use crate::camera::{CameraMessage, CameraTopics};
 use crate::message::Image;
-use crate::settings::BackendSettings;
+use crate::settings::RosSettings;
 use crate::transport::cannot_open;
 use crate::view::{CameraInfo, PointCloud2};
 use palpate_input::error::InputError;
@@ -19,7 +19,7 @@ use tokio::runtime::Runtime;
 /// # Errors
 /// If there is no master, or it rejects the node.
 pub fn listen(
-    settings: &BackendSettings,
+    settings: &RosSettings,
     topics: &CameraTopics,
     take: &mut dyn FnMut(CameraMessage) -> bool,
 ) -> Result<Vec<String>, InputError> {

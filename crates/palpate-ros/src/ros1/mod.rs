@@ -9,7 +9,7 @@ use crate::message::{
     Touching, TriggerResponse, WrenchStamped,
 };
 use crate::service::{Answer, Service};
-use crate::settings::BackendSettings;
+use crate::settings::RosSettings;
 use crate::topics::{CommandMessage, Endpoint, TactileMessage, Topic, Topics};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Transport, Waker, cannot_open, cannot_send,
@@ -69,7 +69,7 @@ impl Ros1 {
     /// # Errors
     /// If there is no master, or it rejects the node.
     pub fn open(
-        settings: &BackendSettings,
+        settings: &RosSettings,
         side: Endpoint,
         services: Vec<Service>,
     ) -> Result<Self, InputError> {

@@ -138,7 +138,7 @@ fn listed(controllers: impl Iterator<Item = Controller>) -> Answer {
 }
 
 /// Remedy of an answer with another layout.
-const OTHER_RELEASE: &str = "its answer cannot be read; set backend.release to the release of ROS 2 on \
+const OTHER_RELEASE: &str = "its answer cannot be read; set backend.ros2.release to the release of ROS 2 on \
                              the driver's computer";
 
 /// Strictness of a switch: as far as possible, or all or none.

@@ -5,7 +5,7 @@ use super::{dds_topic, open_node};
 use crate::camera::{CameraMessage, CameraTopics};
 use crate::definition::HasDefinition;
 use crate::message::Image;
-use crate::settings::BackendSettings;
+use crate::settings::RosSettings;
 use crate::transport::cannot_open;
 use crate::view::{CameraInfo, PointCloud2};
 use palpate_input::error::InputError;
@@ -23,7 +23,7 @@ type Reader = Box<dyn Fn() -> Option<CameraMessage>>;
 /// # Errors
 /// If the network cannot be joined.
 pub fn listen(
-    settings: &BackendSettings,
+    settings: &RosSettings,
     topics: &CameraTopics,
     take: &mut dyn FnMut(CameraMessage) -> bool,
 ) -> Result<Vec<String>, InputError> {

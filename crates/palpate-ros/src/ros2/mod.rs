@@ -14,7 +14,7 @@ use crate::message::{
 use crate::network::network;
 use crate::planning_scene::CollisionObject;
 use crate::service::{Answer, Service};
-use crate::settings::{BackendSettings, MappingKind};
+use crate::settings::{MappingKind, RosSettings};
 use crate::topics::{CommandMessage, Endpoint, TactileMessage, Topic};
 use crate::transport::{
     Delivery, Packet, PacketMessage, Publisher, Transport, Waker, cannot_open, cannot_send,
@@ -46,7 +46,7 @@ type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
 pub struct Ros2 {
     context: Context,
     node: Node,
-    settings: BackendSettings,
+    settings: RosSettings,
     side: Endpoint,
     poll: Poll,
     events: Events,
@@ -78,7 +78,7 @@ fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
 }
 
 /// Opens a node of this name in the network of `settings`.
-fn open_node(settings: &BackendSettings, name: &str) -> Result<(Context, Node), InputError> {
+fn open_node(settings: &RosSettings, name: &str) -> Result<(Context, Node), InputError> {
     let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
         .map_err(cannot_open("the network"))?;
     let mut participant = DomainParticipantBuilder::new(domain);
@@ -100,7 +100,7 @@ impl Ros2 {
     /// # Errors
     /// If the network cannot be joined.
     pub fn open(
-        settings: &BackendSettings,
+        settings: &RosSettings,
         side: Endpoint,
         services: Vec<Service>,
     ) -> Result<Self, InputError> {

@@ -9,7 +9,7 @@ use crate::joints::JointNames;
 use crate::link::Link;
 use crate::message::{Header, Time, Wrench as WrenchMessage, WrenchStamped};
 use crate::service::{Answer, Service};
-use crate::settings::BackendSettings;
+use crate::settings::RosSettings;
 use crate::status::ArmStatus;
 use crate::tactile;
 use crate::topics::Topic;
@@ -89,7 +89,7 @@ pub struct SimulatedRobotServer {
     body: Box<dyn Backend>,
     /// Reading of the last tick.
     reading: Reading,
-    settings: BackendSettings,
+    settings: RosSettings,
     names: JointNames,
     pc: Box<dyn ArmComputer>,
     /// Deliveries, queued for the loop.
@@ -126,7 +126,7 @@ impl SimulatedRobotServer {
     pub fn new(
         mut body: Box<dyn Backend>,
         chain: &Chain,
-        settings: &BackendSettings,
+        settings: &RosSettings,
         connect: Connect,
         injections: Vec<Injection>,
         seed: u64,

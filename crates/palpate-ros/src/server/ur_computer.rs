@@ -12,7 +12,7 @@ use crate::driver::ur::{IDLE, POWER_OFF, RUNNING, UrState, safety};
 use crate::joints::JointNames;
 use crate::message::{Bool, Float64, RobotMode, SafetyMode};
 use crate::service::Service;
-use crate::settings::BackendSettings;
+use crate::settings::RosSettings;
 use crate::status::ArmStatus;
 use crate::trajectory_stream::STOP_RAD_S2;
 use crate::transport::Packet;
@@ -98,7 +98,7 @@ impl UrComputer {
         names: JointNames,
         period_s: f64,
         qdot_limits: Vec<f64>,
-        settings: &BackendSettings,
+        settings: &RosSettings,
     ) -> Self {
         let count = names.names().len();
         Self {

@@ -2,7 +2,7 @@
 
 use palpate_input::config::Loader;
 use palpate_ros::driver::{Driver, Profile};
-use palpate_ros::settings::BackendSettings;
+use palpate_ros::settings::RosSettings;
 use palpate_ros::topics::{Endpoint, Topic};
 use std::path::Path;
 
@@ -48,15 +48,15 @@ fn rows<'a>(table: &'a str, release: &str) -> Vec<Row<'a>> {
 }
 
 /// Returns the settings of an experiment that names only the profile and the release.
-pub fn settings(profile: &str, release: &str) -> BackendSettings {
-    let text = format!("[backend]\nkind=\"ros2\"\nprofile=\"{profile}\"\nrelease=\"{release}\"");
+pub fn settings(profile: &str, release: &str) -> RosSettings {
+    let text = format!("[ros2]\nprofile=\"{profile}\"\nrelease=\"{release}\"");
     let mut loader = Loader::from_text(Path::new("test.toml"), text).unwrap();
-    Profile::fill_in(&mut loader);
-    loader.value("backend").unwrap().clone().try_into().unwrap()
+    Profile::fill_in(&mut loader, "ros2");
+    loader.value("ros2").unwrap().clone().try_into().unwrap()
 }
 
 /// Every topic and service that is used exists with that name, type, direction and durability.
-fn names_are_those_of(rows: &[Row], settings: &BackendSettings) {
+fn names_are_those_of(rows: &[Row], settings: &RosSettings) {
     let driver: &Driver = settings.driver();
     let topics = driver.topics.iter().chain(driver.further).copied();
     // A tactile sensor has its own driver.

@@ -8,7 +8,7 @@ use palpate_ros::franka_message::FrankaRobotState;
 use palpate_ros::joints::JointNames;
 use palpate_ros::message::{Header, Point, Pose, Quaternion, WrenchStamped};
 use palpate_ros::receiver::TopicReceiver;
-use palpate_ros::settings::BackendSettings;
+use palpate_ros::settings::RosSettings;
 use palpate_ros::transport::{Delivery, Packet};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -86,7 +86,7 @@ fn the_wrench_is_that_on_the_arm() {
         message.wrench.torque = estimate.torque_nm.into();
         message
     };
-    let receiver = |settings: &BackendSettings| {
+    let receiver = |settings: &RosSettings| {
         TopicReceiver::new(JointNames::new(vec!["fr3_joint1".into()]), settings.clone())
     };
     let push = |to: &TopicReceiver, packet: Packet| {

@@ -14,7 +14,7 @@ use palpate_ros::server::failure::FailureEffect;
 use palpate_ros::server::ur_computer::UrComputer;
 use palpate_ros::server::ur_trajectory::Trajectory;
 use palpate_ros::service::Service;
-use palpate_ros::settings::BackendSettings;
+use palpate_ros::settings::RosSettings;
 use palpate_ros::trajectory_stream::{TrajectoryStream, stoppable_share};
 use palpate_ros::transport::Packet;
 use proptest::prelude::*;
@@ -26,8 +26,8 @@ const ROBOT_S: f64 = 0.002;
 const TICK_S: f64 = 0.004;
 
 /// Settings of a driver of this release.
-fn settings(release: Release) -> BackendSettings {
-    let mut settings = BackendSettings { profile: Profile::Ur, release, ..Default::default() };
+fn settings(release: Release) -> RosSettings {
+    let mut settings = RosSettings { profile: Profile::Ur, release, ..Default::default() };
     let controller = trajectory_controller(release);
     settings.topics.command.name = format!("/{controller}/joint_trajectory");
     settings
@@ -51,7 +51,7 @@ impl Robot {
         Self::with(lag_s, settings(release))
     }
 
-    fn with(lag_s: f64, settings: BackendSettings) -> Self {
+    fn with(lag_s: f64, settings: RosSettings) -> Self {
         let names = JointNames::new(vec!["a".into()]);
         let computer = UrComputer::new(names.clone(), ROBOT_S, vec![PI], &settings);
         let reading = Reading { q: vec![0.5], qdot: vec![0.0], ..Reading::default() };

@@ -25,7 +25,7 @@ pub mod wrench;
 use super::load::ContactLoad;
 use effect::{Effect, EffectSwitch, Requirement};
 use palpate_explore::robot::finger::TipMotion;
-use palpate_explore::robot::sensor::SensorKind;
+use palpate_explore::robot::sensor::{Signal, TipSurface};
 use palpate_input::config::{Rules, Validate};
 
 // An effect comes after those that it requires.
@@ -70,16 +70,14 @@ impl Effects {
         }
     }
 
-    /// Returns the minimal effects of a finger with a sensor of this kind.
-    pub fn minimal(kind: SensorKind) -> Self {
-        if kind == SensorKind::Automatic {
-            return Self::biotac();
-        }
-        let is_pad = kind == SensorKind::DepthPatch;
+    /// Returns the minimal effects of a finger whose sensor reads `signal`; without one, a BioTac.
+    pub fn minimal(signal: Option<Signal>) -> Self {
+        let Some(signal) = signal else { return Self::biotac() };
+        let is_pad = signal == Signal::Depth;
         Self {
             gel: is_pad.then(gel::GelEffect::default),
             rigid_tip: (!is_pad).then(rigid_tip::RigidTipEffect::default),
-            wrench: (kind == SensorKind::ForceTorqueTip).then(wrench::WrenchEffect::default),
+            wrench: (signal == Signal::Wrench).then(wrench::WrenchEffect::default),
             ..Self::default()
         }
     }
@@ -87,6 +85,15 @@ impl Effects {
     /// Returns every effect with its defaults, except those that another one excludes.
     pub fn all() -> Self {
         Self { rigid_tip: None, gel: None, ..Self::each() }
+    }
+
+    /// Returns the surface of the fingertip.
+    pub fn surface(&self) -> TipSurface {
+        match (&self.gel, &self.skin) {
+            (Some(gel), _) => TipSurface::Pad(gel.pad()),
+            (None, Some(_)) => TipSurface::Skin,
+            (None, None) => TipSurface::Rigid,
+        }
     }
 
     /// Returns whether a model computes the load of the object on the finger.

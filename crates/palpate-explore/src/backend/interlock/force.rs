@@ -11,7 +11,7 @@ pub const FORCE: InterlockEntry = InterlockEntry {
         let finger = &site.robot.finger;
         let lever_m = finger.length_m + finger.radius_m + SPARE_M;
         let mount_m = site.robot.chain.tool.translation.vector.norm();
-        let noise_nm = site.robot.accuracy.as_ref().map_or(0.0, |it| it.torque_sd_nm(mount_m));
+        let noise_nm = site.robot.sensor.wrench.as_ref().map_or(0.0, |it| it.torque_sd_nm(mount_m));
         let default_nm = force_n * lever_m + SIGMAS * noise_nm;
         Some(Box::new(Force {
             force_n,

@@ -4,8 +4,7 @@ use crate::backend::Reading;
 use crate::robot::Robot;
 use crate::robot::finger::Finger;
 use crate::robot::sensor::{
-    BioTac, ContactSwitch, DepthPatch, Doubt, ForceTorqueTip, IdealSensor, SensedContact, Sensor,
-    SensorKind,
+    BioTac, Doubt, ForceTorqueTip, IdealSensor, SensedContact, Sensor, TipParts,
 };
 use crate::task::touch::TouchSettings;
 use nalgebra::Vector3;
@@ -14,20 +13,17 @@ use nalgebra::Vector3;
 /// contacts.
 fn sensors(settings: &TouchSettings, robot: &Robot) -> Vec<Box<dyn Sensor>> {
     let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
-    let Robot { finger, chain, accuracy, pad, .. } = robot;
-    let wrench = || Box::new(ForceTorqueTip::new(accuracy.clone(), chain.tool));
-    match robot.sensor {
-        SensorKind::Automatic => vec![
-            Box::new(IdealSensor::default()),
-            Box::new(BioTac::new(finger, detection.clone(), *point, *pressure_limit_counts)),
-            wrench(),
-        ],
-        SensorKind::ForceTorqueTip => vec![wrench()],
-        SensorKind::DepthPatch => {
-            vec![Box::new(DepthPatch::new(pad.clone().unwrap_or_default(), finger))]
-        }
-        SensorKind::Contact => vec![Box::new(ContactSwitch::default())],
+    let Robot { finger, chain, sensor } = robot;
+    let wrench = sensor.wrench.as_ref();
+    if let Some((_, kind)) = sensor.settings.kind() {
+        let tip = TipParts { finger, tool: &chain.tool, pad: sensor.pad(), wrench };
+        return vec![kind.sensor(&tip)];
     }
+    vec![
+        Box::new(IdealSensor::default()),
+        Box::new(BioTac::new(finger, detection.clone(), *point, *pressure_limit_counts)),
+        Box::new(ForceTorqueTip::new(wrench.cloned(), chain.tool)),
+    ]
 }
 
 /// Event that ends an approach.

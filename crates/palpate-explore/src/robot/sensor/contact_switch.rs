@@ -1,10 +1,28 @@
 //! Bare contact: a flag or a force tells that the tip touches, not where on the tip.
 
 use super::doubt::Doubt;
+use super::kind::{SensorKind, Signal, TipParts};
 use super::sample::{Sample, Wrench};
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 use nalgebra::Matrix3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Table `[sensor.contact]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactSettings {}
+
+impl SensorKind for ContactSettings {
+    fn signal(&self) -> Signal {
+        Signal::Flag
+    }
+
+    fn sensor(&self, _: &TipParts) -> Box<dyn Sensor> {
+        Box::new(ContactSwitch::default())
+    }
+}
 
 /// Places contacts at the foremost point of the tip, with a covariance that covers the unknown
 /// normal.

@@ -2,13 +2,31 @@
 
 use super::contact_switch::foremost;
 use super::doubt::Doubt;
+use super::kind::{SensorKind, Signal, TipParts};
 use super::sample::{Sample, Wrench};
-use super::settings::WrenchAccuracy;
+use super::wrench_accuracy::WrenchAccuracy;
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3, Vector6};
 use palpate_geometry::primitives::nearest_on_segment;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+
+/// Table `[sensor.force_torque_tip]`: the accuracy is that of `[effects.wrench]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForceTorqueTipSettings {}
+
+impl SensorKind for ForceTorqueTipSettings {
+    fn signal(&self) -> Signal {
+        Signal::Wrench
+    }
+
+    fn sensor(&self, tip: &TipParts) -> Box<dyn Sensor> {
+        Box::new(ForceTorqueTip::new(tip.wrench.cloned(), *tip.tool))
+    }
+}
 
 /// Smallest force whose line of action locates a contact, if the sensor's accuracy is unknown.
 // heuristic: below it, the noise of a common sensor turns the force by more than 30°.

@@ -1,62 +1,94 @@
-//! Settings of a finger's sensor: its kind, and what is known of its accuracy.
+//! Settings of the finger's sensor: table `[sensor]`, and the list of the kinds of sensors.
 
+use super::contact_switch::ContactSettings;
+use super::depth_patch::DepthPatchSettings;
+use super::force_torque::ForceTorqueTipSettings;
+use super::kind::{SensorKind, Signal};
+use palpate_input::config::{ConfigError, Loader, Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[sensor]`: the sensor that locates the contacts.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SensorSettings {
-    /// Kind of the sensor.
-    pub kind: SensorKind,
-}
-
-/// Kind of a fingertip sensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum SensorKind {
-    /// The BioTac of the effects or of the robot; without one, the exact contact in a simulation,
-    /// and the force/torque sensor of a robot.
-    #[default]
-    Automatic,
-    /// Rigid tip on a force/torque sensor: the wrench locates the contact.
-    ForceTorqueTip,
-    /// Elastomer pad with a camera behind it: depth images locate a patch of the surface.
-    DepthPatch,
-    /// A flag or a force that tells contact, and nothing of its place on the tip.
-    Contact,
-}
-
-impl SensorKind {
-    /// Returns the name used in a scene file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Automatic => "automatic",
-            Self::ForceTorqueTip => "force_torque_tip",
-            Self::DepthPatch => "depth_patch",
-            Self::Contact => "contact",
+/// Defines the table `[sensor]`, with a table for each kind of sensor.
+macro_rules! sensor_settings {
+    ($($(#[$note:meta])* $table:ident: $settings:ty,)+) => {
+        /// Table `[sensor]`: the sensor that locates the contacts. Without a table in it, that is
+        /// the BioTac of the effects or of the robot; without one, the exact contact in a
+        /// simulation, and the force/torque sensor of a robot.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct SensorSettings {
+            $(
+                $(#[$note])*
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $table: Option<$settings>,
+            )+
         }
+
+        /// Tables of the kinds of sensors.
+        const TABLES: &[&str] = &[$(stringify!($table)),+];
+
+        impl SensorSettings {
+            /// Returns the given tables, with their names.
+            fn tables(&self) -> impl Iterator<Item = (&'static str, &dyn SensorKind)> {
+                let all = [$((stringify!($table), self.$table.as_ref().map(|it| it as _))),+];
+                all.into_iter().filter_map(|(name, kind)| Some((name, kind?)))
+            }
+        }
+    };
+}
+
+sensor_settings! {
+    /// Rigid tip on a force/torque sensor: the wrench locates the contact.
+    force_torque_tip: ForceTorqueTipSettings,
+    /// Elastomer pad with a camera behind it: depth images locate a patch of the surface.
+    depth_patch: DepthPatchSettings,
+    /// Flag or force that tells contact, and nothing of its place on the tip.
+    contact: ContactSettings,
+}
+
+impl SensorSettings {
+    /// Returns the name of the sensor's table, and the table; `None` for the sensor that the
+    /// backend has.
+    pub fn kind(&self) -> Option<(&'static str, &dyn SensorKind)> {
+        self.tables().next()
+    }
+
+    /// Returns the signal that the selected sensor reads.
+    pub fn signal(&self) -> Option<Signal> {
+        self.kind().map(|(_, kind)| kind.signal())
+    }
+
+    /// Changes the settings of the table with the dotted key `table` in `loader` before they are
+    /// read: a sensor's table that is `false` is removed.
+    ///
+    /// # Errors
+    /// If the former key `kind` is given, with the table that replaces it.
+    pub fn prepare(loader: &mut Loader, table: &str) -> Result<(), ConfigError> {
+        let key = format!("{table}.kind");
+        if let Some(kind) = loader.value(&key).cloned() {
+            let allowed = match kind.as_str() {
+                Some("automatic") => "no kind; without a table in [sensor] it is automatic".into(),
+                Some(name) if TABLES.contains(&name) => {
+                    format!("no kind, and a table [{table}.{name}]")
+                }
+                _ => format!("no kind, and a table of {}", TABLES.join(", ")),
+            };
+            return Err(loader.not_allowed(&key, &kind.to_string(), &allowed));
+        }
+        for name in TABLES {
+            loader.take_false(&format!("{table}.{name}"));
+        }
+        Ok(())
     }
 }
 
-/// Accuracy of a force/torque sensor. Vectors are along x, y, z of the sensor.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct WrenchAccuracy {
-    /// Standard deviation of the noise of a force reading.
-    pub noise_n: [f64; 3],
-    /// Standard deviation of the noise of a torque reading.
-    pub noise_nm: [f64; 3],
-    /// Resolution of the forces.
-    pub resolution_n: [f64; 3],
-    /// Resolution of the torques.
-    pub resolution_nm: [f64; 3],
-    /// Random walk of the force bias: standard deviation per square root of a second.
-    pub drift_n_sqrt_s: [f64; 3],
-    /// Change of the force bias with the arm's posture: standard deviation per metre of motion of
-    /// the tip.
-    pub posture_n_m: f64,
-    /// Largest force readings; 0 if unknown.
-    pub range_n: [f64; 3],
-    /// Largest torque readings; 0 if unknown.
-    pub range_nm: [f64; 3],
+impl Validate for SensorSettings {
+    fn check(&self, rules: &mut Rules) {
+        let names: Vec<&str> = self.tables().map(|(name, _)| name).collect();
+        if let [first, second, ..] = names[..] {
+            rules.require(second, "(given)", false, || {
+                format!("one sensor, and `{first}` is given, too; remove one")
+            });
+        }
+    }
 }
