@@ -22,7 +22,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Standard deviation of a distance, m.
 // heuristic: a time-of-flight sensor near a surface.
-const SD_M: f64 = 1e-3;
+pub const SD_M: f64 = 1e-3;
 
 /// Probe that measures distances to the exact mesh.
 struct RangeFinder<'a> {
