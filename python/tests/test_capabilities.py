@@ -1,4 +1,4 @@
-"""Capabilities from Python: each works, or is refused with the reason in `docs/capabilities.md`."""
+"""Capabilities from Python: each works, or is refused with the reason in `tests/capabilities.md`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import palpate
 import palpate.gym
 import pytest
 
-TABLE = Path(__file__).parents[2] / "docs" / "capabilities.md"
+TABLE = Path(__file__).parents[2] / "tests" / "capabilities.md"
 
 FORCE = {
     "simulator": "kinematic",
