@@ -25,7 +25,10 @@ const ENDED: &[(&[&str], &str)] = &[
     (&["nan"], "is NaN"),
     (&["swapped_names"], "beyond its speed limit"),
     (&["future"], "in the future"),
-    (&["unstamped"], "its stamp is zero, so its age is unknown; stamp it, or set backend.ros2.accept"),
+    (
+        &["unstamped"],
+        "its stamp is zero, so its age is unknown; stamp it, or set backend.ros2.accept",
+    ),
     (&["backward"], BACKWARD),
     (&["no_joints"], "no new message on /joint_states"),
     (&["no_wrench"], "no new message on /ft_sensor/wrench"),
