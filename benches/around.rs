@@ -11,9 +11,10 @@ mod curves;
 use curves::{Curve, draw, print, seconds};
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
+use palpate::robot::sensor::TipSurface;
 use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
@@ -39,9 +40,9 @@ fn main() -> anyhow::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let scene = Scene::load(&root.join("scenes/suite/around/mug.toml"), &[])?;
     let environment = Arc::new(Environment::build(scene)?);
-    let (task, finger) = (environment.task(), &environment.scene().finger);
+    let task = environment.task();
     let gp = GpSettings::default();
-    let mut belief = Belief::new(task, (finger, false), &gp, &SpatialGpSettings::default());
+    let mut belief = Belief::new(task, &TipSurface::Rigid, &gp, &SpatialGpSettings::default());
     let make = |name| planner::by_name(name).ok_or(anyhow::anyhow!("no planner {name}"));
     let mut planner = (make("active")?.make)(&Default::default(), stream(1, 0, "active"));
     let mut other = (make("sobol")?.make)(&Default::default(), stream(1, 0, "begin"));
@@ -52,22 +53,28 @@ fn main() -> anyhow::Result<()> {
     let mut choice = curve("choice of the next touch", "#d55e00", 2.0);
     let mut mesh = curve("mesh, 64 cells along a side", "#e69f00", 1.0);
     let mut count = 0;
+    let offer = Offer::default();
     for last in COUNTS {
         let n = last as f64;
         let (mut search_s, mut extension_s) = (None, None);
         while count < last {
             let is_chosen = (BEGIN..CHOSEN).contains(&count);
-            let plan = if is_chosen { planner.plan(&belief) } else { other.plan(&belief) }?;
+            let plan = if is_chosen {
+                planner.plan(&belief, &offer)
+            } else {
+                other.plan(&belief, &offer)
+            }?;
             let Some(approach) = task.approach(&plan.target) else { continue };
-            belief.observe(&plan.target, &approach, &probe.execute(&approach)?);
+            belief.observe(&plan.target, &probe.touch(&approach)?);
             count += 1;
             let is_near = count + UPDATED > last;
             if count > CHOSEN && !is_near {
                 continue;
             }
             let begun = Instant::now();
-            let factorisations = belief.refit()?.factorisations;
+            belief.refit()?;
             let updated_s = Some(begun.elapsed().as_secs_f64());
+            let factorisations = belief.fit().map_or(0, |fit| fit.factorisations);
             match factorisations {
                 0 => extension_s = updated_s,
                 1 => {}
@@ -78,7 +85,7 @@ fn main() -> anyhow::Result<()> {
         extended.values.extend(extension_s.map(|seconds| (n, seconds)));
         eprintln!("{count} touches");
         let chosen = seconds(|| {
-            let _ = black_box(planner.plan(&belief));
+            let _ = black_box(planner.plan(&belief, &offer));
         });
         choice.values.push((n, chosen));
         let meshed = seconds(|| {

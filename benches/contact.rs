@@ -10,7 +10,6 @@ use nalgebra::{Isometry3, Point3};
 use palpate::backend::Command;
 use palpate::experiment::statistics::median;
 use palpate::explore::control::{Controller, Goal};
-use palpate::explore::probe::Touch;
 use palpate::sim::mujoco::CompiledModels;
 use palpate::sim::probe::resting_pose;
 use palpate::sim::simulator::Simulator;
@@ -137,7 +136,8 @@ fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     let mut rest = |target: &Vec<f64>| {
         let approach = cast.task().approach(&target[..].into()).unwrap();
         let y_m = resting_pose(cast, &approach).context("a place without contact")?.p_wt.y;
-        let Touch::Contact(contact) = probe.touch(&approach)? else { anyhow::bail!("a miss") };
+        let outcome = probe.touch(&approach)?;
+        let contact = outcome.contact().context("a miss")?;
         Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
     };
     truth.iter().map(|truth| rest(&truth.target)).collect()

@@ -3,9 +3,9 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::{Contact, End, Evidence, Outcome};
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
-use palpate::explore::probe::Touch;
+use palpate::explore::planner::{self, Offer};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
@@ -17,6 +17,7 @@ use palpate::sim::finger::gel::{Gel, GelState};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
+use palpate::task::Target;
 use rand::RngExt;
 use std::hint::black_box;
 use std::path::Path;
@@ -163,20 +164,21 @@ fn patches(_: &mut Criterion) {
     let mut random = stream(1, 0, "places");
     let mut beliefs = [(); 2].map(|()| HeightField::new(zone.clone(), GpSettings::default()));
     let mut contact_at = |parts: &[f64]| {
-        let target = zone.at(parts);
-        let approach = environment.task().approach(&target.clone().into())?;
-        let Ok(Touch::Contact(contact)) = probe.touch(&approach) else { return None };
-        Some((target, contact))
+        let target = Target::from(zone.at(parts));
+        let outcome = probe.touch(&environment.task().approach(&target)?).ok()?;
+        Some((target, outcome.contact()?.clone()))
     };
     let mut count = 0;
     while count < 60 {
         let [x, z] = [(); 2].map(|()| random.random_range(0.05..0.95));
-        let Some((target, mut contact)) = contact_at(&[x, z]) else { continue };
-        beliefs[0].observe(&target, &Touch::Contact(contact.clone()));
+        let Some((target, contact)) = contact_at(&[x, z]) else { continue };
+        beliefs[0].observe(&target, &contact.clone().into());
         let around = [[0.02, 0.0], [-0.01, 0.02], [-0.01, -0.02]];
         let further = around.into_iter().filter_map(|[a, b]| contact_at(&[x + a, z + b]));
-        contact.patch = further.map(|(_, contact)| contact).collect();
-        beliefs[1].observe(&target, &Touch::Contact(contact));
+        let points: Vec<Contact> =
+            std::iter::once(contact).chain(further.map(|(_, contact)| contact)).collect();
+        let evidence = vec![Evidence::Points(points.into())];
+        beliefs[1].observe(&target, &Outcome::new(End::Contact, evidence));
         count += 1;
     }
     let Some(active) = planner::by_name("active") else { return };
@@ -187,7 +189,7 @@ fn patches(_: &mut Criterion) {
             let begin = Instant::now();
             let is_fitted = belief.refit().is_ok();
             let middle = begin.elapsed().as_secs_f64();
-            black_box((is_fitted, planner.plan(&belief.into()).is_ok()));
+            black_box((is_fitted, planner.plan(&belief.into(), &Offer::default()).is_ok()));
             [middle, begin.elapsed().as_secs_f64()]
         });
         made.fold([f64::INFINITY; 2], |least, s| [least[0].min(s[0]), least[1].min(s[1])])

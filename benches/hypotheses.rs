@@ -12,10 +12,11 @@ use curves::{Curve, draw_over, print};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::recognition::{ObjectHypotheses, RecognitionSettings};
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::math::seed::stream;
+use palpate::robot::sensor::TipSurface;
 use std::path::Path;
 use std::time::Instant;
 
@@ -52,11 +53,12 @@ fn main() -> anyhow::Result<()> {
                 library.clone(),
                 scene.pose.clone().unwrap_or_default(),
                 settings,
-                (task, false, None),
+                task,
+                &TipSurface::Rigid,
                 &mut stream(1, trial.into(), "hypotheses"),
             );
             let (gp, space) = (GpSettings::default(), SpatialGpSettings::default());
-            let mut belief = Belief::new(task, (&scene.finger, false), &gp, &space)
+            let mut belief = Belief::new(task, &TipSurface::Rigid, &gp, &space)
                 .with_hypotheses(Some(hypotheses));
             let entry = planner::by_name("object_information");
             let entry = entry.ok_or_else(|| anyhow::anyhow!("no planner"))?;
@@ -64,15 +66,15 @@ fn main() -> anyhow::Result<()> {
             let mut probe = drawn.probe(trial)?;
             for touch in 1..=TOUCHES {
                 let begun = Instant::now();
-                let plan = planner.plan(&belief)?;
+                let plan = planner.plan(&belief, &Offer::default())?;
                 if touch > 1 {
                     seconds[3].push(begun.elapsed().as_secs_f64());
                 }
                 let approach = task.approach(&plan.target);
                 let approach = approach.ok_or_else(|| anyhow::anyhow!("out of reach"))?;
-                let outcome = probe.execute(&approach)?;
+                let outcome = probe.touch(&approach)?;
                 let begun = Instant::now();
-                belief.observe(&plan.target, &approach, &outcome);
+                belief.observe(&plan.target, &outcome);
                 if let Some(curve) = AT.iter().position(|at| *at == touch) {
                     seconds[curve].push(begun.elapsed().as_secs_f64());
                 }

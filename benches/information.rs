@@ -14,10 +14,11 @@ use palpate::experiment::statistics::equal_error::{IntervalEstimate, equal_error
 use palpate::experiment::statistics::{PairedDifference, median};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::evidence::{Contact, Evidence, Outcome};
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, Outcome, Probe, Touch};
+use palpate::explore::probe::Probe;
 use palpate::math::seed;
-use palpate::task::Approach;
+use palpate::task::Action;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -49,19 +50,18 @@ impl Estimating {
 }
 
 impl Probe for Estimating {
-    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
-        let outcome = self.exact.execute(approach)?;
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        let mut outcome = self.exact.execute(action)?;
         let (moved, turned) = (PLACE_SD_M * self.normals(), TILT_RAD * self.normals());
-        let touch = match outcome.touch {
-            none @ (Touch::Miss | Touch::Overload) => none,
-            Touch::Contact(Contact { p_wc, normal_w, .. }) => {
-                let tangent = turned - normal_w * turned.dot(&normal_w);
-                let (axis, angle) = Unit::new_and_get(tangent);
-                let normal_w = Rotation3::from_axis_angle(&axis, angle) * normal_w;
-                Touch::Contact(Contact::new(p_wc + moved, normal_w))
-            }
-        };
-        Ok(Outcome { touch, ..outcome })
+        for evidence in &mut outcome.evidence {
+            let Evidence::Points(points) = evidence else { continue };
+            let Some(Contact { p_wc, normal_w, .. }) = points.points.first() else { continue };
+            let tangent = turned - normal_w * turned.dot(normal_w);
+            let (axis, angle) = Unit::new_and_get(tangent);
+            let normal_w = Rotation3::from_axis_angle(&axis, angle) * normal_w;
+            *points = Contact::new(p_wc + moved, normal_w).into();
+        }
+        Ok(outcome)
     }
 
     fn time_s(&self) -> Option<f64> {

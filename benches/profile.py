@@ -103,7 +103,7 @@ def profile(program: pathlib.Path, title: str, experiment: str, sets: list[str])
     touches = [touch for row in rows for touch in row["touches"]]
     factorisations = sum(touch.get("fit", {}).get("factorisations", 0) for touch in touches) / len(touches)
     # The time of a row is that since the start of its trial.
-    moved_s = sum(row["touches"][-1].get("time_s") or 0 for row in rows) / len(touches)
+    moved_s = sum(row["touches"][-1]["outcome"].get("time_s") or 0 for row in rows) / len(touches)
     listed = [f"{part} {100 * share:.0f}" for part, share in shares.most_common() if share >= LEAST]
     print(title, f"{spent_s:.1f} s", listed, sep=": ")
     moved = f"{moved_s:.1f}" if moved_s else "–"

@@ -6,7 +6,7 @@ mod tap;
 
 use nalgebra::Point3;
 use palpate::backend::Reading;
-use palpate::explore::probe::{Probe, Touch};
+use palpate::explore::probe::Probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
 use palpate::sim::simulator::Simulator;
@@ -39,11 +39,11 @@ fn slide(environment: &Arc<Environment>, target: &Target) -> Option<Slide> {
     let readings = Arc::<Mutex<Vec<Reading>>>::default();
     let body = Tap { inner: simulator.body().ok()??, readings: Arc::clone(&readings) };
     let mut servo = simulator.servo(Box::new(body), 0).ok()?;
-    let touch = servo.touch(&environment.task().approach(target)?).ok()?;
-    let Touch::Contact(contact) = touch else { return None };
+    let outcome = servo.touch(&environment.task().approach(target)?).ok()?;
+    let (_, further) = outcome.points().split_first()?;
     let bvh = MeshBvh::new(environment.mesh()?.clone());
     let off_m = |p_w: &Point3<f64>| (bvh.closest_point(p_w).point - p_w).norm();
-    let errors_m = contact.patch.iter().map(|point| off_m(&point.p_wc)).collect();
+    let errors_m = further.iter().map(|point| off_m(&point.p_wc)).collect();
     let forces_n = forces_n(&readings.lock().ok()?);
     let first = forces_n.iter().position(|force_n| *force_n >= FORCE_N)?;
     let last = forces_n.iter().rposition(|force_n| *force_n >= LOST * FORCE_N)?;

@@ -2,8 +2,10 @@
 //! touch with a view, over that without one.
 
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::Evidence;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
+use palpate::explore::planner::{self, Offer};
+use palpate::explore::view::SeenSurface;
 use palpate::math::seed::stream;
 use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
@@ -45,9 +47,10 @@ fn measure(name: &str, environment: Arc<Environment>, settings: [GpSettings; 2])
         return;
     };
     let [alone, seen] = settings;
+    let shown = || Evidence::Seen(SeenSurface::of_region(&view, environment.task().region()));
     let taken_s = fastest(|| {
         let mut field = HeightField::new(zone.clone(), seen.clone());
-        field.observe_view(&view);
+        field.add(&shown());
         field.refit().is_ok()
     });
     println!(
@@ -56,14 +59,14 @@ fn measure(name: &str, environment: Arc<Environment>, settings: [GpSettings; 2])
         1e3 * taken_s
     );
     let mut fields = [alone, seen].map(|settings| HeightField::new(zone.clone(), settings));
-    fields[1].observe_view(&view);
+    fields[1].add(&shown());
     let mut probe = exact_probe(Arc::clone(&environment));
     for _ in 0..TOUCHES {
-        let target = zone.at(&[(); 2].map(|()| random.random_range(0.05..0.95)));
-        let Some(approach) = environment.task().approach(&target.clone().into()) else { return };
-        let Ok(touch) = probe.touch(&approach) else { return };
+        let target = zone.at(&[(); 2].map(|()| random.random_range(0.05..0.95))).into();
+        let Some(approach) = environment.task().approach(&target) else { return };
+        let Ok(outcome) = probe.touch(&approach) else { return };
         for field in &mut fields {
-            field.observe(&target, &touch);
+            field.observe(&target, &outcome);
             // Each update starts at the fit before it.
             if field.refit().is_err() {
                 return;
@@ -75,7 +78,9 @@ fn measure(name: &str, environment: Arc<Environment>, settings: [GpSettings; 2])
         let fit_s = fastest(|| field.clone().refit().is_ok());
         let belief = field.into();
         let plan_s = fastest(|| {
-            (active.make)(&Default::default(), stream(1, 0, "active")).plan(&belief).is_ok()
+            (active.make)(&Default::default(), stream(1, 0, "active"))
+                .plan(&belief, &Offer::default())
+                .is_ok()
         });
         [fit_s, plan_s]
     });

@@ -4,7 +4,7 @@
 
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
-use palpate::explore::planner::{self, Plan, PlanError, Planner, PlannerEntry, sample};
+use palpate::explore::planner::{self, Offer, Plan, PlanError, Planner, PlannerEntry, sample};
 
 /// Planner that takes the random target, of thirty, that is farthest from all earlier ones
 /// (Mitchell 1991).
@@ -13,7 +13,7 @@ struct FarthestOfSome {
 }
 
 impl Planner for FarthestOfSome {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+    fn plan(&mut self, belief: &Belief, _: &Offer) -> Result<Plan, PlanError> {
         let earlier: Vec<Vec<f64>> = belief.targets().iter().map(|it| it.numbers()).collect();
         let distance = |target: &[f64]| -> f64 {
             let squares = |other: &Vec<f64>| -> f64 {
@@ -21,7 +21,7 @@ impl Planner for FarthestOfSome {
             };
             earlier.iter().map(squares).fold(f64::INFINITY, f64::min)
         };
-        let some = (0..30).map(|_| sample::random_target(belief, &mut self.rng));
+        let some = (0..30).map(|_| sample::random_target(belief.surface(), &mut self.rng));
         let farthest =
             some.max_by(|a, b| distance(&a.numbers()).total_cmp(&distance(&b.numbers())));
         farthest.map(Plan::at).ok_or_else(|| "no target".into())
@@ -34,6 +34,7 @@ pub static ENTRY: PlannerEntry = PlannerEntry {
     about: "of thirty random targets, the farthest from earlier ones",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |_, rng| Box::new(FarthestOfSome { rng }),
 };
 

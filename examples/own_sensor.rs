@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 use palpate::backend::{Sample, Wrench};
-use palpate::explore::probe::{Probe, Touch, servo::Servo};
+use palpate::explore::probe::{Probe, servo::Servo};
 use palpate::robot::Finger;
 use palpate::robot::sensor::{Doubt, SensedContact, Sensor};
 use palpate::sim::{Environment, Scene, simulator::Simulator};
@@ -47,8 +47,8 @@ pub fn touch() -> Result<f64, Box<dyn std::error::Error>> {
     let (task, zone) = (world.task(), world.task().zone().ok_or("no zone")?);
     let mut servo =
         Servo::new(robot, task.touch().clone(), body, 1)?.with_sensor(Box::new(Switch::default()));
-    let touch = servo.touch(&task.approach(&place.into()).ok_or("not in the zone")?)?;
-    let Touch::Contact(contact) = touch else { return Err("a miss".into()) };
+    let outcome = servo.touch(&task.approach(&place.into()).ok_or("not in the zone")?)?;
+    let contact = outcome.contact().ok_or("a miss")?;
     Ok(world.true_height_m(&place).ok_or("no surface")? - zone.height_m(&contact.p_wc))
 }
 

@@ -4,7 +4,6 @@
 //!     cargo run --release --example touch_around -- scenes/container_around_finger.toml 60
 
 use nalgebra::Vector3;
-use palpate::explore::probe::Touch;
 use palpate::geometry::low_discrepancy::direction;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
@@ -61,16 +60,16 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
         let touch = probe.touch(&approach);
         work_s += begun.elapsed().as_secs_f64();
         let end = match touch {
-            Ok(Touch::Contact(contact)) => {
-                let near = bvh.closest_point(&contact.p_wc);
-                off_mm.push(1e3 * near.distance_m);
-                let [a, b, c] = bvh.mesh().corners(near.triangle as usize);
-                let normal_w = (b - a).cross(&(c - a));
-                turned_deg.push(normal_w.angle(&contact.normal_w).to_degrees());
-                "contact".into()
+            Ok(outcome) => {
+                if let Some(contact) = outcome.contact() {
+                    let near = bvh.closest_point(&contact.p_wc);
+                    off_mm.push(1e3 * near.distance_m);
+                    let [a, b, c] = bvh.mesh().corners(near.triangle as usize);
+                    let normal_w = (b - a).cross(&(c - a));
+                    turned_deg.push(normal_w.angle(&contact.normal_w).to_degrees());
+                }
+                outcome.end.name().into()
             }
-            Ok(Touch::Miss) => "miss".into(),
-            Ok(Touch::Overload) => "overload".into(),
             Err(fault) => {
                 println!("{i}: along {:.2?}: {fault}", aim.direction_w.as_slice());
                 probe = simulator.probe(1)?;

@@ -20,7 +20,7 @@ pub fn ellipsoid(p: Point3<f64>, at: Point3<f64>, radii_m: [f64; 3]) -> Field {
 
 /// Returns a rod with round ends.
 pub fn rod(p: Point3<f64>, a: Point3<f64>, b: Point3<f64>, radius_m: f64) -> Field {
-    Field::round_cone(p, (a, radius_m), (b, radius_m))
+    Field::round_cone(p, [a, b], [radius_m, radius_m])
 }
 
 /// Returns the half-space on the other side of `outward`.

@@ -264,13 +264,13 @@ fn block(p: Point3<f64>) -> Field {
 fn star(p: Point3<f64>) -> Field {
     let arms = [[0.0, 1.0], [0.951, 0.309], [0.588, -0.809], [-0.588, -0.809], [-0.951, 0.309]];
     let arm = |[x, z]: [f64; 2]| {
-        Field::round_cone(p, (Point3::origin(), 0.015), (point![0.054 * x, 0.0, 0.054 * z], 0.005))
+        Field::round_cone(p, [Point3::origin(), point![0.054 * x, 0.0, 0.054 * z]], [0.015, 0.005])
     };
     together(arms.map(arm), 0.006)
 }
 
 fn cone(p: Point3<f64>) -> Field {
-    Field::round_cone(p, (point![0.0, 0.0, -0.004], 0.019), (point![0.0, 0.0, 0.019], 0.004))
+    Field::round_cone(p, [point![0.0, 0.0, -0.004], point![0.0, 0.0, 0.019]], [0.019, 0.004])
 }
 
 fn boulder(p: Point3<f64>) -> Field {
@@ -317,7 +317,7 @@ fn horseshoe(p: Point3<f64>) -> Field {
 
 fn bottle(p: Point3<f64>) -> Field {
     let body =
-        Field::round_cone(p, (point![0.0, 0.0, -0.05], 0.028), (point![0.0, 0.0, 0.012], 0.027));
+        Field::round_cone(p, [point![0.0, 0.0, -0.05], point![0.0, 0.0, 0.012]], [0.028, 0.027]);
     let neck = rod(p, point![0.0, 0.0, 0.03], point![0.0, 0.0, 0.066], 0.011);
     let lip = ellipsoid(p, point![0.0, 0.0, 0.066], [0.016, 0.016, 0.007]);
     body.union(neck, 0.02).union(lip, 0.004)
@@ -352,7 +352,7 @@ fn fork(p: Point3<f64>) -> Field {
     let handle = rod(p, point![0.0, 0.0, -0.072], point![0.0, 0.0, 0.0], 0.007);
     let bridge = rod(p, point![-0.03, 0.0, 0.005], point![0.03, 0.0, 0.005], 0.008);
     let tines = [-0.03, 0.0, 0.03].map(|x| {
-        Field::round_cone(p, (point![x, 0.0, 0.005], 0.007), (point![x, 0.0, 0.073], 0.004))
+        Field::round_cone(p, [point![x, 0.0, 0.005], point![x, 0.0, 0.073]], [0.007, 0.004])
     });
     together([handle, bridge].into_iter().chain(tines), 0.004)
 }
@@ -450,7 +450,7 @@ fn comb(p: Point3<f64>) -> Field {
     let spine = cuboid(p, point![0.0, 0.0, 0.033], [0.058, 0.008, 0.01]);
     let teeth = (0..6).map(|i| {
         let x = 0.022 * (f64::from(i) - 2.5);
-        Field::round_cone(p, (point![x, 0.0, 0.03], 0.005), (point![x, 0.0, -0.041], 0.003))
+        Field::round_cone(p, [point![x, 0.0, 0.03], point![x, 0.0, -0.041]], [0.005, 0.003])
     });
     together([spine].into_iter().chain(teeth), 0.003)
 }

@@ -27,7 +27,8 @@ with open(sys.argv[1], "rb") as file:
                 assert len(frame.electrodes) in (0, 19) and len(frame.pac) in (0, 22), frame
         elif channel.topic == "/palpate/touch":
             row = json.loads(decoded.row)
-            assert row["target"] == list(decoded.target) and decoded.outcome in ("contact", "miss", "overload")
+            assert row["target"]["place"] == list(decoded.target)
+            assert row["outcome"]["end"] == decoded.outcome and decoded.outcome in ("contact", "miss", "overload")
         elif channel.topic == "/palpate/belief":
             assert len(decoded.points) == len(decoded.colors) and len(decoded.points) % 3 == 0
             assert decoded.mesh_file.filename == "" and decoded.pose.orientation.w == 1.0

@@ -54,13 +54,17 @@ def run(
     workers: dict[str, Any],
     executor: Executor,
     trials_per_job: int,
-    how: tuple[str | None, bool, int, bool],
+    *,
+    out: str | None,
+    fresh: bool,
+    threads: int,
+    raises: bool,
     look: Progress,
 ) -> _palpate.Run:
     """Runs the missing trials of an experiment on an executor; `workers` are the factories of its Python planners.
 
     Args:
-        how: as for `_palpate.Experiment.run`; 0 threads mean one.
+        threads: as for `_palpate.Experiment.run`, but 0 means one.
     """
     if not callable(getattr(executor, "submit", None)):
         raise TypeError(
@@ -68,13 +72,12 @@ def run(
         )
     if trials_per_job < 1:
         raise ValueError(f"trials_per_job = {trials_per_job}: allowed is 1 or more")
-    out, fresh, threads, raises = how
     planners = _pickled(workers)
     collector = _palpate.RowCollector(core, list(workers.items()), out, fresh)
     try:
         payload = pickle.dumps((BUILD, collector.text, planners, max(1, threads), raises))
         total = core.trials * len(core.planners)
-        jobs = _Jobs(executor, payload, collector, (total, raises), look)
+        jobs = _Jobs(executor, payload, collector, total, raises, look)
         jobs.run(_groups(collector.missing, trials_per_job))
         count, first = jobs.lost()
         if count:
@@ -99,12 +102,19 @@ class _Jobs:
     """Jobs of a run."""
 
     def __init__(
-        self, executor: Executor, payload: bytes, collector: _palpate.RowCollector, how: tuple[int, bool], look: Progress
+        self,
+        executor: Executor,
+        payload: bytes,
+        collector: _palpate.RowCollector,
+        total: int,
+        raises: bool,
+        look: Progress,
     ) -> None:
         self._executor = executor
         self._payload = payload
         self._collector = collector
-        self._total, self._raises = how
+        self._total = total
+        self._raises = raises
         self._look = look
         #: Jobs without a result, with the number of their submission.
         self._waiting: list[tuple[Any, _Trials, int]] = []
@@ -213,14 +223,15 @@ def _pickled(workers: dict[str, Any]) -> bytes:
 def work(payload: bytes, trials: _Trials, _: Any) -> tuple[bytes, dict[str, str] | None, BaseException | None]:
     """Runs a job in its worker: returns the rows, the hashes of the inputs, and an exception."""
     try:
-        runner, workers, how = _runner(payload)
-        lines, error = runner.run(trials, how, (_ignore, partial(_stop, workers)))
+        runner, workers, threads, raises = _runner(payload)
+        stop = partial(_stop, workers)
+        lines, error = runner.run(trials, threads=threads, raises=raises, look=_ignore, stop=stop)
         return lines, runner.inputs, error
     except (PalpateError, KeyboardInterrupt) as error:
         return b"", None, error
 
 
-_Runner = tuple[_palpate.JobRunner, dict[str, Any], tuple[int, bool]]
+_Runner = tuple[_palpate.JobRunner, dict[str, Any], int, bool]
 
 #: Runner of the last run in this process, which the next jobs of the run use again.
 _last: dict[bytes, _Runner] = {}
@@ -237,7 +248,7 @@ def _runner(payload: bytes) -> _Runner:
             workers = _workers(planners)
             runner = _palpate.JobRunner(text, list(workers.items()))
             _last.clear()
-            _last[key] = (runner, workers, (threads, raises))
+            _last[key] = (runner, workers, threads, raises)
         return _last[key]
 
 

@@ -188,11 +188,23 @@ class Experiment:
 
         look = Progress(self.name, progress)
         folder = None if out is None else os.fspath(out)
-        how = (folder, fresh, threads, on_error == "raise")
+        raises = on_error == "raise"
         if executor is None:
-            run = Run(core.run(list(workers.items()), how, (look, partial(_stop, workers))))
+            own, stop = list(workers.items()), partial(_stop, workers)
+            found = core.run(own, out=folder, fresh=fresh, threads=threads, raises=raises, look=look, stop=stop)
         else:
-            run = Run(run_on(core, workers, executor, trials_per_job, how, look))
+            found = run_on(
+                core,
+                workers,
+                executor,
+                trials_per_job,
+                out=folder,
+                fresh=fresh,
+                threads=threads,
+                raises=raises,
+                look=look,
+            )
+        run = Run(found)
         rows: dict[str, Any] = run._core.trials()
         failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
         if failed:
@@ -217,8 +229,16 @@ class Experiment:
     ) -> dict[str, Any] | None:
         core, workers = self._prepared(planners, max_trials, threads, LIMIT_S, False)
 
-        how = (baseline, accept, tolerance, threads, planners is not None)
-        return core.check(list(workers.items()), how, (Progress(self.name, False), partial(_stop, workers)))
+        return core.check(
+            list(workers.items()),
+            baseline=baseline,
+            accept=accept,
+            tolerance=tolerance,
+            threads=threads,
+            is_partial=planners is not None,
+            look=Progress(self.name, False),
+            stop=partial(_stop, workers),
+        )
 
     def _prepared(
         self,

@@ -98,7 +98,7 @@ class ProcessPlanner:
             self._ask(("make", self._home.factory, *self._begin), belief, start_s)
             self._begin = None
         reply = self._ask(("plan",), belief, self._home.limit_s)
-        target: list[float] = reply
+        target: list[float] | str = reply
         return target
 
     def close(self) -> None:

@@ -432,14 +432,25 @@ class Experiment:
     def run(
         self,
         own: Sequence[tuple[str, Callable[[Zone | None, int], Any]]],
-        how: tuple[str | None, bool, int, bool],
-        callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
+        *,
+        out: str | None,
+        fresh: bool,
+        threads: int,
+        raises: bool,
+        look: Callable[[int, int], None],
+        stop: Callable[[], None],
     ) -> Run: ...
     def check(
         self,
         own: Sequence[tuple[str, Callable[[Zone | None, int], Any]]],
-        how: tuple[str, str | None, float, int, bool],
-        callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
+        *,
+        baseline: str,
+        accept: str | None,
+        tolerance: float,
+        threads: int,
+        is_partial: bool,
+        look: Callable[[int, int], None],
+        stop: Callable[[], None],
     ) -> dict[str, Any] | None: ...
     def __copy__(self) -> Experiment: ...
     def __deepcopy__(self, _memo: Any) -> Experiment: ...
@@ -452,8 +463,11 @@ class JobRunner:
     def run(
         self,
         trials: Sequence[tuple[int, str]],
-        how: tuple[int, bool],
-        callbacks: tuple[Callable[[int, int], None], Callable[[], None]],
+        *,
+        threads: int,
+        raises: bool,
+        look: Callable[[int, int], None],
+        stop: Callable[[], None],
     ) -> tuple[bytes, BaseException | None]: ...
 
 @final

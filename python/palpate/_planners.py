@@ -10,6 +10,7 @@ import copy
 import ctypes
 import importlib
 import inspect
+import json
 import os
 import re
 import sys
@@ -224,13 +225,18 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
     return planner
 
 
-def target_of(planned: Any) -> list[float]:
-    """Returns a planner's result as a list of numbers.
+def target_of(planned: Any) -> list[float] | str:
+    """Returns a planner's result as a list of coordinates, or a named target as JSON.
+
+    A named target is a dict as in rows: `{"stroke": {"place": [x, z], "to": [u, v]}}`, `{"tilted": {"place": [x, z],
+    "pitch_deg": 30}}`.
 
     Raises:
         PlannerError: if it is something else.
     """
     try:
+        if isinstance(planned, Mapping):
+            return json.dumps(planned, default=lambda array: np.asarray(array).tolist())
         return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
     except (TypeError, ValueError) as error:
         raise PlannerError(f"the planner returned {planned!r}, which is not a target: {error}") from None

@@ -40,7 +40,8 @@ impl Ball {
 
     /// Whether a target, shape (6,), aims at a point in the ball.
     fn contains(&self, target: Vec<f64>) -> bool {
-        Target::from_numbers(&target).is_some_and(|target| Region::from(self.0).contains(&target))
+        let region = Region::from(self.0);
+        region.target(&target).is_some_and(|target| region.contains(&target))
     }
 
     /// Returns the target, shape (6,), that aims at a point in the world frame (default: the

@@ -11,11 +11,11 @@ use crate::recognition;
 use crate::zone::Zone;
 use nalgebra::Point3;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
-use palpate::explore::belief::{HeightField, SurfaceBelief};
+use palpate::explore::belief::HeightField;
 use palpate::explore::whole_object::ImplicitSurface;
 use palpate::format::counted;
 use palpate::gp::Posterior;
-use palpate::task::Target;
+use palpate::task::{Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -38,21 +38,13 @@ type Field<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
 
 impl Belief {
     fn over_zone(&self, name: &str) -> PyResult<&HeightField> {
-        match self.0.surface() {
-            SurfaceBelief::HeightField(belief) => Ok(belief),
-            SurfaceBelief::ImplicitSurface(_) => {
-                Err(errors::not_around(name, "mesh(cells), field(points), ball"))
-            }
-        }
+        let unknown = || errors::not_around(name, "mesh(cells), field(points), ball");
+        self.0.height_field().ok_or_else(unknown)
     }
 
     fn around(&self, name: &str) -> PyResult<&ImplicitSurface> {
-        match self.0.surface() {
-            SurfaceBelief::ImplicitSurface(belief) => Ok(belief),
-            SurfaceBelief::HeightField(_) => {
-                Err(errors::not_over_zone(name, "mean(points), variance(points), zone"))
-            }
-        }
+        let unknown = || errors::not_over_zone(name, "mean(points), variance(points), zone");
+        self.0.implicit_surface().ok_or_else(unknown)
     }
 
     fn values<'py>(
@@ -244,7 +236,7 @@ impl Belief {
     /// only).
     fn reaches(&self, target: Vec<f64>) -> PyResult<bool> {
         let scope = self.around("reaches")?.scope();
-        let target = Target::from_numbers(&target);
+        let target = Region::from(scope.ball).target(&target);
         let aim = target.as_ref().and_then(Target::aim);
         Ok(aim.is_some_and(|aim| scope.ball.contains(aim) && scope.reaches(aim)))
     }

@@ -67,14 +67,14 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     counts(&table, "trial", all.iter().map(|(row, ..)| row.trial as usize))?;
     words(&table, "planner", all.iter().map(|(row, ..)| Some(row.planner.as_str())))?;
     counts(&table, "touch", all.iter().map(|(_, count, _)| *count))?;
-    words(&table, "outcome", touches().map(|touch| Some(outcome(touch))))?;
+    words(&table, "outcome", touches().map(|touch| Some(touch.outcome.end.name())))?;
     let scene = &run.experiment.scene;
     let coordinates = scene.zone.as_ref().map_or(&AIM[..], |zone| &PLACE[..zone.dimension()]);
     for (axis, name) in coordinates.iter().enumerate() {
         numbers(&table, name, touches().map(|touch| touch.target.numbers().get(axis).copied()))?;
     }
     for (axis, name) in ["contact_x_m", "contact_y_m", "contact_z_m"].iter().enumerate() {
-        numbers(&table, name, touches().map(|touch| Some(touch.contact?[axis])))?;
+        numbers(&table, name, touches().map(|touch| Some(touch.contact()?[axis])))?;
     }
     numbers(&table, "planned_sd_m", touches().map(|touch| touch.planned_sd_m))?;
     words(&table, "fallback", touches().map(|touch| touch.fallback.map(fallback)))?;
@@ -194,14 +194,6 @@ fn curve(run: &Run, planner: &str, measure: &Measure) -> Vec<[f64; 4]> {
     };
     let points = summary::curve(&run.experiment, &run.rows, planner);
     points.iter().filter_map(reading).collect()
-}
-
-fn outcome(touch: &TouchRow) -> &'static str {
-    match (touch.contact.is_some(), touch.overload) {
-        (true, _) => "contact",
-        (false, true) => "overload",
-        (false, false) => "miss",
-    }
 }
 
 fn fallback(reason: Fallback) -> &'static str {

@@ -3,6 +3,7 @@
 
 use crate::belief::Belief;
 use crate::known::Known;
+use crate::target::TargetInput;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -13,7 +14,7 @@ use std::time::{Duration, Instant};
 // heuristic: waking up takes about as long.
 const BUSY_WAIT: Duration = Duration::from_micros(50);
 
-type Reply = Result<Vec<f64>, String>;
+type Reply = Result<TargetInput, String>;
 
 /// Planner's end of the channel.
 #[pyclass(frozen, module = "palpate._palpate")]
@@ -51,7 +52,7 @@ impl PlannerChannel {
     }
 
     /// Sends a target.
-    fn answer(&self, target: Vec<f64>) {
+    fn answer(&self, target: TargetInput) {
         // Ignored if the trial no longer waits.
         let _ = self.replies.send(Ok(target));
     }
@@ -82,7 +83,7 @@ impl TrialEnd {
     ///
     /// # Errors
     /// If there is no target.
-    pub(crate) fn ask(&self, belief: Known) -> Result<Vec<f64>, NoTarget> {
+    pub(crate) fn ask(&self, belief: Known) -> Result<TargetInput, NoTarget> {
         let gone = || NoTarget::Failed("the planner's thread has ended".into());
         self.requests.send(belief).map_err(|_| gone())?;
         let begun = Instant::now();

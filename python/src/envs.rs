@@ -2,7 +2,7 @@
 
 use crate::belief::Belief;
 use crate::errors;
-use crate::exploration::{Episode, EpisodeOptions, ExplorationScene, Reward};
+use crate::exploration::{EpisodeOptions, ExplorationEnv, ExplorationScene, Reward};
 use crate::fork::ProcessPool;
 use numpy::ndarray::{ArrayView2, Axis};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) struct ParallelExplorations {
     worlds: Arc<[Arc<ExplorationScene>]>,
     how: EpisodeOptions,
-    each: Mutex<Vec<Episode>>,
+    each: Mutex<Vec<ExplorationEnv>>,
     pool: ProcessPool,
 }
 
@@ -65,7 +65,7 @@ impl ParallelExplorations {
         }
         let how = EpisodeOptions { touches, initial, reward, believes: grid > 0 };
         let each = (0..count)
-            .map(|_| Episode::new(&worlds[0], how).map_err(errors::scene))
+            .map(|_| ExplorationEnv::new(&worlds[0], how).map_err(errors::scene))
             .collect::<PyResult<Vec<_>>>()?;
         let pool = ProcessPool::new(threads);
         Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
@@ -87,7 +87,7 @@ impl ParallelExplorations {
     /// Belief of an exploration.
     fn belief(&self, index: usize) -> PyResult<Belief> {
         let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = each.get(index).map(|env| Belief(env.known.clone()));
+        let found = each.get(index).map(|env| Belief(env.belief().clone()));
         found.ok_or_else(|| errors::other(format!("no exploration {index}")))
     }
 
@@ -96,7 +96,7 @@ impl ParallelExplorations {
         let pool = self.pool.get()?;
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
-            let begin = |(env, seed): (&mut Episode, u64)| {
+            let begin = |(env, seed): (&mut ExplorationEnv, u64)| {
                 env.seed(seed);
                 env.begin(&self.worlds);
             };
@@ -121,7 +121,7 @@ impl ParallelExplorations {
         py.detach(|| {
             let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
             let each = each.as_mut_slice();
-            let go = |(env, action): (&mut Episode, &Vec<f32>)| match env.is_over {
+            let go = |(env, action): (&mut ExplorationEnv, &Vec<f32>)| match env.is_over {
                 true => env.begin(&self.worlds),
                 false => env.touch(action),
             };
@@ -153,7 +153,7 @@ impl ParallelExplorations {
             each.iter().flat_map(|env| env.observations.iter().copied()).collect();
         let touches = touches.into_pyarray(py).reshape([count, self.how.touches, width])?;
         step.set_item("touches", touches)?;
-        let column = |of: fn(&Episode) -> f64| PyArray1::from_iter(py, each.iter().map(of));
+        let column = |of: fn(&ExplorationEnv) -> f64| PyArray1::from_iter(py, each.iter().map(of));
         step.set_item("count", PyArray1::from_iter(py, each.iter().map(|env| env.count as i64)))?;
         if self.how.believes {
             let believed: Vec<f32> =

@@ -47,21 +47,21 @@ impl JobRunner {
     }
 
     /// Runs `trials`, pairs of number and planner. Returns lines of `trials.jsonl` in any order,
-    /// and the exception that interrupted it. `raises` and `callbacks` are those of
-    /// `Experiment.run`.
+    /// and the exception that interrupted it. The options are those of `Experiment.run`.
+    #[pyo3(signature = (trials, *, threads, raises, look, stop))]
     fn run<'py>(
         &self,
         py: Python<'py>,
         trials: Vec<(u32, String)>,
-        how: (usize, bool),
-        callbacks: (Py<PyAny>, Py<PyAny>),
+        threads: usize,
+        raises: bool,
+        look: Py<PyAny>,
+        stop: Py<PyAny>,
     ) -> PyResult<(Bound<'py, PyBytes>, Option<PyErr>)> {
-        let (threads, raises) = how;
         let mut jobs = runner::missing_jobs(&self.simulation, &[]).map_err(errors::other)?;
         let wanted: HashSet<_> = trials.iter().map(|(i, name)| (*i, name.as_str())).collect();
         jobs.retain(|(trial, planner)| wanted.contains(&(*trial, planner.name())));
-        let mut callbacks = RunCallbacks::new(callbacks);
-        callbacks.raises = raises;
+        let callbacks = RunCallbacks::new(look, stop, raises);
         let lines = Mutex::new(Ok(Vec::new()));
         let tick = |progress: Progress| {
             callbacks.count(&progress);

@@ -116,22 +116,27 @@ impl Experiment {
         resolved(&self.0)
     }
 
-    /// Runs the missing trials. `own` pairs names of Python planners with their factories; `how`
-    /// has the folder, whether to start again, the number of threads, and whether the first error
-    /// of a Python planner ends the run. `(look, stop)` are callbacks: `look` gets the number of
-    /// finished and of all trials at intervals, `stop` is called when the run is stopped.
+    /// Runs the missing trials, in the folder `out` if there is one. `own` pairs names of Python
+    /// planners with their factories; with `raises`, the first error of one of them ends the run.
+    /// `look` is called with the number of finished and of all trials at intervals, `stop` when
+    /// the run is stopped.
+    #[pyo3(signature = (own, *, out, fresh, threads, raises, look, stop))]
+    #[allow(clippy::too_many_arguments)]
     fn run(
         &self,
         py: Python<'_>,
         own: Vec<(String, Py<PyAny>)>,
-        how: (Option<PathBuf>, bool, usize, bool),
-        callbacks: (Py<PyAny>, Py<PyAny>),
+        out: Option<PathBuf>,
+        fresh: bool,
+        threads: usize,
+        raises: bool,
+        look: Py<PyAny>,
+        stop: Py<PyAny>,
     ) -> PyResult<Run> {
-        let (out, fresh, threads, raises) = how;
         let simulation = self.simulation(py, own)?;
-        let callbacks = RunCallbacks { raises, ..RunCallbacks::new(callbacks) };
+        let callbacks = RunCallbacks::new(look, stop, raises);
         let run = match &out {
-            Some(folder) => callbacks.kept(py, &simulation, (folder, fresh), threads),
+            Some(folder) => callbacks.kept(py, &simulation, folder, fresh, threads),
             None => callbacks.in_memory(py, &simulation, threads),
         };
         // Releases the Python planners before the interpreter continues.
@@ -142,28 +147,33 @@ impl Experiment {
         }
     }
 
-    /// Tests the planners for regressions against the baseline file `path`, as the command
+    /// Tests the planners for regressions against the file `baseline`, as the command
     /// `palpate check` does: returns verdict, remarks, and the columns of a table. With a reason to
-    /// `accept`, writes the file instead; returns `None`. `how` has the file, the reason, the
-    /// tolerance, the number of threads, and whether the baseline's other planners are left alone;
-    /// `own` and `callbacks` are those of `run`.
+    /// `accept`, writes the file instead; returns `None`. With `is_partial`, the baseline's other
+    /// planners are left alone. The other options are those of `run`.
+    #[pyo3(signature = (own, *, baseline, accept, tolerance, threads, is_partial, look, stop))]
+    #[allow(clippy::too_many_arguments)]
     fn check<'py>(
         &self,
         py: Python<'py>,
         own: Vec<(String, Py<PyAny>)>,
-        how: (PathBuf, Option<String>, f64, usize, bool),
-        callbacks: (Py<PyAny>, Py<PyAny>),
+        baseline: PathBuf,
+        accept: Option<String>,
+        tolerance: f64,
+        threads: usize,
+        is_partial: bool,
+        look: Py<PyAny>,
+        stop: Py<PyAny>,
     ) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let (path, accept, tolerance, threads, is_partial) = how;
-        let old = match accept.is_some() && !path.exists() {
+        let old = match accept.is_some() && !baseline.exists() {
             true => None,
-            false => Some(StoredBaseline::read(&path).map_err(errors::other)?),
+            false => Some(StoredBaseline::read(&baseline).map_err(errors::other)?),
         };
         if let Some(old) = &old {
-            old.check_pairs(&path, &self.0).map_err(errors::other)?;
+            old.check_pairs(&baseline, &self.0).map_err(errors::other)?;
         }
         let simulation = self.simulation(py, own)?;
-        let callbacks = RunCallbacks::new(callbacks);
+        let callbacks = RunCallbacks::new(look, stop, false);
         let tick = |progress: Progress| callbacks.count(&progress);
         let stop = &callbacks.is_stopped;
         let jobs = runner::missing_jobs(&simulation, &[]).map_err(errors::other)?;
@@ -180,9 +190,9 @@ impl Experiment {
         let total = jobs.len();
         let run = || runner::run_in_memory(&simulation, jobs, threads, stop, &tick);
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
-        let new = accepted(&simulation, &rows, &why, (old.as_ref(), is_partial), &rules);
+        let new = accepted(&simulation, &rows, &why, old.as_ref(), is_partial, &rules);
         let text = new.map_err(errors::other)?.text().map_err(errors::other)?;
-        write_whole(&path, &text).map_err(errors::other)?;
+        write_whole(&baseline, &text).map_err(errors::other)?;
         Ok(None)
     }
 }
@@ -278,15 +288,15 @@ pub(crate) struct RunCallbacks {
     /// Whether no further trials are started.
     pub(crate) is_stopped: AtomicBool,
     /// Whether the first failed trial of a Python planner ends the run.
-    pub(crate) raises: bool,
+    raises: bool,
     /// First failed trial and its reason.
     failure: Mutex<Option<String>>,
 }
 
 impl RunCallbacks {
-    pub(crate) fn new((look, stop): (Py<PyAny>, Py<PyAny>)) -> Self {
+    pub(crate) fn new(look: Py<PyAny>, stop: Py<PyAny>, raises: bool) -> Self {
         let (done, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-        Self { look, stop, done, is_stopped, raises: false, failure: Mutex::default() }
+        Self { look, stop, done, is_stopped, raises, failure: Mutex::default() }
     }
 
     /// Counts a finished trial; stops the run if it failed and errors are raised.
@@ -311,7 +321,8 @@ impl RunCallbacks {
         &self,
         py: Python<'_>,
         simulation: &Simulation,
-        (path, fresh): (&Path, bool),
+        path: &Path,
+        fresh: bool,
         threads: usize,
     ) -> PyResult<Run> {
         let experiment = simulation.experiment();
@@ -322,7 +333,7 @@ impl RunCallbacks {
         let total = done.len() + jobs.len();
         let outcome = self.watched(py, total, || {
             let tick = |progress: Progress| self.count(&progress);
-            runner::run(simulation, (&mut folder, jobs), threads, &self.is_stopped, None, &tick)
+            runner::run(simulation, &mut folder, jobs, threads, &self.is_stopped, None, &tick)
         });
         folder.sort(experiment).map_err(errors::run)?;
         outcome?.map_err(errors::run)?;

@@ -2,14 +2,14 @@
 
 use crate::errors;
 use crate::fork;
-use crate::known::{self, AIM, BeliefErrors, GroundTruth, Known};
+use crate::known::{self, AIM, BeliefErrors, GroundTruth};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
 use palpate::experiment::trial;
-use palpate::explore::belief::SurfaceBelief;
-use palpate::explore::planner::sample::random_aim;
-use palpate::explore::planner::uniform;
-use palpate::explore::probe::{Contact, Probe};
+use palpate::explore::belief::Belief;
+use palpate::explore::episode::Episode;
+use palpate::explore::evidence::Contact;
+use palpate::explore::planner::sample::random_target;
 use palpate::explore::recognition::Library;
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
@@ -76,7 +76,7 @@ impl ExplorationScene {
     }
 
     /// Returns a belief without touches.
-    fn empty_belief(&self, random: &mut ChaCha8Rng) -> Known {
+    fn empty_belief(&self, random: &mut ChaCha8Rng) -> Belief {
         let environment = self.simulator.environment();
         let known = known::empty_belief(environment);
         let library = self.library.as_ref();
@@ -144,12 +144,9 @@ impl ExplorationScene {
 
     /// Row of a touch: its target, contact and 1, or zeros without contact.
     fn touch_row(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
-        let mut row = match (self.task().region(), target) {
-            (Region::Zone(zone), Target::Place(place)) => self.zone_row(zone, place, met),
-            (Region::Zone(zone), Target::Tilted { place, .. } | Target::Stroke { place, .. }) => {
-                self.zone_row(zone, place, met)
-            }
-            (Region::Ball(ball), Target::Aim(aim) | Target::StrokeAround { aim, .. }) => {
+        let mut row = match (self.task().region(), target.place(), target.aim()) {
+            (Region::Zone(zone), Some(place), _) => self.zone_row(zone, place, met),
+            (Region::Ball(ball), _, Some(aim)) => {
                 let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
                 let mut row: Vec<f64> = aim.direction_w.iter().map(|ahead| -ahead).collect();
                 row.extend(within(aim.p_w).iter());
@@ -213,12 +210,10 @@ pub(crate) enum Reward {
 }
 
 /// A running exploration.
-pub(crate) struct Episode {
+pub(crate) struct ExplorationEnv {
     how: EpisodeOptions,
     world: Arc<ExplorationScene>,
-    probe: Box<dyn Probe>,
-    /// Belief after the touches so far.
-    pub(crate) known: Known,
+    episode: Episode<'static>,
     random: ChaCha8Rng,
     score: f64,
     /// Number of touches made.
@@ -237,17 +232,17 @@ pub(crate) struct Episode {
     pub(crate) failure: Option<String>,
 }
 
-impl Episode {
+impl ExplorationEnv {
     /// Creates an exploration that has not started.
     ///
     /// # Errors
     /// If the robot cannot be moved to its start.
     pub(crate) fn new(world: &Arc<ExplorationScene>, how: EpisodeOptions) -> Result<Self, Fault> {
+        let belief = world.empty_belief(&mut seed::stream(0, 0, "exploration"));
         Ok(Self {
             how,
             world: Arc::clone(world),
-            probe: world.simulator.probe(0)?,
-            known: world.empty_belief(&mut seed::stream(0, 0, "exploration")),
+            episode: Episode::new(world.task(), belief, world.simulator.probe(0)?),
             random: seed::stream(0, 0, "exploration"),
             score: 0.0,
             count: 0,
@@ -258,6 +253,11 @@ impl Episode {
             is_over: true,
             failure: None,
         })
+    }
+
+    /// Belief after the touches so far.
+    pub(crate) fn belief(&self) -> &Belief {
+        self.episode.belief()
     }
 
     /// Scene of the episode.
@@ -275,12 +275,12 @@ impl Episode {
         let world = &worlds[self.random.random_range(0..worlds.len())];
         let probe = world.simulator.probe(self.random.random());
         self.world = Arc::clone(world);
-        self.known = world.empty_belief(&mut self.random);
+        let belief = world.empty_belief(&mut self.random);
         self.observations = vec![0.0; self.how.touches * world.row()];
         self.believed = vec![0.0; 2 * world.grid.len()];
         (self.count, self.is_over, self.failure) = (0, false, None);
         let made = probe.and_then(|probe| {
-            self.probe = probe;
+            self.episode = Episode::new(self.world.task(), belief, probe);
             (0..self.how.initial).try_for_each(|_| {
                 let target = self.anywhere();
                 self.touch_at(&target)
@@ -300,28 +300,19 @@ impl Episode {
     }
 
     fn anywhere(&mut self) -> Target {
-        match self.known.surface() {
-            SurfaceBelief::HeightField(belief) => uniform(belief.zone(), &mut self.random).into(),
-            SurfaceBelief::ImplicitSurface(belief) => {
-                let mut random = seed::stream(self.random.random(), 0, "side");
-                random_aim(belief.scope(), &mut random).into()
-            }
+        let belief = self.episode.belief();
+        if belief.region().zone().is_some() {
+            return random_target(belief.surface(), &mut self.random);
         }
+        let mut random = seed::stream(self.random.random(), 0, "side");
+        random_target(belief.surface(), &mut random)
     }
 
     /// Makes a touch; an unreachable aim counts as a touch without contact.
     fn touch_at(&mut self, target: &Target) -> Result<(), Fault> {
-        let task = self.world.task();
         let mut met = None;
-        if let Some(approach) = task.approach(target) {
-            let mut outcome = self.probe.execute(&approach)?;
-            let recognises = self.world.library.is_some();
-            if self.how.believes || self.how.reward != Reward::None || recognises {
-                let is_used = self.world.is_around() || recognises;
-                outcome.swept = outcome.swept.filter(|_| is_used);
-                self.known.observe(target, &approach, &outcome);
-            }
-            met = outcome.contact().cloned();
+        if let Ok(action) = self.episode.action(target) {
+            met = self.episode.execute(target, &action)?.contact().cloned();
         }
         let numbers = self.world.touch_row(target, met.as_ref());
         let row = self.observations[self.count * numbers.len()..].iter_mut();
@@ -342,8 +333,8 @@ impl Episode {
         if !self.how.believes && self.how.reward == Reward::None {
             return Ok(());
         }
-        self.known.refit().map_err(|error| error.to_string())?;
-        let (world, known) = (&self.world, &self.known);
+        self.episode.fit().map_err(|error| error.to_string())?;
+        let (world, known) = (&self.world, self.episode.belief());
         let unit_m = world.unit_m();
         match world.truth.measure(known, CELLS) {
             Some(BeliefErrors::Zone(metrics)) => {
@@ -376,19 +367,7 @@ impl Episode {
 }
 
 /// Means and variances of the height or the field on the grid.
-fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    match known.surface() {
-        SurfaceBelief::HeightField(belief) => {
-            let values = belief.surface().map(|it| it.predict(grid.iter().map(Vec::as_slice)));
-            let values = values.into_iter().flatten();
-            values.map(|values| (values.mean, values.variance)).collect()
-        }
-        SurfaceBelief::ImplicitSurface(belief) => {
-            let Some(surface) = belief.surface() else { return Vec::new() };
-            let points_w: Vec<Point3<f64>> = grid.iter().map(|at| Point3::from_slice(at)).collect();
-            let means_m = surface.values(&points_w).into_iter();
-            let sds_m = surface.sds_m(&points_w);
-            means_m.zip(sds_m).map(|(mean_m, sd_m)| (mean_m, sd_m * sd_m)).collect()
-        }
-    }
+fn believed(belief: &Belief, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let Some(field) = belief.field() else { return Vec::new() };
+    field.means(grid).into_iter().zip(field.variances(grid, &mut [])).collect()
 }

@@ -1,21 +1,27 @@
 //! Interactive exploration: touch by touch, with the belief after each.
 
 use crate::belief::Belief;
-use crate::known::{self, BeliefErrors, GroundTruth, Known};
+use crate::known::{self, BeliefErrors, GroundTruth};
 use crate::scene::{Scene, Touch};
+use crate::target::TargetInput;
 use crate::{errors, exploration, fork};
+use palpate::backend::Fault;
+use palpate::explore::episode::Episode;
+use palpate::explore::evidence::Outcome;
+use palpate::explore::view::SeenSurface;
 use palpate::format::counted;
+use palpate::sim::camera::probe::CameraProbe;
 use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Interactive exploration of a scene: each touch updates a belief, which is fitted and can be
 /// compared with the ground truth.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Exploration {
     scene: Py<Scene>,
-    known: Mutex<Known>,
+    episode: Mutex<Episode<'static>>,
     truth: GroundTruth,
 }
 
@@ -33,34 +39,39 @@ impl Exploration {
                 GroundTruth::of(environment, exploration::TRUTH_PER_SIDE),
             )
         })?;
-        Ok(Self { known: Mutex::new(known), truth, scene })
+        let seeds = [scene.get().seed(), 0];
+        let probe = CameraProbe::new(scene.get().probe(), scene.get().environment(), seeds);
+        let episode = Episode::new(scene.get().environment().task(), known, probe);
+        Ok(Self { episode: Mutex::new(episode), truth, scene })
     }
 
     /// Makes a touch at a target and fits the belief.
-    fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
-        let (touch, values) = self.scene.get().touched(py, target.clone())?;
-        let fitted = py.detach(|| {
-            let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(target) = Target::from_numbers(&target) {
-                known.observe(&target, &values.approach, &values.outcome);
-            }
-            known.refit().map(|_| ())
-        });
-        fitted.map_err(errors::other)?;
-        Ok(touch)
+    fn touch(&self, py: Python<'_>, target: &Bound<'_, PyAny>) -> PyResult<Touch> {
+        let scene = self.scene.get();
+        let (target, _) = scene.target(&TargetInput::of(target)?)?;
+        let outcome = self.execute(py, &target)?;
+        Ok(scene.result(&target, &outcome))
+    }
+
+    /// Looks from place `camera` of the scene's camera and fits the belief; returns the number of
+    /// surface elements that it shows.
+    #[pyo3(signature = (camera = 0))]
+    fn look(&self, py: Python<'_>, camera: u32) -> PyResult<usize> {
+        let outcome = self.execute(py, &Target::Look { camera })?;
+        Ok(outcome.seen().map_or(0, SeenSurface::len))
     }
 
     /// Belief after the touches so far.
     #[getter]
     fn belief(&self) -> Belief {
-        Belief(self.known.lock().unwrap_or_else(PoisonError::into_inner).clone())
+        Belief(self.lock().belief().clone())
     }
 
     /// Errors of the belief, named as in rows; None before the first touch.
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let measured = fork::detach(py, || {
-            let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let known = self.lock().belief().clone();
             self.truth.measure(&known, CELLS)
         })?;
         let json = match measured {
@@ -76,7 +87,25 @@ impl Exploration {
     }
 
     fn __repr__(&self) -> String {
-        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        format!("Exploration({})", counted(known.targets().len(), "touch"))
+        format!("Exploration({})", counted(self.lock().belief().targets().len(), "touch"))
+    }
+}
+
+impl Exploration {
+    fn lock(&self) -> MutexGuard<'_, Episode<'static>> {
+        self.episode.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Executes the action at a target and fits the belief.
+    fn execute(&self, py: Python<'_>, target: &Target) -> PyResult<Outcome> {
+        let executed = py.detach(|| {
+            let mut episode = self.lock();
+            let action = episode.action(target)?;
+            let outcome = episode.execute(target, &action)?;
+            Ok::<_, Fault>((outcome, episode.fit()))
+        });
+        let (outcome, fitted) = executed.map_err(errors::scene)?;
+        fitted.map_err(errors::other)?;
+        Ok(outcome)
     }
 }

@@ -6,20 +6,20 @@ use palpate::experiment::truth::Truth;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::sim::Environment;
+use palpate::task::Zone;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
-use palpate::explore::belief::SurfaceBelief;
 
 /// Returns an empty belief for `environment` with default settings.
 pub(crate) fn empty_belief(environment: &Environment) -> Known {
     let scene = environment.scene();
-    let finger = (&scene.finger, scene.effects.skin.is_some());
-    Known::new(environment.task(), finger, &GpSettings::default(), &SpatialGpSettings::default())
+    let surface = scene.effects.surface();
+    Known::new(environment.task(), &surface, &GpSettings::default(), &SpatialGpSettings::default())
 }
 
 /// Number of values of a target of `known`.
 pub(crate) fn target_numbers(known: &Known) -> usize {
-    known.height_field().map_or(AIM, |field| field.zone().dimension())
+    known.region().zone().map_or(AIM, Zone::dimension)
 }
 
 /// Number of values of a target around an object.
@@ -53,14 +53,12 @@ impl GroundTruth {
     /// Errors of `known`; a closed surface is meshed with `cells` along its longest side. `None`
     /// before the first fit, or without ground truth.
     pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<BeliefErrors> {
-        match (self, known.surface()) {
-            (Self::Zone(truth), SurfaceBelief::HeightField(belief)) => {
-                truth.compare(belief).map(BeliefErrors::Zone)
+        match self {
+            Self::Zone(truth) => truth.compare(known.surface()).map(BeliefErrors::Zone),
+            Self::Around(shape) => {
+                let surface = known.implicit_surface()?.surface()?;
+                Some(BeliefErrors::Around(shape.as_ref()?.evaluate(surface, cells)))
             }
-            (Self::Around(shape), SurfaceBelief::ImplicitSurface(belief)) => {
-                Some(BeliefErrors::Around(shape.as_ref()?.evaluate(belief.surface()?, cells)))
-            }
-            _ => None,
         }
     }
 }

@@ -24,6 +24,7 @@ mod program;
 mod recognition;
 mod run;
 mod scene;
+mod target;
 mod zone;
 
 use pyo3::prelude::*;

@@ -2,10 +2,13 @@
 
 use crate::belief::Belief;
 use crate::desk::{NoTarget, PlannerChannel, TrialEnd};
-use crate::known::{Known, target_numbers};
+use crate::known::Known;
+use crate::target::TargetInput;
 use crate::zone::Zone;
-use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
-use palpate::task::{self, Target};
+use palpate::explore::planner::{
+    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, Refined,
+};
+use palpate::task;
 use pyo3::prelude::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -15,8 +18,7 @@ pub(crate) struct PythonFactory {
     /// Name, `MODULE:CLASS`.
     pub(crate) name: String,
     /// Function that starts a planner from the zone (None around an object) and the seed. The
-    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> sequence of
-    /// float`, whose exception is the reason for a missing target.
+    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> target`, whose exception is the reason for a missing target.
     pub(crate) start: Py<PyAny>,
     /// Source code that determines the plans.
     pub(crate) source: String,
@@ -33,7 +35,7 @@ impl PlannerFactory for PythonFactory {
 
     fn make(&self, _: &PlanningSettings, mut random: ChaCha8Rng) -> Box<dyn Planner> {
         let start = Python::attach(|py| self.start.clone_ref(py));
-        Box::new(PythonPlanner { start, seed: random.random(), begun: None })
+        Box::new(Refined(PythonPlanner { start, seed: random.random(), begun: None }))
     }
 }
 
@@ -75,10 +77,9 @@ impl PythonPlanner {
         })
     }
 
-    fn target(&mut self, belief: &Known) -> Result<Vec<f64>, String> {
+    fn target(&mut self, belief: &Known) -> Result<TargetInput, String> {
         if self.begun.is_none() {
-            let zone = belief.height_field().map(|field| field.zone());
-            self.begun = Some(self.begin(zone));
+            self.begun = Some(self.begin(belief.region().zone()));
         }
         let Some(begun) = &self.begun else { return Err("the planner was not started".into()) };
         let StartedPlanner { planner, desk } = begun.as_ref().map_err(Clone::clone)?;
@@ -101,20 +102,10 @@ impl PythonPlanner {
 }
 
 impl Planner for PythonPlanner {
-    fn plan(&mut self, belief: &Known) -> Result<Plan, PlanError> {
-        let target = self.target(belief).map_err(|reason| PlanError { reason })?;
-        let (found, wanted) = (target.len(), target_numbers(belief));
-        // A place of a zone may be followed by a pitch or the end of a stroke, an aim by a way.
-        let is_longer = matches!((wanted, found), (2, 3 | 4) | (6, 9));
-        if found != wanted && !is_longer {
-            let is_zone = belief.height_field().is_some();
-            let of = if is_zone { "of this zone" } else { "around an object" };
-            let reason =
-                format!("the target has {found} coordinates, a target {of} needs {wanted}");
-            return Err(PlanError { reason });
-        }
-        let target = Target::from_numbers(&target).ok_or("the target has no direction")?;
-        Ok(Plan::at(target))
+    fn plan(&mut self, belief: &Known, _offer: &Offer) -> Result<Plan, PlanError> {
+        let planned = self.target(belief);
+        let target = planned.and_then(|target| target.in_region(&belief.region()));
+        target.map(Plan::at).map_err(|reason| PlanError { reason })
     }
 }
 

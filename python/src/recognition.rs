@@ -1,7 +1,7 @@
 //! Recognition for Python: hypotheses of a belief, and the core of the Gymnasium environments.
 
 use crate::errors;
-use crate::exploration::{Episode, EpisodeOptions, ExplorationScene, Reward};
+use crate::exploration::{EpisodeOptions, ExplorationEnv, ExplorationScene, Reward};
 use crate::fork;
 use palpate::experiment::measure::recognition::NONE;
 use palpate::experiment::{Experiment, Simulation};
@@ -31,7 +31,7 @@ pub(crate) fn pose(hypotheses: &ObjectHypotheses) -> (String, [f64; 3], [f64; 3]
     (object.name.clone(), position_m, rotation_deg)
 }
 
-/// Episode of touches of an object drawn from a library.
+/// ExplorationEnv of touches of an object drawn from a library.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct RecognitionEpisode {
     simulation: Simulation,
@@ -40,7 +40,7 @@ pub(crate) struct RecognitionEpisode {
 }
 
 struct State {
-    episode: Episode,
+    episode: ExplorationEnv,
     object: TrueObject,
 }
 
@@ -104,7 +104,7 @@ impl RecognitionEpisode {
     /// reason of an early end.
     #[getter]
     fn observation(&self) -> (Vec<f32>, usize, bool, Option<String>) {
-        let Episode { observations, count, is_over, failure, .. } = &self.lock().episode;
+        let ExplorationEnv { observations, count, is_over, failure, .. } = &self.lock().episode;
         (observations.clone(), *count, *is_over, failure.clone())
     }
 
@@ -114,7 +114,7 @@ impl RecognitionEpisode {
         let state = self.lock();
         state
             .episode
-            .known
+            .belief()
             .hypotheses()
             .map(ObjectHypotheses::class_probabilities)
             .unwrap_or_default()
@@ -149,7 +149,7 @@ fn begin(simulation: &Simulation, how: EpisodeOptions, seed: u64) -> PyResult<St
     let found = drawn.as_ref().and_then(|drawn| Some((drawn, drawn.object()?, drawn.library()?)));
     let (drawn, object, library) = found.ok_or_else(|| errors::other("no object is drawn"))?;
     let world = ExplorationScene::of_library(drawn.simulator().clone(), Arc::clone(library));
-    let mut episode = Episode::new(&world, how).map_err(errors::scene)?;
+    let mut episode = ExplorationEnv::new(&world, how).map_err(errors::scene)?;
     episode.seed(seed);
     episode.begin(std::slice::from_ref(&world));
     Ok(State { episode, object: object.clone() })

@@ -6,7 +6,6 @@ use crate::columns;
 use crate::errors;
 use crate::experiment::{FormerNames, parsed};
 use crate::fork;
-use crate::known::Known;
 use crate::pickle::{self, Reduced, Version};
 use crate::places::rows;
 use crate::zone::Zone;
@@ -16,8 +15,7 @@ use palpate::experiment::store::{self, resolved};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
 use palpate::geometry::mesh::Mesh;
-use palpate::report::replay::BeliefReplay;
-use palpate::report::{findings, tables, whole_object};
+use palpate::report::{findings, tables};
 use palpate::task;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -113,12 +111,7 @@ impl Run {
     fn belief(&self, trial: u32, planner: &str, touch: u32) -> PyResult<Belief> {
         let row = self.row(trial, planner)?;
         let experiment = &self.0.experiment;
-        let known = if experiment.scene.whole_object.is_some() {
-            whole_object::belief(experiment, row, touch).map_err(errors::other)?.map(Known::from)
-        } else {
-            let replay = BeliefReplay::of(experiment, row, touch).map_err(errors::other)?;
-            replay.map(|replay| Known::from(replay.belief))
-        };
+        let known = row.belief(experiment, touch).map_err(errors::other)?;
         let none = || {
             let (made, first) = (row.touches.len(), experiment.initial_touches);
             errors::other(format!(

@@ -6,17 +6,19 @@ use crate::experiment::FormerNames;
 use crate::mesh::{Arrays, arrays, mesh_of};
 use crate::pickle::{self, Reduced, Version};
 use crate::places::Places;
+use crate::target::TargetInput;
 use crate::zone::Zone;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use palpate::backend::Fault;
 use palpate::config::Loader;
-use palpate::explore::probe;
+use palpate::explore::evidence::{Contact, Outcome};
+use palpate::explore::probe::Probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::sim;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::simulator::Simulator;
-use palpate::task::{self, Approach};
+use palpate::task;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -33,7 +35,7 @@ pub(crate) struct Scene {
     /// Mesh in place of the object's file.
     mesh: Option<MeshArrays>,
     /// Probe, created with the first touch.
-    probe: Mutex<Option<Box<dyn probe::Probe>>>,
+    probe: Arc<Mutex<Option<Box<dyn Probe>>>>,
     seed: u64,
 }
 
@@ -68,7 +70,7 @@ impl Scene {
             Simulator::new(Arc::new(environment.map_err(errors::scene)?)).map_err(errors::scene)
         })?;
         simulator.check_reach().map_err(errors::scene)?;
-        Ok(Self { simulator, settings, mesh, probe: Mutex::new(None), seed })
+        Ok(Self { simulator, settings, mesh, probe: Arc::default(), seed })
     }
 
     /// Reads the settings of a scene from its file, or from assignments alone.
@@ -81,7 +83,7 @@ impl Scene {
         read.map_err(errors::config)
     }
 
-    pub(crate) fn environment(&self) -> &Environment {
+    pub(crate) fn environment(&self) -> &Arc<Environment> {
         self.simulator.environment()
     }
 
@@ -90,49 +92,77 @@ impl Scene {
         task.zone().ok_or_else(|| errors::not_around(name, "ball, mesh()"))
     }
 
-    /// Makes a touch at a target; also returns the approach and the swept volume.
-    ///
-    /// # Errors
-    /// `ValueError` for an invalid target, `SimulationError` for a fault of the backend.
-    pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, TouchData)> {
-        let task = self.environment().task();
-        let known = task::Target::from_numbers(&target).filter(|at| task.contains(at));
-        let Some(approach) = known.and_then(|at| task.approach(&at)) else {
-            let words = match task.ball() {
-                None => "is outside the zone",
-                Some(_) => "is not a reachable aim of six numbers into the ball",
-            };
-            return Err(PyValueError::new_err(format!("{target:?} {words}")));
-        };
-        let touched = py.detach(|| {
-            let mut probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
-            let probe = match &mut *probe {
-                Some(probe) => probe,
-                none => none.insert(self.simulator.probe(self.seed)?),
-            };
-            Ok::<_, Fault>((probe.execute(&approach)?, probe.time_s()))
-        });
-        let (found, time_s) = touched.map_err(errors::scene)?;
-        let outcome = match &found.touch {
-            probe::Touch::Contact(_) => OUTCOMES[0],
-            probe::Touch::Miss => OUTCOMES[1],
-            probe::Touch::Overload => OUTCOMES[2],
-        };
-        let contact = found.contact().cloned();
-        let place = (task.zone())
+    /// Returns the probe of all touches, which this creates with the first.
+    pub(crate) fn probe(&self) -> SceneProbe {
+        SceneProbe {
+            simulator: self.simulator.clone(),
+            seed: self.seed,
+            probe: Arc::clone(&self.probe),
+        }
+    }
+
+    /// Returns the seed of all random numbers.
+    pub(crate) fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Returns the result of a touch, or of a stroke.
+    pub(crate) fn result(&self, target: &task::Target, outcome: &Outcome) -> Touch {
+        let contact = outcome.contact().cloned();
+        let zone = self.environment().task().zone();
+        let place = zone
             .zip(contact.as_ref())
             .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
-        let values = TouchData { approach, outcome: found };
-        Ok((Touch { target, outcome, contact, place, time_s }, values))
+        let (target, time_s) = (target.numbers(), outcome.time_s);
+        Touch { target, outcome: outcome.end.name(), contact, place, time_s }
+    }
+
+    /// Returns a target in the region with its approach.
+    ///
+    /// # Errors
+    /// `ValueError` for an invalid target.
+    pub(crate) fn target(&self, target: &TargetInput) -> PyResult<(task::Target, task::Approach)> {
+        let task = self.environment().task();
+        let found = target.in_region(task.region()).map_err(PyValueError::new_err)?;
+        let approach = task.approach(&found).filter(|_| task.contains(&found));
+        let approach = approach.ok_or_else(|| {
+            let words = match task.ball() {
+                None => "is outside the zone",
+                Some(_) => "is not a reachable aim into the ball",
+            };
+            PyValueError::new_err(format!("{:?} {words}", found.numbers()))
+        })?;
+        Ok((found, approach))
     }
 }
 
-/// Data of a touch that a belief is updated with.
-pub(crate) struct TouchData {
-    /// Approach of the finger.
-    pub(crate) approach: Approach,
-    /// Outcome of the touch.
-    pub(crate) outcome: probe::Outcome,
+/// Probe of a scene, whose touches follow each other.
+#[derive(Clone)]
+pub(crate) struct SceneProbe {
+    simulator: Simulator,
+    seed: u64,
+    probe: Arc<Mutex<Option<Box<dyn Probe>>>>,
+}
+
+impl Probe for SceneProbe {
+    fn execute(&mut self, action: &task::Action) -> Result<Outcome, Fault> {
+        let mut probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
+        let probe = match &mut *probe {
+            Some(probe) => probe,
+            none => none.insert(self.simulator.probe(self.seed)?),
+        };
+        probe.execute(action)
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        let probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
+        probe.as_ref().and_then(|probe| probe.time_s())
+    }
+
+    fn rest(&mut self, time_s: f64) {
+        let mut probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
+        probe.iter_mut().for_each(|probe| probe.rest(time_s));
+    }
 }
 
 #[pymethods]
@@ -274,8 +304,11 @@ impl Scene {
     }
 
     /// Makes a touch at a target, shape (d,), metres; around an object six numbers, as in `Ball`.
-    fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
-        Ok(self.touched(py, target)?.0)
+    fn touch(&self, py: Python<'_>, target: &Bound<'_, PyAny>) -> PyResult<Touch> {
+        let (target, approach) = self.target(&TargetInput::of(target)?)?;
+        let mut probe = self.probe();
+        let outcome = py.detach(|| probe.touch(&approach)).map_err(errors::scene)?;
+        Ok(self.result(&target, &outcome))
     }
 
     /// True height above the datum, metres, at places of shape (..., d); NaN outside the object.
@@ -326,7 +359,7 @@ pub(crate) struct Touch {
     /// located).
     #[pyo3(get)]
     outcome: &'static str,
-    contact: Option<probe::Contact>,
+    contact: Option<Contact>,
     place: Option<(Vec<f64>, f64)>,
     /// Simulator or robot time since its start, seconds; None without motion.
     #[pyo3(get)]
@@ -375,7 +408,7 @@ impl Touch {
         pickle::check(&version, "Touch")?;
         let outcome = OUTCOMES.into_iter().find(|known| *known == outcome);
         let contact = contact.map(|json| serde_json::from_str(&json)).transpose();
-        let contact: Option<probe::Contact> = contact.map_err(errors::other)?;
+        let contact: Option<Contact> = contact.map_err(errors::other)?;
         Ok(Self { target, outcome: outcome.unwrap_or_default(), contact, place, time_s })
     }
 

@@ -42,14 +42,20 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     assert len(run.summary().query("planner == 'own:Middle'")) > 0
 
 
+def further(touch):
+    """Returns the points of a touch after the point of contact."""
+    evidence = touch["outcome"].get("evidence", [])
+    return [point for one in evidence if "points" in one for point in one["points"]["points"][1:]]
+
+
 def test_an_own_planner_makes_strokes():
     slides = palpate.Experiment.load("container_strokes", touches=5, initial_touches=2)
     run = slides.run([own.Strokes], trials=1)
     assert run.trials()["failure"].isna().all()
     touches = json.loads(run.rows())["touches"]
-    assert all(len(touch.get("patch", [])) == 0 for touch in touches[:2])
+    assert all(len(further(touch)) == 0 for touch in touches[:2])
     assert all("stroke" in touch["target"] for touch in touches[2:])
-    assert sum(len(touch.get("patch", [])) for touch in touches[2:]) > 20
+    assert sum(len(further(touch)) for touch in touches[2:]) > 20
     taps = palpate.Experiment.load("container", touches=3, initial_touches=2)
     failed = taps.run([own.Strokes], trials=1).trials()["failure"]
     assert all("the scene has no [touch.stroke]" in reason for reason in failed)

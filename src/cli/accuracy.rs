@@ -12,6 +12,7 @@ use crate::report::table::with_interval;
 use crate::report::{accuracy, files};
 use crate::sim::Scene;
 use crate::study::accuracy::comparison::{AccuracyComparison, CheapestScene, MeasurementCounts};
+use crate::study::accuracy::convergence::ConvergenceOrder;
 use crate::study::accuracy::deviation::{ErrorStatistics, Quantity, TouchShare};
 use crate::study::accuracy::switches::with_all_effects;
 use crate::study::accuracy::tolerance::{Criterion, Origin};
@@ -113,26 +114,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     needs_zone(&scene, &args.scene)?;
     let path = args.scene.display();
     ensure!(scene.object.is_some(), "{path}: levels and effects need a scene with an object");
-    let is_verdict = matches!(args.tolerance, Some(Criterion::Verdict(_)));
-    let is_of_effects = args.against == Some(Origin::Scene);
-    let has_levels = !is_of_effects && !is_verdict;
-    let has_effects = (is_of_effects || args.against.is_none()) && scene.simulator.moves_finger();
-    if !has_levels && !has_effects {
-        let body = scene.simulator.name();
-        ensure!(
-            scene.simulator.moves_finger(),
-            "{path}: simulator = \"{body}\" has no effects; effects need simulator = \"kinematic\""
-        );
-        bail!("--against: --tolerance verdict compares with the scene; use --against scene");
-    }
-    let origin =
-        args.against.unwrap_or(if has_effects { Origin::Scene } else { Origin::Reference });
-    let is_of_contact =
-        |it| !matches!(it, Criterion::Touches(it) if it.quantity != Quantity::Contact);
-    ensure!(
-        origin != Origin::Truth || args.tolerance.is_none_or(is_of_contact),
-        "--against truth: true forces are unknown; allowed is a tolerance in mm or um"
-    );
+    let Scope { has_levels, has_effects, origin } = Scope::new(args, &scene)?;
     let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/accuracy-{name}")));
     args.force.check_folder(&out, "accuracy.json")?;
@@ -140,69 +122,27 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
 
     let stop = stop_on_interrupt("touches")?;
     let is_stopped = || stop.load(Ordering::Relaxed);
-    let (mut levels, mut effects, mut orders) = (None, None, Vec::new());
+    let mut study = Study::default();
     if has_levels {
-        let effort = effort(args, LEVEL_TOUCHES, false);
-        let compared = compare(Variant::levels(&scene), effort, args.tolerance, (talk, &stop))?;
-        if !is_stopped() {
-            orders = compared.orders(&scene)?;
-        }
-        print(&format!("levels; the reference is the finest:\n{}", table(&compared)))?;
-        let words = ["does NOT decrease", "decreases"];
-        if let Some(is_converging) = compared.is_converging() {
-            let words = words[usize::from(is_converging)];
-            print(&format!("the force error {words} at every level towards the reference"))?;
-        }
-        for order in &orders {
-            print(&format!(
-                "order of convergence in the {}: {:.2} observed, {} expected",
-                order.name, order.observed, order.expected
-            ))?;
-        }
-        levels = Some(compared);
+        study.add_levels(args, &scene, talk, &stop)?;
     }
     if has_effects && !is_stopped() {
-        let scene = if args.full { with_all_effects(&scene) } else { scene.clone() };
-        let effort = effort(args, EFFECT_TOUCHES, true);
-        let compared = compare(Variant::effects(&scene), effort, args.tolerance, (talk, &stop))?;
-        let within = compared
-            .criterion
-            .map_or(String::new(), |it| format!(", within {}", criterion_text(it)));
-        print(&format!(
-            "effects{within}; keep every effect that is marked needed and that the real finger has:"
-        ))?;
-        print(&format!("{}{INTERVAL_NOTE}", table(&compared)))?;
-        effects = Some(compared);
+        study.add_effects(args, &scene, talk, &stop)?;
     }
-    let compared = if origin == Origin::Scene { &effects } else { &levels };
-    let mut cheapest = None;
-    if let (Some(tolerance), Some(compared), false) = (args.tolerance, compared, is_stopped()) {
-        for origin in [Origin::Reference, Origin::Truth] {
-            print_cheapest_level(levels.as_ref(), tolerance, origin)?;
-        }
-        let (selected, fresh) = match tolerance {
-            _ if origin == Origin::Scene => {
-                (compared.without_unneeded_effects()?, Some(HELD_OUT_TARGETS))
-            }
-            Criterion::Touches(tolerance) => (compared.cheapest(&tolerance, origin), None),
-            Criterion::Verdict(_) => (None, None),
-        };
-        let fresh = args.held_out.or(fresh.filter(|_| !is_verdict));
-        let confirm = |selected| compared.confirm(selected, origin, fresh);
-        cheapest = selected.map(confirm).transpose()?;
-    }
-    let study = serde_json::json!({
+    let cheapest = if is_stopped() { None } else { study.cheapest(args, origin)? };
+    let Study { levels, orders, effects } = &study;
+    let results = serde_json::json!({
         "scene": name, "levels": levels, "orders": orders, "effects": effects, "cheapest": cheapest,
     });
-    write_whole(&out.join("accuracy.json"), &serde_json::to_string_pretty(&study)?)?;
-    if let Some(svg) = accuracy::draw(levels.as_ref(), &orders, effects.as_ref()) {
+    write_whole(&out.join("accuracy.json"), &serde_json::to_string_pretty(&results)?)?;
+    if let Some(svg) = accuracy::draw(levels.as_ref(), orders, effects.as_ref()) {
         files::write(&out.join("accuracy"), &svg)?;
     }
     print(&format!("results and figure in {}", out.display()))?;
     if is_stopped() {
         return Ok(Outcome::Interrupted);
     }
-    let Some(criterion) = compared.as_ref().and_then(|compared| compared.criterion) else {
+    let Some(criterion) = study.of(origin).and_then(|compared| compared.criterion) else {
         return Ok(Outcome::Done);
     };
     let within = format!("{} from {}", criterion_text(criterion), origin.name());
@@ -220,6 +160,133 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     write_whole(&path, format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
     print(&format!("{described}\nscene: {}", path.display()))?;
     Ok(if cheapest.is_confirmed { Outcome::Done } else { Outcome::Failed })
+}
+
+/// Comparisons that the options ask for.
+struct Scope {
+    has_levels: bool,
+    has_effects: bool,
+    /// Origin of the errors that the tolerance limits.
+    origin: Origin,
+}
+
+impl Scope {
+    fn new(args: &Args, scene: &Scene) -> anyhow::Result<Self> {
+        let path = args.scene.display();
+        let is_of_effects = args.against == Some(Origin::Scene);
+        let has_levels = !is_of_effects && !is_verdict(args);
+        let moves_finger = scene.simulator.moves_finger();
+        let has_effects = (is_of_effects || args.against.is_none()) && moves_finger;
+        if !has_levels && !has_effects {
+            let body = scene.simulator.name();
+            ensure!(
+                moves_finger,
+                "{path}: simulator = \"{body}\" has no effects; effects need simulator = \"kinematic\""
+            );
+            bail!("--against: --tolerance verdict compares with the scene; use --against scene");
+        }
+        let origin =
+            args.against.unwrap_or(if has_effects { Origin::Scene } else { Origin::Reference });
+        let is_of_contact =
+            |it| !matches!(it, Criterion::Touches(it) if it.quantity != Quantity::Contact);
+        ensure!(
+            origin != Origin::Truth || args.tolerance.is_none_or(is_of_contact),
+            "--against truth: true forces are unknown; allowed is a tolerance in mm or um"
+        );
+        Ok(Self { has_levels, has_effects, origin })
+    }
+}
+
+/// Returns whether the tolerance is a verdict on planners.
+fn is_verdict(args: &Args) -> bool {
+    matches!(args.tolerance, Some(Criterion::Verdict(_)))
+}
+
+/// Finished comparisons.
+#[derive(Default)]
+struct Study {
+    levels: Option<AccuracyComparison>,
+    orders: Vec<ConvergenceOrder>,
+    effects: Option<AccuracyComparison>,
+}
+
+impl Study {
+    /// Compares the levels of the scene and prints their table.
+    fn add_levels(
+        &mut self,
+        args: &Args,
+        scene: &Scene,
+        talk: Verbosity,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<()> {
+        let effort = effort(args, LEVEL_TOUCHES, false);
+        let compared = compare(Variant::levels(scene), effort, args.tolerance, talk, stop)?;
+        if !stop.load(Ordering::Relaxed) {
+            self.orders = compared.orders(scene)?;
+        }
+        print(&format!("levels; the reference is the finest:\n{}", table(&compared)))?;
+        let words = ["does NOT decrease", "decreases"];
+        if let Some(is_converging) = compared.is_converging() {
+            let words = words[usize::from(is_converging)];
+            print(&format!("the force error {words} at every level towards the reference"))?;
+        }
+        for order in &self.orders {
+            print(&format!(
+                "order of convergence in the {}: {:.2} observed, {} expected",
+                order.name, order.observed, order.expected
+            ))?;
+        }
+        self.levels = Some(compared);
+        Ok(())
+    }
+
+    /// Compares the scene without each effect and prints the table.
+    fn add_effects(
+        &mut self,
+        args: &Args,
+        scene: &Scene,
+        talk: Verbosity,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<()> {
+        let scene = if args.full { with_all_effects(scene) } else { scene.clone() };
+        let effort = effort(args, EFFECT_TOUCHES, true);
+        let compared = compare(Variant::effects(&scene), effort, args.tolerance, talk, stop)?;
+        let within = compared
+            .criterion
+            .map_or(String::new(), |it| format!(", within {}", criterion_text(it)));
+        print(&format!(
+            "effects{within}; keep every effect that is marked needed and that the real finger has:"
+        ))?;
+        print(&format!("{}{INTERVAL_NOTE}", table(&compared)))?;
+        self.effects = Some(compared);
+        Ok(())
+    }
+
+    /// Returns the comparison with errors of this origin.
+    fn of(&self, origin: Origin) -> Option<&AccuracyComparison> {
+        if origin == Origin::Scene { self.effects.as_ref() } else { self.levels.as_ref() }
+    }
+
+    /// Returns the cheapest scene within the tolerance, confirmed on held-out targets or trials;
+    /// prints the cheapest level.
+    fn cheapest(&self, args: &Args, origin: Origin) -> anyhow::Result<Option<CheapestScene>> {
+        let (Some(tolerance), Some(compared)) = (args.tolerance, self.of(origin)) else {
+            return Ok(None);
+        };
+        for origin in [Origin::Reference, Origin::Truth] {
+            print_cheapest_level(self.levels.as_ref(), tolerance, origin)?;
+        }
+        let (selected, fresh) = match tolerance {
+            _ if origin == Origin::Scene => {
+                (compared.without_unneeded_effects()?, Some(HELD_OUT_TARGETS))
+            }
+            Criterion::Touches(tolerance) => (compared.cheapest(&tolerance, origin), None),
+            Criterion::Verdict(_) => (None, None),
+        };
+        let fresh = args.held_out.or(fresh.filter(|_| !is_verdict(args)));
+        let confirm = |(selected, scene)| compared.confirm(selected, scene, origin, fresh);
+        selected.map(confirm).transpose()
+    }
 }
 
 fn effort(args: &Args, touches: u16, is_of_effects: bool) -> MeasurementCounts {
@@ -242,17 +309,18 @@ fn compare(
     variants: Vec<(Variant, Scene)>,
     effort: MeasurementCounts,
     criterion: Option<Criterion>,
-    (talk, stop): (Verbosity, &AtomicBool),
+    talk: Verbosity,
+    stop: &AtomicBool,
 ) -> anyhow::Result<AccuracyComparison> {
     let bar = progress_bar(talk, "accuracy", "variants", variants.len() as u64, 0);
     let mut variants = variants.into_iter();
-    let Some(reference) = variants.next() else {
+    let Some((reference, scene)) = variants.next() else {
         bail!("no variant of the scene can be simulated")
     };
-    let mut comparison = AccuracyComparison::new(reference, effort, criterion)?;
+    let mut comparison = AccuracyComparison::new(reference, scene, effort, criterion)?;
     step(talk, &bar);
-    for variant in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
-        comparison.add(variant)?;
+    for (variant, scene) in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
+        comparison.add(variant, scene)?;
         step(talk, &bar);
     }
     bar.finish_and_clear();

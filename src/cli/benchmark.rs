@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         options.set.extend(QUICK.1.map(String::from));
     }
     let load = |case| {
-        run::with_planners((&options.set, &args.planner), |sets| {
+        run::with_planners(&options.set, &args.planner, |sets| {
             Experiment::load_cell(&path, case, sets)
         })
     };
@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     for experiment in experiments {
         let part = folder.join(&experiment.name);
         let made =
-            run::run_missing(&options, experiment, Some(part.clone()), &mut stop, (talk, host))?;
+            run::run_missing(&options, experiment, Some(part.clone()), &mut stop, talk, host)?;
         match made.outcome(talk) {
             Outcome::Done => runs.push((part.display().to_string(), Run::read(&part)?)),
             Outcome::Interrupted => {

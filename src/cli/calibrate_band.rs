@@ -20,7 +20,7 @@ use palpate_explore::band::LearnedBand;
 use palpate_input::tables;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 #[derive(clap::Args)]
@@ -76,63 +76,16 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/band-{name}")));
     args.force.check_folder(&out, "coverage.json")?;
     set_thread_count(args.threads)?;
-    let cases = sweep_cases(&path)?;
-    let experiments = match cases.is_empty() {
-        true => vec![Experiment::load(&path, &args.set)?],
-        false => (cases.iter())
-            .map(|case| Experiment::load_cell(&path, case, &args.set))
-            .collect::<Result<_, _>>()?,
-    };
-    for experiment in &experiments {
-        needs_zone(&experiment.scene, &args.experiment)?;
-    }
-    let first = &experiments[0];
-    ensure!(
-        args.test || experiments.len() >= OBJECTS_MIN,
-        "{}: has {} objects; a band is learned from at least {OBJECTS_MIN}, listed in [sweep] scene",
-        path.display(),
-        experiments.len()
-    );
-    let sampled = COUNTS.into_iter().find(|&count| count >= first.first_fit());
-    let least = sampled.unwrap_or(COUNTS[0]);
-    ensure!(
-        sampled.is_some_and(|least| first.touches >= least),
-        "{}: touches = {}, of which {} are initial; allowed is at least {least}, with a fit after one of \
-         the counts {COUNTS:?}",
-        path.display(),
-        first.touches,
-        first.first_fit(),
-    );
-    let band = first.gp.band.learned().cloned();
+    let experiments = load(args, &path)?;
+    let band = experiments[0].gp.band.learned().cloned();
     ensure!(
         !args.test || band.is_some(),
         "{}: gp.band has no half-widths to test; allowed is \"objects\" or a table of this command",
         path.display()
     );
-
-    let stop = stop_on_interrupt("trials")?;
-    let planners: Vec<String> =
-        first.planners.iter().filter(|name| *name != ORACLE).cloned().collect();
-    let each = u64::from(args.trials) * planners.len() as u64 * u64::from(first.touches);
-    let bar = progress_bar(talk, &name, "touches", each * experiments.len() as u64, 0);
-    let mut objects = Vec::new();
-    for experiment in experiments {
-        let object = object_name(&experiment);
-        let simulation =
-            report_slow_steps(talk, |tell| Simulation::new_with_progress(experiment, tell))?;
-        let jobs: Vec<(u32, &String)> = (0..args.trials)
-            .flat_map(|trial| planners.iter().map(move |name| (trial, name)))
-            .collect();
-        let samples = (jobs.into_par_iter())
-            .filter(|_| !stop.load(Ordering::Relaxed))
-            .map(|(trial, name)| sample_trial(&simulation, name, trial, &|| step(talk, &bar)))
-            .collect::<Result<Vec<_>, _>>()?;
-        if stop.load(Ordering::Relaxed) {
-            return Ok(Outcome::Interrupted);
-        }
-        objects.push(ObjectSamples { object, samples: samples.concat() });
-    }
-    bar.finish_and_clear();
+    let Some(objects) = sample(args, experiments, &name, talk)? else {
+        return Ok(Outcome::Interrupted);
+    };
 
     let all: Vec<&ObjectSamples> = objects.iter().collect();
     let learned_from = format!("{}, {} objects", path.display(), objects.len());
@@ -157,6 +110,75 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     }
     print(&format!("{text}\nin {}", out.display()))?;
     Ok(Outcome::Done)
+}
+
+/// Loads the experiments at `path`, one per object.
+///
+/// # Errors
+/// If they have no zone, too few objects, or no touches after a fit.
+fn load(args: &Args, path: &Path) -> anyhow::Result<Vec<Experiment>> {
+    let cases = sweep_cases(path)?;
+    let experiments = match cases.is_empty() {
+        true => vec![Experiment::load(path, &args.set)?],
+        false => (cases.iter())
+            .map(|case| Experiment::load_cell(path, case, &args.set))
+            .collect::<Result<_, _>>()?,
+    };
+    for experiment in &experiments {
+        needs_zone(&experiment.scene, &args.experiment)?;
+    }
+    ensure!(
+        args.test || experiments.len() >= OBJECTS_MIN,
+        "{}: has {} objects; a band is learned from at least {OBJECTS_MIN}, listed in [sweep] scene",
+        path.display(),
+        experiments.len()
+    );
+    let first = &experiments[0];
+    let sampled = COUNTS.into_iter().find(|&count| count >= first.first_fit());
+    let least = sampled.unwrap_or(COUNTS[0]);
+    ensure!(
+        sampled.is_some_and(|least| first.touches >= least),
+        "{}: touches = {}, of which {} are initial; allowed is at least {least}, with a fit after one of \
+         the counts {COUNTS:?}",
+        path.display(),
+        first.touches,
+        first.first_fit(),
+    );
+    Ok(experiments)
+}
+
+/// Runs the trials of all objects and samples their beliefs; `None` if interrupted.
+fn sample(
+    args: &Args,
+    experiments: Vec<Experiment>,
+    name: &str,
+    talk: Verbosity,
+) -> anyhow::Result<Option<Vec<ObjectSamples>>> {
+    let stop = stop_on_interrupt("trials")?;
+    let first = &experiments[0];
+    let planners: Vec<String> =
+        first.planners.iter().filter(|name| *name != ORACLE).cloned().collect();
+    let each = u64::from(args.trials) * planners.len() as u64 * u64::from(first.touches);
+    let bar = progress_bar(talk, name, "touches", each * experiments.len() as u64, 0);
+    let mut objects = Vec::new();
+    for experiment in experiments {
+        let object = object_name(&experiment);
+        let simulation =
+            report_slow_steps(talk, |tell| Simulation::new_with_progress(experiment, tell))?;
+        let jobs: Vec<(u32, &String)> = (0..args.trials)
+            .flat_map(|trial| planners.iter().map(move |name| (trial, name)))
+            .collect();
+        let samples = (jobs.into_par_iter())
+            .filter(|_| !stop.load(Ordering::Relaxed))
+            .map(|(trial, name)| sample_trial(&simulation, name, trial, &|| step(talk, &bar)))
+            .collect::<Result<Vec<_>, _>>()?;
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        objects.push(ObjectSamples { object, samples: samples.concat() });
+    }
+    bar.finish_and_clear();
+    Ok(Some(objects))
 }
 
 /// Returns the name of an experiment's object: that of its mesh, or of the experiment.

@@ -5,9 +5,7 @@ use crate::report::camera_view::{DepthImage, camera_views};
 use crate::report::files::png;
 use crate::sim::Environment;
 use anyhow::{Context, ensure};
-use palpate_explore::belief::Belief;
-use palpate_explore::gp_settings::GpSettings;
-use palpate_explore::whole_object::SpatialGpSettings;
+use palpate_explore::view::SeenSurface;
 use palpate_gp::math::seed;
 use std::path::Path;
 
@@ -19,9 +17,7 @@ pub(super) fn draw(environment: &Environment, path: &Path) -> anyhow::Result<Str
     let (mut images, mut text) = (Vec::new(), String::new());
     for (number, name) in names.enumerate() {
         let view = environment.look(number, &mut seed::stream(0, 0, &format!("view {number}")))?;
-        let (gp, space) = (GpSettings::default(), SpatialGpSettings::default());
-        let mut belief = Belief::new(environment.task(), (&scene.finger, false), &gp, &space);
-        let seen = belief.observe_view(&view);
+        let seen = SeenSurface::of_region(&view, environment.task().region());
         let elements: Vec<_> = seen.elements().collect();
         let sds_mm = elements.iter().map(|element| 1e3 * element.sd);
         let least_mm = sds_mm.clone().fold(f64::INFINITY, f64::min);

@@ -112,11 +112,11 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         bail!("[backend]: a check runs in simulation; allowed is none of {}", arm_tables());
     }
     let stop = stop_on_interrupt("trials")?;
-    let rules = CheckOptions { tolerance: args.tolerance, ..CheckOptions::default() };
     if let Some(why) = &args.accept {
-        return accept_baseline(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
+        return accept_baseline(args, &simulation, old.as_ref(), why, &stop, talk);
     }
     let mut old = old.context("no baseline")?;
+    let rules = rules(args);
     if !args.planner.is_empty() {
         old.keep_planners(&simulation.experiment().planners);
     }
@@ -134,6 +134,10 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
             Verdict::Worse | Verdict::Missing => Outcome::Failed,
         },
     })
+}
+
+fn rules(args: &Args) -> CheckOptions {
+    CheckOptions { tolerance: args.tolerance, ..CheckOptions::default() }
 }
 
 fn print_results(
@@ -170,7 +174,7 @@ fn accept_baseline(
     args: &Args,
     simulation: &Simulation,
     old: Option<&StoredBaseline>,
-    (why, rules): (&str, &CheckOptions),
+    why: &str,
     stop: &AtomicBool,
     talk: Verbosity,
 ) -> anyhow::Result<Outcome> {
@@ -184,7 +188,7 @@ fn accept_baseline(
     if stop.load(Ordering::Relaxed) {
         return Ok(Outcome::Interrupted);
     }
-    let new = accepted(simulation, &rows, why, (old, !args.planner.is_empty()), rules)?;
+    let new = accepted(simulation, &rows, why, old, !args.planner.is_empty(), &rules(args))?;
     write_whole(&args.baseline, &new.text()?)?;
     let mut text = format!("{} in {}", counted(rows.len(), "trial"), args.baseline.display());
     new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));

@@ -97,7 +97,8 @@ fn sizes(extent: f64, units: impl IntoIterator<Item = Unit>) -> String {
 /// Returns the unit of a mesh, and the factor that makes it explorable if no unit does. `extent` is
 /// the largest in the file's numbers; `is_stl` for a format in which millimetres are usual.
 pub(super) fn unit(
-    (extent, is_stl): (f64, bool),
+    extent: f64,
+    is_stl: bool,
     given: Option<Unit>,
     stated: &FileStatements,
     asker: Asker,

@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
         args.force.check_file(&folder.join(PAGE))?;
         make_folder(folder)?;
         let name = compared.objects.join(", ");
-        text += &format!("\npage: {}\n", write(folder, (&name, ""), &compared)?.display());
+        text += &format!("\npage: {}\n", write(folder, &name, "", &compared)?.display());
     }
     print(text.trim_end())?;
     Ok(Outcome::Done)
@@ -66,7 +66,8 @@ pub(super) fn text(compared: &SuiteComparison) -> String {
 /// Writes a comparison to a folder as a page and a CSV table; returns the page's path.
 pub(super) fn write(
     folder: &Path,
-    (name, question): (&str, &str),
+    name: &str,
+    question: &str,
     compared: &SuiteComparison,
 ) -> anyhow::Result<PathBuf> {
     let page = folder.join(PAGE);

@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     if is_run {
         return belief(args, talk);
     }
-    scan(&path, &args.scan, (args.out.as_deref(), args.grid, args.force), talk)
+    scan(&path, &args.scan, args.out.as_deref(), args.grid, args.force, talk)
 }
 
 /// Allowed cells of a belief around an object, as for `gp.cells`.
@@ -149,8 +149,8 @@ fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         ..ReportSettings::default()
     };
     match format {
-        Format::Mesh(write) => mesh_file(run, args, (touches, write), out),
-        Format::Gif | Format::Mp4 => film_file(&run, args, touches, (&format, out), talk),
+        Format::Mesh(write) => mesh_file(run, args, touches, write, out),
+        Format::Gif | Format::Mp4 => film_file(&run, args, touches, &format, out, talk),
     }
 }
 
@@ -159,7 +159,8 @@ fn film_file(
     run: &Run,
     args: &Args,
     touches: u32,
-    (format, out): (&Format, &Path),
+    format: &Format,
+    out: &Path,
     talk: Verbosity,
 ) -> anyhow::Result<Outcome> {
     ensure!(args.grid.is_none(), "--grid applies only to a mesh (.ply, .obj)");
@@ -194,7 +195,8 @@ fn film_file(
 fn mesh_file(
     mut run: Run,
     args: &Args,
-    (touches, write): (u32, fn(&PointCloud) -> String),
+    touches: u32,
+    write: fn(&PointCloud) -> String,
     out: &Path,
 ) -> anyhow::Result<Outcome> {
     let is_around = run.experiment.scene.whole_object.is_some();

@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let (arm, mut last) = (simulation.arm(), None);
     let mut observer = |event: &TrialEvent| {
         let TrialEvent::Finished(touched) = event else { return Ok(None) };
-        let stopped = Fault::Stopped { time_s: touched.row.time_s.unwrap_or_default() };
+        let stopped = Fault::Stopped { time_s: touched.row.outcome.time_s.unwrap_or_default() };
         if let Some(found) = &touched.row.recognition {
             let _ = print(&line(touched.count, found));
             if let Some(arm) = arm {

@@ -153,7 +153,7 @@ fn work(args: &Args, path: &Path, page: &Page) -> anyhow::Result<Work> {
     if path.extension().is_some_and(|extension| extension == "toml") {
         let load = |sets: &[String]| load_experiment(&path, sets);
         let experiment = match is_experiment(&path) {
-            true => with_planners((&args.set, &args.planner), load)?,
+            true => with_planners(&args.set, &args.planner, load)?,
             false => {
                 let mut experiment = load(&args.set)?;
                 let too = args.planner.iter().filter(|name| !experiment.planners.contains(name));
@@ -239,8 +239,8 @@ impl Live<'_> {
         let commit = self.program.commit;
         let fresh = self.args.fresh;
         let (mut folder, done) = RunFolder::open(&path, session.simulation(), commit, fresh)?;
-        let continues = (self.args.clear_fault, self.args.command_after_fault());
-        connect_arm(session.simulation_mut(), &path, continues)?;
+        let (clears_fault, command) = (self.args.clear_fault, self.args.command_after_fault());
+        connect_arm(session.simulation_mut(), &path, clears_fault, command)?;
         let desk = Arc::clone(session.desk());
         desk.set_start(self.args.hold, self.args.approve);
         let truth = session.simulation().truth().clone();

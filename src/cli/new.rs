@@ -297,7 +297,8 @@ impl MeshPlacement {
             high - low
         };
         let unit = choices::unit(
-            (extent(&mesh).max() / read_m, extension == "stl"),
+            extent(&mesh).max() / read_m,
+            extension == "stl",
             args.unit,
             &stated,
             asker,

@@ -103,7 +103,8 @@ pub(super) fn prepare_simulator(
 pub(super) fn connect_arm(
     simulation: &mut Simulation,
     folder: &Path,
-    (clears_fault, command): (bool, String),
+    clears_fault: bool,
+    command: String,
 ) -> anyhow::Result<()> {
     if !simulation.is_real() {
         return Ok(());

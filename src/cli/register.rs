@@ -12,7 +12,7 @@ use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
 use anyhow::Context;
-use palpate_explore::probe::Touch;
+use palpate_explore::evidence::Outcome as TouchOutcome;
 use palpate_explore::registration::{RegistrationDesign, register};
 use palpate_gp::math::seed;
 use std::path::PathBuf;
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     args.force.check_file(&out)?;
     if let Some(cloud) = &args.cloud.cloud {
         let position_m = args.body.at.unwrap_or_default();
-        return register_cloud((&args.file, cloud), position_m, &args.cloud, &out, talk);
+        return register_cloud(&args.file, cloud, position_m, &args.cloud, &out, talk);
     }
     let path = find(&args.file, SCENES)?;
     let (scene, settings) = match is_experiment(&path) {
@@ -101,8 +101,8 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
     };
     let bar = progress_bar(talk, "register", "touches", of as u64, 0);
-    let made = &mut |_: &Touch| step(talk, &bar);
-    let found = register(&mut *probe, &robot, touch, (&body, &design), made)?;
+    let made = &mut |_: &TouchOutcome| step(talk, &bar);
+    let found = register(&mut *probe, &robot, touch, &body, &design, made)?;
     bar.finish_and_clear();
     let before = scene.arm.as_ref().and_then(|arm| arm.correction());
     let text = format!(

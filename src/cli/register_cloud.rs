@@ -34,7 +34,8 @@ pub(super) struct CloudArgs {
 /// Registers the points of `cloud` to `mesh` from the initial position `position_m` of the mesh's
 /// origin in the cloud's frame, and writes the pose to `out`.
 pub(super) fn register_cloud(
-    (mesh, cloud): (&Path, &Path),
+    mesh: &Path,
+    cloud: &Path,
     position_m: [f64; 3],
     args: &CloudArgs,
     out: &Path,

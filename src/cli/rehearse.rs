@@ -8,7 +8,7 @@ use crate::experiment::backend_settings::arm_tables;
 use anyhow::{Context, bail};
 use palpate_explore::backend::pace;
 use palpate_explore::belief::Belief;
-use palpate_explore::planner;
+use palpate_explore::planner::{self, Offer};
 use palpate_gp::math::seed;
 use palpate_input::format::counted;
 use std::sync::atomic::Ordering;
@@ -41,10 +41,9 @@ pub(super) fn run(
     let begun_s = pace::now_s();
     let mut followed = 0;
     let (task, scene) = (simulation.task(), &experiment.scene);
-    let finger = (&scene.finger, scene.effects.skin.is_some());
-    let belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
+    let belief = Belief::new(task, &scene.effects.surface(), &experiment.gp, &experiment.space);
     while followed < experiment.touches && !stop.load(Ordering::Relaxed) {
-        let target = planner.plan(&belief)?.target;
+        let target = planner.plan(&belief, &Offer::default())?.target;
         let approach = task.approach(&target).context("no approach of a target")?;
         let passed_s = servo.rehearse(&approach)?;
         followed += 1;

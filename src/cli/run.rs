@@ -9,9 +9,10 @@ use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::rehearse;
 use super::step::{Stepper, is_unregistered};
 use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
+use crate::experiment::Simulation;
 use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::experiment::Experiment;
-use crate::experiment::runner::{self, Progress, Shard};
+use crate::experiment::runner::{self, Progress, RealRun, Shard};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
@@ -111,6 +112,25 @@ impl Args {
         Self { planner: planners.to_vec(), threads, fresh, ..Self::default() }
     }
 
+    /// Checks that the options apply to a simulation or a real arm.
+    fn check(&self, simulation: &Simulation) -> anyhow::Result<()> {
+        let simulator = simulation.experiment().scene.simulator;
+        if self.record && !simulator.moves_finger() && !simulation.is_real() {
+            let body = simulator.name();
+            bail!(
+                "--record: simulator = \"{body}\" does not move, so there is nothing to record; allowed are \
+                 \"kinematic\" and \"dynamic\""
+            );
+        }
+        if self.step && !simulation.is_real() {
+            bail!("--step: a simulation needs no operator; allowed with {}", arm_tables());
+        }
+        if self.shard.is_some() && simulation.is_real() {
+            bail!("--shard: a real arm runs one trial at a time; remove --shard");
+        }
+        Ok(())
+    }
+
     /// Whether an operator is asked before each touch of a real arm.
     fn is_asked(&self, run: &Path, talk: Verbosity) -> bool {
         if self.step || self.no_step {
@@ -160,21 +180,21 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     if cases.is_empty() {
         let out = args.out.clone();
         let experiment =
-            with_planners((&args.set, &args.planner), |sets| Experiment::load(&path, sets))?;
+            with_planners(&args.set, &args.planner, |sets| Experiment::load(&path, sets))?;
         if args.dry {
             return rehearse::run(experiment, args.clear_fault, talk);
         }
         if let Some(shards) = args.plan {
             return plan(experiment, shards, args.threads, talk);
         }
-        return run_one(args, experiment, out, &mut stop, (talk, host));
+        return run_one(args, experiment, out, &mut stop, talk, host);
     }
     for (option, is_given) in [("--plan", args.plan.is_some()), ("--dry", args.dry)] {
         ensure!(!is_given, "{}: {option} needs an experiment without a [sweep]", path.display());
     }
     // All combinations are loaded before the first is run.
     let load = |case| {
-        with_planners((&args.set, &args.planner), |sets| Experiment::load_cell(&path, case, sets))
+        with_planners(&args.set, &args.planner, |sets| Experiment::load_cell(&path, case, sets))
     };
     let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let first = experiments[0].clone();
@@ -184,13 +204,13 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     for experiment in experiments {
         let part = if args.out.is_none() { args.suffix() } else { String::new() };
         paths.push(folder.join(format!("{}{part}", experiment.name)));
-        match run_one(args, experiment, paths.last().cloned(), &mut stop, (talk, host))? {
+        match run_one(args, experiment, paths.last().cloned(), &mut stop, talk, host)? {
             Outcome::Done => (),
             other => return Ok(other),
         }
     }
     if args.shard.is_none() {
-        compare_cells(args, (&first, name), &folder, paths)?;
+        compare_cells(args, &first, name, &folder, paths)?;
     }
     Ok(Outcome::Done)
 }
@@ -201,7 +221,8 @@ const REFERENCE: &str = "sobol";
 /// Compares the finished runs of a sweep: prints tables and writes a page to its folder.
 fn compare_cells(
     args: &Args,
-    (first, name): (&Experiment, &str),
+    first: &Experiment,
+    name: &str,
     folder: &Path,
     paths: Vec<PathBuf>,
 ) -> anyhow::Result<()> {
@@ -214,7 +235,7 @@ fn compare_cells(
     name_objects(&mut compared, name);
     let mut text = compare::text(&compared);
     if !args.no_report {
-        let page = compare::write(folder, (name, &first.question), &compared)?;
+        let page = compare::write(folder, name, &first.question, &compared)?;
         text += &format!("\npage: {}", page.display());
     }
     if !args.json {
@@ -233,7 +254,8 @@ pub(super) fn name_objects(compared: &mut SuiteComparison, sweep: &str) {
 
 /// Loads the experiment with the settings of `--set` and adds the planners of `--planner`.
 pub(super) fn with_planners(
-    (sets, planners): (&[String], &[String]),
+    sets: &[String],
+    planners: &[String],
     load: impl Fn(&[String]) -> Result<Experiment, ConfigError>,
 ) -> Result<Experiment, ConfigError> {
     let experiment = load(sets)?;
@@ -291,30 +313,19 @@ pub(super) fn run_missing(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, host): (Verbosity, &Host),
+    talk: Verbosity,
+    host: &Host,
 ) -> anyhow::Result<RunResult> {
     let (own, lacking) = host.load_planners(&experiment.planners);
     let simulation = prepare_simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own);
     let experiment = simulation.experiment();
-    if args.record && !experiment.scene.simulator.moves_finger() && !simulation.is_real() {
-        let body = experiment.scene.simulator.name();
-        bail!(
-            "--record: simulator = \"{body}\" does not move, so there is nothing to record; allowed are \
-             \"kinematic\" and \"dynamic\""
-        );
-    }
-    if args.step && !simulation.is_real() {
-        bail!("--step: a simulation needs no operator; allowed with {}", arm_tables());
-    }
-    if args.shard.is_some() && simulation.is_real() {
-        bail!("--shard: a real arm runs one trial at a time; remove --shard");
-    }
+    args.check(&simulation)?;
     let path = out.unwrap_or_else(|| {
         PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
     });
     let (mut folder, done) = RunFolder::open(&path, &simulation, host.commit, args.fresh)?;
-    connect_arm(&mut simulation, &path, (args.clear_fault, args.command_after_fault()))?;
+    connect_arm(&mut simulation, &path, args.clear_fault, args.command_after_fault())?;
     let simulation = simulation;
     let experiment = simulation.experiment();
     let recorded = args.record.then_some(path.as_path());
@@ -336,11 +347,9 @@ pub(super) fn run_missing(
     let total = (done.len() + jobs.len()) as u64;
     let bar = touches_bar(talk, experiment, [jobs.len(), done.len()]);
     let begun = Instant::now();
-    let threads = args.threads.into();
     let tick = |progress: Progress| touch_step(talk, &bar, experiment, progress);
     let (count, halt) = match simulation.is_real() {
         true => {
-            let rows = (&mut folder, done.as_slice());
             let is_asked = args.is_asked(&path, talk);
             let new = || Stepper::new(&simulation, std::io::stdin().lock());
             let mut stepper = is_asked.then(new).transpose()?;
@@ -353,11 +362,20 @@ pub(super) fn run_missing(
                 }
                 (TrialEvent::Next(_) | TrialEvent::Finished(_), _) => Ok(None),
             };
-            runner::run_real(&simulation, rows, stop, (recorded, None), &tick, &mut ask)?
+            let run = RealRun {
+                simulation: &simulation,
+                folder: &mut folder,
+                stop,
+                recorded,
+                view: None,
+                progress: &tick,
+                observer: &mut ask,
+            };
+            run.run(&done)?
         }
         false => {
-            let rows = (&mut folder, jobs);
-            (runner::run(&simulation, rows, threads, stop, recorded, &tick)?, None)
+            let threads = args.threads.into();
+            (runner::run(&simulation, &mut folder, jobs, threads, stop, recorded, &tick)?, None)
         }
     };
     bar.finish_and_clear();
@@ -375,9 +393,10 @@ fn run_one(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, host): (Verbosity, &Host),
+    talk: Verbosity,
+    host: &Host,
 ) -> anyhow::Result<Outcome> {
-    let made = run_missing(args, experiment, out, stop, (talk, host))?;
+    let made = run_missing(args, experiment, out, stop, talk, host)?;
     let RunResult { path, summary: words, total, halt, .. } = &made;
     // A shard is not summarised: its rows may not fit in memory.
     if args.shard.is_some() {

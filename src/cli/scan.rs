@@ -11,7 +11,7 @@ use crate::report::{files, scan as drawing};
 use crate::sim::Scene;
 use anyhow::Context;
 use palpate_explore::backend::Fault;
-use palpate_explore::probe::Touch;
+use palpate_explore::evidence;
 use palpate_input::format::counted;
 use std::path::Path;
 
@@ -44,7 +44,9 @@ pub(super) fn grid(text: &str) -> Result<Grid, String> {
 pub(super) fn scan(
     path: &Path,
     args: &ScanArgs,
-    (out, grid, force): (Option<&Path>, Option<Grid>, Overwrite),
+    out: Option<&Path>,
+    grid: Option<Grid>,
+    force: Overwrite,
     talk: Verbosity,
 ) -> anyhow::Result<Outcome> {
     let scene = Scene::load(path, &args.set)?;
@@ -63,15 +65,13 @@ pub(super) fn scan(
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
     let simulator = prepare_simulator(&environment, talk)?;
     let targets = scan::targets(zone, grid);
-    let (rows, threads) = ((targets.as_slice(), grid[0]), args.threads.into());
-    let touches = scan::scan(&simulator, rows, threads, &stop, &|| step(talk, &bar))?;
+    let threads = args.threads.into();
+    let touches = scan::scan(&simulator, &targets, grid[0], threads, &stop, &|| step(talk, &bar))?;
     bar.finish_and_clear();
     let Some(touches) = touches else { return Ok(Outcome::Interrupted) };
 
-    let points = touches.iter().filter_map(|touch| match touch {
-        Ok(Touch::Contact(contact)) => Some((contact.p_wc, contact.normal_w)),
-        _ => None,
-    });
+    let contacts = touches.iter().filter_map(|touch| touch.as_ref().ok()?.contact());
+    let points = contacts.map(|contact| (contact.p_wc, contact.normal_w));
     let [columns, rows] = grid;
     let cloud = PointCloud {
         comments: vec![
@@ -88,7 +88,7 @@ pub(super) fn scan(
     write_whole(&folder.join("cloud.ply"), cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), csv(&targets, &touches))?;
     let height_m = |place: &[f64]| environment.true_height_m(place);
-    if let Some(svg) = drawing::picture((zone, mesh, &height_m), &cloud.points) {
+    if let Some(svg) = drawing::picture(zone, mesh, &height_m, &cloud.points) {
         files::write(&folder.join("scan.svg"), &svg)?;
     }
     let faults = touches.iter().filter(|touch| touch.is_err()).count();
@@ -103,18 +103,19 @@ pub(super) fn scan(
 }
 
 /// Returns a CSV line per target: its position, the outcome, the contact point and its normal.
-fn csv(targets: &[Vec<f64>], touches: &[Result<Touch, Fault>]) -> String {
+fn csv(targets: &[Vec<f64>], touches: &[Result<evidence::Outcome, Fault>]) -> String {
     let mut text =
         String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");
     for (target, touch) in targets.iter().zip(touches) {
         let place = target.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let ending = match touch {
-            Ok(Touch::Contact(contact)) => {
-                let (p, n) = (contact.p_wc, contact.normal_w);
-                format!("contact,{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z)
-            }
-            Ok(Touch::Miss) => "miss,,,,,,".into(),
-            Ok(Touch::Overload) => "overload,,,,,,".into(),
+            Ok(touch) => match touch.contact() {
+                Some(contact) => {
+                    let (p, n) = (contact.p_wc, contact.normal_w);
+                    format!("contact,{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z)
+                }
+                None => format!("{},,,,,,", touch.end.name()),
+            },
             Err(fault) => format!("\"{fault}\",,,,,,"),
         };
         text += &format!("{place},{ending}\n");

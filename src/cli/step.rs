@@ -4,7 +4,7 @@ use super::terminal::print_stderr;
 use crate::experiment::Simulation;
 use crate::experiment::trial::NextTouch;
 use palpate_explore::backend::Fault;
-use palpate_explore::planner::{self, Planner};
+use palpate_explore::planner::{self, Offer, Planner};
 use palpate_explore::task::{Target, Task};
 use palpate_gp::math::seed;
 use std::io::{BufRead, Write};
@@ -128,12 +128,12 @@ impl<'a, R: BufRead> Stepper<'a, R> {
             let refused = match answer {
                 Ok(Answer::Go) => return Ok(None),
                 Ok(Answer::Stop) => return Err(Fault::Stopped { time_s: 0.0 }),
-                Ok(Answer::Skip) => match self.other.plan(next.belief) {
+                Ok(Answer::Skip) => match self.other.plan(next.belief, &Offer::default()) {
                     Ok(plan) => return Ok(Some(plan.target)),
                     Err(error) => error.to_string(),
                 },
                 Ok(Answer::Elsewhere(numbers)) => {
-                    let target = Target::from_numbers(&numbers);
+                    let target = task.region().target(&numbers);
                     let fits = target.filter(|target| {
                         let is_inside = task.region().contains(target);
                         is_inside && task.approach(target).is_some()

@@ -8,11 +8,12 @@ use crate::experiment::trial::row::TrialRow;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
+use palpate_explore::evidence::{self, End};
 use palpate_explore::planner;
 use palpate_explore::planner::PLANNERS;
+use palpate_explore::probe::Probe;
 use palpate_explore::probe::servo::Servo;
-use palpate_explore::probe::{self, Probe, Touch};
-use palpate_explore::task::Approach;
+use palpate_explore::task::Action;
 use palpate_input::format::{counted, did_you_mean};
 use std::path::Path;
 
@@ -107,17 +108,17 @@ struct ReportingProbe {
 }
 
 impl Probe for ReportingProbe {
-    fn execute(&mut self, approach: &Approach) -> Result<probe::Outcome, Fault> {
-        let outcome = self.servo.execute(approach)?;
+    fn execute(&mut self, action: &Action) -> Result<evidence::Outcome, Fault> {
+        let outcome = self.servo.execute(action)?;
         self.count += 1;
-        let found = match &outcome.touch {
-            Touch::Contact(contact) => {
+        let found = match (outcome.end, outcome.contact()) {
+            (_, Some(contact)) => {
                 self.sight.mark(contact.p_wc);
                 let [x, y, z] = (contact.p_wc.coords * 1e3).into();
                 format!("contact at ({x:.1}, {y:.1}, {z:.1}) mm")
             }
-            Touch::Miss => "no contact".into(),
-            Touch::Overload => "force limit exceeded".into(),
+            (End::Overload, None) => "force limit exceeded".into(),
+            (_, None) => "no contact".into(),
         };
         let _ = print(&format!(
             "{:8.2} s  touch {}: {found}",

@@ -110,7 +110,7 @@ fn far_datum(zone: &Zone, truth: &Truth) -> Option<String> {
 fn few_contacts(rows: &[TrialRow], planner: &str) -> Option<String> {
     let touches = || planner_rows(rows, planner).flat_map(|row| &row.touches);
     let (contacts, of) =
-        (touches().filter(|touch| touch.contact.is_some()).count(), touches().count());
+        (touches().filter(|touch| touch.contact().is_some()).count(), touches().count());
     is_few(contacts, of)
         .then(|| format!("{planner}: only {contacts} of {of} touches made a usable contact"))
 }

@@ -4,11 +4,12 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
 use crate::experiment::trial::planner_names::HUMAN;
 use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
-use crate::experiment::trial::row::{TrialId, TrialRow};
-use crate::experiment::trial::{self, TrialEvent, TrialObserver};
+use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
+use crate::experiment::trial::{self, FinishedTouch, TrialEvent, TrialObserver};
 use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::backend::{Fault, pace};
 use palpate_explore::planner::{Fallback, PlannerFactory};
+use palpate_explore::task::Target;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
 use rayon::iter::{
@@ -101,7 +102,8 @@ impl Shard {
 /// If a row cannot be stored, or threads cannot be started.
 pub fn run(
     simulation: &Simulation,
-    (folder, jobs): (&mut RunFolder, Vec<Job>),
+    folder: &mut RunFolder,
+    jobs: Vec<Job>,
     threads: usize,
     stop: &AtomicBool,
     recorded: Option<&Path>,
@@ -112,11 +114,11 @@ pub fn run(
     // Jobs are handed out one by one, so that rows finish roughly in order and an interrupted run
     // has complete pairs.
     pool.install(|| {
-        jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
+        jobs.into_iter().par_bridge().try_for_each(|job| {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_counted(simulation, (trial, planner), recorded, progress);
+            let row = run_counted(simulation, job, recorded, progress);
             if row.failure.is_some() && stop.load(Ordering::Relaxed) {
                 // The interruption may have caused the failure; the trial is run again.
                 return Ok(());
@@ -144,9 +146,9 @@ pub fn run_in_memory(
     stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<TrialRow>, InputError> {
-    let run = |(trial, planner): Job| {
+    let run = |job: Job| {
         let row = (!stop.load(Ordering::Relaxed))
-            .then(|| run_counted(simulation, (trial, planner), None, progress))?;
+            .then(|| run_counted(simulation, job, None, progress))?;
         progress(Progress::Trial(&row));
         Some(row)
     };
@@ -169,14 +171,16 @@ pub(super) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, InputErro
 /// trial's failure, so that it does not lose the other trials.
 pub fn run_caught(
     simulation: &Simulation,
-    (trial, planner): Job,
-    shown: (Option<&Path>, Option<&LiveView>),
+    job: Job,
+    recorded: Option<&Path>,
+    view: Option<&LiveView>,
     observer: &mut TrialObserver,
 ) -> TrialRow {
-    let run = || recorded_trial::run(simulation, (trial, planner), shown, &[], observer);
+    let run = || recorded_trial::run(simulation, job, (recorded, view), &[], observer);
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        let (trial, planner) = job;
         TrialRow::without_touches(trial, planner.name(), Some(format!("panicked: {words}")))
     })
 }
@@ -184,10 +188,11 @@ pub fn run_caught(
 /// Runs one trial, and reports each touch.
 fn run_counted(
     simulation: &Simulation,
-    (trial, planner): Job,
+    job: Job,
     recorded: Option<&Path>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> TrialRow {
+    let (trial, planner) = job;
     let path = recorded.map(|run| recording_path(run, planner, trial));
     let mut count = |event: &TrialEvent| {
         if matches!(event, TrialEvent::Finished(_)) {
@@ -195,106 +200,161 @@ fn run_counted(
         }
         Ok(None)
     };
-    run_caught(simulation, (trial, planner), (path.as_deref(), None), &mut count)
+    run_caught(simulation, job, path.as_deref(), None, &mut count)
 }
 
-/// Runs the trials of a real arm that `done` lacks, in sequence, until one fails or `stop` becomes
-/// true between two touches. Every touch is stored in the journal of `folder`, from which an
-/// interrupted trial continues.
-///
-/// `observer` is called before each new touch, when it may return another target or a fault, and
-/// after each touch. A view shows the arm.
-///
-/// Returns the number of finished trials and, if it stopped early, the trial, the reason and the
-/// stored touches.
-///
-/// # Errors
-/// If a row or touch cannot be stored, or a planner is not available.
-pub fn run_real(
-    simulation: &Simulation,
-    (folder, done): (&mut RunFolder, &[TrialId]),
-    stop: &AtomicBool,
-    (recorded, view): (Option<&Path>, Option<&LiveView>),
-    progress: &(dyn Fn(Progress) + Sync),
-    observer: &mut TrialObserver,
-) -> Result<(usize, Option<String>), RunError> {
-    let mut journal = Journal::open(folder.path())?;
-    let mut finished = 0;
-    for (trial, planner) in missing_jobs(simulation, done)? {
-        if stop.load(Ordering::Relaxed) {
-            break;
+/// Run of the trials of a real arm, in sequence. Every touch is stored in the journal of `folder`,
+/// from which an interrupted trial continues.
+pub struct RealRun<'a> {
+    /// Simulation with the connected arm.
+    pub simulation: &'a Simulation,
+    /// Folder to which rows and touches are added.
+    pub folder: &'a mut RunFolder,
+    /// Becomes true to stop the run between two touches.
+    pub stop: &'a AtomicBool,
+    /// Folder of the run if its trials are recorded.
+    pub recorded: Option<&'a Path>,
+    /// View that shows the arm.
+    pub view: Option<&'a LiveView>,
+    /// Called after each touch and each trial.
+    pub progress: &'a dyn Fn(Progress),
+    /// Called before each new touch, when it may return another target or a fault, and after each
+    /// touch.
+    pub observer: &'a mut TrialObserver<'a>,
+}
+
+impl RealRun<'_> {
+    /// Runs the trials that `done` lacks, until one fails or the run is stopped.
+    ///
+    /// Returns the number of finished trials and, if it stopped early, the trial, the reason and
+    /// the stored touches.
+    ///
+    /// # Errors
+    /// If a row or touch cannot be stored, or a planner is not available.
+    pub fn run(mut self, done: &[TrialId]) -> Result<(usize, Option<String>), RunError> {
+        let mut journal = Journal::open(self.folder.path())?;
+        let mut finished = 0;
+        for job in missing_jobs(self.simulation, done)? {
+            if self.stop.load(Ordering::Relaxed) {
+                break;
+            }
+            if let Some(halt) = self.trial(job, &mut journal)? {
+                return Ok((finished, Some(halt)));
+            }
+            finished += 1;
         }
+        Ok((finished, None))
+    }
+
+    /// Runs a trial and adds its row to the folder; if it fails, returns the trial, the reason and
+    /// the stored touches.
+    fn trial(&mut self, job: Job, journal: &mut Journal) -> Result<Option<String>, RunError> {
+        let (trial, planner) = job;
         let name = planner.name();
-        let entry = |touch, fault| {
-            let (time_unix_s, planner) = (pace::now_s(), name.to_owned());
-            JournalEntry { time_unix_s, trial, planner, touch, fault }
-        };
         let made = journal.touches(trial, name);
-        let (mut is_asked, mut unstored) = (false, None);
-        let mut keep = |event: &TrialEvent| {
-            // Touches made before an interruption are not shown again, except the last.
-            let is_shown = event.count() as usize >= made.len();
-            if let Some(arm) = simulation.arm().filter(|_| is_shown) {
-                trial::view::show(arm, simulation, event);
-            }
-            let touched = match event {
-                TrialEvent::Next(next) => {
-                    // An operator's target is repeated, as the planner's own is planned again.
-                    return match made.get(next.count as usize - 1) {
-                        Some(made) => {
-                            let chosen = made.fallback == Some(Fallback::Operator);
-                            Ok(chosen.then(|| made.target.clone()))
-                        }
-                        None => {
-                            let answer = observer(event);
-                            is_asked |= matches!(answer, Err(Fault::Stopped { .. }));
-                            answer
-                        }
-                    };
-                }
-                TrialEvent::Finished(touched) => touched,
-            };
-            let time_s = touched.row.time_s.unwrap_or_default();
-            progress(Progress::Touch);
-            let observed = observer(event);
-            if let Some(made) = made.get(touched.count as usize - 1) {
-                let (touch, target) = (touched.count, made.target.numbers());
-                return match made.target == touched.row.target {
-                    true => Ok(None),
-                    false => Err(Fault::from(InputError::new(format!(
-                        "touch {touch}: recorded target {target:?} differs from the current plan; program or \
-                         experiment changed, use --fresh to start again"
-                    )))),
-                };
-            }
-            if let Err(error) = journal.add(entry(Some(touched.row.clone()), None)) {
-                let message = error.to_string();
-                unstored = Some(error);
-                return Err(Fault::RecordingFailed { time_s, message });
-            }
-            is_asked |= stop.load(Ordering::Relaxed);
-            if is_asked { Err(Fault::Stopped { time_s }) } else { observed }
-        };
-        let path = recorded.map(|run| next_part(&recording_path(run, planner, trial)));
-        let job = (trial, planner);
-        let row = recorded_trial::run(simulation, job, (path.as_deref(), view), &made, &mut keep);
+        let path = self.recorded.map(|run| next_part(&recording_path(run, planner, trial)));
+        let shown = (path.as_deref(), self.view);
+        let simulation = self.simulation;
+        let mut stored =
+            StoredTrial { run: self, journal, job, made: &made, is_asked: false, unstored: None };
+        let mut observe = |event: &TrialEvent| stored.observe(event);
+        let row = recorded_trial::run(simulation, job, shown, &made, &mut observe);
+        let StoredTrial { is_asked, unstored, .. } = stored;
         if let Some(error) = unstored {
             return Err(error);
         }
         let Some(reason) = row.failure else {
-            folder.append(&row)?;
-            finished += 1;
-            progress(Progress::Trial(&row));
-            continue;
+            self.folder.append(&row)?;
+            (self.progress)(Progress::Trial(&row));
+            return Ok(None);
         };
         if !is_asked {
-            journal.add(entry(None, Some(reason.clone())))?;
+            journal.add(journal_entry(job, None, Some(reason.clone())))?;
         }
         let touches = journal.touches(trial, name).len();
-        let kept = folder.path().join(JOURNAL);
+        let kept = self.folder.path().join(JOURNAL);
         let verb = if touches == 1 { "is" } else { "are" };
         let kept = format!("{} {verb} stored in {}", counted(touches, "touch"), kept.display());
-        return Ok((finished, Some(format!("{name}, trial {trial}: {reason}\n{kept}"))));
+        Ok(Some(format!("{name}, trial {trial}: {reason}\n{kept}")))
     }
-    Ok((finished, None))
+}
+
+/// Returns the entry of a touch or a fault of a trial, at this time.
+fn journal_entry(job: Job, touch: Option<TouchRow>, fault: Option<String>) -> JournalEntry {
+    let (trial, planner) = (job.0, job.1.name().to_owned());
+    JournalEntry { time_unix_s: pace::now_s(), trial, planner, touch, fault }
+}
+
+/// A trial of a real arm whose touches are stored.
+struct StoredTrial<'a, 'b> {
+    run: &'a mut RealRun<'b>,
+    journal: &'a mut Journal,
+    job: Job<'a>,
+    /// Touches made before an interruption.
+    made: &'a [TouchRow],
+    /// Whether the trial was stopped on request.
+    is_asked: bool,
+    /// Error of a touch that could not be stored.
+    unstored: Option<RunError>,
+}
+
+impl StoredTrial<'_, '_> {
+    /// Shows an event of the trial, stores a finished touch, and calls the run's observer.
+    fn observe(&mut self, event: &TrialEvent) -> Result<Option<Target>, Fault> {
+        // Touches made before an interruption are not shown again, except the last.
+        let is_shown = event.count() as usize >= self.made.len();
+        let simulation = self.run.simulation;
+        if let Some(arm) = simulation.arm().filter(|_| is_shown) {
+            trial::view::show(arm, simulation, event);
+        }
+        let made = self.made.get(event.count() as usize - 1);
+        match (event, made) {
+            (TrialEvent::Next(_), Some(made)) => {
+                // An operator's target is repeated, as the planner's own is planned again.
+                let chosen = made.fallback == Some(Fallback::Operator);
+                Ok(chosen.then(|| made.target.clone()))
+            }
+            (TrialEvent::Next(_), None) => {
+                let answer = (self.run.observer)(event);
+                self.is_asked |= matches!(answer, Err(Fault::Stopped { .. }));
+                answer
+            }
+            (TrialEvent::Finished(touched), made) => {
+                (self.run.progress)(Progress::Touch);
+                let observed = (self.run.observer)(event);
+                match made {
+                    Some(made) => check_repeated(touched, made).map(|()| None),
+                    None => self.store(touched.row).and(observed),
+                }
+            }
+        }
+    }
+
+    /// Stores a finished touch.
+    ///
+    /// # Errors
+    /// If it cannot be stored, or the run is stopped.
+    fn store(&mut self, touch: &TouchRow) -> Result<(), Fault> {
+        let time_s = touch.outcome.time_s.unwrap_or_default();
+        let entry = journal_entry(self.job, Some(touch.clone()), None);
+        if let Err(error) = self.journal.add(entry) {
+            let message = error.to_string();
+            self.unstored = Some(error);
+            return Err(Fault::RecordingFailed { time_s, message });
+        }
+        self.is_asked |= self.run.stop.load(Ordering::Relaxed);
+        if self.is_asked { Err(Fault::Stopped { time_s }) } else { Ok(()) }
+    }
+}
+
+/// Checks that a touch repeats the recorded one.
+fn check_repeated(touched: &FinishedTouch, made: &TouchRow) -> Result<(), Fault> {
+    if made.target == touched.row.target {
+        return Ok(());
+    }
+    let (touch, target) = (touched.count, made.target.numbers());
+    Err(Fault::from(InputError::new(format!(
+        "touch {touch}: recorded target {target:?} differs from the current plan; program or \
+         experiment changed, use --fresh to start again"
+    ))))
 }

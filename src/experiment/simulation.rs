@@ -198,8 +198,9 @@ impl Simulation {
         let simulator = Simulator::new(Arc::clone(&truth.environment));
         let simulator = simulator.map_err(|error| InputError::new(error.to_string()))?;
         let truth = Arc::new(truth);
-        let own_planners: Vec<Box<dyn PlannerFactory>> =
-            vec![Box::new(OracleFactory(truth.clone()))];
+        let restricted = experiment.planners.iter().filter_map(|name| planner::restricted(name));
+        let oracle: Box<dyn PlannerFactory> = Box::new(OracleFactory(truth.clone()));
+        let own_planners: Vec<_> = restricted.chain([oracle]).collect();
         Ok(Self {
             experiment,
             simulator,

@@ -455,11 +455,9 @@ impl Desk {
 
     /// Returns the target with these numbers, if the finger can touch it.
     fn allowed(&self, numbers: &[f64]) -> Result<Target, OrderError> {
-        let target = Target::from_numbers(numbers);
-        let is_tap = |target: &Target| target.slide_m() == 0.0;
-        let target = target.filter(|target| {
+        let target = self.task.region().target(numbers).filter(|target| {
             let is_inside = self.task.region().contains(target);
-            is_tap(target) && is_inside && self.task.approach(target).is_some()
+            is_inside && self.task.approach(target).is_some()
         });
         let whole = self.task.ball().is_some();
         target.ok_or_else(|| {

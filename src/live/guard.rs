@@ -68,7 +68,8 @@ impl Access {
     /// The status and the reason of a refusal.
     pub(super) fn check(
         &self,
-        (method, uri): (&Method, &Uri),
+        method: &Method,
+        uri: &Uri,
         headers: &HeaderMap,
     ) -> Result<Passage, (StatusCode, &'static str)> {
         let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
@@ -127,7 +128,7 @@ mod tests {
         let pairs = headers.iter().map(|(name, value)| {
             (HeaderName::try_from(*name).unwrap(), HeaderValue::from_str(value).unwrap())
         });
-        let found = access.check((&method, &path.parse().unwrap()), &pairs.collect());
+        let found = access.check(&method, &path.parse().unwrap(), &pairs.collect());
         found.map_or_else(
             |(status, _)| status.as_u16(),
             |passage| match passage {

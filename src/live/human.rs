@@ -15,10 +15,6 @@ impl PlannerFactory for HumanFactory {
         HUMAN
     }
 
-    fn taps(&self) -> bool {
-        true
-    }
-
     fn make(&self, _: &PlanningSettings, _: ChaCha8Rng) -> Box<dyn Planner> {
         let desk = Arc::clone(&self.0);
         Box::new(move |_: &Belief| {

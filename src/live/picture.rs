@@ -6,6 +6,7 @@ use crate::experiment::trial::planner_names::HUMAN;
 use crate::experiment::trial::row::TouchRow;
 use crate::experiment::truth::Truth;
 use crate::report::{explorer, solid, style, whole_object};
+use palpate_explore::evidence::End;
 use palpate_explore::task::Target;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -35,12 +36,12 @@ pub(super) fn state(desk: &Desk) -> Value {
             "next": track.next.as_ref().map(Target::numbers),
             "asks": asks,
             "errors": errors.collect::<Vec<_>>(),
-            "last": track.row.touches.last().map(|touch| match (touch.contact, touch.overload) {
-                (Some(_), _) => "contact",
-                (None, true) => "aborted: the force limit was reached",
-                (None, false) => "no contact",
+            "last": track.row.touches.last().map(|touch| match touch.outcome.end {
+                End::Contact => "contact",
+                End::Overload => "aborted: the force limit was reached",
+                End::Miss | End::Looked => "no contact",
             }),
-            "time_s": track.row.touches.last().and_then(|touch| touch.time_s),
+            "time_s": track.row.touches.last().and_then(|touch| touch.outcome.time_s),
             "hypotheses": track.row.touches.last().map(likely),
             "failure": track.row.failure,
         })

@@ -209,7 +209,7 @@ impl Server {
     }
 
     async fn answer(self: Arc<Self>, request: Request<Incoming>, cut: Cut) -> Response<Body> {
-        let passage = self.access.check((request.method(), request.uri()), request.headers());
+        let passage = self.access.check(request.method(), request.uri(), request.headers());
         let answered = match passage {
             Err((status, words)) => Err(refusal(status, words)),
             Ok(Passage::Enters) => Ok(entry(&self.access)),

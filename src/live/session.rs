@@ -3,7 +3,7 @@
 use super::desk::Desk;
 use super::human::HumanFactory;
 use crate::experiment::Simulation;
-use crate::experiment::runner::{self, Job};
+use crate::experiment::runner::{self, Job, RealRun};
 use crate::experiment::store::{Run, RunError, RunFolder};
 use crate::experiment::trial::TrialEvent;
 use crate::experiment::trial::row::{TrialId, TrialRow};
@@ -65,7 +65,7 @@ impl Session {
             }
             let views = self.desk.begin(together[0].0);
             if self.simulation.is_real() {
-                halted = self.run_real(folder, (together, &views))?;
+                halted = self.run_real(folder, together, &views)?;
                 continue;
             }
             for row in self.side_by_side(together, &views) {
@@ -88,8 +88,8 @@ impl Session {
         let run = |job: &Job| {
             let planner = self.number(job.1.name());
             let mut observe = |event: &TrialEvent| self.desk.observe(planner, event);
-            let shown = (None, views.get(planner));
-            let row = runner::run_caught(&self.simulation, *job, shown, &mut observe);
+            let view = views.get(planner);
+            let row = runner::run_caught(&self.simulation, *job, None, view, &mut observe);
             self.desk.end(planner, &row);
             row
         };
@@ -104,7 +104,8 @@ impl Session {
     fn run_real(
         &self,
         folder: &mut RunFolder,
-        (jobs, views): (&[Job], &[LiveView]),
+        jobs: &[Job],
+        views: &[LiveView],
     ) -> Result<Option<String>, RunError> {
         for (trial, planner) in jobs {
             let number = self.number(planner.name());
@@ -116,9 +117,16 @@ impl Session {
                 .filter(is_other)
                 .collect();
             let mut observe = |event: &TrialEvent| self.desk.observe(number, event);
-            let (rows, shown) = ((&mut *folder, &others[..]), (None, views.get(number)));
-            let (_, halted) =
-                runner::run_real(&self.simulation, rows, &self.stop, shown, &|_| (), &mut observe)?;
+            let run = RealRun {
+                simulation: &self.simulation,
+                folder: &mut *folder,
+                stop: &self.stop,
+                recorded: None,
+                view: views.get(number),
+                progress: &|_| (),
+                observer: &mut observe,
+            };
+            let (_, halted) = run.run(&others)?;
             if let Some(reason) = halted {
                 self.desk.fail(number, &reason);
                 return Ok(Some(reason));

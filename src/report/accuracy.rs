@@ -61,7 +61,7 @@ pub fn draw(
     ]);
     let first = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
     let entries = entries.filter(|_| levels.is_some());
-    let mut sheet = FigureLayout::new(size, (first, [STEP_PX, ROW_PX]), (size[0], ""), entries);
+    let mut sheet = FigureLayout::new(size, first, [STEP_PX, ROW_PX], size[0], "", entries);
     if let Some(levels) = levels {
         for (column, error) in ERRORS.into_iter().enumerate() {
             let area = sheet.area(column, 0.0);

@@ -245,7 +245,7 @@ pub fn profiles(compared: &SuiteComparison) -> Option<String> {
     let area = Area { left: 70.0, top: 60.0, width: 460.0, height: 300.0 };
     let x_name = format!("error over the touches, relative to {}", compared.reference);
     let names = [x_name.as_str(), "fraction of the trials"];
-    Some(draw(compared, (area, x, names), curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
+    Some(draw(compared, area, x, names, curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
 }
 
 /// Draws the reliability over all objects: the fraction of places with a surface, over its
@@ -269,14 +269,16 @@ fn reliability(compared: &SuiteComparison) -> Option<String> {
     let area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };
     let names = ["predicted probability of a surface", "fraction with a surface"];
     let is_known = curves.iter().any(|curve| !curve.is_empty());
-    let axes = (area, Axis::linear(0.0, 1.0, 6.0), names);
-    is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))
+    let x = Axis::linear(0.0, 1.0, 6.0);
+    is_known.then(|| draw(compared, area, x, names, curves, [[0.0, 0.0], [1.0, 1.0]]))
 }
 
 /// Draws one panel with a curve for each planner, a legend above, and a dashed reference line.
 fn draw(
     compared: &SuiteComparison,
-    (area, x, [x_name, y_name]): (Area, Axis, [&str; 2]),
+    area: Area,
+    x: Axis,
+    [x_name, y_name]: [&str; 2],
     curves: Vec<Vec<(f64, f64)>>,
     reference: [[f64; 2]; 2],
 ) -> String {
@@ -286,7 +288,7 @@ fn draw(
     let swatches = strokes.iter().cloned().map(Swatch::Line);
     let entries = swatches.zip(names.iter().map(String::as_str));
     let size = [area.right() + 20.0, area.bottom() + 50.0];
-    let mut sheet = FigureLayout::new(size, (area, [0.0; 2]), (area.width, ""), entries);
+    let mut sheet = FigureLayout::new(size, area, [0.0; 2], area.width, "", entries);
     let panel = Panel { area: sheet.area(0, 0.0), x, y: Axis::linear(0.0, 1.0, 6.0) };
     let canvas = &mut sheet.canvas;
     panel.frame(canvas);

@@ -98,8 +98,8 @@ pub fn drawings(run: &Run, planner: &str, counts: &[u32]) -> anyhow::Result<Vec<
     let row = replay::row(run, planner).with_context(|| format!("no trial of {planner}"))?;
     let drawings = match &run.experiment.scene.zone {
         None => solids(run, row, counts),
-        Some(zone) if zone.dimension() == 1 => self::curves(run, (row, zone), counts),
-        Some(zone) => reliefs(run, (row, zone), counts),
+        Some(zone) if zone.dimension() == 1 => self::curves(run, row, zone, counts),
+        Some(zone) => reliefs(run, row, zone, counts),
     };
     drawings?.with_context(|| format!("{planner} has no belief to draw"))
 }
@@ -107,7 +107,7 @@ pub fn drawings(run: &Run, planner: &str, counts: &[u32]) -> anyhow::Result<Vec<
 /// Drawings; `None` if there is nothing to draw.
 type Drawings = anyhow::Result<Option<Vec<String>>>;
 
-fn curves(run: &Run, (row, zone): (&TrialRow, &Zone), counts: &[u32]) -> Drawings {
+fn curves(run: &Run, row: &TrialRow, zone: &Zone, counts: &[u32]) -> Drawings {
     let unit = Length::of(zone);
     let Some(heights) = curves::height_axis(run, unit) else { return Ok(None) };
     let inner =
@@ -130,7 +130,7 @@ fn curves(run: &Run, (row, zone): (&TrialRow, &Zone), counts: &[u32]) -> Drawing
     counts.par_iter().map(draw).collect()
 }
 
-fn reliefs(run: &Run, (row, zone): (&TrialRow, &Zone), counts: &[u32]) -> Drawings {
+fn reliefs(run: &Run, row: &TrialRow, zone: &Zone, counts: &[u32]) -> Drawings {
     let Some(space) = surfaces::space(run, zone) else { return Ok(None) };
     let grid = Grid::new(run, 2, surfaces::PLACES)?;
     let places: Vec<&[f64]> = grid.places().collect();
@@ -257,7 +257,7 @@ impl<'a> FilmLayout<'a> {
         &self,
         row: &TrialRow,
     ) -> impl Iterator<Item = (Swatch, &'static str)> + use<> {
-        let is_missed = row.touches.iter().any(|touch| touch.contact.is_none());
+        let is_missed = row.touches.iter().any(|touch| touch.contact().is_none());
         touch_entries().into_iter().chain(is_missed.then_some(MISS))
     }
 
@@ -267,7 +267,7 @@ impl<'a> FilmLayout<'a> {
         let error_px = if self.errors.is_empty() { 0.0 } else { ERROR_PX[0] };
         let foot_px = error_px + if self.has_bar { BAR_PX[0] } else { 0.0 };
         let size = [self.width_px + 2.0 * MARGIN_PX, first.bottom() + foot_px];
-        FigureLayout::new(size, (first, [width, 0.0]), (self.width_px, ON_RELIEF), entries)
+        FigureLayout::new(size, first, [width, 0.0], self.width_px, ON_RELIEF, entries)
     }
 
     /// Returns the area of the first panel.

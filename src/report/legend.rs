@@ -59,13 +59,15 @@ pub struct FigureLayout {
 }
 
 impl FigureLayout {
-    /// Creates a drawing of `size` with a legend of a width, drawn in a group of `attributes`, and
-    /// a distance of `step` between panels. The drawing grows, and `first` moves down, by the
+    /// Creates a drawing of `size` with a legend of `legend_px`, drawn in a group of `attributes`,
+    /// and a distance of `step` between panels. The drawing grows, and `first` moves down, by the
     /// legend's additional rows.
     pub fn new<'a>(
         [width, height]: [f64; 2],
-        (first, step): (Area, [f64; 2]),
-        (legend_px, attributes): (f64, &str),
+        first: Area,
+        step: [f64; 2],
+        legend_px: f64,
+        attributes: &str,
         entries: impl IntoIterator<Item = (Swatch, &'a str)>,
     ) -> Self {
         let legend = Legend::new(legend_px, entries);
@@ -90,7 +92,7 @@ impl FigureLayout {
 /// Returns the legend entry of missed touches, if there are any.
 pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
     let mut touches = run.rows.iter().flat_map(|row| &row.touches);
-    let is_missed = touches.any(|touch| touch.contact.is_none());
+    let is_missed = touches.any(|touch| touch.contact().is_none());
     is_missed.then_some(MISS)
 }
 

@@ -20,7 +20,7 @@ const COMPLETE: &str = include_str!("reference.toml");
 pub fn settings() -> String {
     let schema = schema_for!(Experiment).to_value();
     let mut text = String::new();
-    add_table(&mut text, (&schema, &allowed()), "", &schema);
+    add_table(&mut text, &schema, &allowed(), "", &schema);
     text
 }
 
@@ -63,7 +63,8 @@ fn whole(key: &str) -> String {
 /// `allowed` has the allowed values by key.
 fn add_table(
     text: &mut String,
-    (root, allowed): (&Value, &BTreeMap<String, String>),
+    root: &Value,
+    allowed: &BTreeMap<String, String>,
     prefix: &str,
     schema: &Value,
 ) {
@@ -103,7 +104,7 @@ fn add_table(
             *text += &format!("\n### `{}`\n\nAs `{}`.\n", SAME[1], SAME[0]);
             continue;
         }
-        add_table(text, (root, allowed), &key, within);
+        add_table(text, root, allowed, &key, within);
     }
 }
 

@@ -24,7 +24,7 @@ pub fn draw(counts: &[(u32, [f64; LEVELS.len()])]) -> String {
         entries.map(|(i, name)| (Swatch::Line(style::stroke(colour(i), 1.8)), name.as_str()));
     let size = [LEFT_PX + SIDE_PX + 30.0, TOP_PX + SIDE_PX + 60.0];
     let first = Area { left: LEFT_PX, top: TOP_PX, width: SIDE_PX, height: SIDE_PX };
-    let mut sheet = FigureLayout::new(size, (first, [0.0; 2]), (SIDE_PX, ""), entries);
+    let mut sheet = FigureLayout::new(size, first, [0.0; 2], SIDE_PX, "", entries);
     let area = sheet.area(0, 0.0);
     let axis = || Axis::linear(0.0, 1.0, 5.0);
     let panel = Panel { area, x: axis(), y: axis() };

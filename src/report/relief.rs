@@ -330,7 +330,8 @@ impl Relief {
     pub fn mark(
         &self,
         canvas: &mut Canvas,
-        (camera, p): (&Camera, &Vector3<f64>),
+        camera: &Camera,
+        p: &Vector3<f64>,
         radius: f64,
         colour: &str,
     ) {

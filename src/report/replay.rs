@@ -7,8 +7,7 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::report::canvas::{Canvas, PointPx};
 use crate::report::style;
 use crate::report::table::digits;
-use anyhow::{Context, ensure};
-use nalgebra::Point3;
+use anyhow::ensure;
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
@@ -52,25 +51,10 @@ impl<'a> BeliefReplay<'a> {
     ) -> anyhow::Result<Option<Self>> {
         let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
         let Some(last) = touches.last() else { return Ok(None) };
-        let (Some(fit), Some(zone)) = (&last.fit, &experiment.scene.zone) else {
+        let belief = row.belief(experiment, count)?;
+        let Some(belief) = belief.as_ref().and_then(|belief| belief.height_field()).cloned() else {
             return Ok(None);
         };
-        let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let finger = &experiment.scene.finger;
-        let belief = HeightField::new(zone.clone(), experiment.gp.clone());
-        let mut belief = belief.with_finger(finger.clone());
-        for view in row.views.iter().filter(|view| view.after < count) {
-            belief.observe_seen(view.seen.clone());
-        }
-        for touch in touches {
-            let is_place = |it: &&[f64]| it.len() == zone.dimension();
-            touch.target.place().filter(is_place).with_context(|| {
-                format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
-            })?;
-            let outcome = touch.outcome(finger, -zone.ahead_w().into_inner());
-            belief.observe_target(&touch.target, &outcome);
-        }
-        belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };
         Ok(Some(Self {
             belief,
@@ -195,7 +179,7 @@ pub fn row<'a>(run: &'a Run, planner: &str) -> Option<&'a TrialRow> {
 
 /// Returns the place (x) or (x, z) of a touch and its height above the datum; `None` for a miss.
 pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
-    let p_wc = Point3::from(touch.contact?);
+    let p_wc = touch.contact()?;
     Some((zone.place(&p_wc), zone.height_m(&p_wc)))
 }
 

@@ -42,23 +42,29 @@ pub fn zone_picture(zone: &Zone, mesh: &Mesh, height_m: Heights) -> Option<Strin
     let heights_m = zone.grid(GRID).into_iter().filter_map(|place| height_m(&place));
     let heights_m = heights_m.flat_map(|height_m| [height_m - FLAT_M, height_m + FLAT_M]);
     let axis = Axis::around(heights_m, 0.04, 5.0)?;
-    draw((zone, mesh, height_m), &axis, None)
+    draw(zone, mesh, height_m, &axis, None)
 }
 
 /// Draws the object with the zone's outline on the left and the points of contact on the right, as
 /// SVG; `None` without points.
-pub fn picture(object: (&Zone, &Mesh, Heights), contacts: &[Contact]) -> Option<String> {
-    let heights_m = contacts.iter().map(|(p_w, _)| object.0.height_m(p_w));
-    draw(object, &Axis::around(heights_m, 0.04, 5.0)?, Some(contacts))
+pub fn picture(
+    zone: &Zone,
+    mesh: &Mesh,
+    height_m: Heights,
+    contacts: &[Contact],
+) -> Option<String> {
+    let heights_m = contacts.iter().map(|(p_w, _)| zone.height_m(p_w));
+    draw(zone, mesh, height_m, &Axis::around(heights_m, 0.04, 5.0)?, Some(contacts))
 }
 
 /// Draws object and contacts, with heights coloured along `axis`.
 fn draw(
-    object: (&Zone, &Mesh, Heights),
+    zone: &Zone,
+    mesh: &Mesh,
+    height_m: Heights,
     axis: &Axis,
     contacts: Option<&[Contact]>,
 ) -> Option<String> {
-    let zone = object.0;
     let space = Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: axis.range().into() };
     let unit = Length::of(zone);
     let ([width, height], columns, bar_px) = match contacts {
@@ -68,12 +74,12 @@ fn draw(
     let axes_px = if contacts.is_none() { AXES_PX } else { 0.0 };
     let mut canvas = Canvas::new(columns * width, height + FOOT_PX + axes_px);
     let first = Area { left: 0.0, top: 8.0, width, height };
-    let camera = draw_object(&mut canvas, first, object, axis);
+    let camera = draw_object(&mut canvas, first, zone, mesh, height_m, axis);
     if contacts.is_none() {
         let top = height + FOOT_PX + 0.5 * AXES_PX;
         draw_axes(&mut canvas, &camera, [66.0, top], &zone.x_wz().rotation.inverse());
         draw_scale_bar(&mut canvas, camera.px_per_m(), [BAR_LEFT_PX, top - 14.0]);
-        if object.1.has_patches() {
+        if mesh.has_patches() {
             let hole = [(Swatch::Box(HOLE_LEGEND), "hole of the mesh, without ground truth")];
             Legend::new(width, hole).draw(&mut canvas, [BAR_LEFT_PX, top + 24.0]);
         }
@@ -109,7 +115,9 @@ const PLACES: usize = 90;
 fn draw_object(
     canvas: &mut Canvas,
     area: Area,
-    (zone, mesh, height_m): (&Zone, &Mesh, Heights),
+    zone: &Zone,
+    mesh: &Mesh,
+    height_m: Heights,
     axis: &Axis,
 ) -> Camera {
     let unit = Length::of(zone);

@@ -85,7 +85,7 @@ pub fn draw(results: &[SensorResults]) -> Option<String> {
     let step = [PANEL.0 + GAP.0, PANEL.1 + GAP.1];
     let width = 70.0 + 2.0 * step[0];
     let size = [width, 66.0 + results.len() as f64 * step[1]];
-    let mut sheet = FigureLayout::new(size, (first, step), (width - 140.0, ""), entries);
+    let mut sheet = FigureLayout::new(size, first, step, width - 140.0, "", entries);
     for (row, result) in results.iter().enumerate() {
         let measure = result.measure();
         let in_mm = |point: &CurvePoint| Some(measure.unit.per_si * point.of(measure)?.median);

@@ -12,8 +12,6 @@ use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use anyhow::Context;
 use nalgebra::Point3;
-use palpate_explore::task::Task;
-use palpate_explore::whole_object::{ExplorationSetup, ImplicitSurface};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::decimate::decimate;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -91,7 +89,7 @@ pub fn sequences(
             sequence.touches.push(SolidTouch {
                 aim_w: aim.p_w,
                 along_w: *aim.direction_w,
-                contact_w: touch.contact.map(Point3::from),
+                contact_w: touch.contact(),
                 is_initial: i < initial_touches,
             });
         }
@@ -120,7 +118,10 @@ pub fn frame(
     most: usize,
 ) -> anyhow::Result<Option<SurfaceFrame>> {
     let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
-    let Some(belief) = belief(experiment, row, count)? else { return Ok(None) };
+    let belief = row.belief(experiment, count)?;
+    let Some(belief) = belief.as_ref().and_then(|belief| belief.implicit_surface()) else {
+        return Ok(None);
+    };
     let Some(surface) = belief.surface() else { return Ok(None) };
     let mesh = surface.mesh(experiment.space.cells).map(|mesh| decimate(&mesh, most));
     let mesh = mesh.unwrap_or_default();
@@ -143,39 +144,4 @@ pub fn frame(
         seen_w: belief.seen().iter().flat_map(|it| it.elements()).map(|it| it.p_w).collect(),
         mesh,
     }))
-}
-
-/// Returns the belief after `count` touches of a trial; `None` without a fit then.
-///
-/// # Errors
-/// If the touches do not belong to the object or cannot be conditioned on.
-pub fn belief(
-    experiment: &Experiment,
-    row: &TrialRow,
-    count: u32,
-) -> anyhow::Result<Option<ImplicitSurface>> {
-    let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
-    let Some(fit) = touches.last().and_then(|touch| touch.fit.as_ref()) else { return Ok(None) };
-    let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
-    let scene = &experiment.scene;
-    let ball = scene.whole_object.as_ref().and_then(|around| around.ball());
-    let ball =
-        ball.context("the scene has no ball of [whole_object]; resolved.toml is incomplete")?;
-    let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
-    let scope = ExplorationSetup::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
-    let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
-    for view in row.views.iter().filter(|view| view.after < count) {
-        belief.observe_seen(view.seen.clone());
-    }
-    for touch in touches {
-        // The roll of the finger does not change its path.
-        let standoff_m = scene.touch.standoff_m;
-        let approach = ball.approach_to(&touch.target, &scene.finger, standoff_m, 0.0);
-        let (aim, approach) = (touch.target.aim().zip(approach))
-            .context("the target has no direction, which a whole object needs")?;
-        let outcome = touch.outcome(&scene.finger, -approach.direction_w().into_inner());
-        belief.observe(aim, &approach, &outcome);
-    }
-    belief.condition(before, fit)?;
-    Ok(Some(belief))
 }

@@ -16,7 +16,7 @@ use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain, model};
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::robot::sensor::SensorModel;
 use palpate_explore::task::{Approach, Ball, RADIUS_M, Region, Task, WholeObject, Zone};
-use palpate_explore::view::{Offer, View};
+use palpate_explore::view::{LookOffer, View};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::holes::{Hole, find_holes};
 use palpate_geometry::implicit::ImplicitSolid;
@@ -257,13 +257,11 @@ impl Environment {
         camera.at(number).look(&VisibleScene { object: bvh, middle_w, capsules_w }, rng)
     }
 
-    /// Returns the looks of the scene's camera but those with the numbers `taken`; a touch takes
-    /// `touch_s`.
-    pub fn offers(&self, taken: &[u32], touch_s: f64) -> Vec<Offer> {
+    /// Returns the looks of the scene's camera but those with the numbers `taken`.
+    pub fn looks(&self, taken: &[u32]) -> Vec<LookOffer> {
         let Some(camera) = &self.scene.camera else { return Vec::new() };
         let numbers = (0..=camera.further.len() as u32).filter(|number| !taken.contains(number));
-        let offer =
-            |number: u32| camera.at(number as usize).offer(number, &self.middle_w(), touch_s);
+        let offer = |number: u32| camera.at(number as usize).offer(number, &self.middle_w());
         numbers.map(offer).collect()
     }
 
@@ -296,7 +294,7 @@ impl Environment {
                 let standoff_m = self.task.touch().standoff_m;
                 let around_m = ball.keep_out(finger, standoff_m).radius_m + CLEARANCE_M;
                 let home_w = ball.centre_w + Vector3::y() * around_m;
-                stage_with_wrist((ball.centre_w, around_m), home_w, finger.r_at())
+                stage_with_wrist(ball.centre_w, around_m, home_w, finger.r_at())
             }
             Region::Zone(zone) => {
                 let [near_m, _] = self.task.depth_m();

@@ -4,12 +4,15 @@ use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, ObjectShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
-use palpate_explore::probe::{Contact, Outcome, Probe, SweptVolume, Touch, check_finite};
+use palpate_explore::evidence::{
+    Contact, End, Evidence, FreeVolume, Outcome, Source, SurfacePoints,
+};
+use palpate_explore::probe::{Probe, checked_approach};
 use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::SensedContact;
-use palpate_explore::task::Approach;
 use palpate_explore::task::approach::BEYOND_M;
 use palpate_explore::task::stroke::{SAMPLE_M, STEEPEST};
+use palpate_explore::task::{Action, Approach};
 use palpate_geometry::bvh::SweepHit;
 use palpate_geometry::sweep::Capsule;
 use std::sync::Arc;
@@ -26,8 +29,8 @@ struct ExactProbe {
 }
 
 impl Probe for ExactProbe {
-    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
-        check_finite(approach)?;
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        let approach = checked_approach(action)?;
         let environment = &self.environment;
         if let (ObjectShape::Function(function), Some(zone)) =
             (environment.shape(), environment.task().zone())
@@ -36,26 +39,27 @@ impl Probe for ExactProbe {
             let x_m = place[0];
             let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
             let p_wc = zone.point(&place, function.height_m(x_m));
-            let normal_w = zone.x_wz().rotation * normal_z;
-            return Ok(Touch::Contact(Contact::new(p_wc, normal_w)).into());
+            return Ok(Contact::new(p_wc, zone.x_wz().rotation * normal_z).into());
         }
-        let found = resting_pose(environment, approach);
-        let turned_w = || {
-            approach.p_far_w
-                + approach.direction_w().scale(turnaround_distance_m(environment, approach))
+        let finger = pitched(environment, approach);
+        let Some(rest) = resting_pose(environment, approach) else {
+            let way_m = turnaround_distance_m(environment, approach);
+            let p_wt = approach.p_far_w + approach.direction_w().scale(way_m);
+            let free = FreeVolume::new(finger, approach, p_wt, End::Miss);
+            return Ok(Outcome::new(End::Miss, vec![Evidence::Free(free)]));
         };
-        let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
-        let swept = Some(SweptVolume { finger: pitched(environment, approach), p_wt });
-        let sensed = found.map(|RestingPose { p_wt, hit }| {
-            let x_wt = Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
-            let p_tc = x_wt.inverse_transform_point(&hit.point);
-            (x_wt, SensedContact::new(p_tc, x_wt.inverse_transform_vector(&hit.normal)))
-        });
-        let touch = found.map_or(Touch::Miss, |rest| {
-            let patch = slide(environment, approach, rest).collect();
-            Touch::Contact(Contact { patch, ..Contact::new(rest.hit.point, rest.hit.normal) })
-        });
-        Ok(Outcome { touch, swept, sensed, doubt: None })
+        let RestingPose { p_wt, hit } = rest;
+        let first = Contact::new(hit.point, hit.normal);
+        let points = SurfacePoints {
+            points: std::iter::once(first).chain(slide(environment, approach, rest)).collect(),
+            source: approach.slide_w.map(|_| Source::Stroke),
+        };
+        let free = FreeVolume::new(finger, approach, p_wt, End::Contact);
+        let evidence = vec![Evidence::Points(points), Evidence::Free(free)];
+        let x_wt = Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
+        let p_tc = x_wt.inverse_transform_point(&hit.point);
+        let sensed = SensedContact::new(p_tc, x_wt.inverse_transform_vector(&hit.normal));
+        Ok(Outcome { sensed: Some((x_wt, sensed)), ..Outcome::new(End::Contact, evidence) })
     }
 }
 

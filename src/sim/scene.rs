@@ -231,62 +231,108 @@ impl Validate for ObjectSettings {
 
 impl Validate for Scene {
     fn check(&self, rules: &mut Rules) {
-        let lacks = |rules: &mut Rules, key: &str, lacks: bool, allowed: &str| {
-            rules.require(key, "(none)", !lacks, || allowed.into());
-        };
-        let given = |rules: &mut Rules, key: &str, given: bool, allowed: &str| {
-            rules.require(key, "(given)", !given, || allowed.into());
-        };
+        self.check_region(rules);
+        rules.table("finger", &self.finger);
+        self.check_pitches(rules);
+        self.check_stroke(rules);
+        self.check_object(rules);
+        self.check_library(rules);
+        self.check_wrist(rules);
+        self.check_camera(rules);
+        rules.table("effects", &self.effects);
+        rules.table("touch", &self.touch);
+        rules.table("solver", &self.solver);
+        self.check_solver(rules);
+        self.check_load(rules);
+        self.check_sensor(rules);
+        let bumps = self.simulator != SimulatorKind::Dynamic && self.effects.collision.is_some();
+        let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
+        forbid_given(rules, "effects.collision", bumps, allowed);
+        self.check_detection(rules);
+        self.object.iter().for_each(|object| rules.table("object", object));
+        self.check_arm(rules);
+    }
+}
+
+/// Reports that the setting `key` is needed, if it `is_missing`.
+fn require_given(rules: &mut Rules, key: &str, is_missing: bool, allowed: &str) {
+    rules.require(key, "(none)", !is_missing, || allowed.into());
+}
+
+/// Reports that the setting `key` is not allowed, if it `is_given`.
+fn forbid_given(rules: &mut Rules, key: &str, is_given: bool, allowed: &str) {
+    rules.require(key, "(given)", !is_given, || allowed.into());
+}
+
+impl Scene {
+    /// Checks zone or whole object: exactly one of them.
+    fn check_region(&self, rules: &mut Rules) {
         match &self.whole_object {
             None => {
                 let allowed =
                     "a table [zone] with x_m and z_m, or [whole_object] for a whole object";
-                lacks(rules, "zone", self.zone.is_none(), allowed);
+                require_given(rules, "zone", self.zone.is_none(), allowed);
                 self.zone.iter().for_each(|zone| rules.table("zone", zone));
             }
             Some(around) => {
                 let allowed = "no zone: [whole_object] explores the object from all sides";
-                given(rules, "zone", self.zone.is_some(), allowed);
+                forbid_given(rules, "zone", self.zone.is_some(), allowed);
                 rules.table("whole_object", around);
             }
         }
-        rules.table("finger", &self.finger);
+    }
+
+    /// Returns whether the region is a zone with two coordinates.
+    fn is_flat(&self) -> bool {
+        self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some())
+    }
+
+    fn check_pitches(&self, rules: &mut Rules) {
         let others = &self.finger.other_pitches_deg;
-        let is_flat = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
-        let can_tilt = self.simulator == SimulatorKind::Swept && is_flat;
+        let can_tilt = self.simulator == SimulatorKind::Swept && self.is_flat();
         rules.require(
             "finger.other_pitches_deg",
             format!("{others:?}"),
             others.is_empty() || can_tilt,
             || "none, unless simulator = \"swept\" touches a zone with x_m and z_m".into(),
         );
+    }
+
+    fn check_stroke(&self, rules: &mut Rules) {
         let allowed = "none: strokes are along a zone with x_m and z_m, or around a whole object";
-        let is_curve = self.whole_object.is_none() && !is_flat;
-        given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
+        let is_curve = self.whole_object.is_none() && !self.is_flat();
+        forbid_given(rules, "touch.stroke", self.touch.stroke.is_some() && is_curve, allowed);
         let has_pad = self.effects.gel.is_some() || self.sensor.signal() == Some(Signal::Depth);
         let allowed = "no stroke with [effects.gel] or [sensor.depth_patch]: the points of the \
                        pad's patch and of the stroke's path share one list";
-        given(rules, "touch.stroke", self.touch.stroke.is_some() && has_pad, allowed);
+        forbid_given(rules, "touch.stroke", self.touch.stroke.is_some() && has_pad, allowed);
+    }
+
+    /// Checks what the simulator touches: a function or an object.
+    fn check_object(&self, rules: &mut Rules) {
         let body = self.simulator.name();
         if self.simulator == SimulatorKind::Analytic {
             let allowed = "\"toy\", because simulator = \"analytic\"";
-            lacks(rules, "function", self.function.is_none(), allowed);
+            require_given(rules, "function", self.function.is_none(), allowed);
             let allowed = "no object: simulator = \"analytic\" touches a curve";
-            given(rules, "object", self.object.is_some(), allowed);
+            forbid_given(rules, "object", self.object.is_some(), allowed);
             let allowed = "no whole_object: simulator = \"analytic\" touches a curve";
-            given(rules, "whole_object", self.whole_object.is_some(), allowed);
+            forbid_given(rules, "whole_object", self.whole_object.is_some(), allowed);
             let allowed = "no arm: simulator = \"analytic\" needs none";
-            given(rules, "arm", self.arm.is_some(), allowed);
-            let is_deep = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
+            forbid_given(rules, "arm", self.arm.is_some(), allowed);
             let allowed = "no z_m: the surface of simulator = \"analytic\" is a curve over x";
-            given(rules, "zone.z_m", is_deep, allowed);
+            forbid_given(rules, "zone.z_m", self.is_flat(), allowed);
         } else {
             let allowed = format!("no function: simulator = \"{body}\" touches an object");
-            given(rules, "function", self.function.is_some(), &allowed);
+            forbid_given(rules, "function", self.function.is_some(), &allowed);
             let allowed = format!("a table with a mesh, because simulator = \"{body}\"");
-            lacks(rules, "object", self.object.is_none() && self.library.is_none(), &allowed);
+            let is_missing = self.object.is_none() && self.library.is_none();
+            require_given(rules, "object", is_missing, &allowed);
         }
-        self.check_library(rules);
+    }
+
+    /// Checks that the finger can turn around a whole object.
+    fn check_wrist(&self, rules: &mut Rules) {
         let turns = self.whole_object.is_none()
             || self.arm.is_some()
             || self.simulator != SimulatorKind::Dynamic;
@@ -295,14 +341,18 @@ impl Validate for Scene {
              stage of simulator = \"dynamic\" has no wrist"
                 .into()
         });
+    }
+
+    fn check_camera(&self, rules: &mut Rules) {
         if let Some(camera) = &self.camera {
             rules.table("camera", camera);
             let is_curve = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_none());
-            given(rules, "camera", is_curve, "no camera: a zone without z_m is a curve");
+            forbid_given(rules, "camera", is_curve, "no camera: a zone without z_m is a curve");
         }
-        rules.table("effects", &self.effects);
-        rules.table("touch", &self.touch);
-        rules.table("solver", &self.solver);
+    }
+
+    /// Checks the solver's steps and collisions against the simulator, the arm and the finger.
+    fn check_solver(&self, rules: &mut Rules) {
         if self.simulator == SimulatorKind::Dynamic {
             let (period_s, step_s) = (self.period_s(), self.solver.step_s);
             let whole = self.solver.steps(period_s).is_some();
@@ -328,40 +378,50 @@ impl Validate for Scene {
                     .into()
             });
         }
+    }
+
+    /// Checks that at most one model computes the finger's load, and one does if it is needed.
+    fn check_load(&self, rules: &mut Rules) {
         let effects = self.effective_effects();
         let is_bare = self.simulator == SimulatorKind::Kinematic && !effects.has_load();
         let allowed = "a table, because simulator = \"kinematic\" needs a soft skin, a [rigid_tip] \
                        or a [gel] (for an exact rigid finger use simulator = \"swept\"; without any [effects] the \
                        skin is a BioTac's)";
-        lacks(rules, "effects.skin", is_bare, allowed);
+        require_given(rules, "effects.skin", is_bare, allowed);
         let is_twofold = effects.skin.is_some() && effects.rigid_tip.is_some();
-        given(rules, "effects.rigid_tip", is_twofold, "either this or [effects.skin], not both");
+        let allowed = "either this or [effects.skin], not both";
+        forbid_given(rules, "effects.rigid_tip", is_twofold, allowed);
         let is_other = effects.skin.is_some() || effects.rigid_tip.is_some();
         let is_twofold = effects.gel.is_some() && is_other;
         let allowed = "either this or [effects.skin] or [effects.rigid_tip], not both";
-        given(rules, "effects.gel", is_twofold, allowed);
+        forbid_given(rules, "effects.gel", is_twofold, allowed);
+    }
+
+    /// Checks that the scene has the channels that the sensor needs.
+    fn check_sensor(&self, rules: &mut Rules) {
+        let (effects, body) = (self.effective_effects(), self.simulator.name());
         rules.table("sensor", &self.sensor);
-        if let Some((name, kind)) = self.sensor.kind() {
-            let key = format!("sensor.{name}");
-            rules.require(&key, "(given)", self.simulator.moves_finger(), || {
-                format!("no table, because simulator = \"{body}\" has no sensor")
-            });
-            let (is_blind, allowed) = match kind.signal() {
-                Signal::Wrench => (
-                    effects.wrench.is_none(),
-                    "another sensor, or a table [effects.wrench]: the tip is on a force/torque sensor",
-                ),
-                Signal::Depth => (
-                    effects.gel.is_none(),
-                    "another sensor, or a table [effects.gel]: the pad that gives the depths",
-                ),
-                Signal::Flag => (false, ""),
-            };
-            rules.require(&key, "(given)", !is_blind, || allowed.into());
-        }
-        let bumps = self.simulator != SimulatorKind::Dynamic && self.effects.collision.is_some();
-        let allowed = "no collision: only simulator = \"dynamic\" computes collisions of links";
-        given(rules, "effects.collision", bumps, allowed);
+        let Some((name, kind)) = self.sensor.kind() else { return };
+        let key = format!("sensor.{name}");
+        rules.require(&key, "(given)", self.simulator.moves_finger(), || {
+            format!("no table, because simulator = \"{body}\" has no sensor")
+        });
+        let (is_blind, allowed) = match kind.signal() {
+            Signal::Wrench => (
+                effects.wrench.is_none(),
+                "another sensor, or a table [effects.wrench]: the tip is on a force/torque sensor",
+            ),
+            Signal::Depth => (
+                effects.gel.is_none(),
+                "another sensor, or a table [effects.gel]: the pad that gives the depths",
+            ),
+            Signal::Flag => (false, ""),
+        };
+        rules.require(&key, "(given)", !is_blind, || allowed.into());
+    }
+
+    /// Checks that contact is detected: above the noise, and before the skin is compressed.
+    fn check_detection(&self, rules: &mut Rules) {
         if let (Some(wrench), false) = (&self.effects.wrench, self.detects_by_frames()) {
             let least_n = CONTACT_SIGMAS * wrench.noise_max_n();
             let values = self.touch.detection_n >= least_n;
@@ -382,7 +442,9 @@ impl Validate for Scene {
                 )
             });
         }
-        self.object.iter().for_each(|object| rules.table("object", object));
+    }
+
+    fn check_arm(&self, rules: &mut Rules) {
         if let Some(arm) = &self.arm {
             rules.table("arm", arm);
             let clear = arm.mount_m >= self.finger.length_m;
@@ -391,9 +453,7 @@ impl Validate for Scene {
             });
         }
     }
-}
 
-impl Scene {
     /// Checks the tables of recognition.
     fn check_library(&self, rules: &mut Rules) {
         if let Some(pose) = &self.pose {

@@ -8,7 +8,6 @@
 use crate::experiment::Simulation;
 use crate::experiment::trial::TrialEvent;
 use palpate_explore::band::{BandFeatures, COEFFICIENTS, LearnedBand, relative_width};
-use palpate_explore::belief::SurfaceBelief;
 use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions};
 use palpate_gp::math::optimize::Bounds;
 use palpate_input::error::InputError;
@@ -101,7 +100,7 @@ pub fn sample_trial(
     let row = simulation.trial_with(&mut *probe, available, trial, &mut |event| {
         let TrialEvent::Finished(touch) = event else { return Ok(None) };
         tell();
-        let SurfaceBelief::HeightField(field) = touch.belief.surface() else { return Ok(None) };
+        let Some(field) = touch.belief.height_field() else { return Ok(None) };
         let is_sampled =
             COUNTS.contains(&touch.count) && touch.count >= simulation.experiment().first_fit();
         let features = is_sampled.then(|| field.band_features(&places));

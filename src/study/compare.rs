@@ -157,7 +157,7 @@ fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
     }
     ObjectResult {
         scores: logs.into_iter().filter_map(score).collect(),
-        miss_share: share(|touch| touch.contact.is_none() && !touch.overload),
+        miss_share: share(|touch| touch.is_miss()),
         fallback_share: share(|touch| touch.fallback.is_some()),
         travel_m: some_mean(travels.collect()),
         coverage: at_end(|touch| touch.metrics.as_ref()?.coverage),
@@ -188,7 +188,7 @@ pub fn interquartile_mean_interval(strata: &[&[f64]], seed: u64) -> Option<Inter
         let sample = picked.flat_map(|(scores, picks)| picks.iter().map(|pick| scores[*pick]));
         interquartile_mean(&sample.collect::<Vec<_>>()).unwrap_or(f64::NAN)
     };
-    Some(estimate(&sizes, (seed, "compare"), of))
+    Some(estimate(&sizes, seed, "compare", of))
 }
 
 /// Probability that a trial of `one` is better than one of `other`, averaged over the objects that
@@ -222,7 +222,7 @@ pub fn geometric_mean(strata: &[&[f64]], seed: u64) -> Option<IntervalEstimate> 
     }
     let logs: Vec<Vec<f64>> = strata.iter().map(|scores| log_scores(scores)).collect();
     let of = |picks: &[Vec<usize>]| mean_of_means(&logs, picks).exp();
-    Some(estimate(&counts(&logs), (seed, "suite"), of))
+    Some(estimate(&counts(&logs), seed, "suite", of))
 }
 
 /// Share of the gap from [`BASELINE_PLANNER`] to the [`ORACLE`] that a planner closes, in log error
@@ -248,7 +248,7 @@ pub fn gap_closed(
         let [floor, own, ceiling] = [&floor, &own, &ceiling].map(|it| mean_of_means(it, picks));
         (floor - own) / (floor - ceiling)
     };
-    let found = estimate(&sizes, (seed, "suite"), share);
+    let found = estimate(&sizes, seed, "suite", share);
     let ends = found.interval.iter().flatten();
     ends.chain([&found.value]).all(|number| number.is_finite()).then_some(found)
 }
@@ -273,7 +273,8 @@ fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
 /// each stratum; deterministic for a `seed` and `purpose`.
 fn estimate(
     sizes: &[usize],
-    (seed, purpose): (u64, &str),
+    seed: u64,
+    purpose: &str,
     of: impl Fn(&[Vec<usize>]) -> f64,
 ) -> IntervalEstimate {
     let mut rng = seed::stream(seed, 0, purpose);

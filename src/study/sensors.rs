@@ -195,7 +195,7 @@ impl SensorResults {
     /// Robot time of a touch, s: mean over the trials of a kit.
     pub fn touch_time_s(&self, kit: &str) -> Option<f64> {
         let times = planner_rows(&self.rows, kit)
-            .filter_map(|row| Some(row.touches.last()?.time_s? / row.touches.len() as f64));
+            .filter_map(|row| Some(row.touches.last()?.outcome.time_s? / row.touches.len() as f64));
         let (sum, count) = times.fold((0.0, 0), |(sum, count), time| (sum + time, count + 1));
         (count > 0).then(|| sum / f64::from(count))
     }

@@ -136,18 +136,18 @@ fn the_cheapest_level_is_tried_on_other_targets() {
     let tolerance: Tolerance = "1000mm".parse().unwrap();
     let criterion = Some(palpate::study::accuracy::tolerance::Criterion::Touches(tolerance));
     let effort = MeasurementCounts { touches: 4, pairs: 0, trials: 0, trial_touches: 1, seed: 0 };
-    let named = |name: &str, scene: &Scene| (Variant::named(name.into()), scene.clone());
+    let named = |name: &str| Variant::named(name.into());
     let coarse = shipped::scene("container_finger.toml", &["effects.skin.samples=60"]);
-    let mut levels = AccuracyComparison::new(named("fine", &scene), effort, criterion).unwrap();
-    levels.add(named("coarse", &coarse)).unwrap();
-    levels.add(named("same", &scene)).unwrap();
+    let mut levels =
+        AccuracyComparison::new(named("fine"), scene.clone(), effort, criterion).unwrap();
+    levels.add(named("coarse"), coarse).unwrap();
+    levels.add(named("same"), scene.clone()).unwrap();
     let [coarse, same] = [0, 1].map(|i| levels.variants[i].clone());
     assert_eq!((same.touches, same.contact_m.unwrap().max), (4, 0.0));
     assert!(coarse.force_n.unwrap().mean > 0.0 && coarse.finger_bytes < same.finger_bytes);
     let (cheapest, _) = levels.cheapest(&tolerance, Origin::Reference).unwrap();
     assert!(cheapest.wall_s <= same.wall_s && cheapest.wall_s <= coarse.wall_s);
-    let same = (same, scene.clone());
-    let confirmed = levels.confirm(same, Origin::Reference, Some(6)).unwrap();
+    let confirmed = levels.confirm(same, scene, Origin::Reference, Some(6)).unwrap();
     assert!(confirmed.is_confirmed && confirmed.held_out.touches == 6);
 }
 

@@ -6,8 +6,9 @@ use crate::common::shipped::{contact, environment, scene};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::{Backend, Fault};
 use palpate::error::InputError;
+use palpate::explore::evidence::End;
+use palpate::explore::probe::Probe;
 use palpate::explore::probe::servo::ArmReach;
-use palpate::explore::probe::{Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::low_discrepancy::direction;
 use palpate::geometry::report::MeshReport;
@@ -103,10 +104,10 @@ fn nothing_goes_below_what_the_object_stands_on() {
             let aim = Aim::against(MIDDLE_W.into(), &direction(i, 60));
             if task.is_reachable(&aim) {
                 let approach = task.approach(&aim.into()).unwrap();
-                let end = probe.execute(&approach).unwrap();
-                touched += usize::from(end.contact().is_some());
-                let lowest_m =
-                    end.swept.map_or(1.0, |swept| swept.p_wt.z) - finger.drop_m(&approach.r_wa);
+                let outcome = probe.touch(&approach).unwrap();
+                touched += usize::from(outcome.contact().is_some());
+                let tip_m = outcome.free().map_or(1.0, |free| free.p_wt.z);
+                let lowest_m = tip_m - finger.drop_m(&approach.r_wa);
                 assert!(lowest_m > 0.45 - 1e-9, "{i}: {lowest_m}");
             }
         }
@@ -145,7 +146,8 @@ fn comes_to_all(name: &str, sets: &[&str]) -> usize {
         if task.is_reachable(&aim) {
             reached += 1;
             let touch = probe.touch(&task.approach(&aim.into()).unwrap());
-            assert!(matches!(touch, Ok(Touch::Contact(_))), "{name} {aim:?}: {touch:?}");
+            let end = touch.as_ref().map(|outcome| outcome.end);
+            assert_eq!(end, Ok(End::Contact), "{name} {aim:?}: {touch:?}");
         }
     }
     assert!(reached < 40);
@@ -184,7 +186,7 @@ fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move()
         assert!(task.is_reachable(&aim), "{i}");
         let mut servo = simulator.servo(standing_at(q), 1).unwrap();
         match servo.touch(&task.approach(&aim.into()).unwrap()) {
-            Ok(Touch::Miss) => arrived.push(i),
+            Ok(outcome) if outcome.end == End::Miss => arrived.push(i),
             Err(Fault::NoPath { time_s, .. }) => assert_eq!(time_s, 0.0),
             end => panic!("{i}: {end:?}"),
         }

@@ -3,7 +3,7 @@
 use crate::common::shapes::UniformRandom;
 use crate::common::shipped::scene;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
-use palpate::explore::probe::Touch;
+use palpate::explore::evidence::End;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::Zone;
@@ -30,17 +30,16 @@ fn found(scene: Scene, targets: &[Vec<f64>]) -> Vec<Option<[f64; 6]>> {
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let zone = environment.task().zone().unwrap();
     // Each target has its own body, so that touches are independent.
-    let touch = |target: &Vec<f64>| match (simulator.probe(3).unwrap())
-        .touch(&environment.task().approach(&target[..].into()).unwrap())
-        .unwrap()
-    {
-        Touch::Contact(contact) => {
+    let touch = |target: &Vec<f64>| {
+        let outcome = (simulator.probe(3).unwrap())
+            .touch(&environment.task().approach(&target[..].into()).unwrap())
+            .unwrap();
+        assert_ne!(outcome.end, End::Overload, "too much force");
+        outcome.contact().map(|contact| {
             let place = zone.place(&contact.p_wc);
             let n = zone.x_wz().inverse_transform_vector(&contact.normal_w);
-            Some([place[0], place[1], zone.height_m(&contact.p_wc), n.x, n.y, n.z])
-        }
-        Touch::Miss => None,
-        Touch::Overload => panic!("too much force"),
+            [place[0], place[1], zone.height_m(&contact.p_wc), n.x, n.y, n.z]
+        })
     };
     targets.iter().map(touch).collect()
 }

@@ -1,13 +1,14 @@
 //! Tests of the belief's quantiles and of the finger's reach on the believed surface.
 
+use crate::common::outcomes::outcome;
 use crate::common::program::{fails, palpate, succeeds};
 use nalgebra::Vector3;
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::Contact;
 use palpate::explore::gp_settings::{Band, BandName, GpSettings};
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, SweptVolume, Touch};
 use palpate::math::normal::BAND_95;
 use palpate::robot::Finger;
 use palpate::task::{Target, Zone};
@@ -32,9 +33,9 @@ fn believe(places: &[(f64, f64)], band: BandName) -> HeightField {
     for (x, z) in places {
         let height_m = 0.1 * x + 0.004 * (60.0 * z).sin();
         let p_wc = zone().point(&[*x, *z], height_m);
-        belief.observe(&[*x, *z], &Touch::Contact(Contact::new(p_wc, Vector3::y())));
+        let contact = Contact::new(p_wc, Vector3::y());
         let p_wt = p_wc + Vector3::y() * finger.radius_m;
-        belief.observe_swept(&SweptVolume { finger: finger.clone(), p_wt });
+        belief.observe(&[*x, *z].into(), &outcome(&zone(), &finger, p_wt, Some(contact)));
     }
     belief.refit().unwrap();
     belief

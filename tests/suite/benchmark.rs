@@ -5,9 +5,9 @@ use palpate::experiment::runner;
 use palpate::experiment::store::{Run, RunFolder};
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::belief::{Belief, SurfaceBelief};
+use palpate::explore::belief::Belief;
 use palpate::explore::planner::{
-    Plan, PlanError, Planner, PlannerFactory, PlanningSettings, sample,
+    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, sample,
 };
 use palpate::study::benchmark::{
     BenchmarkResult, BenchmarkSource, PROTOCOL, REFERENCE, protocol_sha256, summarise,
@@ -74,14 +74,12 @@ impl PlannerFactory for Mine {
 }
 
 impl Planner for Shrunk {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+    fn plan(&mut self, belief: &Belief, _: &Offer) -> Result<Plan, PlanError> {
         if self.share == 0.0 {
             return Err("out of order".into());
         }
-        let SurfaceBelief::HeightField(field) = belief.surface() else {
-            return Err("needs a zone".into());
-        };
-        let zone = field.zone();
+        let region = belief.region();
+        let zone = region.zone().ok_or("needs a zone")?;
         let place = sample::uniform(zone, &mut self.random);
         let low = [zone.x_m[0], zone.z_m.unwrap()[0]];
         let place = place.iter().zip(low).map(|(at, low)| low + self.share * (at - low));
@@ -105,7 +103,7 @@ fn small() -> BenchmarkResult {
         let path = folder.path().join(&case.label);
         let (mut rows, done) = RunFolder::open(&path, &simulation, "unknown", false).unwrap();
         let jobs = runner::missing_jobs(&simulation, &done).unwrap();
-        runner::run(&simulation, (&mut rows, jobs), 0, &AtomicBool::new(false), None, &|_| ())
+        runner::run(&simulation, &mut rows, jobs, 0, &AtomicBool::new(false), None, &|_| ())
             .unwrap();
         rows.sort(simulation.experiment()).unwrap();
         runs.push((case.label.clone(), Run::read(&path).unwrap()));

@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vec
 use palpate::config::Loader;
 use palpate::experiment::{Experiment, Simulation, real_robot};
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::{Contact, End, Evidence};
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::probe::{Contact, Touch};
 use palpate::explore::view::{
     CameraAccuracy, PixelNoise, PoseError, RigidError, SeenSurface, View, corrected_pose, thin,
 };
@@ -114,15 +114,15 @@ fn settings() -> GpSettings {
 fn touched(environment: &Arc<Environment>, view: &View, count: usize) -> HeightField {
     let zone = environment.task().zone().unwrap();
     let mut field = HeightField::new(zone.clone(), settings());
-    field.observe_view(view);
+    field.add(&Evidence::Seen(SeenSurface::of_region(view, environment.task().region())));
     let mut probe = exact_probe(Arc::clone(environment));
     let mut random = seed::stream(3, 0, "places");
     for _ in 0..count {
         let target = zone.at(&[(); 2].map(|()| random.random_range(0.05..0.95)));
-        let approach = environment.task().approach(&target.clone().into()).unwrap();
-        let outcome = probe.execute(&approach).unwrap();
+        let target = target.into();
+        let outcome = probe.touch(&environment.task().approach(&target).unwrap()).unwrap();
         assert!(outcome.contact().is_some());
-        field.observe_target(&target.into(), &outcome);
+        field.observe(&target, &outcome);
     }
     field.refit().unwrap();
     field
@@ -511,18 +511,20 @@ fn places_seen_through_are_kept() {
     let (zone, finger) = (environment.task().zone().unwrap(), &environment.scene().finger);
     let field = || HeightField::new(zone.clone(), settings()).with_finger(finger.clone());
     let [mut found, mut drawn] = [field(), field()];
-    let seen = found.observe_view(&look(&environment, 0)).clone();
-    drawn.observe_seen(serde_json::from_str(&serde_json::to_string(&seen).unwrap()).unwrap());
+    let seen = SeenSurface::of_region(&look(&environment, 0), environment.task().region());
+    let seen = Evidence::Seen(seen);
+    found.add(&seen);
+    drawn.add(&serde_json::from_str(&serde_json::to_string(&seen).unwrap()).unwrap());
     let mut probe = exact_probe(Arc::clone(&environment));
     let places = zone.grid(9);
     let mut touch = |place: &Vec<f64>| {
         let approach = environment.task().approach(&place.clone().into()).unwrap();
-        probe.execute(&approach).unwrap()
+        probe.touch(&approach).unwrap()
     };
     let touches: Vec<_> = places.iter().map(&mut touch).collect();
-    let missed = touches.iter().position(|outcome| outcome.touch == Touch::Miss).unwrap();
+    let missed = touches.iter().position(|outcome| outcome.end == End::Miss).unwrap();
     for field in [&mut found, &mut drawn] {
-        field.observe_target(&places[missed].clone().into(), &touches[missed]);
+        field.observe(&places[missed].clone().into(), &touches[missed]);
     }
     let [found, drawn] = [&found, &drawn].map(|field| {
         let silhouette = field.surface_evidence().silhouette();
@@ -530,10 +532,8 @@ fn places_seen_through_are_kept() {
     });
     assert_eq!(found, drawn);
     let mean = |is_miss: bool| {
-        let of = touches
-            .iter()
-            .zip(&found)
-            .filter(|(outcome, _)| (outcome.touch == Touch::Miss) == is_miss);
+        let of =
+            touches.iter().zip(&found).filter(|(outcome, _)| (outcome.end == End::Miss) == is_miss);
         let shares: Vec<f64> = of.map(|(_, share)| *share).collect();
         shares.iter().sum::<f64>() / shares.len() as f64
     };

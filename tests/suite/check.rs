@@ -3,7 +3,7 @@
 use crate::common::program::palpate;
 use palpate::experiment::{Experiment, Simulation, runner};
 use palpate::explore::belief::Belief;
-use palpate::explore::planner::{self, Plan, PlanError, Planner, PlannerEntry};
+use palpate::explore::planner::{self, Offer, Plan, PlanError, Planner, PlannerEntry};
 use palpate::math::seed;
 use palpate::study::check::baseline::TrialLine;
 use palpate::study::check::measures::CHECK_MEASURES;
@@ -184,8 +184,8 @@ fn margin() -> f64 {
 }
 
 impl Planner for Shy {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        let plan = self.own.plan(belief)?;
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
+        let plan = self.own.plan(belief, offer)?;
         let zone = belief.height_field().ok_or("zones only")?.zone();
         let (low, high) = (zone.at(&[0.0; 2]), zone.at(&[1.0; 2]));
         let sides = low.iter().zip(&high);
@@ -204,6 +204,7 @@ static WORSE: PlannerEntry = PlannerEntry {
     about: "active, but away from the border",
     zone_only: Some("it keeps away from a border"),
     needs_library: false,
+    plans_strokes: false,
     make: |settings, rng| {
         let own = (planner::by_name("active").unwrap().make)(settings, rng);
         Box::new(Shy { own, margin: margin() })
@@ -215,6 +216,7 @@ static RESEEDED: PlannerEntry = PlannerEntry {
     about: "random, with other random numbers",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |settings, mut rng| {
         rng.random::<u64>();
         (planner::by_name("random").unwrap().make)(settings, rng)

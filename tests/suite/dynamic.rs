@@ -5,7 +5,8 @@ use crate::common::tap::Tap;
 use nalgebra::{Isometry3, Translation3};
 use palpate::backend::{Command, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
-use palpate::explore::probe::{Probe, Touch};
+use palpate::explore::evidence::Outcome;
+use palpate::explore::probe::Probe;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::mujoco::{CompiledModels, StepLimit};
 use palpate::sim::probe::resting_pose;
@@ -21,14 +22,14 @@ const DRY: &str = "effects={skin={}}";
 const WET: &str = "effects={skin={}, fluid={}}";
 
 /// Returns a touch with all readings during it.
-fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading>) {
+fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Outcome, Vec<Reading>) {
     let simulator = Simulator::new(Arc::clone(environment)).unwrap();
     let readings = Arc::new(Mutex::new(Vec::new()));
     let body = Tap { inner: simulator.body().unwrap().unwrap(), readings: Arc::clone(&readings) };
     let mut servo = simulator.servo(Box::new(body), 1).unwrap();
-    let touch = servo.touch(&environment.task().approach(&target[..].into()).unwrap()).unwrap();
+    let outcome = servo.touch(&environment.task().approach(&target[..].into()).unwrap()).unwrap();
     let readings = readings.lock().unwrap().clone();
-    (touch, readings)
+    (outcome, readings)
 }
 
 /// Presses the finger to `deep` from `above` and waits; returns the load there.
@@ -96,7 +97,7 @@ fn a_slow_touch_is_the_kinematic_one() {
         for target in [[0.0, 0.5], [0.03, 0.47], [-0.02, 0.53]] {
             let [kinematic, dynamic] = ["simulator=\"kinematic\"", DYNAMIC].map(|body| {
                 let sets: Vec<&str> = [carrier, DRY, body].into_iter().chain(slow).collect();
-                let (touch, readings) =
+                let (outcome, readings) =
                     tapped(&environment("container_finger.toml", &sets), &target);
                 // Last tick before the finger is retracted.
                 let rests = |reading: &&Reading| {
@@ -104,7 +105,7 @@ fn a_slow_touch_is_the_kinematic_one() {
                         && reading.ideal_contact().is_some_and(|ideal| ideal.force_n > 0.0)
                 };
                 let rest = readings.iter().rev().find(rests).unwrap();
-                (contact(touch).p_wc, rest.ideal_contact().unwrap().force_n)
+                (contact(outcome).p_wc, rest.ideal_contact().unwrap().force_n)
             });
             apart = apart.max((kinematic.0 - dynamic.0).norm());
             stronger = stronger.max((dynamic.1 / kinematic.1 - 1.0).abs());
@@ -153,8 +154,8 @@ fn a_touch_stops_gently_and_keeps_its_limits_and_its_line() {
             .unwrap()
             .at(&[0.5, 0.5])])
         {
-            let (touch, readings) = tapped(&environment, &target);
-            contact(touch);
+            let (outcome, readings) = tapped(&environment, &target);
+            contact(outcome);
             let force =
                 |reading: &Reading| reading.ideal_contact().map_or(0.0, |ideal| ideal.force_n);
             let most_n = readings.iter().map(force).fold(0.0, f64::max);

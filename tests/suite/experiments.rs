@@ -66,7 +66,7 @@ fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
 fn toy_constant_starts_stall_visibly_and_recover() {
     let (_, rows) = run("toy.toml", &["planners=[\"active\"]"]);
     let constant =
-        |row: &&TrialRow| row.touches[..3].iter().all(|touch| touch.contact.unwrap()[1] == 1.0);
+        |row: &&TrialRow| row.touches[..3].iter().all(|touch| touch.contact().unwrap().y == 1.0);
     let starts: Vec<&TrialRow> = rows.iter().filter(constant).collect();
     // One start in eight has three equal heights: 6.25 of 50, with a standard deviation of 2.3; two
     // standard deviations below is 1.6.
@@ -115,10 +115,10 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
     ];
     let (experiment, rows) = run("container.toml", &sets);
     for row in &rows {
-        let misses = row.touches.iter().filter(|touch| touch.contact.is_none()).count();
+        let misses = row.touches.iter().filter(|touch| touch.contact().is_none()).count();
         assert!(misses > 0, "the zone does not look past the object");
         for (i, touch) in row.touches.iter().enumerate() {
-            for earlier in row.touches[..i].iter().filter(|earlier| earlier.contact.is_none()) {
+            for earlier in row.touches[..i].iter().filter(|earlier| earlier.contact().is_none()) {
                 let distance = experiment
                     .scene
                     .zone
@@ -162,13 +162,13 @@ fn a_body_that_moves_tells_its_time() {
     let (experiment, rows) = run("container_finger.toml", &sets);
     let times: Vec<Vec<f64>> = rows
         .iter()
-        .map(|row| row.touches.iter().map(|touch| touch.time_s.unwrap()).collect())
+        .map(|row| row.touches.iter().map(|touch| touch.outcome.time_s.unwrap()).collect())
         .collect();
     assert!(times.iter().all(|times| times.is_sorted_by(|before, after| before < after)));
     let shared = experiment.initial_touches as usize;
     assert_eq!(times[0][..shared], times[1][..shared]);
     let (_, cast) = run("container.toml", &sets);
-    assert!(cast.iter().flat_map(|row| &row.touches).all(|touch| touch.time_s.is_none()));
+    assert!(cast.iter().flat_map(|row| &row.touches).all(|touch| touch.outcome.time_s.is_none()));
 }
 
 /// Prior mean and length-scale prior without knowledge of the toy: the median is the geometric

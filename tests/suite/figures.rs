@@ -1,7 +1,7 @@
 //! Tests of all figures: nothing is clipped or overprinted, axes are labelled, both sides of a map
 //! have one scale, and beliefs are drawn only where a surface is likely.
 
-use crate::common::runs::{CURVE, SURFACE, run, tip_behind};
+use crate::common::runs::{CURVE, SURFACE, miss, run};
 use palpate::experiment::store::Run;
 use palpate::report::FIGURES;
 use palpate::report::files::{pdf, tree};
@@ -172,9 +172,9 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     let is_known = |place: &[f64]| replay.is_drawn([place])[0];
     let mut missed = 0;
     for touch in replay.touches {
-        missed += usize::from(touch.contact.is_none());
+        missed += usize::from(touch.contact().is_none());
         assert!(
-            touch.contact.is_some() || !is_known(&touch.target.numbers()),
+            touch.contact().is_some() || !is_known(&touch.target.numbers()),
             "{:?}",
             touch.target
         );
@@ -187,7 +187,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     assert!(drawn.iter().any(|drawn| !drawn));
     // If every touch meets the object, everything is drawn.
     let mut full = crate::common::runs::run(SURFACE);
-    full.rows.iter_mut().for_each(|row| row.touches.retain(|touch| touch.contact.is_some()));
+    full.rows.iter_mut().for_each(|row| row.touches.retain(|touch| touch.contact().is_some()));
     let replay = BeliefReplay::new(&full, "active", 8).unwrap().unwrap();
     let places = full.truth.places.iter().map(Vec::as_slice);
     assert!(replay.is_drawn(places).iter().all(|drawn| *drawn));
@@ -202,10 +202,10 @@ fn nothing_is_drawn_of_a_belief_without_a_surface() {
         let whole = run(settings);
         let mut nowhere = run(settings);
         nowhere.truth.heights_m[1..].fill(None);
-        let zone = nowhere.experiment.scene.zone.clone().unwrap();
+        let scene = nowhere.experiment.scene.clone();
+        let zone = scene.zone.as_ref().unwrap();
         for touch in nowhere.rows.iter_mut().flat_map(|row| &mut row.touches) {
-            touch.contact = None;
-            touch.tip = Some(tip_behind(&zone, &touch.target.numbers()));
+            touch.outcome = miss(zone, &scene.finger, &touch.target.numbers());
         }
         for name in names {
             let drawn = |run: &Run| figures(run).into_iter().find(|(of, _)| *of == name);

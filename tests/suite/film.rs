@@ -98,7 +98,7 @@ fn a_frame_states_the_recorded_error() {
             "standard deviation σ (mm)".into(),
         ];
         assert!(words.iter().all(|words| svg.contains(words)), "{words:?} in {svg}");
-        let contacts = touches.iter().filter(|touch| touch.contact.is_some()).count();
+        let contacts = touches.iter().filter(|touch| touch.contact().is_some()).count();
         // Three more in the legend, and one at the end of the error, whose first value is a dot.
         let more = 4 + usize::from(count == 2);
         assert_eq!(svg.matches("<circle").count(), contacts + more);

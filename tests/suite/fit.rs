@@ -78,8 +78,8 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
         let row = simulation.trial(planner, number);
         let mut touches = Observations::new(1);
         for touch in &row.touches {
-            let [x, y, _] = touch.contact.unwrap();
-            touches.push_height(&[x], y);
+            let p_w = touch.contact().unwrap();
+            touches.push_height(&[p_w.x], p_w.y);
             let Some(fit) = &touch.fit else { continue };
             let best = best_on_grid(&bounds, &touches, [240, 30]);
             fits += 1;
@@ -107,7 +107,7 @@ fn fits_of_a_known_noise_reach_the_global_maximum() {
     let mut touches = Observations::new(2);
     let mut fits = 0;
     for touch in &row.touches {
-        let p_w = touch.contact.unwrap().into();
+        let p_w = touch.contact().unwrap();
         touches.push_height(&zone.place(&p_w), zone.height_m(&p_w));
         let Some(fit) = &touch.fit else { continue };
         let best = best_on_grid(&bounds, &touches, [16, 19]);

@@ -164,7 +164,8 @@ fn what_others_put_into_a_folder_is_not_touched() {
 #[test]
 fn a_journal_has_the_touches_that_were_added() {
     let folder = TempDir::new().unwrap();
-    let touch: TouchRow = serde_json::from_str("{\"target\":[0.1,0.2],\"contact\":null}").unwrap();
+    let row = r#"{"target":{"place":[0.1,0.2]},"outcome":{"end":"miss"}}"#;
+    let touch: TouchRow = serde_json::from_str(row).unwrap();
     let entry = |trial| JournalEntry {
         time_unix_s: 1.0,
         trial,

@@ -115,7 +115,8 @@ fn wrong_values_of_former_settings_are_reported_as_given() {
 
 #[test]
 fn former_columns_are_read() {
-    let row = r#"{"trial":0,"planner":"active","touches":[{"target":[0.5],"contact":null,
+    let row = r#"{"trial":0,"planner":"active","touches":[{"target":{"place":[0.5]},
+        "outcome":{"end":"miss"},
         "stall":"collapsed","outline":{"brier":0.1,"iou":0.5,"wrong_share":0.2}}]}"#;
     let row: TrialRow = serde_json::from_str(row).unwrap();
     let touch = &row.touches[0];

@@ -1,13 +1,14 @@
 //! Tests of contact normals and swept free space, from the touch to the recorded belief.
 
+use crate::common::outcomes::free_volume;
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::{Contact, End, Evidence};
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, SweptVolume, Touch};
 use palpate::gp::Posterior;
 use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
@@ -47,11 +48,11 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         let (mut bounded, mut tight) = (0, 0);
         for _ in 0..200 {
             let target = planner::uniform(zone, &mut rng).into();
-            let outcome = probe.execute(&environment.task().approach(&target).unwrap()).unwrap();
-            let swept = outcome.swept.as_ref().unwrap();
+            let outcome = probe.touch(&environment.task().approach(&target).unwrap()).unwrap();
+            let free = outcome.free().unwrap();
             let p_wc = outcome.contact().expect("missed").p_wc;
             let ceiling_m =
-                |place: &[f64]| swept.upper_bounds_m(zone, std::iter::once(place)).next().unwrap();
+                |place: &[f64]| free.upper_bounds_m(zone, std::iter::once(place)).next().unwrap();
             let at_contact = ceiling_m(&zone.place(&p_wc)).unwrap();
             assert!((at_contact - zone.height_m(&p_wc)).abs() < 1e-6, "{at_contact} {p_wc}");
             for (place, height_m) in truth.places.iter().zip(&truth.heights_m) {
@@ -65,9 +66,9 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         }
         assert!(bounded > 1000 && tight > 100, "{name}: {bounded} {tight}");
         let beside = environment.task().approach(&[0.3, 0.5].into()).unwrap();
-        let outcome = probe.execute(&beside).unwrap();
-        assert_eq!(outcome.touch, Touch::Miss);
-        assert!(outcome.swept.unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
+        let outcome = probe.touch(&beside).unwrap();
+        assert_eq!(outcome.end, End::Miss);
+        assert!(outcome.free().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
     }
 }
 
@@ -83,13 +84,13 @@ fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
                 let z = -0.04 + 0.02 * f64::from(i);
                 let p_wc = SQUARE.point(&[x, z], 0.03 + 0.2 * x * x);
                 let contact = Contact::new(p_wc, Vector3::y());
-                belief.observe(&[x, z], &Touch::Contact(contact));
+                belief.observe(&[x, z].into(), &contact.into());
             }
         }
         if let Some(depth_m) = depth_m {
             let finger = Finger { length_m: 0.0, ..Finger::default() };
             let p_wt = Point3::new(0.0, SQUARE.datum_y_m() + depth_m + finger.radius_m, 0.0);
-            belief.observe_swept(&SweptVolume { finger, p_wt });
+            belief.add(&Evidence::Free(free_volume(&SQUARE, &finger, p_wt, End::Contact)));
         }
         belief.refit().unwrap();
         belief.surface().unwrap().clone()
@@ -125,7 +126,7 @@ fn normals_tilt_the_belief_and_grazing_ones_are_dropped() {
         let mut belief = HeightField::new(SQUARE, settings);
         let p_wc = SQUARE.point(&[0.0, 0.0], 0.02);
         let contact = Contact::new(p_wc, normal_w.normalize());
-        belief.observe(&[0.0, 0.0], &Touch::Contact(contact));
+        belief.observe(&[0.0, 0.0].into(), &contact.into());
         let (_, surface) = belief.refit().unwrap();
         let mut gradient = [0.0; 2];
         surface.mean_gradient(&[0.0, 0.0], &mut gradient, &mut Scratch::default());
@@ -141,13 +142,13 @@ fn the_toys_normals_are_its_slopes() {
     let environment = Arc::new(Environment::build(experiment.scene).unwrap());
     for i in 0..50 {
         let x = -1.973 + 0.08 * f64::from(i);
-        let touch = Simulator::new(Arc::clone(&environment))
+        let outcome = Simulator::new(Arc::clone(&environment))
             .unwrap()
             .probe(1)
             .unwrap()
             .touch(&environment.task().approach(&[x].into()).unwrap())
             .unwrap();
-        let Touch::Contact(Contact { normal_w, .. }) = touch else { panic!("missed") };
+        let Contact { normal_w, .. } = outcome.contact().expect("missed");
         let [above, below] = [1e-6, -1e-6].map(|by| environment.true_height_m(&[x + by]).unwrap());
         assert!((-normal_w.x / normal_w.y - (above - below) / 2e-6).abs() < 1e-6, "{x}");
         assert!((normal_w.norm() - 1.0).abs() < 1e-12 && normal_w.z == 0.0);
@@ -166,20 +167,15 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
         let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
         let (experiment, truth, row) = run("container.toml", &sets, 3);
         let line = serde_json::to_string(&row).unwrap();
-        assert_eq!((line.contains("normal"), line.contains("tip")), (normals, free_space));
+        assert!(line.contains("\"normal_w\"") && line.contains("\"free\""), "{line}");
         assert_eq!(line.contains("slope_noise"), normals);
         let read: TrialRow = serde_json::from_str(&line).unwrap();
         assert_eq!(read, row);
         let mut belief =
             HeightField::new(experiment.scene.zone.clone().unwrap(), experiment.gp.clone());
         for touch in &read.touches {
-            let p_wc = Point3::from(touch.contact.unwrap());
-            let normal_w = touch.normal.map_or(Vector3::y(), Vector3::from);
-            belief.observe(&touch.target.numbers(), &Touch::Contact(Contact::new(p_wc, normal_w)));
-            if let Some(tip) = touch.tip {
-                let finger = experiment.scene.finger.clone();
-                belief.observe_swept(&SweptVolume { finger, p_wt: Point3::from(tip) });
-            }
+            assert!(touch.contact().is_some());
+            belief.observe(&touch.target, &touch.outcome);
         }
         let last = read.touches.last().unwrap();
         belief.condition(last.fit.as_ref().unwrap()).unwrap();

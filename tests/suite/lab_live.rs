@@ -110,7 +110,7 @@ fn a_person_explores(network: &Network) {
     let run = Run::read(&path).unwrap();
     let row = &run.rows[0];
     assert_eq!((row.planner.as_str(), row.touches.len(), &row.failure), ("human", 10, &None));
-    let contacts = row.touches.iter().filter(|touch| touch.contact.is_some()).count();
+    let contacts = row.touches.iter().filter(|touch| touch.contact().is_some()).count();
     assert!(contacts >= 9, "{contacts} contacts");
     for (touch, target) in row.touches[1..].iter().zip(TARGETS) {
         assert_eq!(touch.target.numbers(), target);

@@ -2,6 +2,7 @@
 
 use crate::common::lab::{Network, TwinProcess, UR_EXPERIMENT, row};
 use nalgebra::Point3;
+use palpate::experiment::trial::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
@@ -58,7 +59,7 @@ fn a_planning_scene_has_the_object_and_the_table() {
     let triangles: Vec<[u32; 3]> = serde_json::from_value(last["triangles"].clone()).unwrap();
     let bvh = MeshBvh::new(Mesh::new(&vertices, &triangles).unwrap().0);
     let row = row(folder.path());
-    let contacts = row.touches.iter().filter_map(|touch| touch.contact).map(Point3::from);
+    let contacts = row.touches.iter().filter_map(TouchRow::contact);
     assert!(contacts.clone().count() > 2);
     for p_w in contacts {
         assert!(bvh.contains(&p_w), "{p_w}");

@@ -15,8 +15,8 @@ const STROKES: [&str; 2] = ["scene.touch.stroke={}", "scene.effects.wrench={}"];
 
 /// Lines of points along the strokes of a row.
 fn lines(row: &TrialRow) -> impl Iterator<Item = Vec<Point3<f64>>> {
-    let strokes = row.touches.iter().filter(|touch| !touch.patch.is_empty());
-    strokes.map(|touch| touch.patch.iter().map(|p| Point3::new(p[0], p[1], p[2])).collect())
+    let strokes = row.touches.iter().filter(|touch| touch.outcome.points().len() > 1);
+    strokes.map(|touch| touch.outcome.points().iter().skip(1).map(|point| point.p_wc).collect())
 }
 
 /// The strokes of a simulated robot over topics are where those in the simulator are.

@@ -118,7 +118,7 @@ fn a_ur_at_half_speed_is_followed() {
     let output = network.run("random", 2, folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let row = row(folder.path());
-    assert!(row.touches.iter().all(|touch| touch.contact.is_some()), "{row:?}");
+    assert!(row.touches.iter().all(|touch| touch.contact().is_some()), "{row:?}");
     println!("the twin counted {}", twin.end());
 }
 

@@ -148,7 +148,7 @@ fn a_damaged_row_is_faulted_at_its_line() {
             "is -0.1; allowed is 0.0 to 1000000.0",
         ),
         ("\"trial\":1".into(), "\"trial\":\"x\"".into(), "column 12: allowed is a whole number"),
-        ("\"contact\":[".into(), "\"contact\":[1,".into(), "column "),
+        ("\"p_wc\":[".into(), "\"p_wc\":[1,".into(), "column "),
         ("\"planner\"".into(), "\"planer\"".into(), "missing field `planner`"),
     ];
     for (old, new, says) in &damages {

@@ -6,7 +6,7 @@ use palpate::experiment::trial::row::TrialId;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{
-    self, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_external, sample,
+    self, Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_external, sample,
 };
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -38,9 +38,9 @@ impl PlannerFactory for Mine {
 }
 
 impl Planner for Random {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+    fn plan(&mut self, belief: &Belief, _: &Offer) -> Result<Plan, PlanError> {
         match belief.targets().len() < self.touches {
-            true => Ok(Plan::at(sample::random_target(belief, &mut self.random))),
+            true => Ok(Plan::at(sample::random_target(belief.surface(), &mut self.random))),
             false => Err("enough".into()),
         }
     }
@@ -71,7 +71,7 @@ fn an_own_planner_is_one_of_the_experiments() {
     let (mut rows, done) = rows_of(&simulation, folder.path(), false).unwrap();
     let jobs = runner::missing_jobs(&simulation, &done).unwrap();
     let stop = AtomicBool::new(false);
-    runner::run(&simulation, (&mut rows, jobs), 0, &stop, None, &|_| ()).unwrap();
+    runner::run(&simulation, &mut rows, jobs, 0, &stop, None, &|_| ()).unwrap();
     rows.sort(experiment).unwrap();
     let run = Run::read(folder.path()).unwrap();
     let names: Vec<_> = run.rows.iter().map(|row| row.planner.as_str()).collect();

@@ -1,13 +1,14 @@
 //! Tests of the probability of a surface and of planners that use it.
 
-use nalgebra::{Point3, Vector3};
+use crate::common::outcomes::outcome;
+use nalgebra::Vector3;
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::trial::recorded_trial::ResumedProbe;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::Contact;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, SweptVolume, Touch};
 use palpate::geometry::import::import;
 use palpate::robot::Finger;
 use palpate::task::Zone;
@@ -24,9 +25,8 @@ fn zone() -> Zone {
 /// Adds a touch at a target to the belief, with or without contact.
 fn touch(belief: &mut HeightField, zone: &Zone, target: &[f64], meets: bool) {
     let p_wt = zone.point(target, 0.0);
-    let contact = Contact::new(p_wt, Vector3::y());
-    belief.observe(target, &if meets { Touch::Contact(contact) } else { Touch::Miss });
-    belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
+    let contact = meets.then(|| Contact::new(p_wt, Vector3::y()));
+    belief.observe(&target.into(), &outcome(zone, &Finger::default(), p_wt, contact));
 }
 
 proptest! {
@@ -74,9 +74,9 @@ fn touches_speak_for_their_surroundings() {
         let mut belief = HeightField::new(zone.clone(), GpSettings::default());
         let p_wc = zone.point(&[0.05 - offset * radius_m, 0.05], 0.0);
         let contact = Contact::new(p_wc, Vector3::y());
-        belief.observe(&[0.05, 0.05], &Touch::Contact(contact));
         let p_wt = zone.point(&[0.05, 0.05], 0.0);
-        belief.observe_swept(&SweptVolume { finger: Finger::default(), p_wt });
+        let outcome = outcome(&zone, &Finger::default(), p_wt, Some(contact));
+        belief.observe(&[0.05, 0.05].into(), &outcome);
         belief.surface_evidence().silhouette().probability(&[0.05 + radius_m, 0.05])
     };
     assert!(beyond(0.9) < 0.5 && beyond(0.1) > 0.6, "{} {}", beyond(0.9), beyond(0.1));
@@ -99,13 +99,9 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
     let far_m = simulation.task().depth_m()[1];
     let mut belief = HeightField::new(zone.clone(), GpSettings::default());
     for row in &row.touches {
-        let target = row.target.place().unwrap();
-        let p_wt = zone.x_wz() * zone.local(target, -far_m);
-        let touch = row.contact.map_or(Touch::Miss, |p_w| {
-            Touch::Contact(Contact::new(Point3::from(p_w), Vector3::y()))
-        });
-        belief.observe(target, &touch);
-        belief.observe_swept(&SweptVolume { finger: finger.clone(), p_wt });
+        let p_wt = zone.x_wz() * zone.local(row.target.place().unwrap(), -far_m);
+        let contact = row.contact().map(|p_wc| Contact::new(p_wc, Vector3::y()));
+        belief.observe(&row.target, &outcome(zone, &finger, p_wt, contact));
     }
     let silhouette = belief.surface_evidence().silhouette();
     let truth = simulation.truth();
@@ -134,17 +130,17 @@ fn a_silhouette_is_found() {
     assert!(found < 0.65 * by_share, "{found} {by_share}");
 }
 
-/// A resumed trial plans as if uninterrupted: its rows contain the volumes that its misses swept.
+/// A resumed trial plans as if uninterrupted: its rows contain the volumes that its touches swept.
 #[test]
 fn a_trial_goes_on_where_it_was_broken_off() {
     let simulation = simulation("star");
     let planner = planner::by_name("silhouette").unwrap();
     let whole = simulation.trial(planner, 0);
     let made = whole.touches[..15].to_vec();
-    assert!(made.iter().any(|touch| touch.contact.is_none()));
-    assert!(whole.touches.iter().all(|touch| touch.tip.is_some() == touch.contact.is_none()));
+    assert!(made.iter().any(|touch| touch.contact().is_none()));
+    assert!(whole.touches.iter().all(|touch| touch.outcome.free().is_some()));
     let mut probe = simulation.probe(0).unwrap();
-    let mut resumed = ResumedProbe::new(made, &simulation, &mut *probe);
+    let mut resumed = ResumedProbe::new(made, &mut *probe);
     assert_eq!(simulation.trial_with(&mut resumed, planner, 0, &mut |_| Ok(None)), whole);
 }
 

@@ -1,7 +1,8 @@
 //! Tests of one touch: the finger's hull against the exact mesh, and the analytic curve.
 
 use crate::common::shipped::environment;
-use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::evidence::{Contact, End};
+use palpate::explore::probe::Probe;
 use palpate::geometry::sweep::Capsule;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
@@ -14,13 +15,9 @@ fn open(environment: &Arc<Environment>) -> Box<dyn Probe> {
 }
 
 fn contact(environment: &Arc<Environment>, target: &[f64]) -> Contact {
-    match open(environment)
-        .touch(&environment.task().approach(&target[..].into()).unwrap())
-        .unwrap()
-    {
-        Touch::Contact(contact) => contact,
-        other => panic!("{target:?}: {other:?}"),
-    }
+    let outcome =
+        open(environment).touch(&environment.task().approach(&target[..].into()).unwrap()).unwrap();
+    outcome.contact().cloned().unwrap_or_else(|| panic!("{target:?}: {outcome:?}"))
 }
 
 static CONTAINER: LazyLock<Arc<Environment>> = LazyLock::new(|| environment("container.toml", &[]));
@@ -67,7 +64,7 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
 fn past_the_object_the_finger_meets_nothing() {
     let touch =
         |target: &[f64]| open(&BIRD).touch(&BIRD.task().approach(&target[..].into()).unwrap());
-    assert_eq!(touch(&[0.3, 0.5]), Ok(Touch::Miss));
+    assert_eq!(touch(&[0.3, 0.5]).map(|outcome| outcome.end), Ok(End::Miss));
     assert!(touch(&[f64::NAN, 0.5]).is_err());
     assert!(touch(&[0.0, f64::INFINITY]).is_err());
 }

@@ -677,7 +677,7 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
                 kept.push(touched.row.clone());
             }
             match touched.count == after {
-                true => Err(Fault::Stopped { time_s: touched.row.time_s.unwrap() }),
+                true => Err(Fault::Stopped { time_s: touched.row.outcome.time_s.unwrap() }),
                 false => Ok(None),
             }
         };

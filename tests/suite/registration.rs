@@ -299,7 +299,7 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     let design = RegistrationDesign::new(&robot, &touch, &believed, 40, &mut random).unwrap();
     design.check().unwrap();
     let mut probe = Simulator::new(environment).unwrap().probe(1).unwrap();
-    let found = register(&mut *probe, &robot, &touch, (&believed, &design), &mut |_| ()).unwrap();
+    let found = register(&mut *probe, &robot, &touch, &believed, &design, &mut |_| ()).unwrap();
     let error = pose([0.0012, -0.0012, 0.001], [1.2, -1.2, 1.0]);
     let (place_m, turn_deg) = parts(&(found.tool(None).inverse() * error));
     assert!(place_m.iter().all(|off| off.abs() < 2e-4), "{place_m:?}");
@@ -325,7 +325,7 @@ fn registered(
     let design = RegistrationDesign::new(&stated, &touch, &BALL, count, &mut random).unwrap();
     let body = Simulator::new(environment).unwrap().body().unwrap().unwrap();
     let mut probe = Servo::new(stated.clone(), touch.clone(), body, 1).unwrap();
-    let found = register(&mut probe, &stated, &touch, (&BALL, &design), &mut |_| ()).unwrap();
+    let found = register(&mut probe, &stated, &touch, &BALL, &design, &mut |_| ()).unwrap();
     (found, stated)
 }
 
@@ -452,9 +452,9 @@ fn too_few_contacts_are_refused() {
     impl palpate::explore::probe::Probe for Nothing {
         fn execute(
             &mut self,
-            _: &palpate::task::Approach,
-        ) -> Result<palpate::explore::probe::Outcome, palpate::backend::Fault> {
-            Ok(palpate::explore::probe::Touch::Miss.into())
+            _: &palpate::task::Action,
+        ) -> Result<palpate::explore::evidence::Outcome, palpate::backend::Fault> {
+            Ok(palpate::explore::evidence::End::Miss.into())
         }
     }
     let design = RegistrationDesign {
@@ -464,7 +464,7 @@ fn too_few_contacts_are_refused() {
         condition: 1.0,
     };
     let touch = TouchSettings::default();
-    let refused = register(&mut Nothing, &robot, &touch, (&BALL, &design), &mut |_| ());
+    let refused = register(&mut Nothing, &robot, &touch, &BALL, &design, &mut |_| ());
     let refused = refused.unwrap_err().to_string();
     assert!(
         refused.starts_with("0 of 0 touches made contact with the body; at least 12 are needed"),

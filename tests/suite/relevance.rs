@@ -52,9 +52,10 @@ fn need(
     let criterion = Criterion::Touches(tolerance.parse().unwrap());
     let effort = MeasurementCounts { touches, pairs: 2, trials: 0, trial_touches: 1, seed: 0 };
     let mut variants = Variant::effects(&scene).into_iter();
-    let mut whole =
-        AccuracyComparison::new(variants.next().unwrap(), effort, Some(criterion)).unwrap();
-    whole.add(variants.find(|(it, _)| it.effect.as_deref() == Some(effect)).unwrap()).unwrap();
+    let (reference, scene) = variants.next().unwrap();
+    let mut whole = AccuracyComparison::new(reference, scene, effort, Some(criterion)).unwrap();
+    let (without, scene) = variants.find(|(it, _)| it.effect.as_deref() == Some(effect)).unwrap();
+    whole.add(without, scene).unwrap();
     println!("{effect} at {slope_deg} deg: {:?}", whole.variants[0].beyond);
     whole.variants[0].relevance.unwrap()
 }

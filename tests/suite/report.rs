@@ -10,6 +10,7 @@ use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
 use palpate::experiment::report_settings::Claim;
 use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
+use palpate::explore::evidence::End;
 use palpate::report;
 use palpate::report::axes::Axis;
 use palpate::report::files::PNG_SCALE;
@@ -114,7 +115,9 @@ fn a_surface_that_is_nowhere_is_drawn() {
     for settings in [CURVE, SURFACE] {
         let mut run = run(settings);
         run.truth.heights_m.fill(None);
-        run.rows.iter_mut().flat_map(|row| &mut row.touches).for_each(|touch| touch.contact = None);
+        for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
+            touch.outcome = End::Miss.into();
+        }
         for (name, bytes) in drawn(&run) {
             let text = String::from_utf8_lossy(&bytes);
             assert!(name.ends_with("png") || !text.contains("NaN"), "{name}");
@@ -261,7 +264,7 @@ fn recognition() -> RecognitionMetrics {
 fn a_measure_is_told_wherever_measures_are() {
     let mut run = run(SURFACE);
     for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
-        touch.time_s = Some(1.0);
+        touch.outcome.time_s = Some(1.0);
         touch.silhouette = Some(SilhouetteMetrics {
             brier: 0.1,
             iou: 0.8,

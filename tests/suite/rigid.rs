@@ -5,7 +5,7 @@ use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use palpate::backend::{Command, Fault, Wrench};
-use palpate::explore::probe::{Contact, Touch};
+use palpate::explore::evidence::Contact;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::sim::Environment;
@@ -42,12 +42,11 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
     let environment = Arc::new(Environment::with_shape(scene, shape).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let mut probe = simulator.probe(0).unwrap();
-    let mut touch = |target: &[f64; 2]| match probe
-        .touch(&environment.task().approach(&target[..].into()).unwrap())
-        .unwrap()
-    {
-        Touch::Contact(contact) => contact,
-        other => panic!("{collision:?} {target:?}: {other:?}"),
+    let mut touch = |target: &[f64; 2]| {
+        let approach = environment.task().approach(&target[..].into()).unwrap();
+        let outcome = probe.touch(&approach).unwrap();
+        let contact = outcome.contact().cloned();
+        contact.unwrap_or_else(|| panic!("{collision:?} {target:?}: {outcome:?}"))
     };
     targets.iter().map(&mut touch).collect()
 }

@@ -3,6 +3,7 @@
 
 use crate::common::around::{belief, belief_with, meet, simulation, trial};
 use nalgebra::{Point3, Vector3};
+use palpate::experiment::trial::row::TouchRow;
 use palpate::explore::whole_object::{ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::low_discrepancy::directions;
 use palpate::task::Aim;
@@ -59,9 +60,9 @@ fn a_piece_that_no_touch_has_met_is_looked_for() {
     let simulation = simulation(apart, "planners = [\"active\"]\ntouches = 40");
     for name in ["active", "integrated_variance", "travel"] {
         let row = trial(&simulation, name);
-        let sides = row.touches.iter().filter_map(|touch| touch.contact);
-        let right = sides.clone().filter(|[x, ..]| *x > 0.0).count();
-        let left = sides.filter(|[x, ..]| *x < 0.0).count();
+        let sides = row.touches.iter().filter_map(TouchRow::contact);
+        let right = sides.clone().filter(|p_w| p_w.x > 0.0).count();
+        let left = sides.filter(|p_w| p_w.x < 0.0).count();
         assert!(left >= 5 && right >= 5, "{name}: {left} on the left, {right} on the right");
     }
 }

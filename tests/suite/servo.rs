@@ -2,8 +2,9 @@
 
 use crate::common::shipped::{contact, environment};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::explore::evidence::{Contact, End, Outcome};
+use palpate::explore::probe::Probe;
 use palpate::explore::probe::servo::Servo;
-use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::kinematic::KinematicBackend;
@@ -14,7 +15,7 @@ fn simulator(environment: &Arc<Environment>, seed: u64) -> Box<dyn Probe> {
     Simulator::new(Arc::clone(environment)).unwrap().probe(seed).unwrap()
 }
 
-fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<Touch, Fault> {
+fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<Outcome, Fault> {
     simulator(environment, seed).touch(&environment.task().approach(&target[..].into()).unwrap())
 }
 
@@ -80,14 +81,15 @@ fn a_trial_repeats_to_the_bit_and_its_noise_is_the_seeds() {
 #[test]
 fn past_the_object_is_a_miss_and_too_much_force_is_broken_off() {
     let wide = environment("container_finger.toml", &["zone.x_m=[-0.05, 0.2]"]);
-    assert_eq!(touch(&wide, 1, &[0.19, 0.5]), Ok(Touch::Miss));
+    let end = |environment: &Arc<Environment>, target: &[f64]| {
+        touch(environment, 1, target).map(|outcome| outcome.end)
+    };
+    assert_eq!(end(&wide, &[0.19, 0.5]), Ok(End::Miss));
     let careful = environment("container_finger.toml", &["touch.pressure_limit_counts=5"]);
-    assert_eq!(touch(&careful, 1, &[0.0, 0.5]), Ok(Touch::Overload));
+    assert_eq!(end(&careful, &[0.0, 0.5]), Ok(End::Overload));
     let strong = ["touch.force_limit_n=0.02", "effects={skin={}}"];
-    assert_eq!(
-        touch(&environment("container_finger.toml", &strong), 1, &[0.0, 0.5]),
-        Ok(Touch::Overload)
-    );
+    let strong = environment("container_finger.toml", &strong);
+    assert_eq!(end(&strong, &[0.0, 0.5]), Ok(End::Overload));
 }
 
 /// A servo directly on the body.
@@ -155,7 +157,10 @@ impl Backend for Broken {
     }
 }
 
-fn broken(environment: &Arc<Environment>, breaks: Breaks) -> (Result<Touch, Fault>, Vec<Vec<f64>>) {
+fn broken(
+    environment: &Arc<Environment>,
+    breaks: Breaks,
+) -> (Result<Outcome, Fault>, Vec<Vec<f64>>) {
     let commands = Arc::new(Mutex::new(Vec::new()));
     let body = Broken {
         inner: KinematicBackend::new(environment).unwrap(),

@@ -1,16 +1,18 @@
 //! Strokes: laws of a slide along known surfaces, and surfaces along which a finger cannot slide.
 
 use crate::common::program::folder;
-use crate::common::shipped::{contact, environment};
+use crate::common::shipped::environment;
 use crate::common::tap::{Tap, forces_n};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Reading;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
+use palpate::explore::evidence::Contact;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner::stroke::{StrokeOffer, best};
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
-use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::planner::{StrokeOffer, stroke::best};
+use palpate::explore::probe::Probe;
+use palpate::robot::sensor::TipSurface;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Target, Zone};
@@ -91,9 +93,10 @@ fn slide(environment: &Arc<Environment>, x: f64, to: f64) -> (Vec<Contact>, Vec<
     let mut servo = simulator.servo(Box::new(body), 0).unwrap();
     let target = Target::Stroke { place: [x, MIDDLE_M], to: [to, MIDDLE_M] };
     let approach = environment.task().approach(&target).unwrap();
-    let touched = contact(servo.touch(&approach).unwrap());
+    let outcome = servo.touch(&approach).unwrap();
+    assert!(outcome.contact().is_some(), "{outcome:?}");
     let forces_n = forces_n(&readings.lock().unwrap());
-    (touched.points().cloned().collect(), forces_n)
+    (outcome.points().to_vec(), forces_n)
 }
 
 /// Height of a front at `x`, by linear interpolation.
@@ -215,11 +218,13 @@ fn exact_and_moving_probe_slide_along_the_same_line() {
     let target = Target::Stroke { place: [-0.02, 0.47], to: [0.02, 0.53] };
     let [exact, moving] = [exact, moving].map(|environment| {
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
-        contact(probe.touch(&environment.task().approach(&target).unwrap()).unwrap())
+        let outcome = probe.touch(&environment.task().approach(&target).unwrap()).unwrap();
+        assert!(outcome.contact().is_some(), "{outcome:?}");
+        outcome.points()[1..].to_vec()
     });
-    assert!(exact.patch.len() > 50 && moving.patch.len() > 40);
-    for point in &moving.patch {
-        let nearest = exact.patch.iter().map(|other| (other.p_wc - point.p_wc).norm());
+    assert!(exact.len() > 50 && moving.len() > 40);
+    for point in &moving {
+        let nearest = exact.iter().map(|other| (other.p_wc - point.p_wc).norm());
         // Samples are a millimetre apart on slopes of up to two.
         assert!(nearest.fold(f64::INFINITY, f64::min) < 1.5e-3, "{}", point.p_wc);
     }
@@ -236,19 +241,18 @@ fn a_row_with_strokes_is_replayed() {
     let row = simulation.trial(raster, 0);
     assert_eq!(row.failure, None);
     let last = &row.touches[5];
-    assert!(matches!(last.target, Target::Stroke { .. }) && last.patch.len() > 20);
+    assert!(matches!(last.target, Target::Stroke { .. }) && last.outcome.points().len() > 21);
     let mut belief = Belief::new(
         simulation.task(),
-        (&simulation.experiment().scene.finger, false),
+        &TipSurface::Rigid,
         &simulation.experiment().gp,
         &simulation.experiment().space,
     );
     for touch in &row.touches {
-        let approach = simulation.task().approach(&touch.target).unwrap();
-        let against_w = -approach.direction_w().into_inner();
-        belief.observe(&touch.target, &approach, &touch.touch(against_w).into());
+        belief.observe(&touch.target, &touch.outcome);
     }
-    let found = belief.refit().unwrap().hyperparameters.length_scales.clone();
+    belief.refit().unwrap();
+    let found = belief.fit().unwrap().hyperparameters.length_scales.clone();
     let written = &last.fit.as_ref().unwrap().hyperparameters.length_scales;
     for (found, written) in found.iter().zip(written) {
         assert!((found / written - 1.0).abs() < 0.05, "{found} {written}");
@@ -307,38 +311,34 @@ fn strokes_around_an_object_are_on_its_surface() {
         "scene.whole_object.lowest_m=0.45",
         "touches=9",
         "initial_touches=3",
-        "planners=[\"active\", \"raster\", \"random_strokes\", \"active(taps)\"]",
+        "planners=[\"active\", \"raster\", \"random_strokes\", \"active(tap)\"]",
     ];
     let experiment = Experiment::load(&path, &sets.map(String::from)).unwrap();
     let simulation = Simulation::new(experiment).unwrap();
     let mesh = simulation.environment().mesh().unwrap().clone();
     let bvh = palpate::geometry::bvh::MeshBvh::new(mesh);
-    for name in ["active", "raster", "random_strokes", "active(taps)"] {
+    for name in ["active", "raster", "random_strokes", "active(tap)"] {
         let row = simulation.trial(simulation.planner(name).unwrap(), 0);
         assert_eq!(row.failure, None, "{name}");
         let settings = (&simulation.experiment().gp, &simulation.experiment().space);
-        let finger = (&simulation.experiment().scene.finger, false);
-        let mut belief = Belief::new(simulation.task(), finger, settings.0, settings.1);
+        let mut belief = Belief::new(simulation.task(), &TipSurface::Rigid, settings.0, settings.1);
         let (mut strokes, mut points) = (0, 0);
         for (count, touch) in row.touches.iter().enumerate() {
-            let approach = simulation.task().approach(&touch.target).unwrap();
             let length_m = touch.target.slide_m();
             strokes += usize::from(length_m > 0.0);
-            assert!(length_m < 0.06 + 1e-9 && (length_m > 0.0 || touch.patch.is_empty()));
-            for [x, y, z, ..] in &touch.patch {
-                let p_w = Point3::new(*x, *y, *z);
-                let off_m = (bvh.closest_point(&p_w).point - p_w).norm();
+            let points_w = touch.outcome.points();
+            assert!(length_m < 0.06 + 1e-9 && (length_m > 0.0 || points_w.len() < 2));
+            for Contact { p_wc: p_w, .. } in points_w.iter().skip(1) {
+                let off_m = (bvh.closest_point(p_w).point - p_w).norm();
                 assert!(off_m < 1e-9 && p_w.z > lowest_m, "{name}: {p_w}, {off_m}");
                 points += 1;
             }
-            let against_w = -approach.direction_w().into_inner();
-            let outcome = touch.outcome(finger.0, against_w);
-            belief.observe(&touch.target, &approach, &outcome);
+            belief.observe(&touch.target, &touch.outcome);
             if count >= 2 {
                 belief.refit().unwrap();
             }
         }
-        let taps = name == "active(taps)";
+        let taps = name == "active(tap)";
         assert!(taps == (strokes == 0) && taps == (points == 0), "{name}: {strokes}, {points}");
         let found = belief.fit().unwrap().hyperparameters.length_scales[0];
         let written = row.touches[8].fit.as_ref().unwrap().hyperparameters.length_scales[0];
@@ -364,12 +364,12 @@ proptest! {
         for (fractions, height) in &touches {
             let place = zone.at(fractions);
             let p_wc: Point3<f64> = zone.point(&place, *height);
-            field.observe(&place, &Touch::Contact(Contact::new(p_wc, Vector3::y())));
+            field.observe(&place.into(), &Contact::new(p_wc, Vector3::y()).into());
         }
         field.refit().unwrap();
         let [tap_s, speed_m_s] = [[3.0, 0.02], [1e-6, 1e-6], [10.0, 1e6]][extreme];
         let offer = StrokeOffer { longest_m, speed_m_s, tap_s, travel_m_s: 0.1, from: None };
-        match best(&field, &offer, &[zone.at(&at)]).unwrap() {
+        match best(&field.into(), &offer, zone.at(&at).into()) {
             Target::Stroke { place, to } => {
                 prop_assert!(zone.contains(&place) && zone.contains(&to));
                 let length_m = (place[0] - to[0]).hypot(place[1] - to[1]);

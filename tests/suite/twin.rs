@@ -6,7 +6,7 @@ use crate::common::hub::Hub;
 use crate::common::rig::ARM;
 use crate::common::rig::{Rig, RigSettings, STAGE, patient};
 use palpate::backend::{Backend, Command};
-use palpate::explore::probe::Touch;
+use palpate::explore::evidence::End;
 use palpate::ros::arm::RosArm;
 use palpate::ros::driver::Profile;
 use palpate::ros::server::serve::services;
@@ -19,14 +19,16 @@ fn compare(scene: &str, settings: RigSettings) {
     let rig = Rig::new(scene, settings, &[]);
     let place = [0.4, 0.55];
     let touches = rig.touch(&rig.lab().unwrap(), &[place]);
-    let Ok(Touch::Contact(far)) = &touches[0] else { panic!("{touches:?}") };
+    let far = touches[0].as_ref().ok().and_then(|outcome| outcome.contact());
+    let Some(far) = far else { panic!("{touches:?}") };
     let task = rig.simulator.environment().task();
     let near = rig
         .simulator
         .probe(0)
         .unwrap()
         .touch(&task.approach(&task.zone().unwrap().at(&place).into()).unwrap());
-    let Ok(Touch::Contact(near)) = near else { panic!("{near:?}") };
+    let near = near.unwrap();
+    let near = near.contact().unwrap_or_else(|| panic!("{near:?}"));
     let off_m = (far.p_wc - near.p_wc).norm();
     assert!(off_m < 3e-4, "{off_m}: {far:?} {near:?}");
 }
@@ -111,7 +113,8 @@ fn the_arm_moves_again_when_the_operator_has_cleared_it() {
     let lab = rig.lab().unwrap();
     lab.call(&Service::ClearFault).unwrap();
     let touches = rig.touch(&lab, &[[0.5, 0.5]]);
-    assert!(matches!(touches[0], Ok(Touch::Contact(_))), "{touches:?}");
+    let end = touches[0].as_ref().map(|outcome| outcome.end);
+    assert_eq!(end, Ok(End::Contact), "{touches:?}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::common::rig::{ARM, Rest};
 use crate::common::rig::{Rig, STAGE, patient};
 #[cfg(feature = "mujoco")]
 use palpate::backend::pace;
-use palpate::explore::probe::Touch;
+use palpate::explore::evidence::End;
 use palpate::ros::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
 use palpate::ros::settings::RosSettings;
 use palpate::ros::status::ArmStatus;
@@ -101,7 +101,8 @@ fn what_does_not_hinder_a_touch_does_not_stop_it() {
             scope.spawn(move || {
                 let rig = Rig::new(STAGE, patient(), &[(name, 0.0, None)]);
                 let touches = rig.touch(&rig.lab().unwrap(), &[[0.5, 0.5]]);
-                assert!(matches!(touches[0], Ok(Touch::Contact(_))), "{name}: {touches:?}");
+                let end = touches[0].as_ref().map(|outcome| outcome.end);
+                assert_eq!(end, Ok(End::Contact), "{name}: {touches:?}");
             });
         }
     });
@@ -134,7 +135,8 @@ fn messages_without_stamps_are_taken_where_that_is_set() {
     settings.ros.accept_unstamped = true;
     let rig = Rig::new(STAGE, settings, &[("unstamped", 0.0, None)]);
     let touches = rig.touch(&rig.lab().unwrap(), &[[0.5, 0.5]]);
-    assert!(matches!(touches[0], Ok(Touch::Contact(_))), "{touches:?}");
+    let end = touches[0].as_ref().map(|outcome| outcome.end);
+    assert_eq!(end, Ok(End::Contact), "{touches:?}");
 }
 
 fn status(level: u8, values: &[(&str, &str)]) -> DiagnosticArray {

@@ -7,16 +7,16 @@ use palpate::experiment::simulation::Simulation;
 use palpate::experiment::statistics::equal_error::equal_errors;
 use palpate::experiment::store::Run;
 use palpate::experiment::store::resolved;
-use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::experiment::truth::Truth;
 use palpate::explore::belief::Belief;
-use palpate::explore::planner;
 use palpate::explore::planner::Planner;
+use palpate::explore::planner::{self, Offer};
 use palpate::explore::whole_object::{ImplicitSurface, Surface};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
-use palpate::report::{findings, whole_object};
+use palpate::report::findings;
 use palpate::sim::environment::ObjectShape;
 use palpate::sim::{Environment, Scene};
 use palpate::task::{Aim, Target};
@@ -52,10 +52,8 @@ fn last_share(row: &TrialRow) -> f64 {
 
 /// The surface after the touches of a row.
 fn surface(simulation: &Simulation, row: &TrialRow) -> Surface {
-    let belief = whole_object::belief(simulation.experiment(), row, row.touches.len() as u32)
-        .unwrap()
-        .unwrap();
-    belief.surface().unwrap().clone()
+    let belief = row.belief(simulation.experiment(), row.touches.len() as u32).unwrap().unwrap();
+    belief.implicit_surface().unwrap().surface().unwrap().clone()
 }
 
 /// Any planner finds a ball to a thousandth of its diagonal with twenty touches, with its volume,
@@ -87,8 +85,8 @@ fn a_sphere_is_found() {
 fn a_torus_keeps_its_hole() {
     let simulation = simulation(torus, "planners = [\"active\"]\ntouches = 45");
     let row = trial(&simulation, "active");
-    let inside = row.touches.iter().filter_map(|touch| touch.contact);
-    let inside = inside.filter(|[x, _, z]| x.hypot(*z) < 0.038).count();
+    let inside = row.touches.iter().filter_map(TouchRow::contact);
+    let inside = inside.filter(|p_w| p_w.x.hypot(p_w.z) < 0.038).count();
     assert!(inside >= 3, "{inside} contacts inside the hole");
     let mesh = surface(&simulation, &row).mesh(64).unwrap();
     // Along its axis there is no intersection, and across it two with the ring.
@@ -133,7 +131,7 @@ fn make(name: &str, random: ChaCha8Rng) -> Box<dyn Planner> {
 }
 
 fn plan(planner: &mut Box<dyn Planner>, belief: &ImplicitSurface) -> Aim {
-    *planner.plan(&Belief::from(belief.clone())).unwrap().target.aim().unwrap()
+    *planner.plan(&Belief::from(belief.clone()), &Offer::default()).unwrap().target.aim().unwrap()
 }
 
 /// Another size gives the same result up to rounding.

@@ -9,10 +9,10 @@ use palpate_explore::backend::{
 };
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::gp_settings::GpSettings;
-use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
+use palpate_explore::planner::{self, Offer};
+use palpate_explore::probe::Probe;
 use palpate_explore::probe::servo::Servo;
-use palpate_explore::probe::{Probe, Touch};
 use palpate_explore::robot::arm::Chain;
 use palpate_explore::robot::arm::stage::stage;
 use palpate_explore::robot::{Finger, Robot};
@@ -110,15 +110,15 @@ pub fn explore(touches: usize) -> Result<(HeightField, f64), Box<dyn std::error:
     for count in 0..touches {
         let target = match count {
             0 => zone.at(&[0.3, 0.6]).into(),
-            _ => planner.plan(&Belief::from(belief.clone()))?.target,
+            _ => planner.plan(&Belief::from(belief.clone()), &Offer::default())?.target,
         };
         let approach = task.approach(&target).ok_or("not in the zone")?;
-        let touch = servo.touch(&approach)?;
-        if let Touch::Contact(contact) = &touch {
+        let outcome = servo.touch(&approach)?;
+        if let Some(contact) = outcome.contact() {
             let p_w = contact.p_wc;
             worst_m = worst_m.max((p_w.y - wall_y_m(p_w.x, p_w.z)).abs());
         }
-        belief.observe(target.place().ok_or("no place")?, &touch);
+        belief.observe(&target, &outcome);
         belief.refit()?;
     }
     Ok((belief, worst_m))

@@ -19,7 +19,7 @@
 //! that it then lies below the bound, the odds of no surface are (1 − p) : p·Φ(z): beside an edge
 //! on which the finger came to rest there is no surface, rather than one far below.
 
-use super::probe::SweptVolume;
+use super::evidence::FreeVolume;
 use super::surface_evidence::Silhouette;
 use crate::task::Zone;
 use palpate_gp::math::normal;
@@ -67,7 +67,7 @@ impl FreeSpaceBound {
     }
 
     /// Lowers the bound to the volume swept by one touch.
-    pub(super) fn lower(&mut self, zone: &Zone, swept: &SweptVolume) {
+    pub(super) fn lower(&mut self, zone: &Zone, swept: &FreeVolume) {
         let ceilings_m = swept.upper_bounds_m(zone, self.places.iter().map(Vec::as_slice));
         for (height_m, ceiling_m) in self.heights_m.iter_mut().zip(ceilings_m) {
             *height_m = height_m.min(ceiling_m.unwrap_or(f64::INFINITY));

@@ -15,10 +15,9 @@
 //! hull passed without contact. The length scale is the most likely one of a few. The optimistic
 //! probability has c = 0.
 
-use super::probe::{Contact, SweptVolume};
+use super::evidence::{Contact, End, FreeVolume};
 use crate::robot::Finger;
 use crate::task::Zone;
-use crate::view::{DepthMap, Sight, View};
 use nalgebra::{Point3, Vector2};
 use palpate_gp::kernel::SquaredExponential;
 use palpate_gp::likelihood::Likelihood;
@@ -39,43 +38,6 @@ const LESS_AT_THE_RIM: f64 = 0.9;
 
 /// Number of evidence points along a missed hull; two and five perform the same.
 const MISS_PLACES: usize = 3;
-
-/// Places along the longer side of the zone of which a view tells the presence of a surface.
-// heuristic: two diameters of a finger in a zone as wide as a hand.
-const SEEN_PER_SIDE: usize = 12;
-
-/// Probability of a surface where a view saw none.
-// heuristic: a steep wall may have left a hole in the view.
-const SEEN_THROUGH: f64 = 0.1;
-
-/// Returns what a view says of the presence of a surface, at a few places of the zone: places (x,
-/// z) with a probability; none if the zone has no depth.
-pub(super) fn seen_presence(zone: &Zone, view: &View) -> Vec<([f64; 2], f64)> {
-    let Some([near_m, far_m]) = zone.depth_m else { return Vec::new() };
-    let step_m = zone.widest_m() / SEEN_PER_SIDE as f64;
-    let margin_m = view.accuracy.pose_error.position_sd_m.into_iter().fold(0.0, f64::max);
-    let map = DepthMap::new(view, 0.25 * step_m);
-    let counts = zone.extents_m().into_iter().map(|side| ((side / step_m).round() as usize).max(1));
-    let counts: Vec<usize> = counts.collect();
-    let deep = ((far_m - near_m) / (0.25 * step_m)).ceil().max(1.0) as usize;
-    let verdict = |k: usize| {
-        let cell = [k % counts[0], k / counts[0]];
-        let middles =
-            cell.iter().zip(&counts).map(|(at, count)| (*at as f64 + 0.5) / *count as f64);
-        let place = zone.at(&middles.collect::<Vec<_>>());
-        let line = (0..=deep).map(|d| {
-            let depth_m = near_m + (far_m - near_m) * d as f64 / deep as f64;
-            zone.x_wz() * zone.local(&place, -depth_m)
-        });
-        let presence = match map.sight(line, margin_m) {
-            Sight::Surface => 1.0,
-            Sight::Nothing => SEEN_THROUGH,
-            Sight::Unknown => return None,
-        };
-        Some((flat(&zone.local(&place, 0.0)).into(), presence))
-    };
-    (0..counts.iter().product()).filter_map(verdict).collect()
-}
 
 /// Evidence from touches for the presence of a surface.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -112,21 +74,22 @@ impl SurfaceEvidence {
         }
     }
 
-    /// Adds the contact of a touch at `target`.
-    pub(super) fn add_contact(&mut self, target: &[f64], contact: &Contact) {
+    /// Adds the contact of a touch at `target`; a touch with further points was made by a pad, or
+    /// is a stroke.
+    pub(super) fn add_contact(&mut self, target: &[f64], contact: &Contact, is_on_pad: bool) {
         let target = flat(&self.zone.local(target, 0.0));
         let x_zw = self.zone.x_wz().inverse();
         self.contacts.push([target, flat(&(x_zw * contact.p_wc))]);
         self.on_pad.resize(self.contacts.len() - 1, false);
-        self.on_pad.push(!contact.patch.is_empty());
+        self.on_pad.push(is_on_pad);
         self.hulls.resize(self.contacts.len(), None);
     }
 
-    /// Adds the final place of a touch's hull, and whether the touch was a miss.
-    pub(super) fn add_hull(&mut self, swept: &SweptVolume, has_missed: bool) {
+    /// Adds the final place of a touch's hull.
+    pub(super) fn add_hull(&mut self, swept: &FreeVolume) {
         let tip = flat(&self.zone.x_wz().inverse_transform_point(&swept.p_wt));
         let hull = Stadium::new(&swept.finger, tip);
-        if has_missed {
+        if swept.end == End::Miss {
             self.misses.push(hull.clone());
         } else if let Some(last) = self.hulls.last_mut() {
             last.get_or_insert_with(|| hull.clone());
@@ -229,6 +192,11 @@ impl Silhouette {
             Some(SilhouetteModel { hull, misses, belief, table: OnceCell::new() })
         });
         Self { zone: zone.clone(), seen }
+    }
+
+    /// Creates the silhouette of a surface that is present everywhere.
+    pub fn everywhere() -> Self {
+        Self { zone: Zone::new([0.0, 1.0], None), seen: None }
     }
 
     /// Whether a swept volume was observed.

@@ -109,14 +109,15 @@ impl MeshBvh {
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
     ) -> Option<RayHit> {
-        self.ray_near((&MeshParts::WHOLE, None), origin, direction, max_distance_m)
+        self.ray_near(&MeshParts::WHOLE, None, origin, direction, max_distance_m)
     }
 
     /// Returns the first intersection of a ray that stays in the ball of `near`. A good `guess` of
     /// the triangle that it meets spares most others.
     pub fn ray_near(
         &self,
-        (near, guess): (&MeshParts, Option<u32>),
+        near: &MeshParts,
+        guess: Option<u32>,
         origin: &Point3<f64>,
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
@@ -499,7 +500,7 @@ mod tests {
                 return Ok(());
             };
             let max_m = (radius_m - (start - centre).norm()).max(0.0);
-            let hit = bvh.ray_near((&near, guess), &start, &direction, max_m);
+            let hit = bvh.ray_near(&near, guess, &start, &direction, max_m);
             let whole_m = bvh.ray(&start, &direction, max_m).map(|hit| hit.distance_m);
             prop_assert_eq!(hit.map(|hit| hit.distance_m), whole_m);
             let touches = |near: &MeshParts| bvh.touches_near(near, &start, part * max_m);

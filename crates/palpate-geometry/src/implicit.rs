@@ -124,22 +124,26 @@ impl Field {
         }
     }
 
-    /// Hull of two balls, each a centre and a radius, neither within the other: its exact distance.
+    /// Hull of two balls with these centres and radii, neither in the other: its exact distance.
     ///
     /// It is the union of balls of radius `r_a - s t` at `a + t u`, where u is the unit axis and s
     /// the sine of the half angle; the distance is minimal over t at `t = h - q s / c`, for a point
     /// h along the axis and q beside it.
-    pub fn round_cone(p: Point3<f64>, a: (Point3<f64>, f64), b: (Point3<f64>, f64)) -> Self {
-        let axis = b.0 - a.0;
+    pub fn round_cone(
+        p: Point3<f64>,
+        [a, b]: [Point3<f64>; 2],
+        [a_radius_m, b_radius_m]: [f64; 2],
+    ) -> Self {
+        let axis = b - a;
         let length_m = axis.norm();
-        let sine = (a.1 - b.1) / length_m;
+        let sine = (a_radius_m - b_radius_m) / length_m;
         let tangent = sine / (1.0 - sine * sine).sqrt();
-        let along_m = (p - a.0).dot(&axis) / length_m;
-        let beside_m = (p - a.0 - axis * (along_m / length_m)).norm();
+        let along_m = (p - a).dot(&axis) / length_m;
+        let beside_m = (p - a - axis * (along_m / length_m)).norm();
         let fraction = ((along_m - beside_m * tangent) / length_m).clamp(0.0, 1.0);
-        let from_axis = p - a.0 - axis * fraction;
+        let from_axis = p - a - axis * fraction;
         Self {
-            value: from_axis.norm() - (a.1 + fraction * (b.1 - a.1)),
+            value: from_axis.norm() - (a_radius_m + fraction * (b_radius_m - a_radius_m)),
             gradient: unit_or_zero(from_axis),
         }
     }

@@ -84,13 +84,13 @@ fn right_half(p: Point3<f64>) -> Field {
 
     let tuft = Field::round_cone(
         p,
-        (point![0.0, 0.006, 0.058], 0.0060),
-        (point![0.0, -0.008, 0.067], 0.0035),
+        [point![0.0, 0.006, 0.058], point![0.0, -0.008, 0.067]],
+        [0.0060, 0.0035],
     );
     let nose = Field::round_cone(
         p,
-        (point![0.0, 0.024, 0.030], 0.0032),
-        (point![0.0, 0.0405, 0.028], 0.0024),
+        [point![0.0, 0.024, 0.030], point![0.0, 0.0405, 0.028]],
+        [0.0032, 0.0024],
     );
 
     let trunk = breast.union(back, 0.008).union(foot, 0.010).union(wing, 0.006);

@@ -238,11 +238,11 @@ fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
     let mut begin = 0;
     // A constant number of rows, whose sums stay in registers; then the rest.
     while begin + ROWS <= lanes.len() {
-        lower_rows::<V, N, WIDE, ROWS, true>(factor, lanes, (begin, lane), squares);
+        lower_rows::<V, N, WIDE, ROWS, true>(factor, lanes, begin, lane, squares);
         begin += ROWS;
     }
     if begin < lanes.len() {
-        lower_rows::<V, N, WIDE, ROWS, false>(factor, lanes, (begin, lane), squares);
+        lower_rows::<V, N, WIDE, ROWS, false>(factor, lanes, begin, lane, squares);
     }
 }
 
@@ -251,7 +251,8 @@ fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
 fn lower_rows<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize, const ALL: bool>(
     factor: &Factor,
     lanes: &mut [[f64; N]],
-    (begin, lane): (usize, usize),
+    begin: usize,
+    lane: usize,
     squares: &mut [f64; N],
 ) {
     let count = if ALL { ROWS } else { lanes.len() - begin };

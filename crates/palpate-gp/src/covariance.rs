@@ -64,7 +64,7 @@ pub(super) fn factor(
         let largest = match observations.has_slopes() {
             true => {
                 let buffer = &mut *correlations;
-                with_slopes(dense, kernel, observations, length_scales, (noise, jitter), buffer)
+                with_slopes(dense, kernel, observations, length_scales, noise, jitter, buffer)
             }
             false => {
                 for columns in batches(count) {
@@ -101,7 +101,8 @@ fn with_slopes(
     kernel: &dyn Kernel,
     observations: &Observations,
     length_scales: &[f64],
-    (noise, jitter): (NoiseRatio, f64),
+    noise: NoiseRatio,
+    jitter: f64,
     Correlations { derivatives, row, .. }: &mut Correlations,
 ) -> f64 {
     row.resize(observations.order(), 0.0);
@@ -231,6 +232,28 @@ pub(super) struct DerivativeCovariance {
     derivatives: [Vec<f64>; 3],
 }
 
+/// Weights of the covariances of two places in a sum; see
+/// [`DerivativeCovariance::add_length_gradient`].
+#[derive(Debug, Default)]
+pub(super) struct PairWeights {
+    /// Weight w of both heights.
+    pub(super) heights: f64,
+    /// Weights v of a slope and a height, by axis.
+    pub(super) slope_height: Vec<f64>,
+    /// Weights R of two slopes, row by row.
+    pub(super) slopes: Vec<f64>,
+}
+
+impl PairWeights {
+    /// Sets the weights of the slopes along `dimension` axes to zero.
+    pub(super) fn clear_slopes(&mut self, dimension: usize) {
+        self.slope_height.clear();
+        self.slope_height.resize(dimension, 0.0);
+        self.slopes.clear();
+        self.slopes.resize(dimension * dimension, 0.0);
+    }
+}
+
 impl DerivativeCovariance {
     /// Computes the correlations of `place` with the observations from `first` on.
     pub(super) fn correlate(
@@ -322,7 +345,7 @@ impl DerivativeCovariance {
         observations: &Observations,
         lengths: &[f64],
         i: usize,
-        (heights, slope_height, slopes): (f64, &[f64], &[f64]),
+        PairWeights { heights, slope_height, slopes }: &PairWeights,
         gradient: &mut [f64],
     ) {
         let dimension = lengths.len();

@@ -391,7 +391,7 @@ impl<'a> Search<'a> {
             place
         };
         let known = scan.map(|scan| {
-            scan.profiles(self.sought, (&grid, &self.scale), self.kernel, self.observations)
+            scan.profiles(self.sought, &grid, &self.scale, self.kernel, self.observations)
         });
         let Self { sought, likelihood, scale, .. } = self;
         let values: Vec<f64> = (0..grid.len())

@@ -59,14 +59,14 @@ impl Posterior {
         let count = indices.len();
         let kept = observations.places(&indices);
         let (covariance, residuals, left_variance) =
-            condition(kernel, &hyperparameters, observations, (&kept, factor.as_ref()))?;
+            condition(kernel, &hyperparameters, observations, &kept, factor.as_ref())?;
         let mut dense = dense(covariance.as_ref());
         let largest = 1.0 + hyperparameters.noise_ratio().height.powi(2);
         dense.factor(largest).map_err(|cause| indefinite(count, cause))?;
         let heights = residuals.iter().map(|height| hyperparameters.mean + height);
         let kept = kept.with_heights(heights.collect());
         let left_sd = hyperparameters.signal_sd * left_variance.sqrt();
-        let posterior = Self::factored(kernel, hyperparameters, kept, (&dense, 0.0));
+        let posterior = Self::factored(kernel, hyperparameters, kept, &dense, 0.0);
         Ok(InducingPosterior { posterior, nystrom_residual_sd: left_sd })
     }
 }
@@ -162,7 +162,8 @@ fn condition(
     kernel: &dyn Kernel,
     hyperparameters: &Hyperparameters,
     observations: &Observations,
-    (kept, factor): (&Observations, MatRef<f64>),
+    kept: &Observations,
+    factor: MatRef<f64>,
 ) -> Result<(Mat<f64>, Vec<f64>, f64), CovarianceError> {
     let count = kept.len();
     let mut precision = Mat::<f64>::zeros(count, count);
@@ -172,7 +173,7 @@ fn condition(
     for begin in (0..observations.len()).step_by(BLOCK) {
         let length = BLOCK.min(observations.len() - begin);
         let mut solved = block.as_mut().subcols_mut(0, length);
-        correlate(kernel, hyperparameters, (observations, begin), kept, solved.as_mut());
+        correlate(kernel, hyperparameters, observations, begin, kept, solved.as_mut());
         solve_lower(factor, solved.as_mut(), Par::Seq);
         for (at, mut column) in solved.as_mut().col_iter_mut().enumerate() {
             let i = begin + at;
@@ -211,7 +212,8 @@ fn condition(
 fn correlate(
     kernel: &dyn Kernel,
     hyperparameters: &Hyperparameters,
-    (observations, begin): (&Observations, usize),
+    observations: &Observations,
+    begin: usize,
     kept: &Observations,
     mut out: MatMut<f64>,
 ) {

@@ -2,7 +2,7 @@
 
 use super::covariance;
 use super::covariance::CovarianceError;
-use super::covariance::{Correlations, batches};
+use super::covariance::{Correlations, PairWeights, batches};
 use super::dense::DenseMatrix;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{NoiseRatio, Observations};
@@ -28,8 +28,8 @@ pub struct Likelihood<'a> {
     /// Buffer: L⁻¹·y, then A⁻¹·y if a gradient is requested.
     weights: Vec<f64>,
     scratch: Vec<f64>,
-    /// Weights of a pair of places; see [`DerivativeCovariance::add_length_gradient`].
-    pair: [Vec<f64>; 2],
+    /// Buffer.
+    pair: PairWeights,
     correlations: Correlations,
     jitter: f64,
     factorisations: u32,
@@ -70,7 +70,7 @@ impl<'a> Likelihood<'a> {
             dense: DenseMatrix::new(count),
             weights: Vec::with_capacity(count),
             scratch: Vec::with_capacity(count),
-            pair: Default::default(),
+            pair: PairWeights::default(),
             correlations: Correlations::default(),
             jitter: 0.0,
             factorisations: 0,
@@ -112,8 +112,7 @@ impl<'a> Likelihood<'a> {
     /// [`value_gradient`](Self::value_gradient) there without a gradient.
     pub fn posterior(&self, at: Hyperparameters) -> Posterior {
         let observations = self.observations.clone();
-        let factor = (&self.dense, self.jitter);
-        Posterior::factored(self.kernel, at, observations, factor)
+        Posterior::factored(self.kernel, at, observations, &self.dense, self.jitter)
     }
 
     /// Returns the log marginal likelihood with signal_sd according to `scale`. A `gradient` is
@@ -164,11 +163,10 @@ impl<'a> Likelihood<'a> {
     /// Returns the derivative with respect to the logarithm of the unit of known errors, after
     /// [`gradient`](Self::gradient).
     fn by_known(&self, signal2: f64, noise: NoiseRatio) -> f64 {
+        let change = CovarianceGradient { dense: &self.dense, weights: &self.weights, signal2 };
         let mut sum = 0.0;
         self.observations.for_known(noise, |row, column, value| {
-            let inverse = self.dense.inverse_column(column)[row - column];
-            let change = self.weights[row] * self.weights[column] / signal2 - inverse;
-            sum += change * value * if row == column { 1.0 } else { 2.0 };
+            sum += change.at(row, column) * value * if row == column { 1.0 } else { 2.0 };
         });
         sum
     }
@@ -217,16 +215,16 @@ impl<'a> Likelihood<'a> {
             return;
         };
         if self.observations.has_slopes() {
-            return self.gradient_with_slopes(signal2, lengths, noise, (by_length, by_noise));
+            return self.gradient_with_slopes(signal2, lengths, noise, by_length, by_noise);
         }
         let observations = self.observations;
         let Self { kernel, dense, weights, scratch, correlations, .. } = self;
+        let change = CovarianceGradient { dense, weights, signal2 };
         let mut trace = 0.0;
         for columns in batches(observations.len()) {
             let slopes = correlations.slopes_of(*kernel, observations, lengths, &columns);
-            let buffers = (slopes, &mut *scratch);
-            let known = (&*dense, &weights[..], signal2);
-            trace += add_gradient(observations, lengths, columns, known, buffers, by_length);
+            trace +=
+                add_gradient(observations, lengths, columns, change, slopes, scratch, by_length);
         }
         let by_height = noise.height * noise.height * trace;
         by_noise.iter_mut().take(1).for_each(|by_noise| *by_noise = by_height);
@@ -239,15 +237,13 @@ impl<'a> Likelihood<'a> {
         signal2: f64,
         lengths: &[f64],
         noise: NoiseRatio,
-        (by_length, by_noise): (&mut [f64], &mut [f64]),
+        by_length: &mut [f64],
+        by_noise: &mut [f64],
     ) {
         let Self { observations, dense, weights, pair, correlations, kernel, .. } = self;
-        let [slope_height, slopes] = pair;
         let d = lengths.len();
-        let change = |row: usize, column: usize| {
-            let inverse = dense.inverse_column(column)[row - column];
-            weights[row] * weights[column] / signal2 - inverse
-        };
+        let gradient = CovarianceGradient { dense, weights, signal2 };
+        let change = |row: usize, column: usize| gradient.at(row, column);
         observations.residuals(0.0, lengths, &mut self.scratch);
         for j in 0..observations.len() {
             let column = observations.start(j);
@@ -270,40 +266,58 @@ impl<'a> Likelihood<'a> {
                     derivatives.add_height_gradient(observations, lengths, i, change, by_length);
                     continue;
                 }
-                slope_height.clear();
-                slope_height.resize(d, 0.0);
-                slopes.clear();
-                slopes.resize(d * d, 0.0);
-                for (axis, sum) in slope_height.iter_mut().take(slopes_of_j).enumerate() {
+                pair.clear_slopes(d);
+                for (axis, sum) in pair.slope_height.iter_mut().take(slopes_of_j).enumerate() {
                     *sum += change(row, column + 1 + axis);
                 }
                 for other in 0..observations.slope(i).len() {
-                    slope_height[other] -= change(row + 1 + other, column);
+                    pair.slope_height[other] -= change(row + 1 + other, column);
                     for axis in 0..slopes_of_j {
-                        slopes[axis * d + other] = change(row + 1 + other, column + 1 + axis);
+                        pair.slopes[axis * d + other] = change(row + 1 + other, column + 1 + axis);
                     }
                 }
-                let pair = (change(row, column), &slope_height[..], &slopes[..]);
+                pair.heights = change(row, column);
                 derivatives.add_length_gradient(observations, lengths, i, pair, by_length);
             }
         }
     }
 }
 
+/// Gradient w·wᵀ/s² − A⁻¹ of twice the log marginal likelihood with respect to A.
+#[derive(Clone, Copy)]
+struct CovarianceGradient<'a> {
+    /// A⁻¹.
+    dense: &'a DenseMatrix,
+    /// w = A⁻¹·y.
+    weights: &'a [f64],
+    /// s².
+    signal2: f64,
+}
+
+impl CovarianceGradient<'_> {
+    /// Returns an entry of the lower triangle.
+    #[inline]
+    fn at(self, row: usize, column: usize) -> f64 {
+        let inverse = self.dense.inverse_column(column)[row - column];
+        self.weights[row] * self.weights[column] / self.signal2 - inverse
+    }
+}
+
 widest_fn! {
     /// Adds ½·tr((w·wᵀ/s² − A⁻¹)·∂A) by the length scales for some columns, and returns that by the
-    /// noises of their heights. It has A⁻¹, w and s², and buffers: the derivatives of the
-    /// correlations by the squared distances, which it overwrites, and one for a column.
+    /// noises of their heights. `slopes` are the derivatives of the correlations by the squared
+    /// distances, which it overwrites; `squares` is a buffer for a column.
     fn add_gradient<'a>(
         observations: &'a Observations,
         lengths: &'a [f64],
         columns: Range<usize>,
-        known: (&'a DenseMatrix, &'a [f64], f64),
-        buffers: (&'a mut [f64], &'a mut Vec<f64>),
+        change: CovarianceGradient<'a>,
+        slopes: &'a mut [f64],
+        squares: &'a mut Vec<f64>,
         by_length: &'a mut [f64],
     ) -> f64 {
-        let (dense, weights, signal2) = known;
-        let (mut rest, squares) = buffers;
+        let CovarianceGradient { dense, weights, signal2 } = change;
+        let mut rest = slopes;
         let mut trace = 0.0;
         for j in columns {
             let weight = weights[j] / signal2;

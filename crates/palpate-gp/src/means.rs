@@ -241,7 +241,7 @@ impl MeanField {
                 [&mut *second, along].into_iter().for_each(|unused| unused.fill([0.0; N]));
             }
             bend(second, first, heights, along);
-            add_moments(gradients, &at, (observed, slopes), (second, first));
+            add_moments(gradients, &at, observed, slopes, second, first);
         }
         for (gradient, length) in gradients.iter_mut().zip(&self.lengths) {
             gradient.iter_mut().for_each(|slope| *slope /= length);
@@ -346,17 +346,19 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Adds Σ u·b + c′·m along every axis, for b from [`bend`] and m = `observed.1`.
+    /// Adds Σ u·b + c′·m along every axis, for b from [`bend`] and m = `slopes`.
     fn add_moments<'a, const N: usize>(
         gradients: &'a mut [[f64; N]],
         at: &'a [[f64; N]],
-        observed: (&'a [f64], &'a [f64]),
-        bends: (&'a [[f64; N]], &'a [[f64; N]]),
+        places: &'a [f64],
+        slopes: &'a [f64],
+        bends: &'a [[f64; N]],
+        first: &'a [[f64; N]],
     ) -> () {
-        let ((observed, slopes), (bends, first), dimension) = (observed, bends, at.len());
+        let dimension = at.len();
         for (axis, (gradient, at)) in gradients.iter_mut().zip(at).enumerate() {
             let mut sums = *gradient;
-            for (bend, place) in bends.iter().zip(observed.chunks_exact(dimension)) {
+            for (bend, place) in bends.iter().zip(places.chunks_exact(dimension)) {
                 for lane in 0..N {
                     sums[lane] = bend[lane].mul_add(at[lane] - place[axis], sums[lane]);
                 }

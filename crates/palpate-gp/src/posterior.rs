@@ -51,7 +51,7 @@ impl Posterior {
         let buffer = &mut Correlations::default();
         let jitter =
             covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
-        Ok(Self::factored(kernel, hyperparameters, observations, (&dense, jitter)))
+        Ok(Self::factored(kernel, hyperparameters, observations, &dense, jitter))
     }
 
     /// Creates the posterior from observations whose covariance, including that of their errors, is
@@ -60,7 +60,8 @@ impl Posterior {
         kernel: &'static dyn Kernel,
         hyperparameters: Hyperparameters,
         observations: Observations,
-        (covariance, jitter): (&DenseMatrix, f64),
+        covariance: &DenseMatrix,
+        jitter: f64,
     ) -> Self {
         let factor = Factor::from(covariance);
         let (whitened, weights) = (Vec::new(), Vec::new());
@@ -239,7 +240,8 @@ impl Posterior {
     fn gradient_with_slopes(
         &self,
         weights: &[f64],
-        (derivatives, row): (&DerivativeCovariance, &mut Vec<f64>),
+        derivatives: &DerivativeCovariance,
+        row: &mut Vec<f64>,
         gradient: &mut [f64],
     ) {
         let lengths = &self.hyperparameters.length_scales;
@@ -260,7 +262,7 @@ impl Posterior {
     ) {
         self.covariances(place, None, scratch);
         let Scratch { derivatives, row, .. } = scratch;
-        self.gradient_with_slopes(weights, (derivatives, row), gradient);
+        self.gradient_with_slopes(weights, derivatives, row, gradient);
     }
 
     /// Returns the leave-one-out z-scores of the heights: z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the
@@ -324,7 +326,7 @@ impl Posterior {
         if self.observations.has_slopes() {
             self.covariances(place, None, scratch);
             let Scratch { solved, derivatives, row, .. } = scratch;
-            self.gradient_with_slopes(&self.weights, (derivatives, row), gradient);
+            self.gradient_with_slopes(&self.weights, derivatives, row, gradient);
             return self.hyperparameters.mean + widest_dot(solved, &self.weights);
         }
         let Scratch { solved, slopes, .. } = scratch;
@@ -359,7 +361,7 @@ impl Posterior {
             let explained = self.whiten(place, scratch);
             let Scratch { solved, derivatives, row, .. } = scratch;
             self.factor.solve_upper(solved);
-            self.gradient_with_slopes(solved, (derivatives, row), gradient);
+            self.gradient_with_slopes(solved, derivatives, row, gradient);
             let signal2 = self.hyperparameters.signal_sd.powi(2);
             gradient.iter_mut().for_each(|slope| *slope *= -2.0 * signal2);
             return self.remaining(explained);

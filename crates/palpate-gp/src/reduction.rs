@@ -84,7 +84,7 @@ impl<'a> VarianceReduction<'a> {
                 (0..count).flat_map(|lane| solved.iter().map(move |lanes| lanes[lane])).collect();
             let covariances = |others: &Observations, whitened: &[f64]| {
                 let mut covariances = vec![[0.0; MANY]; others.len()];
-                self.covary((&line[..count], solved), (others, whitened), &mut covariances);
+                self.covary(&line[..count], solved, others, whitened, &mut covariances);
                 covariances
             };
             let (mut factor, mut order) = (Factor::default(), 0);
@@ -125,7 +125,7 @@ impl<'a> VarianceReduction<'a> {
         let mut reductions = Vec::with_capacity(places.len());
         self.posterior.whitened(places, |solved, explained, count| {
             let block = &places[reductions.len()..][..count];
-            self.covary((block, solved), (&self.references, &self.whitened), &mut covariances);
+            self.covary(block, solved, &self.references, &self.whitened, &mut covariances);
             let mut shared2 = [0.0; MANY];
             for (field, at_references) in &self.common {
                 let mut at = [0.0; MANY];
@@ -150,8 +150,10 @@ impl<'a> VarianceReduction<'a> {
     /// the signal's variance; both come with their L⁻¹·k(X, ·).
     fn covary(
         &self,
-        (block, solved): (&[&[f64]], &[[f64; MANY]]),
-        (others, whitened): (&Observations, &[f64]),
+        block: &[&[f64]],
+        solved: &[[f64; MANY]],
+        others: &Observations,
+        whitened: &[f64],
         covariances: &mut [[f64; MANY]],
     ) {
         covariances.fill([0.0; MANY]);

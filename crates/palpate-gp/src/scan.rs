@@ -185,7 +185,8 @@ impl Scan {
     pub(super) fn profiles(
         &mut self,
         sought: &SearchBox,
-        (grid, scale): (&Grid, &SignalModel),
+        grid: &Grid,
+        scale: &SignalModel,
         kernel: &dyn Kernel,
         observations: &Observations,
     ) -> Vec<Option<ProfiledLikelihood>> {

@@ -30,7 +30,7 @@ vectorised_fn! {
             let (done, mut block) = matrix.rb_mut().split_at_col_mut(j);
             let done = done.rb();
             for rows in tiles::<V>(j..order) {
-                subtract::<V>(block.rb_mut(), (done, done), (rows, j), 0..j);
+                subtract::<V>(block.rb_mut(), done, done, rows, j, 0..j);
             }
             let corner = corner(block.rb_mut(), j)?;
             solve::<V>(block, j + WIDE..order, &corner);
@@ -58,8 +58,7 @@ vectorised_fn! {
             }
             for rows in tiles::<V>(0..j) {
                 let from = rows.start;
-                let left = (done.rb(), factor.rb());
-                subtract::<V>(block.rb_mut(), left, (rows, j), from..j);
+                subtract::<V>(block.rb_mut(), done.rb(), factor.rb(), rows, j, from..j);
             }
             let corner = triangle(factor.rb(), j);
             solve::<V>(block, 0..j + WIDE, &corner);
@@ -72,7 +71,7 @@ vectorised_fn! {
                 for c in 0..WIDE {
                     slice_mut(block.rb_mut(), c)[rows.clone()].fill(0.0);
                 }
-                subtract::<V>(block.rb_mut(), (upper, upper), (rows, j), from..order);
+                subtract::<V>(block.rb_mut(), upper, upper, rows, j, from..order);
             }
             for c in 0..WIDE {
                 slice_mut(block.rb_mut(), c)[j..].iter_mut().for_each(|entry| *entry = -*entry);
@@ -92,28 +91,32 @@ fn tiles<V: Vector>(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
 #[inline(always)]
 fn subtract<V: Vector>(
     mut block: MatMut<'_, f64>,
-    factors: (MatRef<'_, f64>, MatRef<'_, f64>),
-    (rows, j): (Range<usize>, usize),
+    p: MatRef<'_, f64>,
+    q: MatRef<'_, f64>,
+    rows: Range<usize>,
+    j: usize,
     sum: Range<usize>,
 ) {
     if rows.len() < 2 * V::LANES {
-        return subtract_tile::<V, 1, 8>(block, factors, (rows, j), sum);
+        return subtract_tile::<V, 1, 8>(block, p, q, rows, j, sum);
     }
     if V::LANES == 8 {
-        return subtract_tile::<V, 2, 8>(block, factors, (rows, j), sum);
+        return subtract_tile::<V, 2, 8>(block, p, q, rows, j, sum);
     }
     // With fewer registers, half of the columns at a time.
     for half in [0, 4] {
         let block = block.rb_mut().split_at_col_mut(half).1;
-        subtract_tile::<V, 2, 4>(block, factors, (rows.clone(), j + half), sum.clone());
+        subtract_tile::<V, 2, 4>(block, p, q, rows.clone(), j + half, sum.clone());
     }
 }
 
 #[inline(always)]
 fn subtract_tile<V: Vector, const HIGH: usize, const COLUMNS: usize>(
     mut block: MatMut<'_, f64>,
-    (p, q): (MatRef<'_, f64>, MatRef<'_, f64>),
-    (rows, j): (Range<usize>, usize),
+    p: MatRef<'_, f64>,
+    q: MatRef<'_, f64>,
+    rows: Range<usize>,
+    j: usize,
     sum: Range<usize>,
 ) {
     let mut sums = [[V::splat(0.0); HIGH]; COLUMNS];

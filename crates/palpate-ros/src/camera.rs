@@ -89,7 +89,8 @@ impl FirstMessages {
     pub fn cloud(
         self,
         topics: &CameraTopics,
-        (published, note): (&[String], Option<String>),
+        published: &[String],
+        note: Option<String>,
     ) -> Result<Cloud, InputError> {
         let (name, span_s) = (topics.view, topics.timeout.as_secs_f64());
         let missing = |what: &str, topic: &str| {
@@ -307,7 +308,7 @@ mod tests {
         let topics = CameraTopics { view: "/points", info: None, timeout: Duration::from_secs(2) };
         let error = |published: &[String], note: Option<&str>| {
             let note = note.map(str::to_owned);
-            FirstMessages::default().cloud(&topics, (published, note)).err().unwrap().to_string()
+            FirstMessages::default().cloud(&topics, published, note).err().unwrap().to_string()
         };
         assert!(error(&[], None).ends_with("in this domain?"));
         assert!(error(&[], Some("A is \"b\": c.")).ends_with("in this domain? A is \"b\": c."));

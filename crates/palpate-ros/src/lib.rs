@@ -117,7 +117,7 @@ pub fn look(settings: &RosSettings, topics: &CameraTopics) -> Result<Cloud, Inpu
     let variable = |name: &str| std::env::var(name).ok();
     let is_ros2 = settings.version == Some(RosVersion::Ros2);
     let note = is_ros2.then(|| network::discovery_note(variable)).flatten();
-    first.cloud(topics, (&published, note))
+    first.cloud(topics, &published, note)
 }
 
 /// Returns the error of settings without a version of ROS, or whose transport this build lacks.

@@ -6,7 +6,7 @@ use super::driver::franka_ros2::FrankaState;
 use super::driver::ur::UrState;
 use super::frames::FrameTree;
 use super::joints::JointNames;
-use super::message::Time;
+use super::message::{Time, WrenchStamped};
 use super::service::{Answer, Service};
 use super::settings::{CLOCK_AHEAD_S, RosSettings};
 use super::status::ArmStatus;
@@ -120,7 +120,7 @@ impl TopicReceiver {
         match delivery {
             Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
             Delivery::Malformed { topic, words } => {
-                let fault = refused(&self.settings.topics.name(topic), words);
+                let fault = self.refuse(topic, words);
                 self.latest().refused.get_or_insert(fault);
             }
             Delivery::Response { service, answer } => self.latest().answers.push((service, answer)),
@@ -175,6 +175,11 @@ impl TopicReceiver {
         }
     }
 
+    /// Returns the fault of an unusable message on `topic`.
+    fn refuse(&self, topic: Topic, words: impl std::fmt::Display) -> LinkFault {
+        refused(&self.settings.topics.name(topic), words)
+    }
+
     /// Reads a message into `heard`, if it belongs to the arm and is recent.
     fn read(
         &self,
@@ -184,33 +189,11 @@ impl TopicReceiver {
         received: Instant,
     ) -> Result<(), LinkFault> {
         let topic = packet.topic();
-        let refuse = |words: String| refused(&self.settings.topics.name(topic), words);
+        let status = self.read_status(heard, packet, received)?;
         let state = &mut heard.topics[topic as usize];
-        // Other drivers, e.g. of a hand, may publish on the same topic.
-        if let Packet::Joints(message) = packet
-            && !self.names.are_among(&message.name)
-        {
-            let names = self.names.names();
-            let words = format!("joints {:?} are not joints of the arm, {names:?}", message.name);
+        if let Some(words) = self.skip_reason(packet, status.as_ref()) {
             state.skipped = Some(words);
             return Ok(());
-        }
-        let mut status = None;
-        if let Packet::Status(message) = packet {
-            let device = self.settings.topics.device();
-            let read = ArmStatus::read(message, device);
-            status = read.map_err(|cause| refuse(cause.to_string()))?;
-            if status.is_none() {
-                let found: Vec<_> = message.status.iter().map(|status| &status.name).collect();
-                state.skipped = Some(format!("no status named \"{device}\" among {found:?}"));
-                return Ok(());
-            }
-        }
-        if heard.ur.read(packet) {
-            status = heard.ur.status();
-        }
-        if heard.franka.read(packet, received) {
-            status = heard.franka.status();
         }
         // A message without a header is as old as its receipt.
         let now_s = match (self.settings.use_sim_time, heard.clock) {
@@ -228,46 +211,64 @@ impl TopicReceiver {
                 return Err(LinkFault::Arm(words));
             }
         }
-        if !is_timely? {
-            return Ok(());
+        if is_timely? && self.store(heard, packet, status, received)? {
+            heard.topics[topic as usize].at = Some(received);
         }
+        Ok(())
+    }
+
+    /// Returns the arm's status after a message that changes it.
+    fn read_status(
+        &self,
+        heard: &mut LatestMessages,
+        packet: &Packet,
+        received: Instant,
+    ) -> Result<Option<ArmStatus>, LinkFault> {
+        if let Packet::Status(message) = packet {
+            let read = ArmStatus::read(message, self.settings.topics.device());
+            return read.map_err(|cause| self.refuse(packet.topic(), cause));
+        }
+        if heard.ur.read(packet) {
+            return Ok(heard.ur.status());
+        }
+        if heard.franka.read(packet, received) {
+            return Ok(heard.franka.status());
+        }
+        Ok(None)
+    }
+
+    /// Returns why a message with this status is skipped: it is of another device, e.g. a hand,
+    /// whose driver may publish on the same topic.
+    fn skip_reason(&self, packet: &Packet, status: Option<&ArmStatus>) -> Option<String> {
+        match packet {
+            Packet::Joints(message) if !self.names.are_among(&message.name) => {
+                let names = self.names.names();
+                Some(format!("joints {:?} are not joints of the arm, {names:?}", message.name))
+            }
+            Packet::Status(message) if status.is_none() => {
+                let device = self.settings.topics.device();
+                let found: Vec<_> = message.status.iter().map(|status| &status.name).collect();
+                Some(format!("no status named \"{device}\" among {found:?}"))
+            }
+            _ => None,
+        }
+    }
+
+    /// Stores a recent message of the arm; returns whether it was of use.
+    fn store(
+        &self,
+        heard: &mut LatestMessages,
+        packet: &Packet,
+        status: Option<ArmStatus>,
+        received: Instant,
+    ) -> Result<bool, LinkFault> {
+        let refuse = |words: String| self.refuse(packet.topic(), words);
         match packet {
             Packet::Joints(message) => {
                 let read = self.names.read(message, &mut heard.q, &mut heard.qdot);
                 read.map_err(|cause| refuse(cause.to_string()))?;
             }
-            Packet::Wrench(message) => {
-                let (force_n, torque_nm) =
-                    (message.wrench.force.into(), message.wrench.torque.into());
-                let wrench = Wrench { force_n, torque_nm };
-                let (force, torque) = (wrench.force_n.as_slice(), wrench.torque_nm.as_slice());
-                if !force.iter().chain(torque).all(|part| part.is_finite()) {
-                    let is_absent = force.iter().chain(torque).all(|part| part.is_nan());
-                    return Err(refuse(match is_absent {
-                        true => {
-                            "all numbers are NaN: no sensor is behind it, as on mock hardware; \
-                                 rehearse with palpate run --dry"
-                                .into()
-                        }
-                        false => format!("{force:?} and {torque:?}"),
-                    }));
-                }
-                let is_estimated = self.settings.has_estimated_wrench();
-                let in_flange = heard.franka.in_flange(&wrench).filter(|_| is_estimated);
-                match (is_estimated, in_flange, self.settings.flange_frame()) {
-                    (true, Some(wrench), Some(flange)) => {
-                        (heard.wrench, heard.wrench_frame) = (Some(wrench), flange);
-                    }
-                    // Without the state its frame is not known yet.
-                    (true, ..) => return Ok(()),
-                    (false, ..) => {
-                        heard.wrench = Some(wrench);
-                        if heard.wrench_frame != message.header.frame_id {
-                            heard.wrench_frame.clone_from(&message.header.frame_id);
-                        }
-                    }
-                }
-            }
+            Packet::Wrench(message) => return self.store_wrench(heard, message),
             Packet::Frames(message) => heard.frames.read(message),
             Packet::Goals(message) => heard.goals = message.clone(),
             Packet::Clock(message) => heard.clock = Some((message.clock.s(), received)),
@@ -298,10 +299,48 @@ impl TopicReceiver {
             | Packet::Markers(_)
             | Packet::Points(_)
             | Packet::CollisionObject(_)
-            | Packet::Description(_) => return Ok(()),
+            | Packet::Description(_) => return Ok(false),
         }
-        heard.topics[topic as usize].at = Some(received);
-        Ok(())
+        Ok(true)
+    }
+
+    /// Stores a wrench; returns whether its frame is known.
+    fn store_wrench(
+        &self,
+        heard: &mut LatestMessages,
+        message: &WrenchStamped,
+    ) -> Result<bool, LinkFault> {
+        let (force_n, torque_nm) = (message.wrench.force.into(), message.wrench.torque.into());
+        let wrench = Wrench { force_n, torque_nm };
+        let (force, torque) = (wrench.force_n.as_slice(), wrench.torque_nm.as_slice());
+        if !force.iter().chain(torque).all(|part| part.is_finite()) {
+            let is_absent = force.iter().chain(torque).all(|part| part.is_nan());
+            let words = match is_absent {
+                true => {
+                    "all numbers are NaN: no sensor is behind it, as on mock hardware; rehearse with \
+                     palpate run --dry"
+                        .into()
+                }
+                false => format!("{force:?} and {torque:?}"),
+            };
+            return Err(self.refuse(Topic::Wrench, words));
+        }
+        let is_estimated = self.settings.has_estimated_wrench();
+        let in_flange = heard.franka.in_flange(&wrench).filter(|_| is_estimated);
+        match (is_estimated, in_flange, self.settings.flange_frame()) {
+            (true, Some(wrench), Some(flange)) => {
+                (heard.wrench, heard.wrench_frame) = (Some(wrench), flange);
+            }
+            // Without the state its frame is not known yet.
+            (true, ..) => return Ok(false),
+            (false, ..) => {
+                heard.wrench = Some(wrench);
+                if heard.wrench_frame != message.header.frame_id {
+                    heard.wrench_frame.clone_from(&message.header.frame_id);
+                }
+            }
+        }
+        Ok(true)
     }
 
     /// Whether a message of `topic` with this stamp is recent enough at `now_s` and in order.
@@ -315,13 +354,12 @@ impl TopicReceiver {
         stamp: Time,
         now_s: f64,
     ) -> Result<bool, LinkFault> {
-        let topics = &self.settings.topics;
         let stamp_s = stamp.s();
         if stamp_s == 0.0 {
             return match self.settings.accept_unstamped {
                 true => Ok(true),
-                false => Err(refused(
-                    &topics.name(topic),
+                false => Err(self.refuse(
+                    topic,
                     format!(
                         "its stamp is zero, so its age is unknown; stamp it, or set {} = true to count \
                          its age from receipt",
@@ -336,7 +374,7 @@ impl TopicReceiver {
             let words = format!(
                 "its stamp is {ahead_ms:.0} ms in the future; check that the clocks are synchronised"
             );
-            return Err(refused(&topics.name(topic), words));
+            return Err(self.refuse(topic, words));
         }
         if stamp_s < state.stamp_s {
             state.backward += 1;
@@ -346,7 +384,7 @@ impl TopicReceiver {
         if self.settings.is_on_change(topic) {
             return Ok(true);
         }
-        let is_late = age_s > topics.max_age_s(topic);
+        let is_late = age_s > self.settings.topics.max_age_s(topic);
         state.late_s = is_late.then_some(age_s);
         Ok(!is_late)
     }

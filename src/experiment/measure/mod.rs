@@ -146,7 +146,7 @@ const UNREACHABLE_RMSE: Measure = measure(Minimise, "unreachable_rmse_m", "RMSE,
 
 /// Time of the simulated or real robot since the start of a trial.
 pub const ROBOT_TIME: Measure =
-    measure(Minimise, "time_s", "robot time", SECONDS).from(Source::Touch(|it| it.time_s));
+    measure(Minimise, "time_s", "robot time", SECONDS).from(Source::Touch(|it| it.outcome.time_s));
 
 /// Share of the truth inside the 95 % band.
 pub const COVERAGE: Measure = measure(Undirected, "coverage", "coverage of the 95 % band", SHARE)

@@ -1,7 +1,7 @@
 //! Errors of the estimated silhouette of an object.
 
 use crate::experiment::truth::Truth;
-use palpate_explore::surface_evidence::SurfaceEvidence;
+use palpate_explore::surface_evidence::Silhouette;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,15 +25,14 @@ pub struct SilhouetteMetrics {
 }
 
 impl SilhouetteMetrics {
-    /// Compares `presence` with the ground truth at the test points. Returns `None` if every point
+    /// Compares `silhouette` with the ground truth at the test points. Returns `None` if every point
     /// has a surface, if the points without one are unknown, or before any observed sweep of the
     /// finger.
-    pub fn of(presence: &SurfaceEvidence, truth: &Truth) -> Option<Self> {
+    pub fn of(silhouette: &Silhouette, truth: &Truth) -> Option<Self> {
         let count = truth.places.len();
         if !truth.is_complete || truth.surface_count() == count {
             return None;
         }
-        let silhouette = presence.silhouette();
         if !silhouette.is_known() {
             return None;
         }

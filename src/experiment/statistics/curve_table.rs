@@ -37,13 +37,14 @@ pub fn curve_table(
         .filter(|point| is_wanted(point.touches))
         .collect();
     let measures: Vec<&Measure> = measures_with_columns(rows).collect();
-    let values = |point: &CurvePoint| values((experiment, &measures), rows, point);
+    let values = |point: &CurvePoint| values(experiment, &measures, rows, point);
     let values: Vec<_> = points.par_iter().map(values).collect();
     points.into_iter().zip(values).collect()
 }
 
 fn values(
-    (experiment, measures): (&Experiment, &[&Measure]),
+    experiment: &Experiment,
+    measures: &[&Measure],
     rows: &[TrialRow],
     point: &CurvePoint,
 ) -> Vec<Option<f64>> {
@@ -57,7 +58,7 @@ fn values(
             values.push(summary.and_then(|summary| summary.error));
         }
         if measure.aggregate.has_median() {
-            let interval = interval((experiment, &samples), rows, point, measure);
+            let interval = interval(experiment, &samples, rows, point, measure);
             values.push(summary.map(|summary| summary.median));
             values.extend(ends(interval));
         }
@@ -80,7 +81,8 @@ fn ends(interval: Option<[f64; 2]>) -> [Option<f64>; 2] {
 
 /// 95 % bootstrap interval of the median; `None` for a single trial.
 fn interval(
-    (experiment, samples): (&Experiment, &BootstrapSamples),
+    experiment: &Experiment,
+    samples: &BootstrapSamples,
     rows: &[TrialRow],
     point: &CurvePoint,
     measure: &Measure,
@@ -105,7 +107,7 @@ pub fn uncertainty(
 ) -> Option<[f64; 2]> {
     if measure.aggregate.has_median() {
         let samples = BootstrapSamples::new(point.trials, experiment.seed);
-        return interval((experiment, &samples), rows, point, measure);
+        return interval(experiment, &samples, rows, point, measure);
     }
     let summary = point.of(measure)?;
     summary.error.map(|error| [summary.mean - error, summary.mean + error])

@@ -4,7 +4,7 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::statistics::{mean, mean_and_error, median};
 use crate::experiment::trial::row::{TouchRow, TrialRow, planner_rows};
-use nalgebra::Point3;
+use palpate_explore::evidence::End;
 use palpate_explore::planner::Fallback;
 use palpate_explore::robot::sensor::Doubt;
 use palpate_explore::task::Zone;
@@ -130,7 +130,7 @@ pub fn goal_touches(points: &[CurvePoint], is_met: impl Fn(&CurvePoint) -> bool)
 pub fn median_shift_m(zone: &Zone, rows: &[TrialRow]) -> Option<f64> {
     let shifts_m: Vec<f64> = (rows.iter().flat_map(|row| &row.touches))
         .filter_map(|touch| {
-            let place = zone.place(&Point3::from(touch.contact?));
+            let place = zone.place(&touch.contact()?);
             let square = |(a, b): (&f64, &f64)| (a - b).powi(2);
             Some(place.iter().zip(touch.target.place()?).map(square).sum::<f64>().sqrt())
         })
@@ -148,8 +148,8 @@ pub fn events(rows: &[TrialRow], planner: &str) -> EventCounts {
         events.trials += 1;
         events.failures += usize::from(row.failure.is_some());
         events.misses += count(TouchRow::is_miss);
-        events.overloads += count(|touch| touch.overload);
-        for doubt in row.touches.iter().filter_map(|touch| touch.doubt) {
+        events.overloads += count(|touch| touch.outcome.end == End::Overload);
+        for doubt in row.touches.iter().filter_map(|touch| touch.outcome.doubt) {
             *events.doubts.entry(doubt).or_default() += 1;
         }
         events.no_variance += count(|touch| touch.fallback == Some(Fallback::NoVariance));

@@ -62,8 +62,7 @@ pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunE
         );
         return Err(InputError::new(problem).into());
     }
-    let (mut folder, there) =
-        RunFolder::open_as(out, (&experiment, &truth, content), commit, false)?;
+    let (mut folder, there) = RunFolder::open_as(out, &experiment, &truth, content, commit, false)?;
     if !there.is_empty() {
         return Err(RunError::at(out, "already has rows; use a new folder"));
     }

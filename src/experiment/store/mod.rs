@@ -93,13 +93,15 @@ impl RunFolder {
         fresh: bool,
     ) -> Result<(Self, Vec<TrialId>), RunError> {
         let content = InputHashes::of(simulation)?;
-        let parts = (simulation.experiment(), simulation.truth(), content);
-        Self::open_as(path, parts, commit, fresh)
+        let (experiment, truth) = (simulation.experiment(), simulation.truth());
+        Self::open_as(path, experiment, truth, content, commit, fresh)
     }
 
     fn open_as(
         path: &Path,
-        (experiment, truth, mut content): (&Experiment, &Truth, InputHashes),
+        experiment: &Experiment,
+        truth: &Truth,
+        mut content: InputHashes,
         commit: &str,
         fresh: bool,
     ) -> Result<(Self, Vec<TrialId>), RunError> {

@@ -126,7 +126,9 @@ fn check_touch(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result
 /// Returns the first value of a touch that is out of range, with its name and the range.
 fn out_of_range(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
     let coordinate = |value: f64| ("a coordinate", value, [-FAR_M, FAR_M]);
-    let places = [touch.contact, touch.normal, touch.tip].into_iter().flatten().flatten();
+    let points = touch.outcome.points().iter().map(|point| point.p_wc.coords);
+    let tip = touch.outcome.free().map(|free| free.p_wt.coords);
+    let places = points.chain(tip).flat_map(|place| <[f64; 3]>::from(place));
     let coordinates = touch.target.numbers().into_iter().chain(places).map(coordinate);
     let measured = MEASURES.iter().filter_map(|measure| {
         Some((measure.id, measure.value_after_touch(touch)?, measure.unit.range))

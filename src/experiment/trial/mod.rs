@@ -8,40 +8,38 @@ pub mod planner_names;
 pub mod recorded_trial;
 pub mod replay;
 pub mod row;
-mod strokes;
+mod row_belief;
 mod verification;
 pub mod view;
 
 pub(super) use oracle::{GroundTruth, OracleFactory};
 
 use self::belief_shape::{BelievedShape, shape};
-use self::looks::Looks;
 use self::row::{TouchRow, TrialRow, ViewRow};
-use self::strokes::Strokes;
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use crate::sim::Environment;
-use crate::sim::finger::effects::gel::GelEffect;
+use crate::sim::camera::probe::CameraProbe;
 use palpate_explore::backend::Fault;
-use palpate_explore::belief::{Belief, SurfaceBelief};
-use palpate_explore::planner::{self, Fallback, Plan, PlanError, PlannerFactory};
-use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::belief::Belief;
+use palpate_explore::episode::Episode;
+use palpate_explore::planner::{self, Fallback, Offer, Plan, PlannerFactory};
+use palpate_explore::probe::Probe;
 use palpate_explore::recognition::{Library, ObjectHypotheses, RecognitionSettings};
-use palpate_explore::task::{Approach, Target, Task};
+use palpate_explore::task::{Action, Approach, Target};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 use rand_chacha::ChaCha8Rng;
 use std::cell::OnceCell;
+use std::fmt::Display;
 use std::sync::Arc;
 
 /// A finished touch.
 pub struct FinishedTouch<'a> {
     /// Number of the touch, from 1.
     pub count: u32,
-    /// Outcome of the touch.
-    pub touch: &'a Touch,
     /// The touch's part of the trial's row.
     pub row: &'a TouchRow,
     /// Views so far.
@@ -121,17 +119,10 @@ fn run_touches(
     (factory, row): (&dyn PlannerFactory, &mut TrialRow),
     observer: &mut TrialObserver,
 ) -> Result<(), String> {
-    let (scene, task) = (truth.environment.scene(), truth.environment.task());
-    let finger = (&scene.finger, scene.effects.skin.is_some());
+    let task = truth.environment.task();
     let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
-    let hypotheses = truth.library.as_ref().map(|library| {
-        let settings = experiment.recognition.clone();
-        let random = &mut stream("hypotheses");
-        hypotheses(&truth.environment, Arc::clone(&library.known), settings, random)
-    });
-    let mut belief =
-        Belief::new(task, finger, &experiment.gp, &experiment.space).with_hypotheses(hypotheses);
-    let (is_around, name) = (belief.implicit_surface().is_some(), factory.name());
+    let belief = initial_belief(experiment, truth, &mut stream("hypotheses"));
+    let (is_around, name) = (task.ball().is_some(), factory.name());
     if let Some(why) = factory.zone_only().filter(|_| is_around) {
         return Err(format!("planner `{name}` does not support whole objects: {why}"));
     }
@@ -140,95 +131,89 @@ fn run_touches(
     let start = start.ok_or("no planner for the initial touches")?;
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
-    // Rows contain contact normals and tips if the belief uses them.
-    let writes_normals = experiment.gp.normals || is_around;
-    let uses_tips = experiment.gp.free_space || experiment.gp.band.learned().is_some();
-    let writes_tips = uses_tips || is_around;
-    let mut looks = Looks::new(experiment, &truth.environment, row.trial);
-    let mut strokes = Strokes::new(task);
-    for number in 0..experiment.views {
-        row.views.push(looks.look((number, 0), probe, &mut belief)?);
+    let most = match experiment.further_views {
+        0 => 0,
+        further => (experiment.views + further) as usize,
+    };
+    let seeds = [experiment.seed, row.trial.into()];
+    let camera = CameraProbe::new(probe, &truth.environment, seeds).with_offers(most);
+    let mut episode = Episode::new(task, belief, camera);
+    for camera in 0..experiment.views {
+        row.views.push(look(&mut episode, Target::Look { camera }, 0)?);
     }
     if experiment.views > 0 {
-        belief.refit().map_err(|error| format!("fit after the views: {error}"))?;
+        episode.fit().map_err(|error| format!("fit after the views: {error}"))?;
+        row.views.iter_mut().for_each(|view| view.fit = episode.belief().fit().cloned());
     }
     for count in 1..=experiment.touches {
-        let failed = |error: PlanError| format!("touch {count}: {error}");
+        let failed = |error: &dyn Display| format!("touch {count}: {error}");
         let mut plan = if count <= experiment.initial_touches {
-            start.plan(&belief).map_err(failed)?
+            start.plan(episode.belief(), &Offer::default()).map_err(|error| failed(&error))?
         } else {
             loop {
-                let mut plan = planner.plan(&belief).map_err(failed)?;
-                let offers = looks.offers(probe, count - 1);
-                let asked = planner.look(&belief, &offers, &plan.target);
-                let Some(offer) = asked.and_then(|asked| offers.get(asked)) else {
-                    let offer = strokes.offer(probe, looks.looked_s());
-                    if let Some(offer) = offer.filter(|_| !factory.taps()) {
-                        plan.target = planner.stroke(&belief, &offer, plan.target);
-                    }
-                    break plan;
-                };
-                row.views.push(looks.look((offer.number, count - 1), probe, &mut belief)?);
-                belief.refit().map_err(|error| format!("fit before touch {count}: {error}"))?;
+                let offer = episode.offer().only(factory.actions());
+                let plan =
+                    planner.plan(episode.belief(), &offer).map_err(|error| failed(&error))?;
+                let Target::Look { .. } = plan.target else { break plan };
+                let mut view = look(&mut episode, plan.target, count - 1)?;
+                episode.fit().map_err(|error| format!("fit before touch {count}: {error}"))?;
+                view.fit = episode.belief().fit().cloned();
+                row.views.push(view);
             }
         };
-        let mut approach = approach_to(task, &plan.target, count)?;
-        let (target, believed) = (&plan.target, &belief);
-        let next = NextTouch { count, target, approach: &approach, belief: believed };
-        let other = observer(&TrialEvent::Next(&next));
-        if let Some(other) = other.map_err(|fault| format!("touch {count}: {fault}"))? {
-            approach = approach_to(task, &other, count)?;
-            plan = Plan { target: other, sd_m: None, fallback: Some(Fallback::Operator) };
+        let mut action = episode.action(&plan.target).map_err(|error| failed(&error))?;
+        if let Action::Touch(approach) = &action {
+            let (target, belief) = (&plan.target, episode.belief());
+            let next = NextTouch { count, target, approach, belief };
+            let other = observer(&TrialEvent::Next(&next)).map_err(|fault| failed(&fault))?;
+            if let Some(other) = other {
+                action = episode.action(&other).map_err(|error| failed(&error))?;
+                plan = Plan { target: other, sd_m: None, fallback: Some(Fallback::Operator) };
+            }
         }
-        let outcome = probe.execute(&approach);
-        let outcome = outcome.map_err(|fault| format!("touch {count}: {fault}"))?;
-        belief.observe(&plan.target, &approach, &outcome);
-        strokes.add(&plan.target, &outcome);
-        let contact = outcome.contact();
-        let is_written = writes_tips || outcome.touch == Touch::Miss;
-        let swept = outcome.swept.as_ref().filter(|_| is_written);
-        let mut touch_row = TouchRow {
-            target: plan.target,
-            contact: contact.map(|contact| contact.p_wc.coords.into()),
-            overload: outcome.touch == Touch::Overload,
-            normal: contact
-                .filter(|contact| contact.has_normal && (writes_normals || contact.sd_m.is_some()))
-                .map(|contact| contact.normal_w.into()),
-            contact_sd_m: contact.and_then(|contact| contact.sd_m),
-            patch: contact.map(TouchRow::patch_of).unwrap_or_default(),
-            doubt: outcome.doubt,
-            tip: swept.map(|swept| swept.p_wt.coords.into()),
-            time_s: probe.time_s(),
-            planned_sd_m: plan.sd_m,
-            fallback: plan.fallback,
-            fit: None,
-            jitter: 0.0,
-            metrics: None,
-            silhouette: None,
-            shape: None,
-            recognition: None,
-        };
+        let outcome = episode.execute(&plan.target, &action).map_err(|fault| failed(&fault))?;
+        let mut touch_row = TouchRow::new(plan, outcome);
         let fitted = match count >= experiment.initial_touches {
-            true => evaluate(experiment, truth, &mut belief, (count, &mut touch_row)),
+            true => evaluate(experiment, truth, &mut episode, (count, &mut touch_row)),
             false => Ok(()),
         };
         let touched = FinishedTouch {
             count,
-            touch: &outcome.touch,
             row: &touch_row,
             views: &row.views,
-            belief: &belief,
+            belief: episode.belief(),
             shape: OnceCell::new(),
         };
         let observed = observer(&TrialEvent::Finished(&touched));
         row.touches.push(touch_row);
         fitted.map_err(|error| format!("fit after touch {count}: {error}"))?;
-        observed.map_err(|fault| format!("touch {count}: {fault}"))?;
+        observed.map_err(|fault| failed(&fault))?;
     }
-    for (view, error) in row.views.iter_mut().zip(belief.rigid_errors()) {
+    for (view, error) in row.views.iter_mut().zip(episode.belief().rigid_errors()) {
         view.error = Some(error);
     }
-    verify(experiment, task, &belief, probe, row)
+    verify(experiment, &mut episode, row)
+}
+
+/// Returns the belief of a trial before its first action.
+fn initial_belief(experiment: &Experiment, truth: &GroundTruth, random: &mut ChaCha8Rng) -> Belief {
+    let surface = truth.environment.scene().effects.surface();
+    let hypotheses = truth.library.as_ref().map(|library| {
+        let settings = experiment.recognition.clone();
+        hypotheses(&truth.environment, Arc::clone(&library.known), settings, random)
+    });
+    let belief = Belief::new(truth.environment.task(), &surface, &experiment.gp, &experiment.space);
+    belief.with_hypotheses(hypotheses)
+}
+
+/// Executes a look after `after` touches, and returns its row.
+///
+/// # Errors
+/// If the view cannot be read, or shows nothing of the region.
+fn look(episode: &mut Episode, target: Target, after: u32) -> Result<ViewRow, String> {
+    let action = episode.action(&target).map_err(|error| error.to_string())?;
+    let outcome = episode.execute(&target, &action).map_err(|fault| fault.to_string())?;
+    Ok(ViewRow { after, target, outcome, fit: None, error: None })
 }
 
 /// Returns the hypotheses about the object of an environment before the first touch.
@@ -239,41 +224,9 @@ pub fn hypotheses(
     random: &mut ChaCha8Rng,
 ) -> ObjectHypotheses {
     let scene = environment.scene();
-    let pad = scene.effects.gel.as_ref().map(GelEffect::pad);
-    let finger = (environment.task(), scene.effects.skin.is_some(), pad);
     let prior = scene.pose.clone().unwrap_or_default();
-    ObjectHypotheses::new(library, prior, settings, finger, random)
-}
-
-/// Relative rounding of a stroke's length.
-const ROUNDING: f64 = 1e-9;
-
-/// Returns the approach to the target of touch `count`.
-///
-/// # Errors
-/// If the region does not contain the target, the finger cannot reach it, or it is a stroke that
-/// the scene does not allow.
-fn approach_to(task: &Task, target: &Target, count: u32) -> Result<Approach, String> {
-    let length_m = target.slide_m();
-    if length_m > 0.0 {
-        let longest_m = task.touch().stroke.as_ref().map(|stroke| stroke.longest_m);
-        let longest_m = longest_m.ok_or_else(|| {
-            format!("touch {count}: a stroke is planned, and the scene has no [touch.stroke]")
-        })?;
-        if length_m > longest_m * (1.0 + ROUNDING) {
-            return Err(format!(
-                "touch {count}: a stroke of {length_m} m is planned; touch.stroke.longest_m is {longest_m}"
-            ));
-        }
-    }
-    let is_inside = task.region().contains(target);
-    task.approach(target).filter(|_| is_inside).ok_or_else(|| {
-        let beyond = match task.ball() {
-            None => "outside the zone",
-            Some(_) => "outside the ball, or unreachable",
-        };
-        format!("touch {count}: planned at {:?}, {beyond}", target.numbers())
-    })
+    let (task, surface) = (environment.task(), scene.effects.surface());
+    ObjectHypotheses::new(library, prior, settings, task, &surface, random)
 }
 
 /// Fits the belief after `count` touches and writes it, with its errors, to the last touch's row.
@@ -283,35 +236,27 @@ fn approach_to(task: &Task, target: &Target, count: u32) -> Result<Approach, Str
 fn evaluate(
     experiment: &Experiment,
     truth: &GroundTruth,
-    belief: &mut Belief,
+    episode: &mut Episode,
     (count, row): (u32, &mut TouchRow),
 ) -> Result<(), CovarianceError> {
-    row.recognition = belief
+    row.recognition = episode
+        .belief()
         .hypotheses()
         .map(|hypotheses| RecognitionMetrics::of(hypotheses, truth.object.as_ref()));
-    let fitted = belief.refit().cloned();
-    match belief.surface() {
-        SurfaceBelief::HeightField(field) => {
-            if fitted.is_ok() {
-                row.metrics = truth.truth.compare(field);
-            }
-            // Only the last row contains the reliability.
-            row.silhouette = SilhouetteMetrics::of(field.surface_evidence(), &truth.truth);
-            if let Some(outline) = row.silhouette.as_mut().filter(|_| count < experiment.touches) {
-                outline.reliability = None;
-            }
-        }
-        SurfaceBelief::ImplicitSurface(surface) => {
-            let is_compared = fitted.is_ok() && experiment.is_evaluated(count);
-            if let Some(surface) = surface.surface().filter(|_| is_compared) {
-                let cells = experiment.space.cells;
-                row.shape = truth.shape.as_ref().map(|shape| shape.evaluate(surface, cells));
-            }
-        }
+    let fitted = episode.fit();
+    let belief = episode.belief();
+    // Only the last row contains the reliability.
+    row.silhouette = SilhouetteMetrics::of(&belief.silhouette(), &truth.truth);
+    if let Some(outline) = row.silhouette.as_mut().filter(|_| count < experiment.touches) {
+        outline.reliability = None;
     }
-    if fitted.is_ok() {
-        row.jitter = belief.jitter();
+    fitted?;
+    row.metrics = truth.truth.compare(belief.surface());
+    if let Some(surface) = belief.implicit_surface().filter(|_| experiment.is_evaluated(count)) {
+        let evaluated = truth.shape.as_ref().zip(surface.surface());
+        row.shape = evaluated.map(|(shape, it)| shape.evaluate(it, experiment.space.cells));
     }
-    row.fit = Some(fitted?);
+    row.jitter = belief.jitter();
+    row.fit = belief.fit().cloned();
     Ok(())
 }

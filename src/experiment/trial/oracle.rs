@@ -9,12 +9,14 @@ use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::library::{LoadedLibrary, TrueObject};
 use crate::sim::probe::exact_probe;
-use palpate_explore::belief::{Belief, SurfaceBelief};
+use palpate_explore::belief::Belief;
 use palpate_explore::planner::candidates::{Candidates, free_aim};
-use palpate_explore::planner::sample::random_aim;
+use palpate_explore::planner::sample::random_target;
 use palpate_explore::planner::search::Search;
-use palpate_explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
-use palpate_explore::task::{Aim, Target};
+use palpate_explore::planner::{
+    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, Refined,
+};
+use palpate_explore::task::{Region, Target};
 use palpate_explore::whole_object::ImplicitSurface;
 use palpate_explore::whole_object::surface::steepness;
 use palpate_geometry::low_discrepancy::SurfacePoint;
@@ -45,18 +47,18 @@ impl GroundTruth {
     fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
         let mut probe = exact_probe(Arc::clone(&self.environment));
         let approach = self.environment.task().approach(target)?;
-        let outcome = probe.execute(&approach).ok()?;
+        let outcome = probe.touch(&approach).ok()?;
         let mut after = belief.clone();
-        after.observe(target, &approach, &outcome);
+        after.observe(target, &outcome);
         Some(after)
     }
 
     /// Error of a belief, m: the root mean square over a zone; the mean of |f| / |∇f| on the true
     /// surface of a whole object.
     fn error_m(&self, belief: &Belief) -> Option<f64> {
-        match belief.surface() {
-            SurfaceBelief::HeightField(field) => self.truth.rmse_m(field.surface()?),
-            SurfaceBelief::ImplicitSurface(surface) => {
+        match belief.implicit_surface() {
+            None => self.truth.rmse_m(belief.field()?),
+            Some(surface) => {
                 let surface = surface.surface()?;
                 let spots = self.shape.as_ref()?.samples().iter().step_by(LOOKED_AT);
                 let offset_m = |spot: &SurfacePoint| {
@@ -78,7 +80,8 @@ impl PlannerFactory for OracleFactory {
     }
 
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
-        Box::new(Oracle { search: Search::new(settings, random), truth: Arc::clone(&self.0) })
+        let search = Search::new(settings, random);
+        Box::new(Refined(Oracle { search, truth: Arc::clone(&self.0) }))
     }
 }
 
@@ -90,24 +93,25 @@ struct Oracle {
 }
 
 impl Planner for Oracle {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        Ok(match belief.surface() {
-            SurfaceBelief::HeightField(field) => {
+    fn plan(&mut self, belief: &Belief, _offer: &Offer) -> Result<Plan, PlanError> {
+        let region = belief.region();
+        let targets = match (&region, belief.implicit_surface()) {
+            (Region::Ball(_), Some(surface)) => self.aims(surface),
+            (Region::Ball(_), None) => Vec::new(),
+            (Region::Zone(zone), _) => {
                 let count = self.search.settings.oracle.candidates;
-                let places = self.search.spread_places(field.zone(), count);
-                let targets = places.into_iter().map(|place| field.target(place)).collect();
-                match self.best(belief, targets).as_ref().and_then(Target::place) {
-                    Some(place) => self.search.plan_at(field, place.to_vec()),
-                    None => self.search.anywhere(field.zone()),
-                }
+                let places = self.search.spread_places(zone, count);
+                places.into_iter().map(|place| belief.target(place)).collect()
             }
-            SurfaceBelief::ImplicitSurface(surface) => {
-                let targets = self.aims(surface).into_iter().map(Target::from).collect();
-                match self.best(belief, targets) {
-                    Some(target) => Plan::at(target),
-                    None => Plan::at(random_aim(surface.scope(), &mut self.search.rng)),
-                }
-            }
+        };
+        let best = self.best(belief, targets);
+        Ok(match (best, region) {
+            (Some(target), Region::Zone(zone)) => match target.place() {
+                Some(place) => self.search.plan_at(belief, &zone, place.to_vec()),
+                None => Plan::at(target),
+            },
+            (Some(target), Region::Ball(_)) => Plan::at(target),
+            (None, _) => self.search.anywhere(belief),
         })
     }
 }
@@ -115,7 +119,7 @@ impl Planner for Oracle {
 impl Oracle {
     /// Returns the target after which `belief` has the smallest error.
     fn best(&self, belief: &Belief, targets: Vec<Target>) -> Option<Target> {
-        let is_refitted = self.search.settings.oracle.refit && belief.height_field().is_some();
+        let is_refitted = self.search.settings.oracle.refit && belief.region().zone().is_some();
         let errors = targets.into_iter().filter_map(|target| {
             let mut after = self.truth.touched(belief, &target)?;
             match is_refitted {
@@ -129,19 +133,18 @@ impl Oracle {
 
     /// Returns random places of the estimated surface with a free path; random directions fill up
     /// the list.
-    fn aims(&mut self, surface: &ImplicitSurface) -> Vec<Aim> {
+    fn aims(&mut self, surface: &ImplicitSurface) -> Vec<Target> {
         let tried = self.search.settings.oracle.candidates;
         let rng = &mut self.search.rng;
         let mut aims = Vec::new();
         if let Some(candidates) = Candidates::new(surface, rng) {
             for _ in 0..tried {
                 let at = rng.random_range(0..candidates.all.len());
-                let place = (&candidates.all[at].p_w, &candidates.all[at].normal_w);
-                aims.extend(free_aim(surface, place));
+                aims.extend(free_aim(surface, &candidates.all[at]).map(Target::from));
             }
         }
         while aims.len() < tried as usize {
-            aims.push(random_aim(surface.scope(), rng));
+            aims.push(random_target(surface, rng));
         }
         aims
     }

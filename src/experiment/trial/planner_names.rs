@@ -1,6 +1,6 @@
 //! Names that an experiment may list: planners, the oracle, and a person.
 
-use palpate_explore::planner::{PLANNERS, TAPPING, is_external};
+use palpate_explore::planner::{PLANNERS, is_external, restricted};
 
 /// Name of the oracle in an experiment's list of planners.
 pub const ORACLE: &str = "oracle";
@@ -20,8 +20,8 @@ pub fn known_planners() -> impl Iterator<Item = (&'static str, &'static str)> {
 }
 
 /// Names allowed in place of `name`: the [`known_planners`], and `name` itself if it names an
-/// [external](is_external) planner, or one that only taps.
+/// [external](is_external) planner, or one that is offered some actions only: `active(tap)`.
 pub fn allowed_names(name: &str) -> Vec<&str> {
-    let is_other = is_external(name) || TAPPING.iter().any(|entry| entry.name == name);
+    let is_other = is_external(name) || restricted(name).is_some();
     known_planners().map(|(name, _)| name).chain(is_other.then_some(name)).collect()
 }

@@ -6,10 +6,10 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::experiment::trial::{TrialEvent, TrialObserver, view};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::LiveView;
+use palpate_explore::evidence::{Contact, Outcome};
 use palpate_explore::planner::PlannerFactory;
-use palpate_explore::probe::{Outcome, Probe, SweptVolume, Touch};
-use palpate_explore::robot::Finger;
-use palpate_explore::task::Approach;
+use palpate_explore::probe::Probe;
+use palpate_explore::task::Action;
 use palpate_ros::recording::{self, Recording, RecordingBackend, RecordingMetadata, TrialEnd};
 use palpate_ros::view::TFMessage;
 use std::iter;
@@ -56,7 +56,7 @@ pub fn run(
         let simulation = drawn.as_ref().unwrap_or(simulation);
         let Some(path) = path else {
             let mut probe = simulation.viewed_probe(trial, view)?;
-            let mut probe = ResumedProbe::new(earlier_touches.to_vec(), simulation, &mut *probe);
+            let mut probe = ResumedProbe::new(earlier_touches.to_vec(), &mut *probe);
             return Ok(simulation.trial_with(&mut probe, planner, trial, observer));
         };
         record(simulation, (trial, planner), (path, view), earlier_touches, observer)
@@ -103,20 +103,17 @@ fn record(
             }
             TrialEvent::Finished(touched) => touched,
         };
-        last_s = touched.row.time_s.unwrap_or_default();
+        last_s = touched.row.outcome.time_s.unwrap_or_default();
         is_interrupted |= observed.is_err();
         if touched.count as usize <= made.len() {
             return observed;
         }
-        let mut touch = recorded(touched.row, touched.count)?;
-        if let Touch::Contact(contact) = touched.touch {
-            touch.normal = contact.normal_w.as_slice().into();
-        }
+        let touch = recorded(touched.row, touched.count)?;
         recording.show(touch.time_s, &touched.shape().markers)?;
         recording.touched(&touch)?;
         observed
     };
-    let mut probe = ResumedProbe::new(made.to_vec(), simulation, &mut servo);
+    let mut probe = ResumedProbe::new(made.to_vec(), &mut servo);
     let mut row = simulation.trial_with(&mut probe, planner, trial, &mut record);
     let ending = TrialEnd { failure: row.failure.clone(), is_interrupted };
     if let Err(fault) = recording.end(servo.time_s().unwrap_or_default(), &ending) {
@@ -130,12 +127,9 @@ fn record(
 /// # Errors
 /// If its row has no JSON.
 fn recorded(row: &TouchRow, touch: u32) -> Result<recording::TouchMessage<'_>, Fault> {
-    let time_s = row.time_s.unwrap_or_default();
-    let outcome = match (row.contact, row.overload) {
-        (Some(_), _) => "contact",
-        (None, true) => "overload",
-        (None, false) => "miss",
-    };
+    let time_s = row.outcome.time_s.unwrap_or_default();
+    let contact = row.outcome.contact();
+    let numbers = |of: fn(&Contact) -> &[f64]| contact.map_or(&[][..], of);
     let json = serde_json::to_string(row);
     let json =
         json.map_err(|error| Fault::RecordingFailed { time_s, message: error.to_string() })?;
@@ -143,9 +137,9 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::TouchMessage<'_>, F
         touch,
         time_s,
         target: row.target.numbers().into(),
-        outcome: outcome.into(),
-        contact: row.contact.as_ref().map_or(&[][..], |contact| contact).into(),
-        normal: row.normal.as_ref().map_or(&[][..], |normal| normal).into(),
+        outcome: row.outcome.end.name().into(),
+        contact: numbers(|contact| contact.p_wc.coords.as_slice()).into(),
+        normal: numbers(|contact| contact.normal_w.as_slice()).into(),
         row: json.into(),
     })
 }
@@ -153,10 +147,9 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::TouchMessage<'_>, F
 /// Probe of a continued trial: returns the touches made before, then makes new ones.
 pub struct ResumedProbe<'a> {
     made: std::vec::IntoIter<TouchRow>,
-    finger: Finger,
     probe: &'a mut dyn Probe,
-    /// Last touch, if it was made before the interruption.
-    last: Option<TouchRow>,
+    /// Time of the last touch, if it was made before the interruption.
+    last_s: Option<Option<f64>>,
     /// Simulator or robot time at the interruption.
     begun_s: f64,
     /// Fault that ended the last touch.
@@ -164,37 +157,32 @@ pub struct ResumedProbe<'a> {
 }
 
 impl<'a> ResumedProbe<'a> {
-    /// Creates a probe that continues with `probe` after the touches `made` of a trial of
-    /// `simulation`.
-    pub fn new(made: Vec<TouchRow>, simulation: &Simulation, probe: &'a mut dyn Probe) -> Self {
-        let begun_s = made.last().and_then(|touch| touch.time_s).unwrap_or(0.0);
-        let finger = simulation.environment().scene().finger.clone();
-        Self { made: made.into_iter(), finger, probe, last: None, begun_s, fault: None }
+    /// Creates a probe that continues with `probe` after the touches `made`.
+    pub fn new(made: Vec<TouchRow>, probe: &'a mut dyn Probe) -> Self {
+        let begun_s = made.last().and_then(|touch| touch.outcome.time_s).unwrap_or(0.0);
+        Self { made: made.into_iter(), probe, last_s: None, begun_s, fault: None }
     }
 }
 
 impl Probe for ResumedProbe<'_> {
-    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
-        self.last = self.made.next();
-        let Some(row) = &self.last else {
-            let outcome = self.probe.execute(approach);
-            self.fault = outcome.as_ref().err().cloned();
-            return outcome;
-        };
-        let mut outcome = row.outcome(&self.finger, -approach.direction_w().into_inner());
-        // Without a stored tip, only the passage of the finger is known.
-        if outcome.swept.is_none() {
-            let finger = self.finger.with_pitch(row.target.pitch_deg());
-            outcome.swept = finger.map(|finger| SweptVolume { finger, p_wt: approach.p_far_w });
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        if let Some(row) = self.made.next() {
+            self.last_s = Some(row.outcome.time_s);
+            return Ok(row.outcome);
         }
-        Ok(outcome)
+        self.last_s = None;
+        let outcome = self.probe.execute(action);
+        self.fault = outcome.as_ref().err().cloned();
+        let begun_s = self.begun_s;
+        outcome.map(|outcome| Outcome {
+            time_s: outcome.time_s.map(|time_s| begun_s + time_s),
+            ..outcome
+        })
     }
 
     fn time_s(&self) -> Option<f64> {
-        match &self.last {
-            Some(row) => row.time_s,
-            None => self.probe.time_s().map(|time_s| self.begun_s + time_s),
-        }
+        let now_s = || self.probe.time_s().map(|time_s| self.begun_s + time_s);
+        self.last_s.unwrap_or_else(now_s)
     }
 
     fn rest(&mut self, time_s: f64) {

@@ -94,7 +94,7 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
     })?;
     let player = Box::new(ReplayBackend::new(recorded.clone()));
     let mut servo = simulation.servo(player, simulation.body_seed(about.trial))?;
-    let mut probe = ResumedProbe::new(made(recorded)?, simulation, &mut servo);
+    let mut probe = ResumedProbe::new(made(recorded)?, &mut servo);
     let (mut touches, mut differs) = (0, None);
     let mut compare = |event: &TrialEvent| {
         let touched = match event {
@@ -106,13 +106,13 @@ pub fn replay(simulation: &Simulation, recorded: &RecordedTrial) -> Result<Repla
             return Ok(None);
         };
         let now = serde_json::to_string(touched.row).unwrap_or_default();
-        if now == then.row || upgrade_row(&then.row).is_some_and(|then| now == then) {
+        if now == then.row {
             touches += 1;
             return Ok(None);
         }
         let (touch, recorded) = (touched.count, then.row.clone().into_owned());
         differs = Some(Difference::Row { touch, recorded, now });
-        Err(Fault::Stopped { time_s: touched.row.time_s.unwrap_or_default() })
+        Err(Fault::Stopped { time_s: touched.row.outcome.time_s.unwrap_or_default() })
     };
     let now = simulation.trial_with(&mut probe, planner, about.trial, &mut compare).failure;
     let is_cut = recorded.ending.is_none();
@@ -162,32 +162,4 @@ fn made(recorded: &RecordedTrial) -> Result<Vec<TouchRow>, InputError> {
         })
     };
     recorded.touches.iter().take(recorded.earlier_touches).map(read).collect()
-}
-
-/// Returns a recorded row in this version's format: version 0.1 wrote targets without a name.
-/// Returns `None` if it cannot be read.
-fn upgrade_row(row: &str) -> Option<String> {
-    serde_json::to_string(&serde_json::from_slice::<TouchRow>(row.as_bytes()).ok()?).ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::upgrade_row;
-
-    /// Includes the numbers of an aim, whose direction keeps its digits.
-    #[test]
-    fn a_row_of_version_0_1_is_rewritten_with_the_name_of_its_target() {
-        for (before, now) in [
-            ("[0.1,0.7]", r#"{"place":[0.1,0.7]}"#),
-            (
-                "[0.1,-0.65,0.5,-0.6,0.0,0.8]",
-                r#"{"aim":{"p_w":[0.1,-0.65,0.5],"ahead_w":[-0.6,0.0,0.8]}}"#,
-            ),
-        ] {
-            let row = |target: &str| format!(r#"{{"target":{target},"contact":[0.1,-0.6,0.7]}}"#);
-            assert_eq!(upgrade_row(&row(before)), Some(row(now)));
-            assert_eq!(upgrade_row(&row(now)), Some(row(now)));
-        }
-        assert_eq!(upgrade_row("{}"), None);
-    }
 }

@@ -4,14 +4,12 @@ use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use palpate_explore::backend::Fault;
-use palpate_explore::planner::Fallback;
-use palpate_explore::probe::{Contact, Outcome, SweptVolume, Touch};
-use palpate_explore::robot::Finger;
-use palpate_explore::robot::sensor::Doubt;
+use palpate_explore::evidence::{End, Outcome};
+use palpate_explore::planner::{Fallback, Plan};
 use palpate_explore::task::Target;
-use palpate_explore::view::{RigidError, SeenSurface};
+use palpate_explore::view::RigidError;
 use palpate_gp::fit::Fit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,8 +49,13 @@ pub struct ViewRow {
     /// Number of touches made before it.
     #[serde(default, skip_serializing_if = "is_first")]
     pub after: u32,
+    /// Camera that looked.
+    pub target: Target,
     /// Surface that it shows, thinned.
-    pub seen: SeenSurface,
+    pub outcome: Outcome,
+    /// Fit after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
     /// Error of the camera's pose after the last touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<RigidError>,
@@ -61,31 +64,10 @@ pub struct ViewRow {
 /// One touch and the belief after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TouchRow {
-    /// Target of the touch; version 0.1 wrote its numbers without a name.
+    /// Target of the touch.
     pub target: Target,
-    /// Contact point (x, y, z) in `W`; none for a miss or an aborted touch.
-    pub contact: Option<[f64; 3]>,
-    /// Whether the touch was aborted: force limit exceeded, or contact not located.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub overload: bool,
-    /// Contact normal in `W`; written if it was measured and the belief uses it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub normal: Option<[f64; 3]>,
-    /// Standard deviation of the contact along its normal, as the sensor states it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub contact_sd_m: Option<f64>,
-    /// Further points that the touch shows: place, normal and standard deviation along it, in `W`.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub patch: Vec<[f64; 7]>,
-    /// Reason why the contact is less certain than usual, or was not located.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub doubt: Option<Doubt>,
-    /// Centre of the fingertip's hemisphere in `W` at the approach's end, if used.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tip: Option<[f64; 3]>,
-    /// Simulator or robot time at the touch's end, s since its start; omitted without motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub time_s: Option<f64>,
+    /// Outcome of the touch, with its evidence.
+    pub outcome: Outcome,
     /// Posterior standard deviation at the target when planned, conditioned on unreached targets;
     /// omitted if not computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -164,6 +146,16 @@ impl TrialRow {
         Self::without_touches(trial, planner, Some(format!("before the first touch: {fault}")))
     }
 
+    /// Returns targets and outcomes of all actions up to touch `touches`, in order.
+    pub fn actions(&self, touches: u32) -> impl Iterator<Item = (&Target, &Outcome)> {
+        let touched = self.touches.iter().take(touches as usize).zip(0..);
+        touched.flat_map(|(touch, before)| {
+            let views = self.views.iter().filter(move |view| view.after == before);
+            let views = views.map(|view| (&view.target, &view.outcome));
+            views.chain([(&touch.target, &touch.outcome)])
+        })
+    }
+
     /// Travel of the finger over its first `touches` touches, along straight lines: between places
     /// of a zone; around an object between contacts, or the aimed points of touches without
     /// contact. `None` for a trial with fewer touches.
@@ -180,74 +172,49 @@ impl TrialRow {
 }
 
 impl TouchRow {
-    /// Whether the finger met nothing, and was not stopped by the force limit.
-    pub fn is_miss(&self) -> bool {
-        self.contact.is_none() && !self.overload
-    }
-
-    /// Returns the touch as it was observed; a contact without a written normal points `against_w`,
-    /// opposite to the approach.
-    pub fn touch(&self, against_w: Vector3<f64>) -> Touch {
-        let further = |[x, y, z, a, b, c, sd_m]: &[f64; 7]| Contact {
-            sd_m: Some(*sd_m).filter(|sd_m| *sd_m > 0.0),
-            ..Contact::new(Point3::new(*x, *y, *z), Vector3::new(*a, *b, *c))
-        };
-        match self.contact {
-            Some(p_wc) => Touch::Contact(Contact {
-                has_normal: self.normal.is_some(),
-                sd_m: self.contact_sd_m,
-                patch: self.patch.iter().map(further).collect(),
-                ..Contact::new(p_wc.into(), self.normal.map_or(against_w, Vector3::from))
-            }),
-            None if self.overload => Touch::Overload,
-            None => Touch::Miss,
+    /// Creates the row of a touch before the fit.
+    pub(super) fn new(plan: Plan, outcome: Outcome) -> Self {
+        Self {
+            target: plan.target,
+            // What a sensor located is in the evidence.
+            outcome: Outcome { sensed: None, ..outcome },
+            planned_sd_m: plan.sd_m,
+            fallback: plan.fallback,
+            fit: None,
+            jitter: 0.0,
+            metrics: None,
+            silhouette: None,
+            shape: None,
+            recognition: None,
         }
     }
 
-    /// Returns what the touch of this `finger` has shown, as far as its row has it; `against_w` as
-    /// for [`touch`](Self::touch).
-    pub fn outcome(&self, finger: &Finger, against_w: Vector3<f64>) -> Outcome {
-        let finger = finger.with_pitch(self.target.pitch_deg());
-        let swept =
-            finger.zip(self.tip).map(|(finger, tip)| SweptVolume { finger, p_wt: tip.into() });
-        Outcome { swept, doubt: self.doubt, ..self.touch(against_w).into() }
+    /// Whether the finger met nothing, and was not stopped by the force limit.
+    pub fn is_miss(&self) -> bool {
+        self.outcome.end == End::Miss
     }
 
-    /// Returns the further points of a contact as a row has them.
-    pub(super) fn patch_of(contact: &Contact) -> Vec<[f64; 7]> {
-        let numbers = |point: &Contact| {
-            let ([x, y, z], [a, b, c]) = (point.p_wc.coords.into(), point.normal_w.into());
-            [x, y, z, a, b, c, point.sd_m.unwrap_or(0.0)]
-        };
-        contact.patch.iter().map(numbers).collect()
+    /// Point of contact in `W`, m; `None` for a miss or an aborted touch.
+    pub fn contact(&self) -> Option<Point3<f64>> {
+        self.outcome.contact().map(|contact| contact.p_wc)
     }
 
     /// Returns the points along a stroke with contact, in `W`, m.
     pub fn slid_w(&self) -> Option<Vec<Point3<f64>>> {
-        let first = self.contact.filter(|_| self.target.slide_m() > 0.0)?;
-        let further = self.patch.iter().map(|p| Point3::new(p[0], p[1], p[2]));
-        Some(std::iter::once(Point3::from(first)).chain(further).collect())
+        let is_stroke = self.contact().is_some() && self.target.slide_m() > 0.0;
+        is_stroke.then(|| self.outcome.points().iter().map(|point| point.p_wc).collect())
     }
 
     /// Positions of the finger for [travel](TrialRow::path_m): one, or both ends of a stroke.
     fn places(&self) -> impl Iterator<Item = &[f64]> + Clone {
-        let end = match &self.target {
-            Target::Stroke { to, .. } => Some(to.as_slice()),
-            Target::StrokeAround { .. } => self.patch.last().map(|point| &point[..3]),
-            _ => None,
-        };
-        std::iter::once(self.place()).chain(end)
-    }
-
-    fn place(&self) -> &[f64] {
-        match (&self.target, &self.contact) {
-            (Target::Place(place), _) => place,
-            (Target::Tilted { place, .. } | Target::Stroke { place, .. }, _) => place,
-            (Target::Aim(_) | Target::StrokeAround { .. }, Some(contact)) => contact,
-            (Target::Aim(aim) | Target::StrokeAround { aim, .. }, None) => {
-                aim.p_w.coords.as_slice()
-            }
-        }
+        let points = self.outcome.points();
+        let place = self.target.place().or_else(|| {
+            let aimed = self.target.aim().map(|aim| aim.p_w.coords.as_slice());
+            points.first().map(|contact| contact.p_wc.coords.as_slice()).or(aimed)
+        });
+        let last = || points.last().map(|point| point.p_wc.coords.as_slice());
+        let end = (self.target.slide_m() > 0.0).then(|| self.target.end().or_else(last)).flatten();
+        place.into_iter().chain(end)
     }
 }
 

@@ -5,13 +5,13 @@
 //! ```
 //! use palpate::experiment::truth::Truth;
 //! use palpate::explore::belief::Belief;
-//! use palpate::explore::planner::{Plan, PlanError, Planner};
+//! use palpate::explore::planner::{Offer, Plan, PlanError, Planner};
 //! use palpate::gp::posterior::Scratch;
 //!
 //! struct Honest;
 //!
 //! impl Planner for Honest {
-//!     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+//!     fn plan(&mut self, belief: &Belief, _: &Offer) -> Result<Plan, PlanError> {
 //!         let posterior = belief.posterior().ok_or("no fit")?;
 //!         Ok(Plan::at(vec![posterior.mean(&[0.0, 0.0], &mut Scratch::default()), 0.0]))
 //!     }
@@ -24,13 +24,13 @@
 //! ```compile_fail,E0050
 //! use palpate::experiment::truth::Truth;
 //! use palpate::explore::belief::Belief;
-//! use palpate::explore::planner::{Plan, PlanError, Planner};
+//! use palpate::explore::planner::{Offer, Plan, PlanError, Planner};
 //!
 //! struct Cheat;
 //!
 //! impl Planner for Cheat {
-//!     fn plan(&mut self, belief: &Belief, truth: &Truth) -> Result<Plan, PlanError> {
-//!         Ok(Plan::at(vec![truth.rmse_m(belief.posterior().ok_or("no fit")?).unwrap_or(0.0)]))
+//!     fn plan(&mut self, belief: &Belief, _: &Offer, truth: &Truth) -> Result<Plan, PlanError> {
+//!         Ok(Plan::at(vec![truth.rmse_m(belief.field().ok_or("no fit")?).unwrap_or(0.0)]))
 //!     }
 //! }
 //! ```
@@ -45,11 +45,10 @@ pub mod scan_truth;
 use crate::experiment::measure::metrics::{Metrics, coverage, interval_score, nlpd, rmse};
 use crate::sim::Environment;
 use crate::sim::reach;
-use palpate_explore::belief::{BAND, HeightField};
+use palpate_explore::belief::{BAND, HeightPredictions, RandomField, SurfaceBelief};
 use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
-use palpate_gp::Posterior;
 use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.
@@ -148,8 +147,8 @@ impl Truth {
     }
 
     /// Root mean square error of a belief over the known surface; `None` without one.
-    pub fn rmse_m(&self, belief: &Posterior) -> Option<f64> {
-        let means = belief.means(self.places.iter().map(Vec::as_slice));
+    pub fn rmse_m(&self, belief: &dyn RandomField) -> Option<f64> {
+        let means = belief.means(&self.places);
         rmse(self.errors(&means).map(|(_, error)| error))
     }
 
@@ -161,18 +160,18 @@ impl Truth {
 
     /// Compares a belief with the ground truth over the known surface; `None` without one, or
     /// before the belief's first fit.
-    pub fn compare(&self, field: &HeightField) -> Option<Metrics> {
-        let belief = field.surface().filter(|_| self.surface_count() > 0)?;
-        let means = belief.means(self.places.iter().map(Vec::as_slice));
+    pub fn compare(&self, belief: &dyn SurfaceBelief) -> Option<Metrics> {
+        let field = belief.field().filter(|_| self.surface_count() > 0)?;
+        let means = field.means(&self.places);
         let is_calibrated = |i: &usize| i.is_multiple_of(CALIBRATION_STEP);
         let places = self.places.iter().step_by(CALIBRATION_STEP);
-        let places: Vec<&[f64]> = places.map(Vec::as_slice).collect();
-        let predictions = belief.predict(places.iter().copied());
-        let bands_m = field.predicted_quantiles_m(&places, &predictions, &BAND)?;
-        let noise2 = belief.hyperparameters().noise_sd.powi(2);
+        let places: Vec<Vec<f64>> = places.cloned().collect();
+        let HeightPredictions { variances, quantiles_m: bands_m } =
+            belief.heights(&places, &BAND)?;
+        let noise2 = field.noise_sd().powi(2);
         let densities = self.errors(&means).filter(|(i, _)| is_calibrated(i));
-        let densities = densities
-            .map(|(i, error)| (error, predictions[i / CALIBRATION_STEP].variance + noise2));
+        let densities =
+            densities.map(|(i, error)| (error, variances[i / CALIBRATION_STEP] + noise2));
         let banded = |holds: &dyn Fn(usize) -> bool| -> Vec<(f64, [f64; 2])> {
             let heights_m = self.heights_m.iter().enumerate().step_by(CALIBRATION_STEP);
             let known = heights_m.zip(&bands_m).filter(|((i, _), _)| holds(*i));

@@ -3,7 +3,7 @@
 use crate::experiment::runner::thread_pool;
 use crate::sim::simulator::Simulator;
 use palpate_explore::backend::Fault;
-use palpate_explore::probe::Touch;
+use palpate_explore::evidence::Outcome;
 use palpate_explore::task::Zone;
 use palpate_input::error::InputError;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -38,11 +38,12 @@ pub fn targets(zone: &Zone, [columns, rows]: [usize; 2]) -> Vec<Vec<f64>> {
 /// If the threads cannot be started.
 pub fn scan(
     simulator: &Simulator,
-    (targets, columns): (&[Vec<f64>], usize),
+    targets: &[Vec<f64>],
+    columns: usize,
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),
-) -> Result<Option<Vec<Result<Touch, Fault>>>, InputError> {
+) -> Result<Option<Vec<Result<Outcome, Fault>>>, InputError> {
     let task = simulator.environment().task();
     let row = |(j, targets): (usize, &[Vec<f64>])| {
         if stop.load(Ordering::Relaxed) {

@@ -70,7 +70,7 @@ impl ScanTruth {
             self.search_radius_m.unwrap_or_else(|| RADIUS_SPACINGS * spacing_m(&contacts));
         let places = zone.grid(per_side);
         let height = |place: [f64; 2], without| {
-            height_m(&contacts, place, (within_m, self.contacts_min), without)
+            height_m(&contacts, place, within_m, self.contacts_min, without)
         };
         let heights_m: Vec<Option<f64>> =
             places.iter().map(|place| height(flat(place), None)).collect();
@@ -101,7 +101,8 @@ fn spacing_m(contacts: &[([f64; 2], f64)]) -> f64 {
 fn height_m(
     contacts: &[([f64; 2], f64)],
     place: [f64; 2],
-    (within_m, least): (f64, usize),
+    within_m: f64,
+    least: usize,
     without: Option<usize>,
 ) -> Option<f64> {
     let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);

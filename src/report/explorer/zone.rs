@@ -110,52 +110,26 @@ pub fn data(run: &Run, counts: &Counts) -> anyhow::Result<Option<Value>> {
     let places: Vec<&[f64]> = grid.places().collect();
     let mut beliefs = Vec::new();
     for name in names() {
-        let frame = |&count: &u32| {
-            let replay = BeliefReplay::new(run, name, count)?;
-            anyhow::Ok(replay.map(|replay| HeightFrame::of(&replay, &places)))
-        };
-        let frames: Vec<Option<HeightFrame>> =
-            counts(name).par_iter().map(frame).collect::<anyhow::Result<_>>()?;
-        let frames: Vec<HeightFrame> = frames.into_iter().flatten().collect();
+        let frames = frames(run, name, &counts(name), &places)?;
         if !frames.is_empty() {
             beliefs.push((name, frames));
         }
     }
-    let frames = || beliefs.iter().flat_map(|(_, frames)| frames);
-    let deviations_m = frames().flat_map(|it| it.deviations_m.iter().copied());
-    let widths_m = frames().flat_map(|it| it.bands_m.iter().map(|[low, high]| high - low));
-    let (Some(deviation_range_m), Some(band_range_m)) =
-        (log_range(deviations_m), log_range(widths_m))
-    else {
+    let all = || beliefs.iter().flat_map(|(_, frames)| frames);
+    let deviations_m = all().flat_map(|it| it.deviations_m.iter().copied());
+    let widths_m = all().flat_map(|it| it.bands_m.iter().map(|[low, high]| high - low));
+    let (Some(deviations_m), Some(bands_m)) = (log_range(deviations_m), log_range(widths_m)) else {
         return Ok(None);
     };
     let (low, high) = axis.range();
+    let heights_m = [low - (high - low), high + (high - low)];
+    let ranges = CodeRanges { heights_m, deviations_m };
     let unit = Length::of(zone);
-    // Range of the codes of heights.
-    let height_range_m = [low - (high - low), high + (high - low)];
-    let heights = |heights_m: &mut dyn Iterator<Item = Option<f64>>| {
-        let [low, high] = height_range_m;
-        encode(heights_m.map(|it| (it.unwrap_or(f64::NAN) - low) / (high - low)))
-    };
     let in_unit = |ends: [f64; 2]| ends.map(|end| end * unit.per_m);
     let axis = |side: usize| -> Vec<f64> {
         grid.along(side).into_iter().map(|at_m| short(at_m * unit.per_m)).collect()
     };
     let space = zone.z_m.map(|z_m| Space { x_m: zone.x_m, z_m, height_m: [low, high] });
-    let frame = |frame: &HeightFrame| {
-        let end = |end: usize| heights(&mut frame.bands_m.iter().map(|ends| Some(ends[end])));
-        let band = [0, 1].map(end);
-        let reach: String =
-            frame.is_reachable.iter().map(|&it| if it { '1' } else { '0' }).collect();
-        json!({
-            "touches": frame.touches,
-            "score": frame.score,
-            "mean": heights(&mut frame.means_m.iter().copied()),
-            "deviation": encode_log(deviation_range_m, frame.deviations_m.iter().copied()),
-            "band": band,
-            "reach": reach,
-        })
-    };
     let planner = |(name, frames): &(&str, Vec<HeightFrame>)| {
         let touches = replay::row(run, name).map_or(&[][..], |row| &row.touches);
         let contacts = touches.iter().map(|touch| contact(zone, touch, unit));
@@ -163,7 +137,7 @@ pub fn data(run: &Run, counts: &Counts) -> anyhow::Result<Option<Value>> {
             "name": name,
             "colours": style::light_and_dark(style::planner(&experiment.planners, name)),
             "contacts": contacts.collect::<Vec<_>>(),
-            "frames": frames.iter().map(frame).collect::<Vec<_>>(),
+            "frames": frames.iter().map(|frame| ranges.frame(frame)).collect::<Vec<_>>(),
         })
     };
     Ok(Some(json!({
@@ -174,14 +148,59 @@ pub fn data(run: &Run, counts: &Counts) -> anyhow::Result<Option<Value>> {
         // Range of the heights drawn, and their stretch.
         "space": in_unit([low, high]),
         "stretch": space.map_or(1.0, |space| space.stretch()),
-        "height_range": in_unit(height_range_m),
-        "deviation_range": in_unit(deviation_range_m),
-        "band_range": in_unit(band_range_m),
-        "truth": heights(&mut grid.places.iter().map(|(_, height_m)| *height_m)),
+        "height_range": in_unit(heights_m),
+        "deviation_range": in_unit(deviations_m),
+        "band_range": in_unit(bands_m),
+        "truth": ranges.heights(grid.places.iter().map(|(_, height_m)| *height_m)),
         "initial_touches": experiment.initial_touches,
         "colours": style::touch_colours(),
         "planners": beliefs.iter().map(planner).collect::<Vec<_>>(),
     })))
+}
+
+/// Replays a planner's beliefs at `places` after the `counts` of touches that have one.
+fn frames(
+    run: &Run,
+    planner: &str,
+    counts: &[u32],
+    places: &[&[f64]],
+) -> anyhow::Result<Vec<HeightFrame>> {
+    let frame = |&count: &u32| {
+        let replay = BeliefReplay::new(run, planner, count)?;
+        anyhow::Ok(replay.map(|replay| HeightFrame::of(&replay, places)))
+    };
+    let frames: Vec<Option<HeightFrame>> =
+        counts.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
+    Ok(frames.into_iter().flatten().collect())
+}
+
+/// Ranges of the values that codes stand for.
+struct CodeRanges {
+    heights_m: [f64; 2],
+    deviations_m: [f64; 2],
+}
+
+impl CodeRanges {
+    fn heights(&self, heights_m: impl Iterator<Item = Option<f64>>) -> String {
+        let [low, high] = self.heights_m;
+        encode(heights_m.map(|it| (it.unwrap_or(f64::NAN) - low) / (high - low)))
+    }
+
+    /// Encodes a belief.
+    fn frame(&self, frame: &HeightFrame) -> Value {
+        let end = |end: usize| self.heights(frame.bands_m.iter().map(|ends| Some(ends[end])));
+        let band = [0, 1].map(end);
+        let reach: String =
+            frame.is_reachable.iter().map(|&it| if it { '1' } else { '0' }).collect();
+        json!({
+            "touches": frame.touches,
+            "score": frame.score,
+            "mean": self.heights(frame.means_m.iter().copied()),
+            "deviation": encode_log(self.deviations_m, frame.deviations_m.iter().copied()),
+            "band": band,
+            "reach": reach,
+        })
+    }
 }
 
 /// Returns the ends of the logarithmic scale of these lengths.

@@ -44,8 +44,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let after = BeliefReplay::new(run, planner, count + 1)?;
     let replays: Vec<BeliefReplay> = std::iter::once(before).chain(after).collect();
     Ok(match zone.dimension() {
-        1 => draw_curves((run, zone), planner, &replays),
-        _ => draw_maps((run, zone), planner, &replays),
+        1 => draw_curves(run, zone, planner, &replays),
+        _ => draw_maps(run, zone, planner, &replays),
     })
 }
 
@@ -82,11 +82,7 @@ const EQUAL_HEIGHT_PX: f64 = 420.0;
 /// Distance between panels, and between a belief and its standard deviation.
 const GAPS_PX: (f64, f64) = (66.0, 40.0);
 
-fn draw_curves(
-    (run, zone): (&Run, &Zone),
-    planner: &str,
-    replays: &[BeliefReplay],
-) -> Option<String> {
+fn draw_curves(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) -> Option<String> {
     let unit = Length::of(zone);
     let read: Vec<Vec<MapValue>> =
         replays.iter().map(|replay| readings(zone.grid(STEPS), replay)).collect();
@@ -99,8 +95,8 @@ fn draw_curves(
     let shape = curves::belief_panel(zone, curves::height_axis(run, unit)?, most, EQUAL_HEIGHT_PX);
     let size = [width, shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0];
     let entries = curves::entries(run, [found]);
-    let panels = (shape.area, [step_px, 0.0]);
-    let mut sheet = FigureLayout::new(size, panels, (width - LEFT_PX, ""), entries);
+    let (first, step) = (shape.area, [step_px, 0.0]);
+    let mut sheet = FigureLayout::new(size, first, step, width - LEFT_PX, "", entries);
     let colour = style::planner(&run.experiment.planners, planner);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
         let above = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
@@ -140,11 +136,7 @@ const MAP_PX: (f64, f64) = (400.0, 640.0);
 /// Smallest distance between maps: below them is the label of the colour bar.
 const MAP_STEP_PX: f64 = 330.0;
 
-fn draw_maps(
-    (run, zone): (&Run, &Zone),
-    planner: &str,
-    replays: &[BeliefReplay],
-) -> Option<String> {
+fn draw_maps(run: &Run, zone: &Zone, planner: &str, replays: &[BeliefReplay]) -> Option<String> {
     let unit = Length::of(zone);
     let [x, z] = [zone.x_m, zone.z_m?].map(|side| side.map(|end| end * unit.per_m));
     let mut entries = vec![
@@ -158,8 +150,8 @@ fn draw_maps(
     let step_px = (shape.area.width + 84.0).max(MAP_STEP_PX);
     let width = LEFT_PX + 2.0 * step_px;
     let size = [width, shape.area.bottom() + 108.0];
-    let panels = (shape.area, [step_px, 0.0]);
-    let mut sheet = FigureLayout::new(size, panels, (width - LEFT_PX, ""), entries);
+    let (first, step) = (shape.area, [step_px, 0.0]);
+    let mut sheet = FigureLayout::new(size, first, step, width - LEFT_PX, "", entries);
     let shape = Panel { area: sheet.area(0, 0.0), ..shape };
     // The zone's part of a panel, all of it unless the zone is far from square.
     let [[left, bottom], [right, top]] = [shape.at(x[0], z[0]), shape.at(x[1], z[1])];

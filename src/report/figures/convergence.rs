@@ -76,23 +76,22 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let over_time = shown.iter().filter(|_| times.is_some()).filter(is_over_time);
     let panels: Vec<(&Measure, bool)> =
         over_touches.chain(over_time.map(|measure| (*measure, true))).collect();
-    let constant = constant_r(run);
     let swatches = curves
         .iter()
         .zip(planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
-    let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
+    let dashed = constant_r(run).map(|_| (Swatch::Line(constant_line()), "R of any constant"));
     let rows = panels.len().div_ceil(2) as f64;
     let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
-    let legend = (WIDTH - 2.0 * LEFT_PX, "");
+    let legend_px = WIDTH - 2.0 * LEFT_PX;
     let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
-    let places = (first, [PANEL.0 + GAP.0, PANEL.1 + GAP.1]);
-    let mut sheet = FigureLayout::new(size, places, legend, swatches.chain(dashed));
+    let step = [PANEL.0 + GAP.0, PANEL.1 + GAP.1];
+    let entries = swatches.chain(dashed);
+    let mut sheet = FigureLayout::new(size, first, step, legend_px, "", entries);
     for (i, (measure, over_time)) in panels.into_iter().enumerate() {
         let area = sheet.area(i % 2, (i / 2) as f64);
-        let constant = constant.filter(|_| measure.id == R.id);
         let time_axis = times.as_ref().filter(|_| over_time);
-        draw_measure(&mut sheet.canvas, area, run, measure, (&x, time_axis, &curves, constant));
+        draw_measure(&mut sheet.canvas, area, run, measure, &x, time_axis, &curves);
     }
     Ok(Some(sheet.canvas.finish()))
 }
@@ -102,7 +101,9 @@ fn draw_measure(
     area: Area,
     run: &Run,
     measure: &Measure,
-    (touches, times, curves, constant): (&Axis, Option<&Axis>, &[Curve], Option<f64>),
+    touches: &Axis,
+    times: Option<&Axis>,
+    curves: &[Curve],
 ) {
     let read: Vec<(&str, Vec<Reading>)> = curves
         .iter()
@@ -117,6 +118,7 @@ fn draw_measure(
             (*colour, points.par_iter().filter_map(of).collect())
         })
         .collect();
+    let constant = constant_r(run).filter(|_| measure.id == R.id);
     let readings = || read.iter().flat_map(|(_, readings)| readings);
     let values = readings().flat_map(|(_, value, beside, band)| {
         let ends = band.iter().flatten().copied();

@@ -45,7 +45,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let step = [PANEL.0 + GAP.0, shape.area.height + GAP.1];
     let legend_px = counts.len() as f64 * step[0];
     let size = [MARGIN.0 + legend_px, MARGIN.1 + planners.len() as f64 * step[1]];
-    let mut sheet = FigureLayout::new(size, (shape.area, step), (legend_px, ""), entries(run, []));
+    let mut sheet = FigureLayout::new(size, shape.area, step, legend_px, "", entries(run, []));
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
             let area = sheet.area(column, row as f64);

@@ -58,7 +58,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX];
     let entries = touch_entries().into_iter().chain(miss_entry(run)).chain(seen_entry(run));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
+    let mut sheet = FigureLayout::new(size, first, PANEL.into(), width, ON_RELIEF, entries);
     let [low, high] = space.height_m;
     let axis = Axis::linear(low, high, 5.0);
     let relief =
@@ -149,7 +149,7 @@ pub fn mark<'a>(
         match replay::contact(zone, touch) {
             Some((place, height)) => {
                 let point = Vector3::new(place[0], height, place[1]);
-                relief.mark(canvas, (&panel.camera, &point), 3.1, colour);
+                relief.mark(canvas, &panel.camera, &point, 3.1, colour);
             }
             None => {
                 let target = touch.target.numbers();

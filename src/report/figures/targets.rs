@@ -67,8 +67,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let step_px = shape.area.width + 84.0;
     let width = (LEFT_PX + rows.len() as f64 * step_px).max(WIDTH_MIN_PX);
     let size = [width, TOP_PX + shape.area.height + 60.0];
-    let panels = (shape.area, [step_px, 0.0]);
-    let mut sheet = FigureLayout::new(size, panels, (width - LEFT_PX, ""), entries);
+    let (first, step) = (shape.area, [step_px, 0.0]);
+    let mut sheet = FigureLayout::new(size, first, step, width - LEFT_PX, "", entries);
     for (column, row) in rows.iter().enumerate() {
         let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
         let canvas = &mut sheet.canvas;

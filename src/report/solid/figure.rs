@@ -58,14 +58,14 @@ pub fn figure(
     let rows = sequences.iter().flat_map(|it| [false, true].map(|is_behind| (it, is_behind)));
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows.clone().count() as f64 * PANEL.1 + FOOT_PX];
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
+    let mut sheet = FigureLayout::new(size, first, PANEL.into(), width, ON_RELIEF, entries);
     let px_per_m = scale(&points, first);
     for (row, (sequence, is_behind)) in rows.enumerate() {
         let area = |column: usize| sheet.area(column, row as f64);
         let views = (0..columns).map(|it| View::new(area(it), is_behind, px_per_m, &points));
         let views: Vec<View> = views.collect();
         for (view, &count) in views.iter().zip(counts) {
-            belief(view, &mut sheet.canvas, (sequence, count), &axis);
+            belief(view, &mut sheet.canvas, sequence, count, &axis);
         }
         if let (Some(truth), Some(view)) = (&truth, views.last()) {
             view.title(&mut sheet.canvas, "true object", "");
@@ -119,7 +119,7 @@ impl<'a> FilmPanels<'a> {
         let [front, behind, true_view] = &self.views[..] else { return };
         for view in [front, behind] {
             view.title(canvas, "belief", "");
-            draw_frame(view, canvas, (self.sequence, frame), &self.axis);
+            draw_frame(view, canvas, self.sequence, frame, &self.axis);
         }
         if let Some(truth) = &self.truth {
             true_view.title(canvas, "true object", "");
@@ -129,25 +129,21 @@ impl<'a> FilmPanels<'a> {
     }
 }
 
-fn belief(
-    view: &View,
-    canvas: &mut Canvas,
-    (sequence, count): (&PlannerSurfaces, u32),
-    axis: &Axis,
-) {
+fn belief(view: &View, canvas: &mut Canvas, sequence: &PlannerSurfaces, count: u32, axis: &Axis) {
     let title = format!("{}, {}", sequence.planner, counted(count, "touch"));
     let Some(frame) = sequence.frames.iter().find(|frame| frame.touches == count) else {
         return view.title(canvas, &title, "no belief at this count");
     };
     view.title(canvas, &title, &frame.score);
-    draw_frame(view, canvas, (sequence, frame), axis);
+    draw_frame(view, canvas, sequence, frame, axis);
 }
 
 /// Draws a surface, coloured by its standard deviation along `axis`, and its touches.
 fn draw_frame(
     view: &View,
     canvas: &mut Canvas,
-    (sequence, frame): (&PlannerSurfaces, &SurfaceFrame),
+    sequence: &PlannerSurfaces,
+    frame: &SurfaceFrame,
     axis: &Axis,
 ) {
     let count = frame.touches as usize;
@@ -175,7 +171,7 @@ fn draw_frame(
             // The target of a missed touch may lie outside of the drawing.
             if touch.contact_w.is_some() {
                 let radius = RADII_PX[usize::from(i + 1 == count)];
-                relief.mark(canvas, (&view.camera, &p_w), radius, colour);
+                relief.mark(canvas, &view.camera, &p_w, radius, colour);
             } else if inner(view.area).contains(at) {
                 canvas.diamond(at, &style::stroke(colour, 1.3));
             }

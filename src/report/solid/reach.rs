@@ -57,7 +57,7 @@ pub fn picture(
     let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
     let entries = entries.map(|(_, swatch, words)| (swatch, words));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = FigureLayout::new(size, (first, PANEL.into()), (width, ""), entries);
+    let mut sheet = FigureLayout::new(size, first, PANEL.into(), width, "", entries);
     let px_per_m = scale(&points, first);
     for (column, is_behind) in [false, true].into_iter().enumerate() {
         let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);

@@ -98,7 +98,7 @@ pub fn data(
     let deviations = deviation_range(frames().flat_map(|frame| &frame.sd_m)).unwrap_or(NONE_M);
     let errors = error_range(frames().flat_map(|frame| &frame.error_m));
     let planner = |sequence: &&PlannerSurfaces| -> anyhow::Result<Value> {
-        let frames = sequence.frames.iter().map(|frame| coded(frame, cube, (deviations, errors)));
+        let frames = sequence.frames.iter().map(|frame| coded(frame, cube, deviations, errors));
         let touches = sequence.touches.iter().map(|touch| marked(touch, cube));
         Ok(json!({
             "name": sequence.planner,
@@ -149,7 +149,8 @@ fn error_range<'a>(errors_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> 
 fn coded<'a>(
     frame: &'a SurfaceFrame,
     cube: Cube,
-    (deviations, errors): ([f64; 2], Option<[f64; 2]>),
+    deviations: [f64; 2],
+    errors: Option<[f64; 2]>,
 ) -> anyhow::Result<Value> {
     let mesh = Coded::new(cube, &frame.mesh)?;
     let ordered = |values: &'a [f64]| mesh.order.iter().map(|&vertex| values[vertex as usize]);

@@ -3,6 +3,7 @@
 mod file;
 mod intrinsics;
 mod pcd;
+pub mod probe;
 pub mod settings;
 
 pub use settings::CameraSettings;
@@ -10,7 +11,7 @@ pub use settings::CameraSettings;
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_explore::robot::Robot;
-use palpate_explore::view::{Offer, PixelNoise, View, corrected_pose};
+use palpate_explore::view::{LookOffer, PixelNoise, View, corrected_pose};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::nearest_of_segments;
 use palpate_geometry::sweep::Capsule;
@@ -82,20 +83,20 @@ impl CameraSettings {
         Ok(View { x_wc: stated, points_c, image, pivot_w, accuracy })
     }
 
-    /// Returns the offer of view `number` from here; a touch takes `touch_s`.
-    pub fn offer(&self, number: u32, middle_w: &Point3<f64>, touch_s: f64) -> Offer {
+    /// Returns the offer of view `number` from here.
+    pub fn offer(&self, number: u32, middle_w: &Point3<f64>) -> LookOffer {
         let [width, height] = self.pixels().map(|count| count as f64);
         let [fx, fy, cx, cy] = self.intrinsics();
         let ends = |focal: f64, centre: f64, size: f64| {
             [-centre, size - 1.0 - centre].map(|px| px / focal)
         };
-        Offer {
+        LookOffer {
             number,
             x_wc: self.x_wc(middle_w),
             pivot_w: self.target_w(middle_w),
             accuracy: self.accuracy(),
             image: [ends(fx, cx, width), ends(fy, cy, height)],
-            cost: self.look_s / touch_s,
+            time_s: self.look_s,
         }
     }
 

@@ -334,8 +334,8 @@ impl AdConverter {
         if let Some(friction) = tip.effects.friction.as_ref().filter(|_| slip_m_s > 0.0) {
             pressure_pa += friction.vibration_pa(slip_m_s) * normal(&mut self.slip_rng);
         }
-        let (effects, rng) = ((fluid, vibration), &mut self.vibration_rng);
-        let counts = self.filter.pac_counts(effects, pressure_pa, 2.0 / SLOTS_HZ, rng);
+        let (dt_s, rng) = (2.0 / SLOTS_HZ, &mut self.vibration_rng);
+        let counts = self.filter.pac_counts(fluid, vibration, pressure_pa, dt_s, rng);
         self.frame.pac_counts.get_or_insert([0.0; VIBRATIONS])[i] = counts;
     }
 

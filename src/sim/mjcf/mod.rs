@@ -91,8 +91,9 @@ pub fn scene(environment: &Environment, mode: ModelPurpose) -> Option<String> {
 "#,
         robot = robot::robot(
             environment.scene(),
-            (&chain, environment.arm_mjcf()),
-            (collides, bumps),
+            &chain,
+            environment.arm_mjcf(),
+            [collides, bumps],
             is_soft,
         ),
         sensor = if senses { SENSOR } else { "" },

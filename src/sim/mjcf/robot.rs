@@ -19,8 +19,9 @@ const NO_COLLISION: &str = r#"contype="0" conaffinity="0""#;
 /// the robot `bumps`; the finger has a pad and a nail if it `is_soft`.
 pub(super) fn robot(
     scene: &Scene,
-    (chain, model): (&Chain, Option<&str>),
-    (collides, bumps): (bool, bool),
+    chain: &Chain,
+    model: Option<&str>,
+    [collides, bumps]: [bool; 2],
     is_soft: bool,
 ) -> String {
     let after_open =
@@ -38,11 +39,11 @@ pub(super) fn robot(
         .map_or("", |(inner, _)| inner)
         .replace(NO_COLLISION, links)
         .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
-        .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, (contact, is_soft)))
+        .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, contact, is_soft))
 }
 
 /// Returns adapter and finger as one body at the flange, where the force/torque sensor is.
-fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, (contact, is_soft): (&str, bool)) -> String {
+fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, contact: &str, is_soft: bool) -> String {
     let mount_m = chain.tool.translation.vector.norm();
     let heel_m = (mount_m - finger.length_m).max(0.0);
     // Inertia of a rod with the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across,

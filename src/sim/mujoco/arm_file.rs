@@ -36,116 +36,185 @@ pub fn arm_parts(path: &Path, tip: Option<&str>) -> Result<ArmParts, InputError>
     let mut data = MjData::try_new(&model).map_err(|cause| fail(cause.to_string()))?;
     data.qpos_mut().fill(0.0);
     data.forward();
-    let bodies = model.body_parentid().len();
-    let name = |kind, id: usize| name(&model, kind, id);
-    let names = |ids: &[usize]| -> String {
-        let names = ids.iter().map(|id| name(MjtObjBase::mjOBJ_BODY, *id));
-        names.collect::<Vec<_>>().join(", ")
-    };
-    let ends: Vec<usize> =
-        (1..bodies).filter(|id| !model.body_parentid().contains(&(*id as i32))).collect();
-    let site = tip.and_then(|tip| model.name_to_id(MjtObjBase::mjOBJ_SITE, tip));
-    let body = tip.and_then(|tip| model.name_to_id(MjtObjBase::mjOBJ_BODY, tip));
-    let (body, tool) = match (tip, body, site) {
-        (_, Some(body), _) => (body, placed(data.xpos()[body], data.xmat()[body])),
-        (_, None, Some(site)) => (
-            model.site_bodyid()[site] as usize,
-            placed(data.site_xpos()[site], data.site_xmat()[site]),
-        ),
-        (Some(tip), None, None) => {
-            let all: Vec<usize> = (1..bodies).collect();
-            let problem = fail("arm.tip".into()).value(format!("\"{tip}\""));
-            return Err(problem.allowed(format!("a site, or a body: {}", names(&all))));
-        }
-        (None, ..) => match ends[..] {
-            [body] => (body, placed(data.xpos()[body], data.xmat()[body])),
-            _ => {
-                let problem = fail("arm.tip".into()).value("missing");
-                let which = "a body or site that carries the tool";
-                return Err(problem.allowed(format!("{which}; the ends are {}", names(&ends))));
-            }
-        },
-    };
-    let parent = |body: usize| model.body_parentid()[body] as usize;
-    let mut chain = vec![body];
-    while let Some(body) = chain.last().map(|body| parent(*body)).filter(|body| *body != 0) {
-        chain.push(body);
-    }
-    chain.reverse();
+    let file = ArmFile { path, model: &model, data: &data };
+    let (body, tool) = file.tip(tip)?;
     let mut parts = ArmParts { name: name_of(path), tool, ..ArmParts::default() };
-    // Number of joints that move each body of the chain.
-    let mut movers = vec![None; bodies];
-    movers[0] = Some(0);
-    let mut joints = Vec::new();
-    for &body in &chain {
-        for joint in (0..model.jnt_type().len()).filter(|i| model.jnt_bodyid()[*i] as usize == body)
-        {
-            let at = |cause: InputError| {
-                let joint = name(MjtObjBase::mjOBJ_JOINT, joint);
-                cause.at(format!("{}: joint {joint}", path.display()))
-            };
-            let kind = kind(&model, joint).map_err(at)?;
-            if model.jnt_stiffness()[joint] != 0.0 {
-                let name = name(MjtObjBase::mjOBJ_JOINT, joint);
-                parts.lacks.push(format!("the spring of {name} (assumed: none)"));
-            }
-            joints.push(joint);
-            parts.links.push(LinkParts {
-                joint: name(MjtObjBase::mjOBJ_JOINT, joint),
-                link: name(MjtObjBase::mjOBJ_BODY, body),
-                kind,
-                origin: data.xanchor()[joint].into(),
-                axis: UnitVector3::new_normalize(Vector3::from(data.xaxis()[joint])),
-                limits: model.jnt_limited()[joint].then_some(model.jnt_range()[joint]),
-                speed: None,
-                acceleration: None,
-                body: Body::default(),
-                motor: motor(&model, joint).map_err(at)?,
-            });
-        }
-        movers[body] = Some(parts.links.len());
-    }
+    let (joints, movers) = file.add_links(body, &mut parts)?;
     check_count(&path.display().to_string(), parts.links.len())?;
-    // A body off the chain moves with the body of the chain that carries it.
-    let carrier = |mut id: usize| {
-        while movers[id].is_none() {
-            id = parent(id);
-        }
-        id
-    };
-    check_constraints(&model, &joints, |id| movers[carrier(id)].unwrap_or_default())
+    check_constraints(&model, &joints, |id| movers[file.carrier(&movers, id)].unwrap_or_default())
         .map_err(|cause| cause.at(path.display()))?;
     match home(&model, &joints) {
         Ok(home) => parts.home = Some(home),
         Err(names) => parts.postures = names,
     }
-    let solid =
-        |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;
-    for id in 1..bodies {
-        let carrier = carrier(id);
-        // The tool replaces the bodies that the tip carries.
-        if carrier == body && id != body {
-            continue;
+    file.add_bodies(body, &movers, &mut parts)?;
+    Ok(parts)
+}
+
+/// A file that MuJoCo has read, with the robot at q = 0.
+struct ArmFile<'a> {
+    path: &'a Path,
+    model: &'a MjModel,
+    data: &'a MjData<&'a MjModel>,
+}
+
+impl ArmFile<'_> {
+    fn name(&self, kind: MjtObjBase, id: usize) -> String {
+        name(self.model, kind, id)
+    }
+
+    /// Number of bodies, of which the first is the world.
+    fn body_count(&self) -> usize {
+        self.model.body_parentid().len()
+    }
+
+    fn parent(&self, body: usize) -> usize {
+        self.model.body_parentid()[body] as usize
+    }
+
+    /// Returns the pose of a body's frame.
+    fn placed(&self, body: usize) -> Isometry3<f64> {
+        placed(self.data.xpos()[body], self.data.xmat()[body])
+    }
+
+    /// Returns the body that carries the tool, and the tool's frame: the body or site `tip`, or
+    /// without a name the only body that carries no other.
+    fn tip(&self, tip: Option<&str>) -> Result<(usize, Isometry3<f64>), InputError> {
+        let (model, data) = (self.model, self.data);
+        let problem = || InputError::new("arm.tip").at(self.path.display());
+        let names = |ids: &[usize]| -> String {
+            let names = ids.iter().map(|id| self.name(MjtObjBase::mjOBJ_BODY, *id));
+            names.collect::<Vec<_>>().join(", ")
+        };
+        let bodies = 1..self.body_count();
+        let Some(tip) = tip else {
+            let is_end = |id: &usize| !model.body_parentid().contains(&(*id as i32));
+            let ends: Vec<usize> = bodies.filter(is_end).collect();
+            let [body] = ends[..] else {
+                let which = "a body or site that carries the tool";
+                let allowed = format!("{which}; the ends are {}", names(&ends));
+                return Err(problem().value("missing").allowed(allowed));
+            };
+            return Ok((body, self.placed(body)));
+        };
+        if let Some(body) = model.name_to_id(MjtObjBase::mjOBJ_BODY, tip) {
+            return Ok((body, self.placed(body)));
         }
+        let Some(site) = model.name_to_id(MjtObjBase::mjOBJ_SITE, tip) else {
+            let all: Vec<usize> = bodies.collect();
+            let allowed = format!("a site, or a body: {}", names(&all));
+            return Err(problem().value(format!("\"{tip}\"")).allowed(allowed));
+        };
+        let body = model.site_bodyid()[site] as usize;
+        Ok((body, placed(data.site_xpos()[site], data.site_xmat()[site])))
+    }
+
+    /// Returns the bodies from the world's to `body`.
+    fn chain(&self, body: usize) -> Vec<usize> {
+        let mut chain = vec![body];
+        while let Some(body) = chain.last().map(|body| self.parent(*body)).filter(|id| *id != 0) {
+            chain.push(body);
+        }
+        chain.reverse();
+        chain
+    }
+
+    /// Adds the links of the chain to `tip`, still without shapes and masses. Returns its joints
+    /// and, for each body of the chain, the number of joints that move it.
+    fn add_links(
+        &self,
+        tip: usize,
+        parts: &mut ArmParts,
+    ) -> Result<(Vec<usize>, Vec<Option<usize>>), InputError> {
+        let model = self.model;
+        let mut movers = vec![None; self.body_count()];
+        movers[0] = Some(0);
+        let mut joints = Vec::new();
+        for body in self.chain(tip) {
+            let all = 0..model.jnt_type().len();
+            for joint in all.filter(|joint| model.jnt_bodyid()[*joint] as usize == body) {
+                let name = self.name(MjtObjBase::mjOBJ_JOINT, joint);
+                let link = self
+                    .link(joint, body)
+                    .map_err(|cause| cause.at(format!("{}: joint {name}", self.path.display())))?;
+                if model.jnt_stiffness()[joint] != 0.0 {
+                    parts.lacks.push(format!("the spring of {name} (assumed: none)"));
+                }
+                joints.push(joint);
+                parts.links.push(link);
+            }
+            movers[body] = Some(parts.links.len());
+        }
+        Ok((joints, movers))
+    }
+
+    /// Returns a joint with the link `body` that it moves.
+    fn link(&self, joint: usize, body: usize) -> Result<LinkParts, InputError> {
+        let (model, data) = (self.model, self.data);
+        Ok(LinkParts {
+            joint: self.name(MjtObjBase::mjOBJ_JOINT, joint),
+            link: self.name(MjtObjBase::mjOBJ_BODY, body),
+            kind: kind(model, joint)?,
+            origin: data.xanchor()[joint].into(),
+            axis: UnitVector3::new_normalize(Vector3::from(data.xaxis()[joint])),
+            limits: model.jnt_limited()[joint].then_some(model.jnt_range()[joint]),
+            speed: None,
+            acceleration: None,
+            body: Body::default(),
+            motor: motor(model, joint)?,
+        })
+    }
+
+    /// Returns the body of the chain that carries a body.
+    fn carrier(&self, movers: &[Option<usize>], mut id: usize) -> usize {
+        while movers[id].is_none() {
+            id = self.parent(id);
+        }
+        id
+    }
+
+    /// Adds shapes and masses of all bodies but those that `tip` carries, which the tool replaces.
+    /// A body off the chain moves with the body of the chain that carries it.
+    fn add_bodies(
+        &self,
+        tip: usize,
+        movers: &[Option<usize>],
+        parts: &mut ArmParts,
+    ) -> Result<(), InputError> {
+        for id in 1..self.body_count() {
+            let carrier = self.carrier(movers, id);
+            if carrier == tip && id != tip {
+                continue;
+            }
+            let shapes = self.shapes(id)?;
+            match movers[carrier] {
+                Some(count) if count > 0 => {
+                    let whole = &mut parts.links[count - 1].body;
+                    whole.shapes.extend(shapes);
+                    whole.masses.extend(mass(self.model, self.data, id));
+                }
+                _ => parts.base.extend(shapes),
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the geoms of a body: those that can collide, or all if none can.
+    fn shapes(&self, body: usize) -> Result<Vec<Shape>, InputError> {
+        let (model, data) = (self.model, self.data);
+        let solid =
+            |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;
         let geoms: Vec<usize> = (0..model.geom_type().len())
-            .filter(|geom| model.geom_bodyid()[*geom] as usize == id)
+            .filter(|geom| model.geom_bodyid()[*geom] as usize == body)
             .collect();
         let has_solid = geoms.iter().any(|geom| solid(*geom));
         let drawn = geoms.into_iter().filter(|geom| !has_solid || solid(*geom));
-        let shapes = drawn.filter_map(|geom| shape(&model, &data, geom).transpose());
-        let shapes = shapes.collect::<Result<Vec<_>, _>>().map_err(|cause| {
-            cause.at(format!("{}: body {}", path.display(), name(MjtObjBase::mjOBJ_BODY, id)))
-        })?;
-        match movers[carrier] {
-            Some(count) if count > 0 => {
-                let whole = &mut parts.links[count - 1].body;
-                whole.shapes.extend(shapes);
-                whole.masses.extend(mass(&model, &data, id));
-            }
-            _ => parts.base.extend(shapes),
-        }
+        let shapes = drawn.filter_map(|geom| shape(model, data, geom).transpose());
+        shapes.collect::<Result<_, _>>().map_err(|cause| {
+            let name = self.name(MjtObjBase::mjOBJ_BODY, body);
+            cause.at(format!("{}: body {name}", self.path.display()))
+        })
     }
-    Ok(parts)
 }
 
 /// Returns the type of a joint of the chain.

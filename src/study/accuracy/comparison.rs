@@ -79,7 +79,8 @@ impl AccuracyComparison {
     /// If the scene cannot be built, or if the criterion is a verdict and the scene's verdict is
     /// undecided.
     pub fn new(
-        (reference, scene): (Variant, Scene),
+        reference: Variant,
+        scene: Scene,
         effort: MeasurementCounts,
         criterion: Option<Criterion>,
     ) -> anyhow::Result<Self> {
@@ -111,7 +112,7 @@ impl AccuracyComparison {
     ///
     /// # Errors
     /// If its scene cannot be built.
-    pub fn add(&mut self, (variant, scene): (Variant, Scene)) -> anyhow::Result<()> {
+    pub fn add(&mut self, variant: Variant, scene: Scene) -> anyhow::Result<()> {
         let mut variant = self.measure(variant, &scene)?;
         variant.relevance = self.relevance(&variant).filter(|_| variant.effect.is_some());
         self.variants.push(variant);
@@ -214,7 +215,8 @@ impl AccuracyComparison {
     /// If a scene cannot be built.
     pub fn confirm(
         &self,
-        (selected, scene): (Variant, Scene),
+        selected: Variant,
+        scene: Scene,
         origin: Origin,
         count: Option<u16>,
     ) -> anyhow::Result<CheapestScene> {
@@ -223,8 +225,8 @@ impl AccuracyComparison {
             Some(Criterion::Verdict(_)) => effort.trials = count.map_or(effort.trials, u32::from),
             _ => effort.touches = count.map_or(effort.touches, usize::from),
         }
-        let reference = (self.reference.clone(), self.scene.clone());
-        let fresh = Self::new(reference, effort, self.criterion)?;
+        let (reference, whole) = (self.reference.clone(), self.scene.clone());
+        let fresh = Self::new(reference, whole, effort, self.criterion)?;
         let unmeasured = Variant::named(selected.name.clone());
         let mut held_out = fresh.measure(unmeasured, &scene)?;
         let ratio = held_out.wall_s.zip(fresh.reference.wall_s).map(|(wall, other)| wall / other);

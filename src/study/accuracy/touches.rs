@@ -8,10 +8,11 @@ use crate::sim::{Environment, Scene};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::trace::{Tick, Ticks, TracedBackend};
 use palpate_explore::belief::HeightField;
+use palpate_explore::evidence::{Contact, End, Outcome};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
-use palpate_explore::planner::{PlannerFactory, PlanningSettings};
-use palpate_explore::probe::{Contact, Probe, Touch};
+use palpate_explore::planner::{Offer, PlannerFactory, PlanningSettings};
+use palpate_explore::probe::Probe;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_explore::robot::finger::{Frame, TipMotion};
 use palpate_explore::task::Target;
@@ -73,7 +74,7 @@ pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
     let Some(entry) = planner::by_name("sobol") else { return Vec::new() };
     let random = seed::stream(seed, 0, "targets");
     let mut sobol = entry.make(&PlanningSettings::default(), random);
-    (0..count).filter_map(|_| Some(sobol.plan(&belief).ok()?.target)).collect()
+    (0..count).filter_map(|_| Some(sobol.plan(&belief, &Offer::default()).ok()?.target)).collect()
 }
 
 /// Results of the touches of one trial.
@@ -110,10 +111,7 @@ pub fn touch_all(
     for target in targets {
         let outcome = environment.task().approach(target).map(|approach| probe.touch(&approach));
         touches.faults += usize::from(matches!(outcome, Some(Err(_))));
-        let contact = match outcome {
-            Some(Ok(Touch::Contact(contact))) => Some(contact),
-            _ => None,
-        };
+        let contact = outcome.and_then(Result::ok).and_then(|outcome| outcome.contact().cloned());
         let ticks = ticks.take();
         if let (Some(first), Some(last)) = (ticks.first(), ticks.last()) {
             touches.simulated_s.push(last.time_s - first.time_s);
@@ -243,8 +241,8 @@ pub fn surface_rmse_m(
     let mut belief = HeightField::new(zone, GpSettings::default());
     let contacts = touches.iter().flat_map(|touches| &touches.contacts);
     for (target, contact) in targets.iter().zip(contacts) {
-        let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
-        belief.observe(target.place()?, &touch);
+        let outcome = contact.clone().map_or_else(|| End::Miss.into(), Outcome::from);
+        belief.observe(target, &outcome);
     }
     let (_, surface) = belief.refit().ok()?;
     Truth::sample(environment, GRID, &|_| ()).rmse_m(surface)

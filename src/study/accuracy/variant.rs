@@ -9,7 +9,7 @@ use super::verdict::Relevance;
 use crate::experiment::statistics::{PairedDifference, median};
 use crate::sim::environment::ObjectShape;
 use crate::sim::{Environment, Scene};
-use palpate_explore::probe::Contact;
+use palpate_explore::evidence::Contact;
 use palpate_input::config::Rules;
 use serde::Serialize;
 use std::sync::Arc;

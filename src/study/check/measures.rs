@@ -62,7 +62,7 @@ pub static CHECK_MEASURES: &[CheckMeasure] = &[
         ROBOT_TIME.value(row, of.touches).map(log)
     }),
     CheckMeasure::share("missed", "share of touches without contact", |row, of| {
-        share(row, of, |touch| touch.contact.is_none())
+        share(row, of, |touch| touch.contact().is_none())
     }),
     CheckMeasure::share("stalled", "share of fallback plans", |row, of| {
         share(row, of, |touch| touch.fallback.is_some())

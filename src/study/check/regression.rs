@@ -114,7 +114,8 @@ pub fn accepted(
     simulation: &Simulation,
     rows: &[TrialRow],
     why: &str,
-    (old, is_partial): (Option<&StoredBaseline>, bool),
+    old: Option<&StoredBaseline>,
+    is_partial: bool,
     rules: &CheckOptions,
 ) -> Result<StoredBaseline, InputError> {
     let mut new = StoredBaseline::new(simulation, rows, why);

@@ -5,15 +5,16 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::trial::row::TrialRow;
-use palpate::explore::probe::{Contact, Outcome, SweptVolume, Touch};
+use palpate::explore::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
 use palpate::explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::robot::Finger;
+use palpate::robot::sensor::TipSurface;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
 use palpate::task::touch::TouchSettings;
-use palpate::task::{Aim, Approach, Ball, Task};
+use palpate::task::{Aim, Approach, Ball, Target, Task};
 use std::sync::Arc;
 
 /// A field with one value per point, negative inside, metres.
@@ -51,7 +52,7 @@ pub fn belief_with(settings: SpatialGpSettings, ball_m: f64, radius_m: f64) -> I
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
     let task = Task::new(ball, TouchSettings::default(), &finger).unwrap();
-    ImplicitSurface::new(ExplorationSetup::new(ball, &task, (&finger, false)), settings)
+    ImplicitSurface::new(ExplorationSetup::new(ball, &task, &TipSurface::Rigid), settings)
 }
 
 pub fn approach(belief: &ImplicitSurface, aim: &Aim) -> Approach {
@@ -64,10 +65,11 @@ pub fn meet(
     met: Option<(Point3<f64>, Vector3<f64>)>,
     p_wt: Point3<f64>,
 ) {
-    let touch =
-        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact::new(p_wc, normal_w)));
+    let end = if met.is_some() { End::Contact } else { End::Miss };
     let radius_m = belief.scope().radius_m;
-    let swept = SweptVolume { finger: Finger { radius_m, ..Finger::default() }, p_wt };
-    let approach = approach(belief, aim);
-    belief.observe(aim, &approach, &Outcome { swept: Some(swept), ..touch.into() });
+    let finger = Finger { radius_m, ..Finger::default() };
+    let free = FreeVolume::new(finger, &approach(belief, aim), p_wt, end);
+    let points = met.map(|(p_wc, normal_w)| Evidence::Points(Contact::new(p_wc, normal_w).into()));
+    let evidence = points.into_iter().chain([Evidence::Free(free)]).collect();
+    belief.observe(&Target::Aim(*aim), &Outcome::new(end, evidence));
 }

@@ -74,5 +74,5 @@ pub fn off_mm(network: &Network, row: &TrialRow) -> Vec<f64> {
     let touch = Experiment::load(Path::new(network.experiment), &[]).unwrap().scene.touch;
     let surface_m = PLANE_Y_M - touch.detection_n / STIFFNESS_N_M;
     let contact = |y_m: f64| 1e3 * (y_m - surface_m).abs();
-    row.touches.iter().map(|touch| contact(touch.contact.unwrap()[1])).collect()
+    row.touches.iter().map(|touch| contact(touch.contact().unwrap().y)).collect()
 }

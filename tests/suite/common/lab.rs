@@ -5,7 +5,6 @@ use palpate::backend::pace;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::backend::arm::Connector;
-use palpate::explore::probe::Touch;
 use palpate::robot::arm::ArmSettings;
 use palpate::ros::settings::{RosSettings, RosVersion};
 use serde_json::Value;
@@ -335,11 +334,9 @@ pub fn contacts_off_m(simulation: &Simulation, row: &TrialRow) -> Vec<f64> {
     let mut off_m = Vec::new();
     for touch in &row.touches {
         let approach = simulation.task().approach(&touch.target).unwrap();
-        let here = match probe.touch(&approach).unwrap() {
-            Touch::Contact(contact) => Some(contact.p_wc),
-            _ => None,
-        };
-        let there = touch.contact.map(nalgebra::Point3::from);
+        let outcome = probe.touch(&approach).unwrap();
+        let here = outcome.contact().map(|contact| contact.p_wc);
+        let there = touch.contact();
         assert_eq!(here.is_some(), there.is_some(), "{:?}", touch.target);
         off_m.extend(here.zip(there).map(|(here, there)| (here - there).norm()));
     }

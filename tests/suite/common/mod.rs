@@ -9,6 +9,7 @@ pub mod fault_injector;
 pub mod hub;
 #[cfg(feature = "mujoco")]
 pub mod lab;
+pub mod outcomes;
 pub mod program;
 pub mod quiet;
 pub mod rig;

@@ -8,7 +8,8 @@ use palpate::backend::interlock::InterlockSettings;
 use palpate::backend::pace;
 use palpate::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
 use palpate::error::InputError;
-use palpate::explore::probe::{Probe, Touch};
+use palpate::explore::evidence::Outcome;
+use palpate::explore::probe::Probe;
 use palpate::robot::arm::ArmSettings;
 use palpate::robot::arm::Chain;
 use palpate::ros::arm::RosArm;
@@ -216,7 +217,7 @@ impl Rig {
     }
 
     /// Touches places at these fractions of the zone, until one fails.
-    pub fn touch(&self, lab: &Arc<RosArm>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
+    pub fn touch(&self, lab: &Arc<RosArm>, places: &[[f64; 2]]) -> Vec<Result<Outcome, Fault>> {
         let zone = self.simulator.environment().task().zone().unwrap();
         let targets: Vec<Target> = places.iter().map(|at| zone.at(at).into()).collect();
         self.touch_targets(lab, &targets)
@@ -227,7 +228,7 @@ impl Rig {
         &self,
         lab: &Arc<RosArm>,
         targets: &[Target],
-    ) -> Vec<Result<Touch, Fault>> {
+    ) -> Vec<Result<Outcome, Fault>> {
         let task = self.simulator.environment().task();
         let body = Box::new(lab.backend());
         let mut servo = match self.simulator.servo_within(body, 0, &self.interlocks) {

@@ -1,13 +1,16 @@
 //! Synthetic runs, so that no trial has to be run.
 
+use super::outcomes::outcome;
 use palpate::experiment::experiment::Experiment;
 use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::store::Run;
 use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::experiment::truth::Truth;
+use palpate::explore::evidence::{Contact, Outcome};
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::Hyperparameters;
 use palpate::math::optimize::Stop;
+use palpate::robot::Finger;
 use palpate::task::Zone;
 
 pub const CURVE: &str = r#"
@@ -71,9 +74,9 @@ fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
     TrialRow { trial, planner, failure, views: Vec::new(), touches, verification: Vec::new() }
 }
 
-/// Position at which a finger turns back after a miss at `target`.
-pub fn tip_behind(zone: &Zone, target: &[f64]) -> [f64; 3] {
-    zone.point(target, -0.1).coords.into()
+/// Outcome of a miss at `target`, with the position at which the finger turns back.
+pub fn miss(zone: &Zone, finger: &Finger, target: &[f64]) -> Outcome {
+    outcome(zone, finger, zone.point(target, -0.1), None)
 }
 
 fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> TouchRow {
@@ -118,15 +121,15 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         silhouette: None,
         shape: None,
         recognition: None,
-        contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
-        tip: height_m(&target).is_none().then(|| tip_behind(zone, &target)),
+        outcome: match height_m(&target) {
+            Some(height_m) => {
+                let against_w = -zone.ahead_w().into_inner();
+                let contact = Contact::new(zone.point(&target, height_m), against_w);
+                Contact { has_normal: false, ..contact }.into()
+            }
+            None => miss(zone, &experiment.scene.finger, &target),
+        },
         target: target.into(),
-        overload: false,
-        normal: None,
-        contact_sd_m: None,
-        patch: Vec::new(),
-        doubt: None,
-        time_s: None,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         fallback: None,
         fit: is_fitted.then_some(fit),

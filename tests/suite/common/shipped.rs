@@ -1,6 +1,6 @@
 //! Shipped scenes with changed settings, and common queries of them.
 
-use palpate::explore::probe::{Contact, Touch};
+use palpate::explore::evidence::{Contact, Outcome};
 use palpate::sim::{Environment, Scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -18,11 +18,9 @@ pub fn environment(name: &str, sets: &[&str]) -> Arc<Environment> {
 }
 
 /// Returns the contact of a touch, which must have one.
-pub fn contact(touch: Touch) -> Contact {
-    match touch {
-        Touch::Contact(contact) => contact,
-        other => panic!("{other:?}"),
-    }
+#[track_caller]
+pub fn contact(outcome: Outcome) -> Contact {
+    outcome.contact().cloned().unwrap_or_else(|| panic!("{outcome:?}"))
 }
 
 /// The paper's toy, Eq. 4.

@@ -4,7 +4,8 @@ use super::case::{Outcome, all, require};
 use palpate::backend::trace::{Tick, TracedBackend};
 use palpate::backend::{Backend, Fault};
 use palpate::error::InputError;
-use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::evidence::{self, Contact, End};
+use palpate::explore::probe::Probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::sim::environment::ObjectShape;
@@ -16,7 +17,7 @@ use std::sync::Arc;
 /// A touch and its data.
 pub struct CheckedTouch {
     /// Result of the touch.
-    pub touch: Result<Touch, Fault>,
+    pub touch: Result<evidence::Outcome, Fault>,
     environment: Option<Arc<Environment>>,
     /// Load on the finger when the contact was read.
     pub load: Option<ReferenceLoad>,
@@ -87,17 +88,19 @@ impl CheckedTouch {
 
     /// Returns the contact, if there was one.
     pub fn contact(&self) -> Option<&Contact> {
-        match &self.touch {
-            Ok(Touch::Contact(contact)) => Some(contact),
-            _ => None,
-        }
+        self.touch.as_ref().ok()?.contact()
+    }
+
+    /// Returns the end of the touch.
+    pub fn end(&self) -> Result<End, &Fault> {
+        self.touch.as_ref().map(|outcome| outcome.end)
     }
 
     /// Requires a contact within `tolerance_m` of the mesh.
     pub fn on_surface(&self, tolerance_m: f64) -> Outcome {
-        match &self.touch {
-            Ok(Touch::Miss) => Outcome::Wrong("met nothing".into()),
-            Ok(Touch::Overload) => Outcome::Faulted("broken off: too much pressure".into()),
+        match self.end() {
+            Ok(End::Miss) => Outcome::Wrong("met nothing".into()),
+            Ok(End::Overload) => Outcome::Faulted("broken off: too much pressure".into()),
             _ => self.on_surface_or_missed(tolerance_m),
         }
     }
@@ -107,13 +110,16 @@ impl CheckedTouch {
         if let Some(why) = &self.refused {
             return Outcome::Faulted(why.clone());
         }
-        let near = match (&self.touch, self.off_surface_m()) {
-            (Err(fault), _) => return Outcome::Faulted(fault.to_string()),
-            (Ok(Touch::Contact(contact)), Some(off_m)) => all([
+        let touched = match &self.touch {
+            Ok(outcome) => outcome.contact().zip(self.off_surface_m()),
+            Err(fault) => return Outcome::Faulted(fault.to_string()),
+        };
+        let near = match touched {
+            Some((contact, off_m)) => all([
                 require((contact.normal_w.norm() - 1.0).abs() < 1e-6, || "normal not unit".into()),
                 require(off_m <= tolerance_m, || format!("{:.3} mm off the surface", 1e3 * off_m)),
             ]),
-            _ => Outcome::Stable,
+            None => Outcome::Stable,
         };
         all([near, self.keeps_speed(), self.keeps_apart()])
     }

@@ -4,7 +4,7 @@ use super::case::{Case, Outcome, case, require};
 use super::checked_touch::{CheckedTouch, environment_of, touch_solid};
 use super::finger_on_wall::stiffen;
 use super::solids::{mesh, wall};
-use palpate::explore::probe::{Contact, Touch};
+use palpate::explore::evidence::{Contact, End};
 use palpate::robot::finger::Finger;
 use palpate::sim::Scene;
 use palpate::sim::finger::Effects;
@@ -121,7 +121,7 @@ pub const CASES: &[Case] = &[
                 return Outcome::Wrong("no mesh".into());
             };
             let touched = touch_solid(scene, mesh, &[0.03 + 1e-3 * mm, 0.0]);
-            require(touched.touch == Ok(Touch::Miss), || format!("{:?}", touched.touch))
+            require(touched.end() == Ok(End::Miss), || format!("{:?}", touched.touch))
         },
     ),
 ];
@@ -188,15 +188,16 @@ fn many(count: f64, period_s: f64) -> Outcome {
         return Outcome::Wrong("no approach".into());
     };
     for i in 0..count as u32 {
-        match probe.touch(&approach) {
-            Ok(Touch::Contact(contact)) => {
-                let moved_m = (contact.p_wc - first.get_or_insert(contact.clone()).p_wc).norm();
-                if moved_m > 3e-4 {
-                    return Outcome::Wrong(format!("moved by {moved_m} m at touch {i}"));
-                }
-            }
-            Ok(other) => return Outcome::Wrong(format!("{other:?} at touch {i}")),
+        let outcome = match probe.touch(&approach) {
+            Ok(outcome) => outcome,
             Err(fault) => return Outcome::Faulted(fault.to_string()),
+        };
+        let Some(contact) = outcome.contact() else {
+            return Outcome::Wrong(format!("{:?} at touch {i}", outcome.end));
+        };
+        let moved_m = (contact.p_wc - first.get_or_insert(contact.clone()).p_wc).norm();
+        if moved_m > 3e-4 {
+            return Outcome::Wrong(format!("moved by {moved_m} m at touch {i}"));
         }
     }
     Outcome::Stable

@@ -1,12 +1,13 @@
 //! Belief of the heights of a surface over a zone: a Gaussian process with its uncertainty.
 
+use crate::evidence::{Contact, End, FreeVolume};
 use crate::free_space::FreeSpaceBound;
 use crate::gp_settings::{Band, BandName, GpSettings};
-use crate::probe::{Contact, SweptVolume};
 use crate::robot::Finger;
-use crate::surface_evidence::{SurfaceEvidence, seen_presence};
+use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
-use crate::view::{Offer, RigidError, SeenSurface, View};
+use crate::view::look::{SEEN_NORMAL_Y_MIN, field_gradient};
+use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -19,20 +20,11 @@ use palpate_gp::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Smallest y of a seen normal in the zone that is used.
-// heuristic: a steeper wall's height is uncertain by four times the error of its place.
-const SEEN_NORMAL_Y_MIN: f64 = 0.25;
-
 /// Largest signal's standard deviation with a view, over the heights' root mean square. Many
 /// heights of a smooth surface make ever larger ones more likely, and with them rounding errors of
 /// the camera's pose.
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
-
-/// Number of surface elements of a view.
-// heuristic: as dense as a Gaussian process of a surface with details of a tenth of the image
-// needs; an update grows as the cube.
-const SEEN: usize = 250;
 
 /// Number of seen heights of a view that a fit uses.
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
@@ -59,15 +51,13 @@ pub struct HeightField {
     pub(super) touched: Vec<Contact>,
     /// Surfaces that cameras have seen, one per view.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    seen: Vec<SeenSurface>,
+    pub(super) seen: Vec<SeenSurface>,
     /// Upper bound from free space, if that is enabled.
     ceiling: Option<FreeSpaceBound>,
     pub(super) presence: SurfaceEvidence,
     /// Space swept by the touches with contact, if the band uses it.
     #[serde(default)]
-    pub(super) swept: Vec<SweptVolume>,
-    /// Whether the last touch was a miss.
-    pub(super) has_missed: bool,
+    pub(super) swept: Vec<FreeVolume>,
     /// Finger of the touches, if known.
     #[serde(default)]
     pub(super) finger: Option<Finger>,
@@ -96,7 +86,6 @@ impl HeightField {
             kernels: KernelSelection::new(settings.kernel.names()),
             presence: SurfaceEvidence::new(&zone),
             swept: Vec::new(),
-            has_missed: false,
             finger: None,
             zone,
             settings,
@@ -118,27 +107,9 @@ impl HeightField {
         self
     }
 
-    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit).
-    /// Returns what it shows of the zone.
-    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        let zone = &self.zone;
-        let margin_m = view.margin_m();
-        let wanted = |p_w: &Point3<f64>| zone.is_near(p_w, margin_m);
-        let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
-        let mut seen = SeenSurface::new(view, (wanted, SEEN), gradient);
-        seen.presence = seen_presence(zone, view);
-        self.observe_seen(seen)
-    }
-
-    /// Returns the gradient in `W` of the height above a surface with this normal.
-    fn height_gradient(&self, normal_w: &UnitVector3<f64>) -> Vector3<f64> {
-        let up = self.zone.x_wz().inverse_transform_vector(normal_w).y;
-        normal_w.into_inner() / up.abs().max(SEEN_NORMAL_Y_MIN)
-    }
-
     /// Returns what a look would show at `places` if the surface is the mean; `None` before the
     /// first fit.
-    pub fn imagined(&self, offer: &Offer, places: &[Vec<f64>]) -> Option<SeenSurface> {
+    pub fn imagined(&self, offer: &LookOffer, places: &[Vec<f64>]) -> Option<SeenSurface> {
         let (posterior, zone) = (self.surface.as_ref()?, &self.zone);
         let scratch = &mut Scratch::default();
         let mut point = |place: &Vec<f64>| {
@@ -151,16 +122,9 @@ impl HeightField {
             !zone.contains(&place) || zone.height_m(p_w) > posterior.mean(&place, scratch)
         };
         let hides = (zone.widest_m(), is_free);
-        let gradient = |normal_w: &UnitVector3<f64>| self.height_gradient(normal_w);
+        let region = zone.clone().into();
+        let gradient = |normal_w: &UnitVector3<f64>| field_gradient(&region, normal_w);
         Some(SeenSurface::imagined(offer, points.into_iter(), hides, gradient))
-    }
-
-    /// Adds a view that is thinned already.
-    pub fn observe_seen(&mut self, seen: SeenSurface) -> &SeenSurface {
-        self.presence.add_seen(&seen.presence);
-        let number = self.seen.len();
-        self.seen.push(seen);
-        &self.seen[number]
     }
 
     /// The surfaces that cameras have seen, one per view.
@@ -225,20 +189,16 @@ impl HeightField {
         is_changed
     }
 
-    /// Adds the volume swept by the last touch: the surface is below it after a contact, and absent
-    /// there after a miss.
-    pub fn observe_swept(&mut self, swept: &SweptVolume) {
-        self.presence.add_hull(swept, self.has_missed);
-        self.lower(swept);
-    }
-
-    /// Adds free space above the surface.
-    pub(super) fn lower(&mut self, swept: &SweptVolume) {
-        if !self.has_missed && self.settings.band.learned().is_some() {
-            self.swept.push(swept.clone());
+    /// Adds free space above the surface; a miss has found none.
+    pub(super) fn lower(&mut self, free: &FreeVolume) {
+        if free.end == End::Miss {
+            return;
         }
-        if let Some(ceiling) = self.ceiling.as_mut().filter(|_| !self.has_missed) {
-            ceiling.lower(&self.zone, swept);
+        if self.settings.band.learned().is_some() {
+            self.swept.push(free.clone());
+        }
+        if let Some(ceiling) = &mut self.ceiling {
+            ceiling.lower(&self.zone, free);
         }
     }
 

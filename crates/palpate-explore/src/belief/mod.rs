@@ -1,134 +1,122 @@
-//! Belief after some touches: a Gaussian process over a zone or in space.
+//! Belief after some actions: the surface in a zone or a ball, and hypotheses about the object.
 
 mod height_field;
+mod over_zone;
 mod quantiles;
+mod random_field;
 mod reach;
+mod solid;
+mod surface_belief;
 mod touches;
 
 pub use height_field::HeightField;
+pub(crate) use over_zone::LOOKED_AT;
 pub use quantiles::BAND;
+pub use random_field::{RandomField, Reduction};
+pub use surface_belief::{BelievedSurface, Deviation, HeightPredictions, SurfaceBelief};
 
+use super::evidence::Outcome;
 use super::gp_settings::GpSettings;
-use super::probe::Outcome;
 use super::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use crate::recognition::ObjectHypotheses;
-use crate::robot::Finger;
-use crate::task::{Approach, Region, Target, Task};
-use crate::view::{RigidError, SeenSurface, View};
-use palpate_gp::Posterior;
+use crate::robot::sensor::TipSurface;
+use crate::task::{Region, Target, Task};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_input::error::InputError;
 use palpate_input::format;
 use serde::{Deserialize, Serialize};
+use std::ops::Deref;
 
-/// Belief of one trial.
+/// Belief of one trial: a belief of the surface, whose methods it has, and hypotheses about the
+/// object.
 ///
 /// To store a belief use [`to_json`](Self::to_json) and [`from_json`](Self::from_json), which
-/// computes the posterior again; hypotheses are not stored.
-#[derive(Clone, Serialize, Deserialize)]
+/// computes the posterior again.
 pub struct Belief {
-    #[serde(flatten)]
-    surface: SurfaceBelief,
+    surface: Box<dyn SurfaceBelief>,
     /// Hypotheses about the object, where the scene has a library.
-    #[serde(skip)]
     hypotheses: Option<ObjectHypotheses>,
 }
 
-/// Belief of a surface. Both variants are large, and few exist at a time.
-#[derive(Clone, Serialize, Deserialize)]
+/// Belief of a surface as it is stored.
+#[derive(Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)]
-pub enum SurfaceBelief {
-    /// Heights over a zone.
+enum StoredBelief {
     HeightField(HeightField),
-    /// A closed surface in a ball.
     ImplicitSurface(ImplicitSurface),
 }
 
 impl Belief {
-    /// Creates a belief without data for `task` and `finger`; the flag marks a soft finger.
+    /// Creates a belief without data for `task` and a tip with this `surface`.
     pub fn new(
         task: &Task,
-        (finger, is_soft): (&Finger, bool),
+        surface: &TipSurface,
         gp: &GpSettings,
         space: &SpatialGpSettings,
     ) -> Self {
         match task.region() {
             Region::Zone(zone) => {
-                HeightField::new(zone.clone(), gp.clone()).with_finger(finger.clone()).into()
+                HeightField::new(zone.clone(), gp.clone()).with_finger(task.finger().clone()).into()
             }
             Region::Ball(ball) => {
-                let scope = ExplorationSetup::new(*ball, task, (finger, is_soft));
+                let scope = ExplorationSetup::new(*ball, task, surface);
                 ImplicitSurface::new(scope, space.clone()).into()
             }
         }
     }
 
-    /// Adds what a touch at `target` that followed `approach` has shown; the belief changes at the
-    /// next [`refit`](Self::refit).
-    pub fn observe(&mut self, target: &Target, approach: &Approach, outcome: &Outcome) {
+    /// Adds what an action at `target` has shown; the belief of the surface changes at the next
+    /// [`refit`](SurfaceBelief::refit).
+    pub fn observe(&mut self, target: &Target, outcome: &Outcome) {
         if let Some(hypotheses) = &mut self.hypotheses {
-            hypotheses.observe(approach, outcome);
+            hypotheses.observe(outcome);
         }
-        match (&mut self.surface, target.aim()) {
-            (SurfaceBelief::HeightField(field), _) => field.observe_target(target, outcome),
-            (SurfaceBelief::ImplicitSurface(surface), Some(aim)) => {
-                surface.observe(aim, approach, outcome);
-            }
-            (SurfaceBelief::ImplicitSurface(_), None) => {}
-        }
+        self.surface.observe(target, outcome);
     }
 
-    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
-    /// it shows.
-    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        let seen = match &mut self.surface {
-            SurfaceBelief::HeightField(field) => field.observe_view(view),
-            SurfaceBelief::ImplicitSurface(surface) => surface.observe_view(view),
-        };
-        if let Some(hypotheses) = &mut self.hypotheses {
-            hypotheses.observe_view(seen);
-        }
-        seen
-    }
-
-    /// Returns the error of the camera's pose in each view, after a fit.
-    pub fn rigid_errors(&self) -> Vec<RigidError> {
-        match &self.surface {
-            SurfaceBelief::HeightField(field) => field.rigid_errors(),
-            SurfaceBelief::ImplicitSurface(surface) => surface.rigid_errors(),
-        }
-    }
-
-    /// Fits the hyperparameters by maximum likelihood and conditions on all touches.
+    /// Fits the surface; see [`SurfaceBelief::refit`].
     ///
     /// # Errors
-    /// If the covariance of the touches cannot be factored.
-    pub fn refit(&mut self) -> Result<&Fit, CovarianceError> {
-        match &mut self.surface {
-            SurfaceBelief::HeightField(field) => field.refit().map(|(fit, _)| fit),
-            SurfaceBelief::ImplicitSurface(surface) => surface.refit().map(|(fit, _)| fit),
-        }
+    /// If the covariance of the evidence cannot be factored.
+    pub fn refit(&mut self) -> Result<(), CovarianceError> {
+        self.surface.refit()
     }
 
-    /// Conditions on all touches with the hyperparameters of the last fit.
+    /// Conditions the surface on all evidence with the hyperparameters of the last fit.
     ///
     /// # Errors
-    /// If the covariance of the touches cannot be factored.
+    /// If the covariance of the evidence cannot be factored.
     pub fn condition(&mut self) -> Result<(), CovarianceError> {
         let Some(fit) = self.fit().cloned() else { return Ok(()) };
-        match &mut self.surface {
-            SurfaceBelief::HeightField(field) => field.condition(&fit),
-            SurfaceBelief::ImplicitSurface(surface) => surface.condition(Some(&fit), &fit),
-        }
+        self.surface.condition(Some(&fit), &fit)
     }
 
-    /// Returns the touches, the settings and the last fit as JSON.
+    /// Conditions the surface on all evidence with the hyperparameters of `fit`, which started
+    /// from `before`, e.g. to draw a recorded belief.
     ///
     /// # Errors
-    /// If memory is exhausted.
+    /// If the covariance of the evidence cannot be factored.
+    pub fn condition_on(&mut self, before: Option<&Fit>, fit: &Fit) -> Result<(), CovarianceError> {
+        self.surface.condition(before, fit)
+    }
+
+    /// Returns the evidence, the settings and the last fit as JSON.
+    ///
+    /// # Errors
+    /// If the belief has hypotheses, which depend on all draws of random numbers before, or is not
+    /// a height field or an implicit surface.
     pub fn to_json(&self) -> Result<String, InputError> {
-        serde_json::to_string(self).map_err(|error| InputError::new(format::json(&error)))
+        if self.hypotheses.is_some() {
+            return Err(InputError::new("a belief with hypotheses about the object is not stored")
+                .remedy("store the row of the trial, from which it is made again"));
+        }
+        let stored = match (self.height_field(), self.implicit_surface()) {
+            (Some(field), _) => StoredBelief::HeightField(field.clone()),
+            (None, Some(surface)) => StoredBelief::ImplicitSurface(surface.clone()),
+            (None, None) => return Err(InputError::new("this kind of belief is not stored")),
+        };
+        serde_json::to_string(&stored).map_err(|error| InputError::new(format::json(&error)))
     }
 
     /// Reads a belief from [`to_json`](Self::to_json) and conditions it again: its posterior is
@@ -137,51 +125,15 @@ impl Belief {
     /// # Errors
     /// If the text is not that of a belief, or the covariance of the touches cannot be factored.
     pub fn from_json(text: &str) -> Result<Self, InputError> {
-        let mut belief: Self = serde_json::from_str(text)
+        let stored: StoredBelief = serde_json::from_str(text)
             .map_err(|error| InputError::new(format::json(&error)).at("belief"))?;
-        let restored = match &mut belief.surface {
-            SurfaceBelief::HeightField(field) => field.restore(),
-            SurfaceBelief::ImplicitSurface(surface) => surface.restore(),
+        let restored = match stored {
+            StoredBelief::HeightField(mut field) => field.restore().map(|()| field.into()),
+            StoredBelief::ImplicitSurface(mut surface) => {
+                surface.restore().map(|()| surface.into())
+            }
         };
-        restored.map_err(|error| InputError::new(error.to_string()).at("belief"))?;
-        Ok(belief)
-    }
-
-    /// Returns the result of the last [`refit`](Self::refit).
-    pub fn fit(&self) -> Option<&Fit> {
-        match &self.surface {
-            SurfaceBelief::HeightField(field) => field.fit(),
-            SurfaceBelief::ImplicitSurface(surface) => surface.fit(),
-        }
-    }
-
-    /// The Gaussian process, after the first fit: heights over places of a zone, or a field over
-    /// points of `W` whose zero set is the surface.
-    pub fn posterior(&self) -> Option<&Posterior> {
-        match &self.surface {
-            SurfaceBelief::HeightField(field) => field.surface(),
-            SurfaceBelief::ImplicitSurface(surface) => Some(surface.surface()?.posterior()),
-        }
-    }
-
-    /// Largest jitter added to a covariance of this belief, relative to its diagonal.
-    pub fn jitter(&self) -> f64 {
-        match &self.surface {
-            SurfaceBelief::HeightField(field) => field.jitter(),
-            SurfaceBelief::ImplicitSurface(_) => self.posterior().map_or(0.0, Posterior::jitter),
-        }
-    }
-
-    /// All targets so far.
-    pub fn targets(&self) -> Vec<Target> {
-        match &self.surface {
-            SurfaceBelief::HeightField(field) => {
-                field.targets().iter().cloned().map(Target::from).collect()
-            }
-            SurfaceBelief::ImplicitSurface(surface) => {
-                surface.aims().iter().copied().map(Target::from).collect()
-            }
-        }
+        restored.map_err(|error: CovarianceError| InputError::new(error.to_string()).at("belief"))
     }
 
     /// Adds hypotheses about the object in the region.
@@ -195,35 +147,27 @@ impl Belief {
     }
 
     /// Returns the belief of the surface.
-    pub fn surface(&self) -> &SurfaceBelief {
-        &self.surface
-    }
-
-    /// Returns the belief over a zone, if it is one.
-    pub fn height_field(&self) -> Option<&HeightField> {
-        match &self.surface {
-            SurfaceBelief::HeightField(field) => Some(field),
-            SurfaceBelief::ImplicitSurface(_) => None,
-        }
-    }
-
-    /// Returns the belief of a whole object, if it is one.
-    pub fn implicit_surface(&self) -> Option<&ImplicitSurface> {
-        match &self.surface {
-            SurfaceBelief::HeightField(_) => None,
-            SurfaceBelief::ImplicitSurface(surface) => Some(surface),
-        }
+    pub fn surface(&self) -> &dyn SurfaceBelief {
+        &*self.surface
     }
 }
 
-impl From<HeightField> for Belief {
-    fn from(field: HeightField) -> Self {
-        Self { surface: SurfaceBelief::HeightField(field), hypotheses: None }
+impl Clone for Belief {
+    fn clone(&self) -> Self {
+        Self { surface: self.surface.boxed(), hypotheses: self.hypotheses.clone() }
     }
 }
 
-impl From<ImplicitSurface> for Belief {
-    fn from(surface: ImplicitSurface) -> Self {
-        Self { surface: SurfaceBelief::ImplicitSurface(surface), hypotheses: None }
+impl Deref for Belief {
+    type Target = dyn SurfaceBelief;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.surface
+    }
+}
+
+impl<B: SurfaceBelief + 'static> From<B> for Belief {
+    fn from(surface: B) -> Self {
+        Self { surface: Box::new(surface), hypotheses: None }
     }
 }

@@ -30,7 +30,7 @@ impl HeightField {
     }
 
     /// Returns [`quantiles_m`](Self::quantiles_m) from the predictions of the surface at `places`.
-    pub fn predicted_quantiles_m(
+    pub(super) fn predicted_quantiles_m(
         &self,
         places: &[impl AsRef<[f64]>],
         predictions: &[Prediction],

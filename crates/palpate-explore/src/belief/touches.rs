@@ -1,7 +1,7 @@
 //! Observations that a belief takes from touches and strokes.
 
 use super::HeightField;
-use crate::probe::{Contact, Outcome, SweptVolume, Touch};
+use crate::evidence::{Contact, End, Evidence, FreeVolume, Outcome, Source, SurfacePoints};
 use crate::task::Target;
 use crate::task::stroke::FIRST_SOURCE;
 use nalgebra::Vector3;
@@ -29,91 +29,93 @@ const STROKE_STEP: f64 = 0.03;
 const STROKE_FITTED: usize = 3;
 
 impl HeightField {
-    /// Adds what a touch or stroke at `target` has shown; nothing for a target that is not a place
-    /// of a zone. The belief changes at the next [`refit`](Self::refit).
-    pub fn observe_target(&mut self, target: &Target, outcome: &Outcome) {
+    /// Adds what an action at `target` has shown; the belief changes at the next
+    /// [`refit`](Self::refit). A target of another region shows nothing.
+    pub fn observe(&mut self, target: &Target, outcome: &Outcome) {
+        if outcome.end == End::Looked {
+            return outcome.evidence.iter().for_each(|evidence| self.add(evidence));
+        }
         let Some(place) = target.place() else { return };
-        if target.slide_m() > 0.0 {
-            return self.observe_stroke(place, outcome);
+        self.targets.push(place.into());
+        outcome.evidence.iter().for_each(|evidence| self.add(evidence));
+        if let Some((points, free)) = outcome.surface_points().zip(outcome.free()) {
+            self.add_path(points, free);
         }
-        self.observe(place, &outcome.touch);
-        outcome.swept.iter().for_each(|swept| self.observe_swept(swept));
-    }
-
-    /// Adds a stroke that began at `target` with the volume swept by then, thinned.
-    fn observe_stroke(&mut self, target: &[f64], outcome: &Outcome) {
-        let thinned = match &outcome.touch {
-            Touch::Contact(contact) => {
-                Touch::Contact(contact.thinned(STROKE_STEP * self.zone.widest_m()))
-            }
-            other => other.clone(),
-        };
-        let number = FIRST_SOURCE + self.targets.len();
-        self.observe_points((target, &thinned), STROKE_FITTED, Some(number));
-        let Some(swept) = &outcome.swept else { return };
-        self.observe_swept(swept);
-        if let Touch::Contact(contact) = &thinned {
-            let finger = &swept.finger;
-            for point in contact.patch.iter().filter(|point| point.has_normal) {
-                let p_wt = point.p_wc + point.normal_w * finger.radius_m;
-                self.lower(&SweptVolume { finger: finger.clone(), p_wt });
-                let place = self.zone.local(&self.zone.place(&point.p_wc), 0.0);
-                self.presence.add_seen(&[([place.x, place.z], 1.0)]);
-            }
-        }
-    }
-
-    /// Adds a touch; the belief changes at the next [`refit`](Self::refit).
-    pub fn observe(&mut self, target: &[f64], touch: &Touch) {
-        self.observe_points((target, touch), usize::MAX, None);
-    }
-
-    /// Adds a touch, of whose further points every `fitted`-th takes part in fits. With a `source`,
-    /// the errors that their sensor states are one that they have in common.
-    fn observe_points(
-        &mut self,
-        (target, touch): (&[f64], &Touch),
-        fitted: usize,
-        source: Option<usize>,
-    ) {
-        self.targets.push(target.into());
-        self.has_missed = *touch == Touch::Miss;
-        let reached = match touch {
-            Touch::Contact(contact) => {
-                self.presence.add_contact(target, contact);
-                self.touched.push(contact.clone());
-                for (i, point) in contact.points().enumerate() {
-                    let slope = self.slope(&point.normal_w).filter(|_| point.has_normal);
-                    let slope =
-                        slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
-                    let place = self.zone.place(&point.p_wc);
-                    let (height, stated) = (self.zone.height_m(&point.p_wc), self.noise(point));
-                    let common = [stated * self.noise_unit_m()];
-                    let known = source.map(|source| KnownError {
-                        variance: 0.0,
-                        source,
-                        loadings: &common,
-                    });
-                    let noise = if source.is_some() { 1.0 } else { stated };
-                    let is_fitted = i % fitted == 0;
-                    let to = if is_fitted { &mut self.contacts } else { &mut self.patches };
-                    to.push(&Observation { place: &place, height, noise, slope, known });
-                }
-                let place = self.zone.place(&contact.p_wc);
-                self.zone.distance(&place, target) <= REACHED_WITHIN
-            }
-            Touch::Miss | Touch::Overload => false,
-        };
+        let reached = outcome.contact().is_some_and(|contact| {
+            self.zone.distance(&self.zone.place(&contact.p_wc), place) <= REACHED_WITHIN
+        });
         if !reached {
-            self.unreached.push(target.into());
+            self.unreached.push(place.into());
         }
+    }
+
+    /// Adds evidence that belongs to the last target; the belief changes at the next
+    /// [`refit`](Self::refit).
+    pub fn add(&mut self, evidence: &Evidence) {
+        match evidence {
+            Evidence::Points(points) => self.add_points(points),
+            Evidence::Free(free) => {
+                self.presence.add_hull(free);
+                self.lower(free);
+            }
+            Evidence::Seen(seen) => {
+                self.presence.add_seen(&seen.presence);
+                self.seen.push(seen.clone());
+            }
+        }
+    }
+
+    /// Adds points of the surface. Of points with a common error, some are dense enough, and some
+    /// of these take part in fits; of others, the first one does.
+    fn add_points(&mut self, points: &SurfacePoints) {
+        let number = FIRST_SOURCE + self.touched.len();
+        let (thinned, fitted, source) = match points.source {
+            Some(_) => (points.thinned(self.stroke_step_m()), STROKE_FITTED, Some(number)),
+            None => (points.clone(), usize::MAX, None),
+        };
+        let Some(first) = thinned.points.first() else { return };
+        let own_place = self.zone.place(&first.p_wc);
+        let target = self.targets.last().unwrap_or(&own_place);
+        self.presence.add_contact(target, first, thinned.points.len() > 1);
+        self.touched.push(first.clone());
+        for (i, point) in thinned.points.iter().enumerate() {
+            let slope = self.slope(&point.normal_w).filter(|_| point.has_normal);
+            let slope = slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
+            let place = self.zone.place(&point.p_wc);
+            let (height, stated) = (self.zone.height_m(&point.p_wc), self.noise(point));
+            let common = [stated * self.noise_unit_m()];
+            let known =
+                source.map(|source| KnownError { variance: 0.0, source, loadings: &common });
+            let noise = if source.is_some() { 1.0 } else { stated };
+            let to = if i % fitted == 0 { &mut self.contacts } else { &mut self.patches };
+            to.push(&Observation { place: &place, height, noise, slope, known });
+        }
+    }
+
+    /// Adds the free space above the points of a stroke, and that there is a surface at each.
+    fn add_path(&mut self, points: &SurfacePoints, free: &FreeVolume) {
+        if points.source != Some(Source::Stroke) {
+            return;
+        }
+        let thinned = points.thinned(self.stroke_step_m());
+        for point in thinned.points.iter().skip(1).filter(|point| point.has_normal) {
+            let p_wt = point.p_wc + point.normal_w * free.finger.radius_m;
+            self.lower(&FreeVolume { p_wt, ..free.clone() });
+            let place = self.zone.local(&self.zone.place(&point.p_wc), 0.0);
+            self.presence.add_seen(&[([place.x, place.z], 1.0)]);
+        }
+    }
+
+    /// Distance between the points of a stroke that are used, m.
+    fn stroke_step_m(&self) -> f64 {
+        STROKE_STEP * self.zone.widest_m()
     }
 
     /// Returns the noise of a contact's height relative to that of an exact one: the deviation of
     /// its surface along the normal, over the normal's part along the heights.
     fn noise(&self, contact: &Contact) -> f64 {
         let normal_y = self.zone.x_wz().inverse_transform_vector(&contact.normal_w).y;
-        let sd_m = contact.sd_m.unwrap_or(0.0) / normal_y.max(NORMAL_Y_MIN);
+        let sd_m = contact.sd_m().unwrap_or(0.0) / normal_y.max(NORMAL_Y_MIN);
         (sd_m / self.noise_unit_m()).max(1.0)
     }
 

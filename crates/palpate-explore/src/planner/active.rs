@@ -1,36 +1,25 @@
 //! Planner `active`: touches where the posterior standard deviation is largest (Yi et al. 2016,
 //! Algorithm 1). For a whole object, it is the standard deviation of the surface along its normal.
 
-use super::candidates::Candidates;
-use super::plan::{Plan, PlannerEntry};
+use super::plan::PlannerEntry;
 use super::search::Search;
-use crate::belief::{Belief, SurfaceBelief};
+use crate::belief::Belief;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "active",
     about: "largest posterior standard deviation, by DIRECT then BFGS (Yi et al. 2016)",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
-        Box::new(move |belief: &Belief| Ok(plan(&mut search, belief)))
+        // The maximum of the variance is that of its root, and its gradient is finite everywhere.
+        Box::new(move |belief: &Belief| {
+            Ok(match belief.explorable() {
+                None => search.anywhere(belief),
+                Some(_) => search
+                    .plan(belief, |points, gradients| belief.surface_variances(points, gradients)),
+            })
+        })
     },
 };
-
-/// Finds the maximum of the variance instead of its root: both have the same maximum, and the
-/// gradient of the variance is finite everywhere.
-fn plan(search: &mut Search, belief: &Belief) -> Plan {
-    match belief.surface() {
-        SurfaceBelief::HeightField(field) => match field.planning_posterior() {
-            None => search.anywhere(field.zone()),
-            Some(known) => {
-                search.plan(field, |places, gradients| known.variances(places, gradients))
-            }
-        },
-        SurfaceBelief::ImplicitSurface(surface) => {
-            Candidates::plan(surface, &mut search.rng, |candidates| {
-                candidates.all.iter().map(|candidate| candidate.offset_m).collect()
-            })
-        }
-    }
-}

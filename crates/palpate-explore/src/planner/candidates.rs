@@ -2,10 +2,9 @@
 //! them is free, and where the space is still unexplored.
 
 use super::plan::{Fallback, Plan};
-use super::sample::{in_ball, random_aim};
-use crate::task::{Aim, any_orthogonal};
+use super::sample::{in_ball, random_target};
+use crate::task::{Aim, Target, any_orthogonal};
 use crate::whole_object::ImplicitSurface;
-use crate::whole_object::surface::{Surface, steepness};
 use nalgebra::{Point3, UnitVector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -22,14 +21,11 @@ pub struct Candidate {
     pub p_w: Point3<f64>,
     /// Unit outward normal at the point.
     pub normal_w: UnitVector3<f64>,
-    /// Standard deviation of the surface's position along the normal, σ / |∇f|.
-    pub offset_m: f64,
 }
 
 /// Candidate targets spread over the estimated surface.
 pub struct Candidates<'a> {
     belief: &'a ImplicitSurface,
-    surface: &'a Surface,
     /// The candidates, in no particular order.
     pub all: Vec<Candidate>,
 }
@@ -40,13 +36,17 @@ impl<'a> Candidates<'a> {
     pub fn new(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
         let surface = belief.surface()?;
         let points_w = surface.points(CELLS, MOST, |step| rng.random_range(0..step))?;
-        let beliefs = surface.sds_m(&points_w).into_iter().zip(surface.fields(&points_w));
-        let all = points_w.into_iter().zip(beliefs).filter_map(|(p_w, (sd_m, field))| {
-            let gradient = field.gradient;
-            let normal_w = UnitVector3::try_new(gradient, 1e-9)?;
-            Some(Candidate { p_w, normal_w, offset_m: sd_m / steepness(&gradient) })
+        let fields = surface.fields(&points_w);
+        let all = points_w.into_iter().zip(fields).filter_map(|(p_w, field)| {
+            let normal_w = UnitVector3::try_new(field.gradient, 1e-9)?;
+            Some(Candidate { p_w, normal_w })
         });
-        Some(Self { belief, surface, all: all.collect() })
+        Some(Self { belief, all: all.collect() })
+    }
+
+    /// Returns the points of the candidates.
+    pub fn points(&self) -> Vec<Vec<f64>> {
+        self.all.iter().map(|candidate| candidate.p_w.coords.as_slice().into()).collect()
     }
 
     /// Plans a touch at the candidate with the highest score whose approach is free; every few
@@ -54,37 +54,29 @@ impl<'a> Candidates<'a> {
     pub fn plan(
         belief: &ImplicitSurface,
         rng: &mut ChaCha8Rng,
-        score: impl FnOnce(&Candidates) -> Vec<f64>,
+        score: impl FnOnce(&[Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
         if let Some(aim) = explore_unknown(belief, rng) {
             return Plan::at(aim);
         }
-        let aside = random_aim(belief.scope(), rng);
+        let aside = random_target(belief, rng);
         match Candidates::new(belief, rng) {
-            Some(candidates) => candidates.best(score(&candidates).into_iter(), &aside),
+            Some(candidates) => candidates.best(score(&candidates.points()).into_iter(), aside),
             None => Plan::at(aside),
         }
     }
 
-    /// The surface of the candidates.
-    pub fn surface(&self) -> &Surface {
-        self.surface
-    }
-
     /// Plans a touch at the candidate with the highest score whose approach is free; `anywhere` if
     /// none is. `scores` has one value per candidate, in their order.
-    pub fn best(&self, scores: impl Iterator<Item = f64>, anywhere: &Aim) -> Plan {
+    pub fn best(&self, scores: impl Iterator<Item = f64>, anywhere: Target) -> Plan {
         let mut order: Vec<(f64, &Candidate)> = scores.zip(&self.all).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
         let free = order.into_iter().find_map(|(_, candidate)| {
-            let place = (&candidate.p_w, &candidate.normal_w);
-            let aim = free_aim(self.belief, place)?;
-            Some(Plan { sd_m: Some(candidate.offset_m), ..Plan::at(aim) })
+            let aim = free_aim(self.belief, candidate)?;
+            let offset_m = self.belief.surface()?.offsets_m(&[candidate.p_w]).first().copied();
+            Some(Plan { sd_m: offset_m, ..Plan::at(aim) })
         });
-        free.unwrap_or_else(|| Plan {
-            fallback: Some(Fallback::Unreachable),
-            ..Plan::at(*anywhere)
-        })
+        free.unwrap_or_else(|| Plan { fallback: Some(Fallback::Unreachable), ..Plan::at(anywhere) })
     }
 }
 
@@ -99,13 +91,10 @@ const SLANT: f64 = 0.3;
 const NEAR: f64 = 0.25;
 const ALONG: f64 = 0.97;
 
-/// Returns an aim at the surface point `p_w` with outward normal `normal_w` whose approach is clear
+/// Returns an aim at a candidate whose approach is clear
 /// of the estimated surface: against the normal if possible, tilted otherwise. Returns `None` if
 /// there is none that differs from all earlier targets.
-pub fn free_aim(
-    belief: &ImplicitSurface,
-    (p_w, normal_w): (&Point3<f64>, &UnitVector3<f64>),
-) -> Option<Aim> {
+pub fn free_aim(belief: &ImplicitSurface, Candidate { p_w, normal_w }: &Candidate) -> Option<Aim> {
     let ball = &belief.scope().ball;
     let outward_w = (p_w - ball.centre_w).try_normalize(1e-12).unwrap_or(**normal_w);
     let beside_w = any_orthogonal(normal_w);

@@ -15,12 +15,13 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "a lattice from coarse to fine, no model",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |_, _| {
         let mut next_level = 0;
         // Remaining nodes of this level, the next one last, as fractions in 0..1.
         let mut rest: Vec<Vec<f64>> = Vec::new();
         Box::new(move |belief: &Belief| {
-            let target = target_from_fractions(belief, |dimension| {
+            let target = target_from_fractions(belief.surface(), |dimension| {
                 loop {
                     match rest.pop() {
                         Some(node) => break node,

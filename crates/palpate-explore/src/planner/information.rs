@@ -8,12 +8,13 @@
 //! that about the pose is their difference.
 
 use super::active;
+use super::offer::Offer;
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
 use super::sample::random_target;
 use super::settings::PlanningSettings;
 use crate::belief::Belief;
 use crate::recognition::{Hypothesis, ObjectHypotheses, Prediction};
-use crate::task::{Aim, Target};
+use crate::task::Target;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -22,6 +23,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "most expected information about object and pose, with a library",
     zone_only: None,
     needs_library: true,
+    plans_strokes: false,
     make: |settings, rng| planner(Goal::Both, settings, rng),
 };
 
@@ -75,17 +77,17 @@ struct InformationPlanner {
 }
 
 impl Planner for InformationPlanner {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
         let hypotheses = belief.hypotheses().ok_or("it needs a scene with a library")?;
         if hypotheses.is_unknown() && belief.fit().is_some() {
-            return self.surface.plan(belief);
+            return self.surface.plan(belief, offer);
         }
         let drawn = hypotheses.draw(HYPOTHESES, &mut self.rng);
         let mut best = (f64::NEG_INFINITY, None);
         for number in 0..CANDIDATES {
             let is_random = (number as f64) < RANDOM_SHARE * CANDIDATES as f64;
             let target = match is_random {
-                true => random_target(belief, &mut self.rng),
+                true => random_target(belief.surface(), &mut self.rng),
                 false => self.on_a_surface(belief, hypotheses, &drawn),
             };
             let Some(gain) = self.information(hypotheses, &drawn, &target) else { continue };
@@ -93,7 +95,7 @@ impl Planner for InformationPlanner {
                 best = (gain, Some(target));
             }
         }
-        let target = best.1.unwrap_or_else(|| random_target(belief, &mut self.rng));
+        let target = best.1.unwrap_or_else(|| random_target(belief.surface(), &mut self.rng));
         Ok(Plan::at(target))
     }
 }
@@ -109,15 +111,8 @@ impl InformationPlanner {
     ) -> Target {
         let hypothesis = &drawn[self.rng.random_range(0..drawn.len())];
         let p_w = hypotheses.surface_point_w(hypothesis, self.rng.random_range(0..usize::MAX / 2));
-        let random = random_target(belief, &mut self.rng);
-        match (belief.height_field(), random.aim()) {
-            (Some(field), _) => {
-                let place = field.zone().place(&p_w);
-                if field.zone().contains(&place) { place.into() } else { random }
-            }
-            (None, Some(aim)) => Target::Aim(Aim { p_w, ..*aim }),
-            (None, None) => random,
-        }
+        let random = random_target(belief.surface(), &mut self.rng);
+        belief.region().touch_of(random, p_w)
     }
 
     /// Returns the expected information of a touch, nats; `None` for a target out of reach.

@@ -9,6 +9,7 @@ mod information;
 mod integrated_variance;
 pub mod look;
 mod object_information;
+mod offer;
 mod plan;
 mod pose_information;
 mod random;
@@ -24,22 +25,19 @@ pub mod stroke;
 mod travel;
 mod ucb;
 
-pub use plan::{Fallback, Plan, PlanError, Planner, PlannerEntry, PlannerFactory, zone_planner};
+pub use offer::{ActionKind, LookOffer, Offer, StrokeOffer};
+pub use plan::{
+    Fallback, Plan, PlanError, Planner, PlannerEntry, PlannerFactory, Refined, zone_planner,
+};
 pub use sample::uniform;
 pub use settings::PlanningSettings;
 
-/// Lists the planners of some modules, and each with the suffix `(taps)`.
+/// Lists the planners of some modules.
 macro_rules! planners {
     ($($module:ident: $name:literal,)*) => {
         /// All built-in planners; add one line per planner.
         pub const PLANNERS: &[PlannerEntry] =
             &[$(PlannerEntry { name: $name, ..$module::ENTRY },)*];
-
-        /// The same planners, which tap where the scene allows strokes too.
-        pub const TAPPING: &[PlannerEntry] = &[$(PlannerEntry {
-            name: concat!($name, "(taps)"),
-            ..$module::ENTRY
-        },)*];
     };
 }
 
@@ -75,5 +73,13 @@ pub fn is_external(name: &str) -> bool {
 
 /// Returns the planner with this name.
 pub fn by_name(name: &str) -> Option<&'static PlannerEntry> {
-    PLANNERS.iter().chain(TAPPING).find(|entry| entry.name == name)
+    PLANNERS.iter().find(|entry| entry.name == name)
+}
+
+/// Returns the factory of a built-in planner that is offered only some kinds of actions:
+/// `active(tap, look)`. `None` for another name.
+pub fn restricted(name: &str) -> Option<Box<dyn PlannerFactory>> {
+    let (base, actions) = name.strip_suffix(')')?.split_once('(')?;
+    let (entry, actions) = (by_name(base)?, ActionKind::parse(actions)?);
+    Some(Box::new(plan::Restricted { name: name.into(), entry, actions }))
 }

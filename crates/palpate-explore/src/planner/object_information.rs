@@ -8,5 +8,6 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "most expected information about the object, with a library",
     zone_only: None,
     needs_library: true,
+    plans_strokes: false,
     make: |settings, rng| planner(Goal::Object, settings, rng),
 };

@@ -1,10 +1,10 @@
 //! The planner trait: selects the next target from the belief alone.
 
+use super::offer::{ActionKind, Offer};
 use super::settings::PlanningSettings;
-use super::stroke::StrokeOffer;
-use crate::belief::{Belief, HeightField};
-use crate::task::Target;
-use crate::view::Offer;
+use super::{look, stroke};
+use crate::belief::Belief;
+use crate::task::{Target, Zone};
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,36 +14,48 @@ use thiserror::Error;
 ///
 /// ```
 /// use palpate_explore::belief::Belief;
-/// use palpate_explore::planner::{Plan, PlanError, Planner};
+/// use palpate_explore::planner::{Offer, Plan, PlanError, Planner};
 ///
 /// struct Middle;
 ///
 /// impl Planner for Middle {
-///     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-///         let field = belief.height_field().ok_or("it explores zones")?;
-///         Ok(Plan::at(field.zone().at(&[0.5; 2])))
+///     fn plan(&mut self, belief: &Belief, _offer: &Offer) -> Result<Plan, PlanError> {
+///         let region = belief.region();
+///         let zone = region.zone().ok_or("it explores zones")?;
+///         Ok(Plan::at(zone.at(&[0.5; 2])))
 ///     }
 /// }
 /// ```
 ///
 /// This crate depends on no simulator and no ground truth, so a planner cannot access them.
 pub trait Planner: Send {
-    /// Returns the next target.
+    /// Returns the next target: a touch, or a stroke or look of the `offer`.
     ///
     /// # Errors
     /// If the planner returns no target; this ends the trial.
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError>;
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError>;
+}
 
-    /// Returns the touch to make where this planner would tap at `target`, in a scene that allows
-    /// strokes; by default the tap or stroke that [pays](super::stroke::worthwhile).
-    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
-        super::stroke::worthwhile(belief, offer, target)
+/// Planner whose taps are replaced by the look or stroke on offer that pays: one that reduces the
+/// variance over the surface more per time.
+pub struct Refined<P>(pub P);
+
+impl<P: Planner> Planner for Refined<P> {
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
+        let mut plan = self.0.plan(belief, offer)?;
+        if let Some(look) = look::best(belief, offer, &plan.target) {
+            return Ok(Plan::at(Target::Look { camera: look.number }));
+        }
+        if let Some(strokes) = &offer.stroke {
+            plan.target = stroke::best(belief, strokes, plan.target);
+        }
+        Ok(plan)
     }
+}
 
-    /// Returns which of the `offers` of a camera to take before a touch at `target`, after which it
-    /// plans anew; by default the one that [pays](super::look::worthwhile).
-    fn look(&mut self, belief: &Belief, offers: &[Offer], target: &Target) -> Option<usize> {
-        super::look::worthwhile(belief, offers, target)
+impl Planner for Box<dyn Planner> {
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
+        (**self).plan(belief, offer)
     }
 }
 
@@ -100,17 +112,18 @@ impl From<&str> for PlanError {
 }
 
 impl<F: FnMut(&Belief) -> Result<Plan, PlanError> + Send> Planner for F {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+    fn plan(&mut self, belief: &Belief, _offer: &Offer) -> Result<Plan, PlanError> {
         self(belief)
     }
 }
 
 /// Wraps a planner that supports zones only; it returns an error for a whole object.
 pub fn zone_planner(
-    mut plan: impl FnMut(&HeightField) -> Plan + Send + 'static,
+    mut plan: impl FnMut(&Belief, &Zone) -> Plan + Send + 'static,
 ) -> Box<dyn Planner> {
     Box::new(move |belief: &Belief| {
-        Ok(plan(belief.height_field().ok_or("this planner supports zones only")?))
+        let region = belief.region();
+        Ok(plan(belief, region.zone().ok_or("this planner supports zones only")?))
     })
 }
 
@@ -124,6 +137,8 @@ pub struct PlannerEntry {
     pub zone_only: Option<&'static str>,
     /// Whether it plans by hypotheses about the object, which need a library.
     pub needs_library: bool,
+    /// Whether it plans strokes itself; otherwise its taps are [`Refined`].
+    pub plans_strokes: bool,
     /// Creates a planner; the generator is its only source of randomness.
     pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
 }
@@ -146,9 +161,9 @@ pub trait PlannerFactory: Send + Sync {
         None
     }
 
-    /// Whether it only taps, where the scene allows strokes.
-    fn taps(&self) -> bool {
-        false
+    /// Kinds of actions that it is offered.
+    fn actions(&self) -> &[ActionKind] {
+        &ActionKind::ALL
     }
 
     /// Creates a planner for a trial; the generator is its only source of randomness.
@@ -164,11 +179,33 @@ impl PlannerFactory for PlannerEntry {
         self.zone_only
     }
 
-    fn taps(&self) -> bool {
-        self.name.ends_with("(taps)")
+    fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
+        let planner = (self.make)(settings, random);
+        if self.plans_strokes { planner } else { Box::new(Refined(planner)) }
+    }
+}
+
+/// A built-in planner that is offered some kinds of actions only.
+pub(super) struct Restricted {
+    pub name: String,
+    pub entry: &'static PlannerEntry,
+    pub actions: Vec<ActionKind>,
+}
+
+impl PlannerFactory for Restricted {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn zone_only(&self) -> Option<&str> {
+        self.entry.zone_only
+    }
+
+    fn actions(&self) -> &[ActionKind] {
+        &self.actions
     }
 
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
-        (self.make)(settings, random)
+        self.entry.make(settings, random)
     }
 }

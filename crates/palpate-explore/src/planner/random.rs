@@ -9,7 +9,8 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "uniformly random targets (baseline of Yi et al. 2016)",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |_, mut rng| {
-        Box::new(move |belief: &Belief| Ok(Plan::at(random_target(belief, &mut rng))))
+        Box::new(move |belief: &Belief| Ok(Plan::at(random_target(belief.surface(), &mut rng))))
     },
 };

@@ -1,10 +1,10 @@
 //! Planner `random_strokes`: strokes between random places of the zone, or from a random touch
 //! around an object along a random heading, a baseline.
 
+use super::offer::{Offer, StrokeOffer};
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
 use super::sample::random_target;
-use super::stroke::StrokeOffer;
-use crate::belief::{Belief, SurfaceBelief};
+use crate::belief::Belief;
 use crate::task::Target;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,6 +14,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "strokes from random touches along random ways, as long as allowed; without strokes, `random`",
     zone_only: None,
     needs_library: false,
+    plans_strokes: true,
     make: |_, rng| Box::new(RandomStrokes { rng }),
 };
 
@@ -22,28 +23,33 @@ struct RandomStrokes {
 }
 
 impl Planner for RandomStrokes {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        Ok(Plan::at(random_target(belief, &mut self.rng)))
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
+        let tap = random_target(belief.surface(), &mut self.rng);
+        let target = match &offer.stroke {
+            Some(strokes) => self.stroke(belief, strokes, tap),
+            None => tap,
+        };
+        Ok(Plan::at(target))
     }
+}
 
-    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
-        if let (SurfaceBelief::ImplicitSurface(surface), Some(aim)) =
-            (belief.surface(), target.aim())
-        {
+impl RandomStrokes {
+    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, tap: Target) -> Target {
+        if let Some(aim) = tap.aim() {
             let turn = self.rng.random_range(0.0..std::f64::consts::TAU);
             let way_w = aim.across_w(turn) * offer.longest_m;
             let stroke = Target::StrokeAround { aim: *aim, way_w };
-            return if surface.scope().contains(&stroke) { stroke } else { target };
+            return if belief.reaches(&stroke) { stroke } else { tap };
         }
-        let other = random_target(belief, &mut self.rng);
-        match (target.place(), other.place()) {
+        let other = random_target(belief.surface(), &mut self.rng);
+        match (tap.place(), other.place()) {
             (Some([x, z]), Some([u, v])) => {
                 let length_m = (u - x).hypot(v - z);
                 let part = (offer.longest_m / length_m).min(1.0);
                 let to = [x + (u - x) * part, z + (v - z) * part];
                 Target::Stroke { place: [*x, *z], to }
             }
-            _ => target,
+            _ => tap,
         }
     }
 }

@@ -4,10 +4,10 @@
 //! bit-reversed (van der Corput) order, so that the region is covered evenly at any time; a line
 //! longer than a stroke is several strokes.
 
+use super::offer::{Offer, StrokeOffer};
 use super::plan::{Plan, PlanError, Planner, PlannerEntry};
-use super::stroke::StrokeOffer;
-use crate::belief::{Belief, SurfaceBelief};
-use crate::task::{Aim, Ball, Target, Zone};
+use crate::belief::Belief;
+use crate::task::{Aim, Ball, Region, Target, Zone};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -16,6 +16,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "parallel strokes along the longer side, or in rings, lines from coarse to fine; without strokes, their starts",
     zone_only: None,
     needs_library: false,
+    plans_strokes: true,
     make: |_, _| Box::new(Raster { line: 0, done_m: 0.0 }),
 };
 
@@ -49,13 +50,19 @@ impl Raster {
     }
 
     /// Length of the line.
-    fn length_m(&self, belief: &Belief) -> f64 {
-        match belief.surface() {
-            SurfaceBelief::HeightField(field) => field.zone().widest_m(),
-            SurfaceBelief::ImplicitSurface(surface) => {
-                let out = (1.0 - self.up().powi(2)).sqrt();
-                TAU * surface.scope().ball.radius_m * out
-            }
+    fn length_m(&self, region: &Region) -> f64 {
+        match region {
+            Region::Zone(zone) => zone.widest_m(),
+            Region::Ball(ball) => TAU * ball.radius_m * (1.0 - self.up().powi(2)).sqrt(),
+        }
+    }
+
+    /// Returns the tap at the fraction `part` of the line: at a place of a zone, or at the ball's
+    /// centre.
+    fn tap(&self, region: &Region, part: f64) -> Target {
+        match region {
+            Region::Zone(zone) => self.place(zone, part).into(),
+            Region::Ball(ball) => self.aim(ball, part).into(),
         }
     }
 
@@ -77,54 +84,53 @@ impl Raster {
         let out = (1.0 - up * up).sqrt();
         Aim::against(ball.centre_w, &Vector3::new(out * cosine, out * sine, up))
     }
-}
 
-impl Planner for Raster {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        let is_curve = belief.height_field().is_some_and(|field| field.zone().dimension() == 1);
-        for _ in 0..TRIED {
-            let length_m = self.length_m(belief);
-            if is_curve || self.done_m >= length_m * (1.0 - ROUNDING) {
-                (self.line, self.done_m) = (self.line.wrapping_add(1), 0.0);
-            }
-            let length_m = self.length_m(belief);
-            let part = self.done_m / length_m;
-            self.done_m += length_m;
-            match belief.surface() {
-                SurfaceBelief::HeightField(field) => {
-                    return Ok(Plan::at(self.place(field.zone(), part)));
-                }
-                SurfaceBelief::ImplicitSurface(surface) => {
-                    let aim = self.aim(&surface.scope().ball, part);
-                    if surface.scope().reaches(&aim) {
-                        return Ok(Plan::at(aim));
-                    }
-                }
-            }
-        }
-        Err("it reaches no start of a ring".into())
-    }
-
-    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
+    /// Returns the stroke that continues the line from `tap` on, or the tap if that is out of reach.
+    fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, tap: Target) -> Target {
+        let region = belief.region();
         // `plan` took the whole line, of which this is one of equal parts.
-        let length_m = self.length_m(belief);
+        let length_m = self.length_m(&region);
         let start_m = self.done_m - length_m;
         let parts = (length_m / offer.longest_m).ceil();
         self.done_m = start_m + length_m / parts;
-        match (belief.surface(), &target) {
-            (SurfaceBelief::HeightField(field), Target::Place(from)) => {
-                match (from.as_slice(), &*self.place(field.zone(), self.done_m / length_m)) {
-                    ([x, z], [u, v]) => Target::Stroke { place: [*x, *z], to: [*u, *v] },
-                    _ => target,
-                }
-            }
-            (SurfaceBelief::ImplicitSurface(surface), Target::Aim(aim)) => {
+        let stroke = match (&tap, self.tap(&region, self.done_m / length_m)) {
+            (Target::Place(from), Target::Place(to)) => match (from.as_slice(), to.as_slice()) {
+                ([x, z], [u, v]) => Target::Stroke { place: [*x, *z], to: [*u, *v] },
+                _ => return tap,
+            },
+            (Target::Aim(aim), _) => {
                 let east_w = Vector3::z().cross(&-aim.direction_w.into_inner());
                 let way_w = east_w.normalize() * (length_m / parts).min(offer.longest_m);
-                let stroke = Target::StrokeAround { aim: *aim, way_w };
-                if surface.scope().contains(&stroke) { stroke } else { target }
+                Target::StrokeAround { aim: *aim, way_w }
             }
-            _ => target,
+            _ => return tap,
+        };
+        if belief.reaches(&stroke) { stroke } else { tap }
+    }
+}
+
+impl Planner for Raster {
+    fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
+        let region = belief.region();
+        let is_curve = region.zone().is_some_and(|zone| zone.dimension() == 1);
+        for _ in 0..TRIED {
+            let length_m = self.length_m(&region);
+            if is_curve || self.done_m >= length_m * (1.0 - ROUNDING) {
+                (self.line, self.done_m) = (self.line.wrapping_add(1), 0.0);
+            }
+            let length_m = self.length_m(&region);
+            let part = self.done_m / length_m;
+            self.done_m += length_m;
+            let tap = self.tap(&region, part);
+            if belief.reaches(&tap) {
+                let strokes = offer.stroke.as_ref();
+                let target = match strokes {
+                    Some(strokes) => self.stroke(belief, strokes, tap),
+                    None => tap,
+                };
+                return Ok(Plan::at(target));
+            }
         }
+        Err("it reaches no start of a ring".into())
     }
 }

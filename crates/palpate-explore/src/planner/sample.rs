@@ -1,8 +1,7 @@
 //! Sampling of targets without a model: points of the unit square, mapped to the zone or object.
 
-use crate::belief::{Belief, SurfaceBelief};
-use crate::task::{Aim, Ball, Target, Zone};
-use crate::whole_object::ExplorationSetup;
+use crate::belief::SurfaceBelief;
+use crate::task::{Aim, Ball, Region, Target, Zone};
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +13,7 @@ pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 /// Returns a uniformly random target: a place of a zone, or an aim from a random direction at the
 /// ball's centre.
-pub fn random_target(belief: &Belief, rng: &mut ChaCha8Rng) -> Target {
+pub fn random_target(belief: &dyn SurfaceBelief, rng: &mut ChaCha8Rng) -> Target {
     target_from_fractions(belief, |count| fractions(count, rng))
 }
 
@@ -25,23 +24,19 @@ fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 /// Returns the target at the fractions in 0..1 returned by `next`, whose argument is the number of
 /// fractions, one or two. For a whole object, they encode a direction, and `next` is called until
 /// one is reachable.
-pub fn target_from_fractions(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Target {
-    match belief.surface() {
-        SurfaceBelief::HeightField(field) => {
-            field.zone().at(&next(field.zone().dimension())).into()
-        }
-        SurfaceBelief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).into(),
+pub fn target_from_fractions(
+    belief: &dyn SurfaceBelief,
+    mut next: impl FnMut(usize) -> Vec<f64>,
+) -> Target {
+    match belief.region() {
+        Region::Zone(zone) => zone.at(&next(zone.dimension())).into(),
+        Region::Ball(ball) => reached(belief, &ball, || next(2)).into(),
     }
 }
 
 /// Number of directions tried before an unreachable one is returned, which ends the trial.
 // heuristic: the chance to miss a reachable thousandth of the sphere is 1/e.
 const TRIED: usize = 1000;
-
-/// Returns an aim at the ball's centre from a uniformly random direction among the reachable ones.
-pub fn random_aim(scope: &ExplorationSetup, rng: &mut ChaCha8Rng) -> Aim {
-    reached(scope, || fractions(2, rng))
-}
 
 /// Returns a uniformly random point of a ball.
 pub(super) fn in_ball(ball: &Ball, rng: &mut ChaCha8Rng) -> Point3<f64> {
@@ -51,12 +46,12 @@ pub(super) fn in_ball(ball: &Ball, rng: &mut ChaCha8Rng) -> Point3<f64> {
 }
 
 /// Returns an aim at the ball's centre from the first reachable direction.
-fn reached(scope: &ExplorationSetup, mut side: impl FnMut() -> Vec<f64>) -> Aim {
-    let mut next = || Aim::against(scope.ball.centre_w, &outward(&side()));
+fn reached(belief: &dyn SurfaceBelief, ball: &Ball, mut side: impl FnMut() -> Vec<f64>) -> Aim {
+    let mut next = || Aim::against(ball.centre_w, &outward(&side()));
     let first = next();
     std::iter::once(first)
         .chain(std::iter::repeat_with(next).take(TRIED))
-        .find(|aim| scope.reaches(aim))
+        .find(|aim| belief.reaches(&Target::from(*aim)))
         .unwrap_or(first)
 }
 

@@ -3,16 +3,16 @@
 //!
 //! The function is evaluated for lists of places, which costs less than single evaluations.
 
+use super::candidates::Candidates;
 use super::plan::{Fallback, Plan};
-use super::sample::uniform;
+use super::sample::{random_target, uniform};
 use super::settings::PlanningSettings;
 use super::sobol;
-use crate::belief::HeightField;
-use crate::task::Zone;
+use crate::belief::Belief;
+use crate::task::{Region, Target, Zone};
 use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions};
 use palpate_gp::math::direct::direct;
 use palpate_gp::math::optimize::Bounds;
-use palpate_gp::posterior::Scratch;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -64,28 +64,38 @@ impl Search {
         Self { settings: settings.clone(), rng }
     }
 
-    /// Returns a plan at a random place, for a belief without data.
-    pub fn anywhere(&mut self, zone: &Zone) -> Plan {
-        Plan::at(uniform(zone, &mut self.rng))
+    /// Returns a plan at a random target, for a belief without data.
+    pub fn anywhere(&mut self, belief: &Belief) -> Plan {
+        Plan::at(random_target(belief.surface(), &mut self.rng))
     }
 
-    /// Plans a touch where `score` is largest; `score` returns the values at places and writes
+    /// Plans a touch where `score` is largest: at a place of a zone, or at one of the candidates on
+    /// the believed surface of a whole object. `score` returns the values at points and writes
     /// their gradients into its second argument unless that is empty.
     pub fn plan(
         &mut self,
-        belief: &HeightField,
-        score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
+        belief: &Belief,
+        mut score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
-        let (_, place) = self.maximum(belief.zone(), score);
-        self.plan_at(belief, place)
+        match (belief.region(), belief.implicit_surface()) {
+            (Region::Zone(zone), _) => {
+                let (_, place) = self.maximum(&zone, score);
+                self.plan_at(belief, &zone, place)
+            }
+            (Region::Ball(_), Some(surface)) => {
+                Candidates::plan(surface, &mut self.rng, |points| score(points, &mut []))
+            }
+            (Region::Ball(_), None) => self.anywhere(belief),
+        }
     }
 
-    /// Plans a touch at `place`, or at a random one if a touch there would bring no information.
-    pub fn plan_at(&mut self, belief: &HeightField, place: Vec<f64>) -> Plan {
-        let stall = fallback_reason(belief, &place);
-        let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
-        let sd_m = Some(variance(belief, &target).sqrt());
-        Plan { target: belief.target(target), sd_m, fallback: stall }
+    /// Plans a touch at a place of a zone, or at a random one if a touch there would bring no
+    /// information.
+    pub fn plan_at(&mut self, belief: &Belief, zone: &Zone, place: Vec<f64>) -> Plan {
+        let stall = fallback_reason(belief, zone, &place);
+        let place = if stall.is_none() { place } else { uniform(zone, &mut self.rng) };
+        let sd_m = Some(variance(belief, &place).sqrt());
+        Plan { target: belief.target(place), sd_m, fallback: stall }
     }
 
     /// Returns the largest value of `score` found and its place.
@@ -153,13 +163,13 @@ impl Search {
         sobol::places(zone, count, self.rng.random())
     }
 
-    /// Returns `values` and their gradients by central differences, one-sided at the zone's border.
+    /// Returns `values` and their gradients by central differences, one-sided at a zone's border.
     pub fn with_gradients<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
         &self,
-        zone: &Zone,
+        region: &Region,
         mut values: V,
     ) -> impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64> + use<V> {
-        let sides: Vec<[f64; 2]> = zone.sides().collect();
+        let sides: Vec<[f64; 2]> = region.zone().iter().flat_map(|zone| zone.sides()).collect();
         move |places, gradients| {
             if gradients.is_empty() {
                 return values(places);
@@ -239,19 +249,21 @@ fn hills(zone: &Zone, seen: &Seen) -> Vec<Vec<f64>> {
 }
 
 /// Returns the reason why a touch at `place` would bring no information, if so.
-fn fallback_reason(belief: &HeightField, place: &[f64]) -> Option<Fallback> {
-    let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
-    let same = |target: &Vec<f64>| belief.zone().distance(target, place) < SAME_TARGET;
+fn fallback_reason(belief: &Belief, zone: &Zone, place: &[f64]) -> Option<Fallback> {
+    let lost_sd = LOST_IN_ROUNDING * belief.field()?.signal_sd();
+    let is_same = |target: &Target| {
+        target.place().is_some_and(|other| zone.distance(other, place) < SAME_TARGET)
+    };
     if variance(belief, place) <= lost_sd * lost_sd {
         Some(Fallback::NoVariance)
-    } else if belief.targets().iter().any(same) {
+    } else if belief.targets().iter().any(is_same) {
         Some(Fallback::DuplicateTarget)
     } else {
         None
     }
 }
 
-fn variance(belief: &HeightField, place: &[f64]) -> f64 {
-    let known = belief.planning_posterior();
-    known.map_or(f64::NAN, |known| known.variance(place, &mut Scratch::default()))
+fn variance(belief: &Belief, place: &[f64]) -> f64 {
+    let variances = belief.explorable().map(|field| field.variances(&[place.into()], &mut []));
+    variances.and_then(|variances| variances.first().copied()).unwrap_or(f64::NAN)
 }

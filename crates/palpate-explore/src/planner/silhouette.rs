@@ -14,9 +14,8 @@
 use super::plan::{Plan, PlannerEntry, zone_planner};
 use super::search::Search;
 use super::sobol;
-use crate::belief::HeightField;
-use palpate_gp::posterior::Posterior;
-use palpate_gp::reduction::VarianceReduction;
+use crate::belief::{Belief, RandomField};
+use crate::task::{Target, Zone};
 use rand::RngExt;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
@@ -24,11 +23,12 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "integrated_variance over the probable surface, times the probability of contact",
     zone_only: Some("the silhouette is defined along a single approach direction"),
     needs_library: false,
+    plans_strokes: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         // Seed of the places at which the variance is computed.
         let seed = search.rng.random();
-        zone_planner(move |belief| plan(&mut search, seed, belief))
+        zone_planner(move |belief, zone| plan(&mut search, seed, belief, zone))
     },
 };
 
@@ -36,31 +36,33 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 /// objects, the fitted ones alone, and a third and three times, did no better.
 const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
-fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
-    let Some(posterior) = belief.planning_posterior() else {
-        return search.anywhere(belief.zone());
-    };
+fn plan(search: &mut Search, seed: u32, belief: &Belief, zone: &Zone) -> Plan {
+    let Some(known) = belief.explorable() else { return search.anywhere(belief) };
     let count = search.settings.silhouette.places;
-    let places = sobol::places(belief.zone(), count, seed);
-    let silhouette = belief.surface_evidence().silhouette();
+    let places = sobol::places(zone, count, seed);
+    let silhouette = belief.silhouette();
     let weigh = |place: &Vec<f64>| silhouette.optimistic_probability(place).sqrt();
     let weights: Vec<f64> = places.iter().map(weigh).collect();
-    let committee: Vec<Posterior> =
-        COMMITTEE.iter().filter_map(|scale| posterior.scaled(*scale).ok()).collect();
-    let candidates = search.spread_places(belief.zone(), search.settings.silhouette.candidates);
+    let candidates = search.spread_places(zone, search.settings.silhouette.candidates);
     let chances = candidates.into_iter().map(|place| (silhouette.hit_probability(&place), place));
     let (chances, candidates): (Vec<f64>, Vec<Vec<f64>>) =
         chances.filter(|(chance, _)| *chance > 0.0).unzip();
-    let tried: Vec<&[f64]> = candidates.iter().map(Vec::as_slice).collect();
-    let mut falls = vec![0.0; tried.len()];
-    for member in &committee {
-        let places = places.iter().map(Vec::as_slice);
-        let reduction = VarianceReduction::new(member, places).weighted(weights.clone());
-        falls.iter_mut().zip(reduction.at(&tried)).for_each(|(sum, fall)| *sum += fall);
+    let mut falls = vec![0.0; candidates.len()];
+    let mut add = |member: &dyn RandomField| {
+        let reduction = member.reduction(&places, weights.clone());
+        let reductions = reduction.at(&candidates);
+        falls.iter_mut().zip(reductions).for_each(|(sum, fall)| *sum += fall);
+    };
+    let committee: Vec<_> = COMMITTEE.iter().filter_map(|scale| known.scaled(*scale)).collect();
+    committee.iter().for_each(|member| add(&**member));
+    if committee.is_empty() {
+        add(known);
     }
     // Time in units of a touch that begins where the last one ended.
+    let last = belief.targets().pop();
     let time = |place: &[f64]| {
-        let way = search.settings.silhouette.travel_cost_m.zip(belief.targets().last());
+        let way = search.settings.silhouette.travel_cost_m;
+        let way = way.zip(last.as_ref().and_then(Target::place));
         let travel_m =
             |here: &[f64]| here.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         1.0 + way.map_or(0.0, |(travel_cost_m, here)| travel_m(here) / travel_cost_m)
@@ -68,7 +70,7 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
     let values = falls.iter().zip(&chances).zip(&candidates);
     let values = values.map(|((fall, chance), place)| chance * fall / time(place));
     match values.zip(&candidates).max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((_, place)) => search.plan_at(belief, place.clone()),
-        None => search.anywhere(belief.zone()),
+        Some((_, place)) => search.plan_at(belief, zone, place.clone()),
+        None => search.anywhere(belief),
     }
 }

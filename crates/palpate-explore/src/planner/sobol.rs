@@ -11,10 +11,11 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "a scrambled Sobol sequence: evenly spread, no model (stronger baseline)",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |_, mut rng| {
         let (seed, mut index) = (rng.random(), 0);
         Box::new(move |belief: &Belief| {
-            let target = target_from_fractions(belief, |count| {
+            let target = target_from_fractions(belief.surface(), |count| {
                 let at = fractions(count, index, seed);
                 index += 1;
                 at

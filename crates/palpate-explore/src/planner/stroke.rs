@@ -1,28 +1,14 @@
 //! Whether a stroke pays: the reduction of the variance over the surface by its points together,
 //! per time, against that of a tap.
 
-use crate::belief::{Belief, HeightField, SurfaceBelief};
+use super::offer::StrokeOffer;
+use crate::belief::Belief;
 use crate::task::stroke::STEEPEST;
 use crate::task::{Aim, Ball, Region, Target, Zone};
 use crate::whole_object::ImplicitSurface;
 use crate::whole_object::surface::Surface;
 use nalgebra::{Point3, Vector3};
 use palpate_gp::reduction::VarianceReduction;
-
-/// Strokes that a scene allows, and what they cost.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StrokeOffer {
-    /// Largest length of a stroke across the approach, m.
-    pub longest_m: f64,
-    /// Speed along it, m/s.
-    pub speed_m_s: f64,
-    /// Time of a tap without the way there, s.
-    pub tap_s: f64,
-    /// Speed of the way to a touch, m/s.
-    pub travel_m_s: f64,
-    /// Last target, from whose end the finger comes.
-    pub from: Option<Target>,
-}
 
 impl StrokeOffer {
     /// Returns a tap or stroke with its reduction per time of a variance that it reduces by `gain`.
@@ -96,49 +82,42 @@ fn inside(zone: &Zone, place: [f64; 2]) -> Option<Vec<f64>> {
 /// per time, or `target` if a tap does so more.
 ///
 /// The finger is assumed to keep contact all along.
-pub fn worthwhile(belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
-    let found = match (belief.surface(), &target) {
-        (SurfaceBelief::HeightField(field), Target::Place(place)) => {
-            best(field, offer, std::slice::from_ref(place))
+pub fn best(belief: &Belief, offer: &StrokeOffer, target: Target) -> Target {
+    let found = match (belief.region(), &target) {
+        (Region::Zone(zone), Target::Place(place)) => in_zone(belief, &zone, offer, place),
+        (Region::Ball(_), Target::Aim(aim)) => {
+            belief.implicit_surface().and_then(|surface| around(surface, offer, aim))
         }
-        (SurfaceBelief::ImplicitSurface(surface), Target::Aim(aim)) => around(surface, offer, aim),
         _ => None,
     };
     found.unwrap_or(target)
 }
 
-/// Returns the tap or stroke from one of `places`, or to it, that reduces the variance the most per
-/// time; `None` before the first fit, and for a zone that is a line.
-pub fn best(field: &HeightField, offer: &StrokeOffer, places: &[Vec<f64>]) -> Option<Target> {
-    let (posterior, zone) = (field.planning_posterior()?, field.zone());
-    if zone.dimension() != 2 {
-        return None;
-    }
+/// Returns the tap or stroke from `place`, or to it, that reduces the variance the most per time;
+/// `None` before the first fit, and for a zone that is a line.
+fn in_zone(belief: &Belief, zone: &Zone, offer: &StrokeOffer, place: &[f64]) -> Option<Target> {
+    let (field, &[x, z]) = (belief.explorable()?, place) else { return None };
     let references = zone.grid(PLACES.sqrt() as usize);
-    let reduction = VarianceReduction::new(posterior, references.iter().map(Vec::as_slice));
+    let reduction = field.reduction(&references, vec![1.0; references.len()]);
     let region = Region::from(zone.clone());
     let step_m = offer.longest_m / POINTS as f64;
     let mut candidates = Vec::new();
-    for place in places {
-        let at = [place[0], place[1]];
-        for heading in 0..HEADINGS {
-            let turn = std::f64::consts::TAU * heading as f64 / HEADINGS as f64;
-            let along = |i: usize| {
-                let way_m = i as f64 * step_m;
-                inside(zone, [at[0] + way_m * turn.cos(), at[1] + way_m * turn.sin()])
-            };
-            let line: Vec<Vec<f64>> = (0..=POINTS).map_while(along).collect();
-            let points: Vec<&[f64]> = line.iter().map(Vec::as_slice).collect();
-            let gains = reduction.along(&points);
-            let mut consider = |target: Target, gain: f64| {
-                candidates.push(offer.rated(&region, target, gain));
-            };
-            consider(Target::Place(place.clone()), gains[0]);
-            for (end, gain) in line.iter().zip(&gains).skip(SHORTEST) {
-                let end = [end[0], end[1]];
-                consider(Target::Stroke { place: at, to: end }, *gain);
-                consider(Target::Stroke { place: end, to: at }, *gain);
-            }
+    for heading in 0..HEADINGS {
+        let turn = std::f64::consts::TAU * heading as f64 / HEADINGS as f64;
+        let along = |i: usize| {
+            let way_m = i as f64 * step_m;
+            inside(zone, [x + way_m * turn.cos(), z + way_m * turn.sin()])
+        };
+        let line: Vec<Vec<f64>> = (0..=POINTS).map_while(along).collect();
+        let gains = reduction.along(&line);
+        let mut consider = |target: Target, gain: f64| {
+            candidates.push(offer.rated(&region, target, gain));
+        };
+        consider(Target::from(place), gains[0]);
+        for (end, gain) in line.iter().zip(&gains).skip(SHORTEST) {
+            let end = [end[0], end[1]];
+            consider(Target::Stroke { place: [x, z], to: end }, *gain);
+            consider(Target::Stroke { place: end, to: [x, z] }, *gain);
         }
     }
     ranked(candidates).next()

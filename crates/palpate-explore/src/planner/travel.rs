@@ -8,24 +8,25 @@
 
 use super::candidates::{Candidates, explore_unknown};
 use super::plan::{Plan, PlannerEntry};
-use super::sample::random_aim;
+use super::sample::random_target;
 use super::search::Search;
-use crate::belief::{Belief, HeightField, SurfaceBelief};
-use crate::task::{Aim, Region, Target};
+use crate::belief::{Belief, RandomField};
+use crate::task::{Region, Target, Zone};
 use crate::whole_object::ImplicitSurface;
-use palpate_gp::posterior::Scratch;
 
 pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     name: "travel",
     about: "the largest standard deviations of the next touches, in the order of a short tour",
     zone_only: None,
     needs_library: false,
+    plans_strokes: false,
     make: |settings, rng| {
         let mut travel = Travel { tour: Vec::new(), search: Search::new(settings, rng) };
         Box::new(move |belief: &Belief| {
-            Ok(match belief.surface() {
-                SurfaceBelief::HeightField(field) => travel.in_zone(field),
-                SurfaceBelief::ImplicitSurface(surface) => travel.around(surface),
+            Ok(match (belief.region(), belief.implicit_surface()) {
+                (Region::Zone(zone), _) => travel.in_zone(belief, &zone),
+                (Region::Ball(_), Some(surface)) => travel.around(surface),
+                (Region::Ball(_), None) => travel.search.anywhere(belief),
             })
         })
     },
@@ -38,29 +39,29 @@ struct Travel {
 }
 
 impl Travel {
-    fn in_zone(&mut self, field: &HeightField) -> Plan {
-        if field.surface().is_none() {
-            return self.search.anywhere(field.zone());
+    fn in_zone(&mut self, belief: &Belief, zone: &Zone) -> Plan {
+        if belief.field().is_none() {
+            return self.search.anywhere(belief);
         }
         let plan = match self.tour.pop() {
             Some(plan) => plan,
             None => {
-                let places = self.largest(field);
-                let tour = places.into_iter().map(|place| self.search.plan_at(field, place));
+                let places = self.largest(belief, zone);
+                let tour = places.into_iter().map(|place| self.search.plan_at(belief, zone, place));
                 self.tour = tour.collect();
-                if let Some(last) = field.targets().last().cloned() {
-                    let zone = Region::from(field.zone().clone());
-                    shorten(&mut self.tour, &last.into(), &|a, b| zone.travel_m(a, b));
+                if let Some(last) = belief.targets().last() {
+                    let region = Region::from(zone.clone());
+                    shorten(&mut self.tour, last, &|a, b| region.travel_m(a, b));
                 }
                 self.tour.reverse();
-                self.tour.pop().unwrap_or_else(|| self.search.anywhere(field.zone()))
+                self.tour.pop().unwrap_or_else(|| self.search.anywhere(belief))
             }
         };
         match &plan {
             // Earlier touches of this tour may have removed the variance that this one was planned
             // for.
             Plan { fallback: None, target, .. } => match target.place() {
-                Some(place) => self.search.plan_at(field, place.to_vec()),
+                Some(place) => self.search.plan_at(belief, zone, place.to_vec()),
                 None => plan,
             },
             _ => plan,
@@ -69,17 +70,17 @@ impl Travel {
 
     /// Returns the places of a tour, at least one: each where σ is largest given touches at those
     /// before.
-    fn largest(&self, field: &HeightField) -> Vec<Vec<f64>> {
+    fn largest(&self, belief: &Belief, zone: &Zone) -> Vec<Vec<f64>> {
         let mut places: Vec<Vec<f64>> = Vec::new();
-        let mut known = field.planning_posterior().cloned();
-        while let Some(posterior) = &known {
-            let (_, place) = self
-                .search
-                .maximum(field.zone(), |places, gradients| posterior.variances(places, gradients));
+        let mut after: Option<Box<dyn RandomField>> = None;
+        while let Some(field) = after.as_deref().or(belief.explorable()) {
+            let (_, place) =
+                self.search.maximum(zone, |places, gradients| field.variances(places, gradients));
             let is_last = places.len() + 1 >= self.search.settings.travel.tour as usize;
-            let after = || posterior.fantasize([place.as_slice()].into_iter()).ok();
-            known = if is_last { None } else { after() };
+            let fantasy = if is_last { None } else { field.fantasize(&[place.clone()]) };
             places.push(place);
+            let Some(fantasy) = fantasy else { break };
+            after = Some(fantasy);
         }
         places
     }
@@ -91,7 +92,7 @@ impl Travel {
         if let Some(plan) = self.tour.pop() {
             return plan;
         }
-        let aside = random_aim(surface.scope(), &mut self.search.rng);
+        let aside = random_target(surface, &mut self.search.rng);
         if let Some(candidates) = Candidates::new(surface, &mut self.search.rng) {
             self.tour = self.farthest(surface, &candidates, &aside);
             self.tour.reverse();
@@ -105,25 +106,24 @@ impl Travel {
         &self,
         surface: &ImplicitSurface,
         candidates: &Candidates,
-        aside: &Aim,
+        aside: &Target,
     ) -> Vec<Plan> {
         let mut plans: Vec<Plan> = Vec::new();
-        let mut known = candidates.surface().posterior().clone();
+        let points = candidates.points();
+        let mut after: Option<Box<dyn RandomField>> = None;
         for _ in 0..self.search.settings.travel.tour {
-            let mut scratch = Scratch::default();
-            let variances = (candidates.all.iter())
-                .map(|candidate| known.variance(candidate.p_w.coords.as_slice(), &mut scratch));
-            let plan = candidates.best(variances, aside);
-            let aimed_at = plan.target.aim().filter(|_| plan.fallback.is_none());
-            let Some(place) = aimed_at.map(|aim| aim.p_w.coords) else { break };
+            let given = surface.surface().map(|surface| surface.posterior() as &dyn RandomField);
+            let Some(field) = after.as_deref().or(given) else { break };
+            let variances = field.variances(&points, &mut []);
+            let plan = candidates.best(variances.into_iter(), aside.clone());
+            let aimed_at = plan.target.point().filter(|_| plan.fallback.is_none());
+            let Some(point) = aimed_at else { break };
             plans.push(plan);
-            match known.fantasize([place.as_slice()].into_iter()) {
-                Ok(after) => known = after,
-                Err(_) => break,
-            }
+            let Some(fantasy) = field.fantasize(&[point]) else { break };
+            after = Some(fantasy);
         }
         if plans.is_empty() {
-            plans.push(Plan::at(*aside));
+            plans.push(Plan::at(aside.clone()));
         }
         if let Some(last) = surface.aims().last() {
             let ball = Region::from(surface.scope().ball);

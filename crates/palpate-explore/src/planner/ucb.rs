@@ -9,16 +9,16 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
     about: "upper confidence bound (UCB): seeks the highest point",
     zone_only: Some("it seeks the highest point of a height field"),
     needs_library: false,
+    plans_strokes: false,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
-        zone_planner(move |belief| {
-            let (Some(surface), Some(known)) = (belief.surface(), belief.planning_posterior())
-            else {
-                return search.anywhere(belief.zone());
+        zone_planner(move |belief, zone| {
+            let (Some(surface), Some(known)) = (belief.field(), belief.explorable()) else {
+                return search.anywhere(belief);
             };
             let sds = search.settings.ucb.kappa;
-            let score = search.with_gradients(belief.zone(), |places| {
-                let means = surface.means(places.iter().map(Vec::as_slice));
+            let score = search.with_gradients(&zone.clone().into(), |places| {
+                let means = surface.means(places);
                 let variances = known.variances(places, &mut []);
                 let each = means.iter().zip(variances);
                 each.map(|(mean, variance)| mean + sds * variance.sqrt()).collect()

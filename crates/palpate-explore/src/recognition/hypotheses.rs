@@ -1,13 +1,14 @@
 //! Hypotheses about object and pose, and *none of these*.
 
-use super::evidence::{Evidence, NoiseModel, TouchEvidence, ViewEvidence, before_m, hull};
 use super::library::{Library, LibraryObject};
+use super::measurement::{
+    Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull,
+};
 use super::particles::{Model, Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
-use crate::probe::Outcome;
-use crate::robot::sensor::GelPad;
+use crate::evidence::Outcome;
+use crate::robot::sensor::{GelPad, TipSurface};
 use crate::task::{Approach, Target, Task};
-use crate::view::SeenSurface;
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_input::config::{Rules, Validate};
 use rand::{Rng, RngExt};
@@ -15,7 +16,6 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Settings of the hypotheses: noise, and the hypothesis *none of these*.
@@ -59,17 +59,6 @@ impl Validate for RecognitionSettings {
     }
 }
 
-/// Noise of a rigid tip or a pad.
-// heuristic: a stylus on a calibrated arm, a mesh of a CAD model, and one contact in a thousand on
-// something else.
-const RIGID: NoiseModel =
-    NoiseModel { contact_sd_m: 5e-4, normal_sd_rad: 10.0 * PI / 180.0, outliers: 1e-3 };
-
-/// Noise of a soft finger, whose electrodes are misled by edges.
-// heuristic: on eight objects of the suite, poses are then within their stated distance.
-const SOFT: NoiseModel =
-    NoiseModel { contact_sd_m: 2e-3, normal_sd_rad: 40.0 * PI / 180.0, outliers: 0.05 };
-
 /// Noise of a shape near to one of the library: the object *none of these* is often of their kind.
 // heuristic: a tenth of an object for a hand, and normals that hardly agree.
 const NEAR_SHAPE: NoiseModel =
@@ -89,18 +78,6 @@ const HOPELESS: f64 = -30.0;
 const RESTARTS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
 const UNDECIDED: f64 = 0.9;
 const DOUBT: f64 = 8.0;
-
-/// Depth by which the tip of a soft finger passes the surface at contact, m.
-// heuristic: the press depth of a BioTac and its margin.
-const SOFT_SLACK_M: f64 = 2e-3;
-
-/// Offset of a soft finger's contacts that more touches do not remove, m.
-// heuristic: the largest one of the estimated surfaces of tuning objects, 0.1 to 0.8 mm.
-const SOFT_OFFSET_M: f64 = 8e-4;
-
-/// Depth by which a pad passes the surface at contact beyond its press depth, m.
-// heuristic: an arm stops it within this.
-const PAD_SLACK_M: f64 = 3e-4;
 
 /// A possible object at a possible pose.
 #[derive(Clone, Debug)]
@@ -150,7 +127,7 @@ pub struct ObjectHypotheses {
     /// Error that all contacts have in common.
     offset_m: f64,
     pad: Option<GelPad>,
-    evidence: Vec<Arc<Evidence>>,
+    evidence: Vec<Arc<Measurement>>,
     objects: Vec<ObjectPosterior>,
     near: Vec<ObjectPosterior>,
 }
@@ -165,25 +142,24 @@ struct ObjectPosterior {
 }
 
 impl ObjectHypotheses {
-    /// Creates the prior: all objects are equally likely. The flag marks a soft finger, which may
-    /// have a pad.
+    /// Creates the prior of touches by a tip with this `surface`: all objects are equally likely.
     pub fn new(
         library: Arc<Library>,
         prior: PosePrior,
         settings: RecognitionSettings,
-        (task, is_soft, pad): (&Task, bool, Option<GelPad>),
+        task: &Task,
+        surface: &TipSurface,
         random: &mut ChaCha8Rng,
     ) -> Self {
-        let slack_m = match &pad {
-            Some(_) => task.touch().press_m + PAD_SLACK_M,
-            None if is_soft => SOFT_SLACK_M,
-            None => 0.0,
-        };
-        let usual = if is_soft { SOFT } else { RIGID };
+        let usual = surface.errors(task.touch().press_m);
         let noise = NoiseModel {
             contact_sd_m: settings.contact_sd_m.unwrap_or(usual.contact_sd_m),
             normal_sd_rad: settings.normal_sd_deg.map_or(usual.normal_sd_rad, f64::to_radians),
             outliers: settings.outliers.unwrap_or(usual.outliers),
+        };
+        let pad = match surface {
+            TipSurface::Pad(pad) => Some(pad.clone()),
+            TipSurface::Rigid | TipSurface::Skin => None,
         };
         let mut made = Self {
             library,
@@ -191,8 +167,8 @@ impl ObjectHypotheses {
             settings,
             noise,
             task: task.clone(),
-            slack_m,
-            offset_m: if is_soft { SOFT_OFFSET_M } else { 0.0 },
+            slack_m: usual.slack_m,
+            offset_m: usual.offset_m[1],
             pad,
             evidence: Vec::new(),
             objects: Vec::new(),
@@ -217,7 +193,7 @@ impl ObjectHypotheses {
     fn model<'a>(
         &'a self,
         number: usize,
-        evidence: &'a [Arc<Evidence>],
+        evidence: &'a [Arc<Measurement>],
         noise: NoiseModel,
     ) -> Model<'a> {
         Model { object: &self.library.objects()[number], prior: &self.prior, evidence, noise }
@@ -233,18 +209,18 @@ impl ObjectHypotheses {
         &self.task
     }
 
-    /// Takes in a touch; nothing after an overload.
-    pub(crate) fn observe(&mut self, approach: &Approach, outcome: &Outcome) {
-        let evidence = TouchEvidence::new(approach, outcome, (self.slack_m, self.pad.as_ref()));
-        self.take_in(evidence.map(Evidence::Touch));
+    /// Updates the posterior by what an action has shown; nothing after an overload, or by a view
+    /// that shows nothing.
+    pub fn observe(&mut self, outcome: &Outcome) {
+        let measurement = match outcome.seen() {
+            Some(seen) => ViewMeasurement::new(seen).map(Measurement::View),
+            None => TouchMeasurement::new(outcome, self.slack_m, self.pad.as_ref())
+                .map(Measurement::Touch),
+        };
+        self.push(measurement);
     }
 
-    /// Takes in a view; nothing if it shows nothing.
-    pub(crate) fn observe_view(&mut self, seen: &SeenSurface) {
-        self.take_in(ViewEvidence::new(seen).map(Evidence::View));
-    }
-
-    fn take_in(&mut self, evidence: Option<Evidence>) {
+    fn push(&mut self, evidence: Option<Measurement>) {
         let Some(evidence) = evidence else { return };
         self.evidence.push(Arc::new(evidence));
         self.update_all();
@@ -404,7 +380,7 @@ impl ObjectHypotheses {
         let object: &LibraryObject = &self.library.objects()[hypothesis.object];
         let (ahead_w, before_m) = (approach.direction_w(), before_m(finger));
         let start_w = approach.p_near_w - ahead_w.scale(before_m);
-        let hull = hull(finger, approach, start_w);
+        let hull = hull(finger, &approach.r_wt(), start_w);
         let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + finger.radius_m;
         let hit = object.sweep(&hypothesis.x_wo, (&hull, &ahead_w), way_m)?;
         let p_wt = start_w + ahead_w.scale(hit.travel_m);

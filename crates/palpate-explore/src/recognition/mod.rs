@@ -4,9 +4,9 @@
 //! hypothesis *none of these* competes with the objects: a shape near to one of the library's, or
 //! an unknown one.
 
-mod evidence;
 mod hypotheses;
 mod library;
+mod measurement;
 mod particles;
 mod pose_prior;
 

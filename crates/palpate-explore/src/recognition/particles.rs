@@ -2,8 +2,8 @@
 //! at a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
 //! Calderhead 2011) on all evidence so far.
 
-use super::evidence::{Evidence, EvidenceFit, LogLikelihood, NoiseModel};
 use super::library::LibraryObject;
+use super::measurement::{LogLikelihood, Measurement, MeasurementFit, NoiseModel};
 use super::pose_prior::{PosePrior, moved};
 use nalgebra::{Cholesky, Const, Isometry3, Matrix6, Vector6};
 use rand::{Rng, RngExt};
@@ -33,7 +33,7 @@ const STEP: f64 = 1.0;
 #[derive(Clone)]
 struct Particle {
     x_wo: Isometry3<f64>,
-    fits: Vec<EvidenceFit>,
+    fits: Vec<MeasurementFit>,
 }
 
 /// Posterior of one object's pose, and the evidence for the object.
@@ -52,7 +52,7 @@ pub(super) struct Particles {
 pub(super) struct Model<'a> {
     pub object: &'a LibraryObject,
     pub prior: &'a PosePrior,
-    pub evidence: &'a [Arc<Evidence>],
+    pub evidence: &'a [Arc<Measurement>],
     pub noise: NoiseModel,
 }
 
@@ -182,7 +182,7 @@ impl Particles {
             if !model.prior.contains(model.object, &x_wo) {
                 continue;
             }
-            let fits: Vec<EvidenceFit> =
+            let fits: Vec<MeasurementFit> =
                 model.evidence.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
             let there = Langevin::new((model, known), &fits, tau_m);
             let log =
@@ -202,7 +202,7 @@ struct Langevin {
 }
 
 impl Langevin {
-    fn new((model, known): (&Model, usize), fits: &[EvidenceFit], tau_m: f64) -> Self {
+    fn new((model, known): (&Model, usize), fits: &[MeasurementFit], tau_m: f64) -> Self {
         let mut sum = LogLikelihood::zero();
         for (i, (touch, fit)) in model.evidence.iter().zip(fits).enumerate() {
             let tau_m = if i < known { 0.0 } else { tau_m };
@@ -271,8 +271,8 @@ pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::{Contact, Outcome, SweptVolume, Touch};
-    use crate::recognition::evidence::TouchEvidence;
+    use crate::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
+    use crate::recognition::measurement::TouchMeasurement;
     use crate::recognition::pose_prior::Turn;
     use crate::robot::Finger;
     use crate::task::{Aim, Ball};
@@ -282,7 +282,7 @@ mod tests {
     use palpate_gp::math::seed;
 
     /// Touches of a box whose front and right side are 2 mm and 3 mm off.
-    fn touches() -> Vec<Arc<Evidence>> {
+    fn touches() -> Vec<Arc<Measurement>> {
         let ball = Ball { centre_w: Point3::origin(), radius_m: 0.15, lowest_m: None };
         let finger = Finger { pitch_deg: 0.0, ..Finger::default() };
         [([0.01, 0.032, 0.0], Vector3::y()), ([0.053, 0.0, 0.01], Vector3::x())]
@@ -290,12 +290,13 @@ mod tests {
             .map(|(p_w, normal_w)| {
                 let aim = Aim::against(p_w.into(), &normal_w);
                 let approach = ball.approach(&aim, &finger, 0.01, 0.0);
-                let touch = Touch::Contact(Contact::new(aim.p_w, normal_w));
                 let p_wt = aim.p_w + normal_w * finger.radius_m;
-                let swept = Some(SweptVolume { finger: finger.clone(), p_wt });
-                let outcome = Outcome { swept, ..touch.into() };
-                let evidence = TouchEvidence::new(&approach, &outcome, (0.0, None));
-                Arc::new(Evidence::Touch(evidence.unwrap()))
+                let contact = Contact::new(aim.p_w, normal_w);
+                let free = FreeVolume::new(finger.clone(), &approach, p_wt, End::Contact);
+                let evidence = vec![Evidence::Points(contact.into()), Evidence::Free(free)];
+                let outcome = Outcome::new(End::Contact, evidence);
+                let evidence = TouchMeasurement::new(&outcome, 0.0, None);
+                Arc::new(Measurement::Touch(evidence.unwrap()))
             })
             .collect()
     }

@@ -271,9 +271,9 @@ fn candidates(
     }
     all.shuffle(rng);
     let made = all.into_iter().filter_map(|(side_w, site, spin)| {
-        let x_wt = pose(body, &side_w, (&site.p_t, &site.outward_t), spin)?;
+        let x_wt = pose(body, &side_w, site, spin)?;
         let sensed_t = match outline.pad() {
-            Some((pad, x_tp)) => pad_points(pad, x_tp, (body, &x_wt, &side_w), &site.p_t),
+            Some((pad, x_tp)) => pad_points(pad, x_tp, &site.p_t, body, &x_wt, &side_w),
             None => vec![site.p_t],
         };
         let touch = RegistrationTouch { x_wt, pressed_m: 0.0, sensed_t, load: None };
@@ -327,8 +327,10 @@ fn sites(outline: &FingerOutline) -> Vec<Site> {
 fn pad_points(
     pad: &GelPad,
     x_tp: &Isometry3<f64>,
-    (body, x_wt, side_w): (&CalibrationBody, &Isometry3<f64>, &UnitVector3<f64>),
     p_t: &Point3<f64>,
+    body: &CalibrationBody,
+    x_wt: &Isometry3<f64>,
+    side_w: &UnitVector3<f64>,
 ) -> Vec<Point3<f64>> {
     let mut x_wp = x_wt * x_tp;
     x_wp.translation.vector -= side_w.scale(PAD_PRESSED_M);
@@ -369,12 +371,12 @@ fn sides(body: &CalibrationBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f
     SIDES.iter().copied().flat_map(circle).collect()
 }
 
-/// Returns the pose of `T` at which the finger's point with this outward normal touches the body on
-/// `side_w`, rotated by `spin` about that normal; `None` if there is none.
+/// Returns the pose of `T` at which the finger's `site` touches the body on `side_w`, rotated by
+/// `spin` about the outward normal; `None` if there is none.
 fn pose(
     body: &CalibrationBody,
     side_w: &UnitVector3<f64>,
-    (p_t, outward_t): (&Point3<f64>, &UnitVector3<f64>),
+    site: &Site,
     spin: f64,
 ) -> Option<Isometry3<f64>> {
     let p_w = match body {
@@ -382,11 +384,11 @@ fn pose(
         CalibrationBody::Plate { point_w, .. } => *point_w,
     };
     let inward_w = -side_w.into_inner();
-    let turn = Rotation3::rotation_between(outward_t, &inward_w)
-        .or_else(|| Rotation3::rotation_between(&-outward_t.into_inner(), side_w))?;
+    let turn = Rotation3::rotation_between(&site.outward_t, &inward_w)
+        .or_else(|| Rotation3::rotation_between(&-site.outward_t.into_inner(), side_w))?;
     let spun = Rotation3::from_axis_angle(side_w, spin) * turn;
     let r_wt = UnitQuaternion::from_rotation_matrix(&spun);
-    let p_wt = p_w - r_wt * p_t.coords;
+    let p_wt = p_w - r_wt * site.p_t.coords;
     Some(Isometry3::from_parts(Translation3::from(p_wt.coords), r_wt))
 }
 

@@ -8,7 +8,8 @@ use super::hand_eye::{
 use super::known_body::{CalibrationBody, FingerOutline};
 use super::wrench_fit::WrenchErrors;
 use crate::backend::Fault;
-use crate::probe::{Probe, Touch};
+use crate::evidence::Outcome;
+use crate::probe::Probe;
 use crate::robot::Robot;
 use crate::task::touch::TouchSettings;
 use nalgebra::Isometry3;
@@ -160,22 +161,23 @@ pub fn register(
     probe: &mut dyn Probe,
     robot: &Robot,
     touch: &TouchSettings,
-    (body, design): (&CalibrationBody, &RegistrationDesign),
-    made: &mut dyn FnMut(&Touch),
+    body: &CalibrationBody,
+    design: &RegistrationDesign,
+    made: &mut dyn FnMut(&Outcome),
 ) -> Result<RegistrationResult, InputError> {
     let of = design.approaches.len();
     let pressed_m = pressed_m(robot, touch);
     let mut touches = Vec::with_capacity(of);
     let (mut made_count, mut ended) = (0, None);
     for (i, approach) in design.approaches.iter().enumerate() {
-        let outcome = match probe.execute(approach) {
+        let outcome = match probe.touch(approach) {
             Ok(outcome) => outcome,
             Err(fault) => {
                 ended = Some((i + 1, fault));
                 break;
             }
         };
-        made(&outcome.touch);
+        made(&outcome);
         made_count += 1;
         if outcome.contact().is_some() {
             let (x_wt, sensed) = outcome.sensed.as_ref().ok_or_else(|| {

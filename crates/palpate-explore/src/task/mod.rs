@@ -1,5 +1,6 @@
 //! Task of the robot: where to explore, how to touch, and the approach of each touch.
 
+mod action;
 pub mod approach;
 pub mod stroke;
 mod target;
@@ -8,6 +9,7 @@ mod task;
 pub mod touch;
 pub mod zone;
 
+pub use action::Action;
 pub use approach::{Approach, Ball, RADIUS_M, WholeObject};
 pub(crate) use target::any_orthogonal;
 pub use target::{Aim, Target};

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Target of the next touch, as selected by a planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(into = "TargetOut", try_from = "TargetIn")]
-#[schemars(with = "TargetOut")]
+#[serde(into = "StoredTarget", try_from = "StoredTarget")]
+#[schemars(with = "StoredTarget")]
 pub enum Target {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
@@ -35,6 +35,20 @@ pub enum Target {
         /// Way of the finger across the approach, in `W`, m.
         way_w: Vector3<f64>,
     },
+    /// An action that a program adds, at a tap.
+    Custom {
+        /// Name of the action.
+        name: String,
+        /// The tap.
+        tap: Box<Target>,
+        /// Parameters of the action.
+        parameters: Vec<f64>,
+    },
+    /// A look of a camera.
+    Look {
+        /// Number of the camera's place.
+        camera: u32,
+    },
 }
 
 impl Target {
@@ -43,8 +57,16 @@ impl Target {
         match self {
             Self::Place(place) => Some(place),
             Self::Tilted { place, .. } | Self::Stroke { place, .. } => Some(place),
-            Self::Aim(_) | Self::StrokeAround { .. } => None,
+            Self::Custom { tap, .. } => tap.place(),
+            Self::Aim(_) | Self::StrokeAround { .. } | Self::Look { .. } => None,
         }
+    }
+
+    /// Returns the point that a touch aims at, in the domain of beliefs: the place of a zone, or x,
+    /// y and z in `W`.
+    pub fn point(&self) -> Option<Vec<f64>> {
+        let aimed = || self.aim().map(|aim| aim.p_w.coords.as_slice());
+        Some(self.place().or_else(aimed)?.into())
     }
 
     /// Returns the place of a zone where the finger leaves the surface, if nothing stops it.
@@ -59,6 +81,7 @@ impl Target {
     pub fn pitch_deg(&self) -> Option<f64> {
         match self {
             Self::Tilted { pitch_deg, .. } => Some(*pitch_deg),
+            Self::Custom { tap, .. } => tap.pitch_deg(),
             _ => None,
         }
     }
@@ -67,6 +90,7 @@ impl Target {
     pub fn aim(&self) -> Option<&Aim> {
         match self {
             Self::Aim(aim) | Self::StrokeAround { aim, .. } => Some(aim),
+            Self::Custom { tap, .. } => tap.aim(),
             _ => None,
         }
     }
@@ -98,23 +122,11 @@ impl Target {
             Self::Tilted { place: [x, z], pitch_deg } => vec![*x, *z, *pitch_deg],
             Self::Stroke { place: [x, z], to: [u, v] } => vec![*x, *z, *u, *v],
             Self::Aim(aim) => aim.numbers().to_vec(),
+            Self::Look { camera } => vec![f64::from(*camera)],
+            Self::Custom { tap, .. } => tap.numbers(),
             Self::StrokeAround { aim, way_w } => {
                 aim.numbers().iter().chain(way_w).copied().collect()
             }
-        }
-    }
-
-    /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, three for
-    /// a place and a pitch, four for a stroke, six for an aim, nine for a stroke around an object.
-    /// Returns `None` for another count, and for an aim without a direction.
-    pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        match *numbers {
-            [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
-            [x, z, pitch_deg] => Some(Self::Tilted { place: [x, z], pitch_deg }),
-            [x, z, u, v] => Some(Self::Stroke { place: [x, z], to: [u, v] }),
-            [x, y, z, u, v, w] => Some(Self::Aim(Aim::along([x, y, z], [u, v, w])?)),
-            [x, y, z, u, v, w, a, b, c] => Self::stroke_around([x, y, z], [u, v, w], [a, b, c]),
-            _ => None,
         }
     }
 
@@ -196,7 +208,7 @@ impl Aim {
 /// A target as written in a row.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum TargetOut {
+enum StoredTarget {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
     /// The place of a zone, touched with another pitch of the finger.
@@ -229,9 +241,23 @@ enum TargetOut {
         /// Way of the slide across the approach, in `W`, m.
         way_w: [f64; 3],
     },
+    /// An action that a program adds, at a tap.
+    Custom {
+        /// Name of the action.
+        name: String,
+        /// The tap.
+        tap: Box<StoredTarget>,
+        /// Parameters of the action.
+        parameters: Vec<f64>,
+    },
+    /// A look of a camera.
+    Look {
+        /// Number of the camera's place.
+        camera: u32,
+    },
 }
 
-impl From<Target> for TargetOut {
+impl From<Target> for StoredTarget {
     fn from(target: Target) -> Self {
         match target {
             Target::Place(place) => Self::Place(place),
@@ -239,6 +265,10 @@ impl From<Target> for TargetOut {
             Target::Stroke { place, to } => Self::Stroke { place, to },
             Target::Aim(Aim { p_w, direction_w: ahead_w }) => {
                 Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
+            }
+            Target::Look { camera } => Self::Look { camera },
+            Target::Custom { name, tap, parameters } => {
+                Self::Custom { name, tap: Box::new((*tap).into()), parameters }
             }
             Target::StrokeAround { aim, way_w } => Self::StrokeAround {
                 p_w: aim.p_w.into(),
@@ -249,33 +279,24 @@ impl From<Target> for TargetOut {
     }
 }
 
-/// A target as read from a row: version 0.1 wrote its numbers without a name.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum TargetIn {
-    Written(TargetOut),
-    Numbers(Vec<f64>),
-}
-
-impl TryFrom<TargetIn> for Target {
+impl TryFrom<StoredTarget> for Target {
     type Error = String;
 
-    fn try_from(read: TargetIn) -> Result<Self, String> {
+    fn try_from(read: StoredTarget) -> Result<Self, String> {
         match read {
-            TargetIn::Written(TargetOut::Place(place)) => Ok(Self::Place(place)),
-            TargetIn::Written(TargetOut::Tilted { place, pitch_deg }) => {
-                Ok(Self::Tilted { place, pitch_deg })
+            StoredTarget::Place(place) => Ok(Self::Place(place)),
+            StoredTarget::Tilted { place, pitch_deg } => Ok(Self::Tilted { place, pitch_deg }),
+            StoredTarget::Stroke { place, to } => Ok(Self::Stroke { place, to }),
+            StoredTarget::Look { camera } => Ok(Self::Look { camera }),
+            StoredTarget::Custom { name, tap, parameters } => {
+                Ok(Self::Custom { name, tap: Box::new((*tap).try_into()?), parameters })
             }
-            TargetIn::Written(TargetOut::Stroke { place, to }) => Ok(Self::Stroke { place, to }),
-            TargetIn::Written(TargetOut::Aim { p_w, ahead_w }) => {
+            StoredTarget::Aim { p_w, ahead_w } => {
                 Aim::along(p_w, ahead_w).map(Self::Aim).ok_or_else(|| no_direction(ahead_w))
             }
-            TargetIn::Written(TargetOut::StrokeAround { p_w, ahead_w, way_w }) => {
+            StoredTarget::StrokeAround { p_w, ahead_w, way_w } => {
                 Self::stroke_around(p_w, ahead_w, way_w).ok_or_else(|| no_direction(ahead_w))
             }
-            TargetIn::Numbers(numbers) => Self::from_numbers(&numbers).ok_or_else(|| {
-                format!("a target has 1, 2, 3, 4, 6 or 9 numbers, not {}", numbers.len())
-            }),
         }
     }
 }
@@ -296,7 +317,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A target is read exactly as it was written, by its name or by its numbers.
+        /// A target is read exactly as it was written.
         #[test]
         fn a_target_is_read_as_it_was_written(
             at in prop::array::uniform3(-0.5f64..0.5),
@@ -309,8 +330,6 @@ mod tests {
             for target in [aim.into(), at[..2].to_vec().into(), tilted, stroke, around] {
                 let json = serde_json::to_string(&target).unwrap();
                 prop_assert_eq!(&serde_json::from_str::<Target>(&json).unwrap(), &target);
-                let numbers = serde_json::to_string(&target.numbers()).unwrap();
-                prop_assert_eq!(&serde_json::from_str::<Target>(&numbers).unwrap(), &target);
             }
         }
     }
@@ -327,7 +346,6 @@ mod tests {
     fn an_aim_has_a_point_and_a_direction() {
         assert!(Aim::along([0.0; 3], [0.0; 3]).is_none());
         assert!(Aim::along([0.0; 3], [0.0, 0.0, f64::NAN]).is_none());
-        assert!(Target::from_numbers(&[0.0; 5]).is_none());
         assert_eq!(*Aim::along([0.0; 3], [0.0, 0.0, -2.0]).unwrap().direction_w, -Vector3::z());
     }
 }

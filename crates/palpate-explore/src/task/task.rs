@@ -56,6 +56,41 @@ impl Region {
         }
     }
 
+    /// Returns a touch of the point `p_w` as at `target`: at its place of the zone, or along the
+    /// aim's direction; `target` itself if the point's place is outside.
+    pub fn touch_of(&self, target: Target, p_w: Point3<f64>) -> Target {
+        match (self, target.aim()) {
+            (Self::Zone(zone), _) => {
+                let place = zone.place(&p_w);
+                if zone.contains(&place) { place.into() } else { target }
+            }
+            (Self::Ball(_), Some(aim)) => Target::Aim(Aim { p_w, ..*aim }),
+            (Self::Ball(_), None) => target,
+        }
+    }
+
+    /// Describes a target that is not in the region, or cannot be reached in it.
+    pub fn outside(&self) -> &'static str {
+        match self {
+            Self::Zone(_) => "outside the zone",
+            Self::Ball(_) => "outside the ball, or unreachable",
+        }
+    }
+
+    /// Returns the tap with these coordinates: (x) or (x, z) of a zone; x, y and z of a point and of
+    /// a direction around an object. `None` for another count, and for an aim without a direction.
+    pub fn target(&self, coordinates: &[f64]) -> Option<Target> {
+        match (self, coordinates) {
+            (Self::Zone(zone), _) if coordinates.len() == zone.dimension() => {
+                Some(coordinates.into())
+            }
+            (Self::Ball(_), &[x, y, z, u, v, w]) => {
+                Aim::along([x, y, z], [u, v, w]).map(Target::Aim)
+            }
+            _ => None,
+        }
+    }
+
     /// Straight-line distance between two targets, m: from where the finger leaves a place of the
     /// zone, or between the points where the finger leaves and enters the ball. 0 if one is not a
     /// target of the region.

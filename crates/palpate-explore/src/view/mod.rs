@@ -4,6 +4,7 @@
 //! [`thin`] turns the thousands of points of a [`View`] into a few hundred surface elements. A
 //! [`SeenSurface`] is the evidence that a belief takes from them.
 
+pub(crate) mod look;
 mod offer;
 mod register;
 mod reject;
@@ -11,7 +12,7 @@ mod seen;
 mod sight;
 mod thin;
 
-pub use offer::Offer;
+pub use offer::LookOffer;
 pub use seen::{CorrectedElement, ERRORS, RigidError, SeenSurface, corrected_pose};
 pub use sight::{DepthMap, Sight};
 pub use thin::{SurfaceElement, thin};

@@ -10,7 +10,7 @@ const STEPS: usize = 24;
 
 /// A view that a planner may ask for before its next touch.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Offer {
+pub struct LookOffer {
     /// Number of the view, which tells its place.
     pub number: u32,
     /// Stated pose of the camera in `W`: z ahead, x right, y down.
@@ -21,8 +21,8 @@ pub struct Offer {
     pub accuracy: CameraAccuracy,
     /// Ends of the image as x/z and y/z of the rays.
     pub image: [[f64; 2]; 2],
-    /// Time of the look over that of a touch.
-    pub cost: f64,
+    /// Time of the look, s.
+    pub time_s: f64,
 }
 
 impl SeenSurface {
@@ -30,7 +30,7 @@ impl SeenSurface {
     /// normal in `W`, that faces the camera, is in the image and has free space before it up to
     /// `hides_m`. `gradient` is that of [`new`](Self::new).
     pub fn imagined(
-        offer: &Offer,
+        offer: &LookOffer,
         points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
         (hides_m, mut is_free): (f64, impl FnMut(&Point3<f64>) -> bool),
         gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,

@@ -2,7 +2,7 @@
 //! on the part that it has seen.
 
 use super::seen::{ERRORS, SeenSurface};
-use crate::probe::Contact;
+use crate::evidence::Contact;
 use nalgebra::{Cholesky, Point3, SMatrix, SVector};
 use palpate_gp::math::least_squares::huber_weight;
 
@@ -130,7 +130,7 @@ impl SeenSurface {
         (weights > 0.0).then(|| Offset {
             off_m: off_m / weights,
             loadings_m: loadings_m / weights,
-            variance_m2: 1.0 / weights + contact.sd_m.unwrap_or(0.0).powi(2),
+            variance_m2: 1.0 / weights + contact.sd_m().unwrap_or(0.0).powi(2),
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Surfaces of a view that are not the object, as a hand before it: the finger went through them.
 
 use super::{CorrectedElement, SeenSurface};
-use crate::probe::Contact;
+use crate::evidence::Contact;
 use nalgebra::Point3;
 
 /// Depth within swept space, m, and in standard deviations of an element, beyond which it is not

@@ -2,9 +2,9 @@
 //! gradient, and positive in swept free space. Also the prior mean: a body around the contacts.
 
 use super::settings::PriorShape;
-use crate::probe::{Contact, SweptVolume, Touch};
+use crate::evidence::{Contact, End, Evidence, FreeVolume, SurfacePoints};
 use crate::task::stroke::FIRST_SOURCE;
-use crate::task::{Aim, Approach, Ball};
+use crate::task::{Aim, Ball};
 use crate::view::SeenSurface;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::implicit::Field;
@@ -13,52 +13,42 @@ use palpate_geometry::primitives::nearest_on_segment;
 use palpate_gp::{KnownError, Observation, Observations, Slope};
 use serde::{Deserialize, Serialize};
 
-/// All contacts and swept volumes.
+/// Evidence of all actions, by kind.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct TouchEvidence {
-    contacts: Vec<Contact>,
-    /// Numbers of the contacts of strokes: the first, and one beyond the last.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    strokes: Vec<[usize; 2]>,
-    ways: Vec<SweptPath>,
+pub struct SpatialEvidence {
+    points: Vec<SurfacePoints>,
+    free: Vec<FreeVolume>,
     /// Surfaces that cameras have seen, one per view.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) seen: Vec<SeenSurface>,
 }
 
-/// Path of a fingertip that was free up to its end.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct SweptPath {
-    /// End point and direction.
-    end: Aim,
-    length_m: f64,
-    radius_m: f64,
-    /// Number of balls along the path that are observed.
-    places: u32,
-    /// Whether there is a contact at its end.
-    is_met: bool,
-}
-
-impl SweptPath {
-    /// Distance of `p_w` from the hull of the swept path, m; negative inside.
+impl FreeVolume {
+    /// Distance of `p_w` from the swept path of the fingertip, m; negative inside.
     fn distance_m(&self, p_w: &Point3<f64>) -> f64 {
-        let start_w = self.end.p_w - self.end.direction_w.scale(self.length_m);
-        (nearest_on_segment(p_w, &start_w, &self.end.p_w) - p_w).norm() - self.radius_m
+        let start_w = self.p_wt - self.ahead_w.scale(self.way_m);
+        (nearest_on_segment(p_w, &start_w, &self.p_wt) - p_w).norm() - self.finger.radius_m
     }
 
-    /// Returns the centres of the observed balls, from the end of the path backwards: those inside
-    /// `ball`, and at least the one at a contact.
-    fn places_w(&self, ball: &Ball) -> impl Iterator<Item = Point3<f64>> {
-        let [near_m, far_m] = ball.chord_m(&self.end);
-        let first_m = if self.is_met { 0.0 } else { (-far_m).max(0.0) };
-        let last_m =
-            (-near_m).min(self.length_m).max(if self.is_met { self.radius_m } else { 0.0 });
-        let is_in = self.is_met || (near_m < far_m && first_m < last_m);
-        let count = if is_in { self.places } else { 0 };
+    /// Returns the centres of the observed balls along the path, from its end backwards: those
+    /// inside `ball`, and at least the one at a contact. Of a contact there are `places`, of a miss
+    /// twice as many, and none of an interrupted touch, whose point of contact is unknown.
+    fn places_w(&self, ball: &Ball, places: u32) -> impl Iterator<Item = Point3<f64>> {
+        let [near_m, far_m] = ball.chord_m(&Aim { p_w: self.p_wt, direction_w: self.ahead_w });
+        let is_met = self.end == End::Contact;
+        let places = match self.end {
+            End::Contact => places,
+            End::Miss => 2 * places,
+            End::Overload | End::Looked => 0,
+        };
+        let first_m = if is_met { 0.0 } else { (-far_m).max(0.0) };
+        let last_m = (-near_m).min(self.way_m).max(if is_met { self.finger.radius_m } else { 0.0 });
+        let is_in = is_met || (near_m < far_m && first_m < last_m);
+        let count = if is_in { places } else { 0 };
         (0..count).map(move |i| {
             let share = f64::from(i) / f64::from(count);
             let back_m = first_m + share * (last_m - first_m);
-            self.end.p_w - self.end.direction_w.scale(back_m)
+            self.p_wt - self.ahead_w.scale(back_m)
         })
     }
 }
@@ -76,53 +66,37 @@ pub(super) enum CameraPose {
 /// contacts: the field is close to a distance, but not exact; a heuristic.
 const SURE: f64 = 0.1;
 
-impl TouchEvidence {
-    /// Adds a touch and, if known, its swept volume, as `places` balls along the path.
-    pub fn observe(
-        &mut self,
-        approach: &Approach,
-        touch: &Touch,
-        swept: Option<&SweptVolume>,
-        places: u32,
-    ) {
-        let places = match touch {
-            Touch::Contact(contact) => {
-                let points = contact.points();
-                let first = self.contacts.len();
-                self.contacts
-                    .extend(points.map(|point| Contact { patch: Vec::new(), ..point.clone() }));
-                if approach.slide_w.is_some() {
-                    self.strokes.push([first, self.contacts.len()]);
-                }
-                places
-            }
-            Touch::Miss => 2 * places,
-            // The point of contact of an interrupted touch is unknown.
-            Touch::Overload => 0,
-        };
-        let Some(SweptVolume { finger, p_wt }) = swept else { return };
-        let ahead_w = approach.direction_w();
-        self.ways.push(SweptPath {
-            end: Aim { p_w: *p_wt, direction_w: ahead_w },
-            length_m: (p_wt - approach.p_near_w).dot(&ahead_w),
-            radius_m: finger.radius_m,
-            places,
-            is_met: matches!(touch, Touch::Contact(_)),
-        });
+impl SpatialEvidence {
+    /// Adds evidence; of points with a common error those that are `apart_m`.
+    pub fn add(&mut self, evidence: &Evidence, apart_m: f64) {
+        match evidence {
+            Evidence::Points(points) => self.points.push(match points.source {
+                Some(_) => points.thinned(apart_m),
+                None => points.clone(),
+            }),
+            Evidence::Free(free) => self.free.push(free.clone()),
+            Evidence::Seen(seen) => self.seen.push(seen.clone()),
+        }
     }
 
-    /// Whether there are errors of known size: those of views, and of strokes whose sensor states
-    /// its own.
+    /// Whether there are errors of known size: those of views, and of points with a common error
+    /// whose sensor states it.
     pub(super) fn has_known_errors(&self) -> bool {
-        let states = |[from, to]: &[usize; 2]| {
-            self.contacts[*from..*to].iter().any(|contact| contact.sd_m.is_some())
+        let mut common = self.points.iter().filter(|points| points.source.is_some());
+        let states = |points: &SurfacePoints| {
+            points.points.iter().any(|contact| contact.covariance_w.is_some())
         };
-        !self.seen.is_empty() || self.strokes.iter().any(states)
+        !self.seen.is_empty() || common.any(states)
+    }
+
+    /// Points of contact with their normals, in order.
+    fn touched(&self) -> impl Iterator<Item = &Contact> + Clone {
+        self.points.iter().flat_map(|points| &points.points)
     }
 
     /// Points of contact in `W`, in order.
-    pub fn contacts(&self) -> impl ExactSizeIterator<Item = &Point3<f64>> + Clone {
-        self.contacts.iter().map(|contact| &contact.p_wc)
+    pub fn contacts(&self) -> impl Iterator<Item = &Point3<f64>> + Clone {
+        self.touched().map(|contact| &contact.p_wc)
     }
 
     /// Returns the points of contact, then those of seen surface elements, in `W`.
@@ -134,52 +108,54 @@ impl TouchEvidence {
     /// Distance of `p_w` from all contacts, all that was seen and all swept paths.
     pub fn distance_to_evidence_m(&self, p_w: &Point3<f64>) -> f64 {
         let met = self.points().map(|point| (point - p_w).norm());
-        met.chain(self.ways.iter().map(|way| way.distance_m(p_w))).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Returns centres and radii of the swept balls inside `ball`.
-    fn free<'a>(&'a self, ball: &'a Ball) -> impl Iterator<Item = (Point3<f64>, f64)> {
-        self.ways.iter().flat_map(|way| way.places_w(ball).map(|p_w| (p_w, way.radius_m)))
+        met.chain(self.free.iter().map(|free| free.distance_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the observations of the field relative to `prior`. At each contact the field is 0,
-    /// with the normal as its gradient if `normals` is set; what the sensor states as the error of
-    /// a stroke's contacts is one that they have in common. At the centre of each swept ball inside
-    /// `ball` it is the distance to the nearest contact. That is the upper bound of a distance
+    /// with the normal as its gradient if `normals` is set; points with a common error have it in the
+    /// size that each states. At the centre of each swept ball inside `ball`, `places` along a path
+    /// to a contact, it is the distance to the nearest contact. That is the upper bound of a distance
     /// there, and the swept radius the lower bound: the standard deviation is that of a uniform
     /// distribution between them. `noise_m` is the unit of the noise.
     pub fn observations(
         &self,
         (prior, ball): (&PriorMean, &Ball),
-        normals: bool,
+        (normals, places): (bool, u32),
         (noise_m, pose): (f64, CameraPose),
     ) -> Observations {
         let mut all = Observations::new(3);
-        let mut strokes = self.strokes.iter().zip(FIRST_SOURCE..).peekable();
-        for (i, contact) in self.contacts.iter().enumerate() {
-            let Contact { p_wc: p_w, normal_w, has_normal, sd_m, .. } = contact;
-            while strokes.next_if(|([_, end], _)| *end <= i).is_some() {}
-            let stroke = strokes.peek().filter(|([first, _], _)| *first <= i);
-            let field = prior.field(p_w);
-            let gradient = normal_w - field.gradient;
-            let slope = (normals && *has_normal)
-                .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
-            let place = p_w.coords.as_slice();
-            let common = [sd_m.unwrap_or(0.0)];
-            let known = stroke.filter(|_| sd_m.is_some()).map(|(_, source)| KnownError {
-                variance: 0.0,
-                source: *source,
-                loadings: &common,
-            });
-            let noise = sd_m.filter(|_| stroke.is_none());
-            let noise = noise.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
-            all.push(&Observation { place, height: -field.value, noise, slope, known });
+        let mut source = FIRST_SOURCE;
+        for points in &self.points {
+            let is_common = points.source.is_some();
+            for contact in &points.points {
+                let Contact { p_wc: p_w, normal_w, has_normal, .. } = contact;
+                let sd_m = contact.sd_m();
+                let field = prior.field(p_w);
+                let gradient = normal_w - field.gradient;
+                let slope = (normals && *has_normal)
+                    .then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
+                let place = p_w.coords.as_slice();
+                let common = [sd_m.unwrap_or(0.0)];
+                let known = (is_common && sd_m.is_some()).then_some(KnownError {
+                    variance: 0.0,
+                    source,
+                    loadings: &common,
+                });
+                let noise = sd_m.filter(|_| !is_common);
+                let noise = noise.map_or(1.0, |sd_m| (sd_m / noise_m).max(1.0));
+                all.push(&Observation { place, height: -field.value, noise, slope, known });
+            }
+            source += usize::from(is_common);
         }
         for number in 0..self.seen.len() {
             self.push_seen((prior, ball.radius_m), number, (noise_m, pose), &mut all);
         }
         let points: Vec<Point3<f64>> = self.points().collect();
-        for (p_w, radius_m) in self.free(ball) {
+        let swept = self
+            .free
+            .iter()
+            .flat_map(|free| free.places_w(ball, places).map(|p_w| (p_w, free.finger.radius_m)));
+        for (p_w, radius_m) in swept {
             let distances_m = points.iter().map(|point| (point - p_w).norm());
             let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
             let least_m = radius_m.min(nearest_m);
@@ -229,12 +205,13 @@ impl TouchEvidence {
 
     /// Registers the views to the contacts, and leaves out what the finger went through.
     pub(super) fn register(&mut self) {
-        let ways = &self.ways;
+        let free = &self.free;
         let inside_m = |p_w: &Point3<f64>, beside_m: f64| {
-            let depths_m = ways.iter().map(|way| -way.distance_m(p_w) - beside_m);
+            let depths_m = free.iter().map(|free| -free.distance_m(p_w) - beside_m);
             depths_m.fold(f64::NEG_INFINITY, f64::max)
         };
-        self.seen.iter_mut().for_each(|seen| seen.align(&self.contacts, inside_m));
+        let contacts: Vec<Contact> = self.touched().cloned().collect();
+        self.seen.iter_mut().for_each(|seen| seen.align(&contacts, inside_m));
     }
 }
 

@@ -1,13 +1,13 @@
 //! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
 //! inside (Williams & Fitzgibbon 2007).
 
-use super::evidence::{CameraPose, PriorMean, TouchEvidence};
+use super::evidence::{CameraPose, PriorMean, SpatialEvidence};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
-use crate::probe::{Outcome, Touch};
-use crate::task::{Aim, Approach, Ball};
-use crate::view::{Offer, RigidError, SeenSurface, View};
+use crate::evidence::{End, Evidence, Outcome};
+use crate::task::{Aim, Ball, Target};
+use crate::view::{LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -28,7 +28,7 @@ pub struct ImplicitSurface {
     settings: SpatialGpSettings,
     #[serde(skip, default = "default_kernel")]
     kernel: &'static dyn Kernel,
-    evidence: TouchEvidence,
+    evidence: SpatialEvidence,
     asked: Vec<Aim>,
     fit: Option<Fit>,
     /// Hyperparameters that the last fit started from.
@@ -87,59 +87,41 @@ const STEP: f64 = 0.7;
 // heuristic: a few points for each length over which a surface changes.
 const STROKE_STEP: f64 = 0.12;
 
-/// Number of surface elements of a view.
-// heuristic: as many as dozens of touches with their normals, whose cost the belief can bear.
-const SEEN: usize = 120;
-
 impl ImplicitSurface {
     /// Creates a belief without data.
     pub fn new(scope: ExplorationSetup, settings: SpatialGpSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
-        let (evidence, asked) = (TouchEvidence::default(), Vec::new());
+        let (evidence, asked) = (SpatialEvidence::default(), Vec::new());
         let (fit, start, surface) = (None, None, None);
         Self { scope, settings, kernel, evidence, asked, fit, start, surface }
     }
 
-    /// Adds what a touch at `aim` that followed `approach` has shown; the belief changes at the
-    /// next [`refit`](Self::refit).
-    pub fn observe(&mut self, aim: &Aim, approach: &Approach, outcome: &Outcome) {
-        self.asked.push(*aim);
-        let apart_m = STROKE_STEP * self.scope.ball.radius_m;
-        let (places, swept) = (self.settings.free_space_samples, outcome.swept.as_ref());
-        match &outcome.touch {
-            Touch::Contact(contact) if approach.slide_w.is_some() => {
-                let thinned = Touch::Contact(contact.thinned(apart_m));
-                self.evidence.observe(approach, &thinned, swept, places);
-            }
-            touch => self.evidence.observe(approach, touch, swept, places),
+    /// Adds what an action at `target` has shown; the belief changes at the next
+    /// [`refit`](Self::refit). A target of another region shows nothing.
+    pub fn observe(&mut self, target: &Target, outcome: &Outcome) {
+        match (target.aim(), outcome.end) {
+            (Some(aim), _) => self.asked.push(*aim),
+            (None, End::Looked) => {}
+            (None, _) => return,
         }
+        outcome.evidence.iter().for_each(|evidence| self.add(evidence));
     }
 
-    /// Adds a view of a camera; the belief changes at the next [`refit`](Self::refit). Returns what
-    /// it shows of the ball.
-    pub fn observe_view(&mut self, view: &View) -> &SeenSurface {
-        let (ball, margin_m) = (&self.scope.ball, view.margin_m());
-        let wanted = |p_w: &Point3<f64>| ball.is_near(p_w, margin_m);
-        self.observe_seen(SeenSurface::new(view, (wanted, SEEN), |normal_w| normal_w.into_inner()))
+    /// Adds evidence; the belief changes at the next [`refit`](Self::refit).
+    pub fn add(&mut self, evidence: &Evidence) {
+        self.evidence.add(evidence, STROKE_STEP * self.scope.ball.radius_m);
     }
 
     /// Returns what a look would show of `points` of the estimated surface with their normals;
     /// `None` before the first fit.
     pub fn imagined(
         &self,
-        offer: &Offer,
+        offer: &LookOffer,
         points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
     ) -> Option<SeenSurface> {
         let surface = self.surface()?;
         let hides = (2.0 * self.scope.ball.radius_m, |p_w: &Point3<f64>| surface.value(p_w) > 0.0);
         Some(SeenSurface::imagined(offer, points, hides, |normal_w| normal_w.into_inner()))
-    }
-
-    /// Adds a view that is thinned already.
-    pub fn observe_seen(&mut self, seen: SeenSurface) -> &SeenSurface {
-        let number = self.evidence.seen.len();
-        self.evidence.seen.push(seen);
-        &self.evidence.seen[number]
     }
 
     /// The surfaces that cameras have seen, one per view.
@@ -300,8 +282,8 @@ impl ImplicitSurface {
         let prior = PriorMean::about(self.settings.prior, &ball, points.iter());
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
         let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
-        let observations =
-            self.evidence.observations((&prior, &ball), self.normals(), (noise_m, pose));
+        let sampled = (self.normals(), self.settings.free_space_samples);
+        let observations = self.evidence.observations((&prior, &ball), sampled, (noise_m, pose));
         (prior, observations)
     }
 
@@ -388,7 +370,7 @@ impl ImplicitSurface {
     }
 
     /// Points of contact in `W`, in order.
-    pub fn contacts(&self) -> impl ExactSizeIterator<Item = &Point3<f64>> + Clone {
+    pub fn contacts(&self) -> impl Iterator<Item = &Point3<f64>> + Clone {
         self.evidence.contacts()
     }
 

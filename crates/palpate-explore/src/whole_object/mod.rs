@@ -1,5 +1,6 @@
 //! Belief of a whole object over space, touched from any side.
 
+mod belief;
 mod evidence;
 mod grid;
 mod implicit_surface;

@@ -1,6 +1,7 @@
 //! Scope of an exploration around a whole object: the ball and the finger.
 
 use crate::robot::Finger;
+use crate::robot::sensor::TipSurface;
 use crate::task::touch::TouchSettings;
 use crate::task::{Aim, Ball, Target, Task};
 use nalgebra::Point3;
@@ -8,11 +9,6 @@ use palpate_geometry::primitives::extent;
 use palpate_input::error::InputError;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// Common offset of the surface that is estimated by
-/// a soft finger: on the twelve tuning objects, in 36 trials of 60 touches, 0.1 to 0.8 mm outwards,
-/// median 0.3 mm.
-const SOFT_OFFSET_M: f64 = 3e-4;
 
 /// A ball that contains the object, and the finger that touches it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -48,15 +44,15 @@ impl TryFrom<StoredSetup> for ExplorationSetup {
     fn try_from(stored: StoredSetup) -> Result<Self, InputError> {
         let StoredSetup { ball, offset_m, touch, finger } = stored;
         let task = Task::new(ball, touch, &finger)?;
-        Ok(Self { offset_m, ..Self::new(ball, &task, (&finger, false)) })
+        Ok(Self { offset_m, ..Self::new(ball, &task, &TipSurface::Rigid) })
     }
 }
 
 impl ExplorationSetup {
-    /// Creates the scope of the `ball` of a task, with `finger`; the flag marks a soft finger.
-    pub fn new(ball: Ball, task: &Task, (finger, is_soft): (&Finger, bool)) -> Self {
-        let offset_m = if is_soft { SOFT_OFFSET_M } else { 0.0 };
-        Self { ball, radius_m: finger.radius_m, offset_m, task: Arc::new(task.clone()) }
+    /// Creates the scope of the `ball` of a task for a tip with this `surface`.
+    pub fn new(ball: Ball, task: &Task, surface: &TipSurface) -> Self {
+        let offset_m = surface.errors(task.touch().press_m).offset_m[0];
+        Self { ball, radius_m: task.finger().radius_m, offset_m, task: Arc::new(task.clone()) }
     }
 
     /// Returns the ball around `contacts`, which estimates the object's size; the ball of the scope

@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::evidence::{Contact, End};
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
-use palpate_explore::planner::{Fallback, PLANNERS, Plan, PlannerEntry, PlanningSettings};
-use palpate_explore::probe::{Contact, Touch};
+use palpate_explore::planner::{Fallback, Offer, PLANNERS, Plan, PlannerEntry, PlanningSettings};
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 use palpate_gp::kernel::SquaredExponential;
@@ -31,7 +31,7 @@ fn belief(zone: &Zone, trial: u64, count: usize, elsewhere: usize) -> HeightFiel
         if i % elsewhere == 0 {
             p_wc.x += extent * 0.05 * rng.random_range(-1.0..1.0);
         }
-        belief.observe(&target, &Touch::Contact(Contact::new(p_wc, Vector3::y())));
+        belief.observe(&target.into(), &Contact::new(p_wc, Vector3::y()).into());
     }
     belief.refit().unwrap();
     belief
@@ -42,7 +42,7 @@ struct InZone(Box<dyn planner::Planner>);
 
 impl InZone {
     fn plan(&mut self, belief: &HeightField) -> Plan {
-        self.0.plan(&Belief::from(belief.clone())).unwrap()
+        self.0.plan(&Belief::from(belief.clone()), &Offer::default()).unwrap()
     }
 }
 
@@ -105,7 +105,7 @@ fn every_planner_stays_in_the_zone_and_repeats_itself() {
 fn a_planner_that_needs_a_library_says_so_without_one() {
     let belief = Belief::from(belief(&SQUARE, 3, 4, 2));
     for entry in PLANNERS.iter().filter(|entry| entry.needs_library) {
-        let error = make(entry.name).0.plan(&belief).unwrap_err();
+        let error = make(entry.name).0.plan(&belief, &Offer::default()).unwrap_err();
         assert!(error.reason.contains("library"), "{}: {}", entry.name, error.reason);
     }
 }
@@ -116,7 +116,7 @@ fn a_belief_that_is_sure_everywhere_is_a_stall() {
     for i in 0..60 {
         let x = -2.0 + 4.0 * f64::from(i) / 59.0;
         let p_wc = Point3::new(x, 1.0, 0.0);
-        belief.observe(&[x], &Touch::Contact(Contact::new(p_wc, Vector3::y())));
+        belief.observe(&[x].into(), &Contact::new(p_wc, Vector3::y()).into());
     }
     belief.refit().unwrap();
     let plan = make("active").plan(&belief);
@@ -132,13 +132,13 @@ fn a_belief_without_any_contact_still_plans() {
         let mut belief = HeightField::new(SQUARE, GpSettings::default());
         let mut planner = make(entry.name);
         let mut targets: Vec<Vec<f64>> = vec![SQUARE.at(&[0.4, 0.7])];
-        belief.observe(&targets[0], &Touch::Miss);
+        belief.observe(&targets[0][..].into(), &End::Miss.into());
         for _ in 0..30 {
             belief.refit().unwrap();
             let target = planner.plan(&belief).target.numbers();
             let repeated = targets.iter().any(|other| SQUARE.distance(other, &target) < 1e-6);
             assert!(!repeated, "{}: {target:?} again", entry.name);
-            belief.observe(&target, &Touch::Miss);
+            belief.observe(&target[..].into(), &End::Miss.into());
             targets.push(target);
         }
     }

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 use palpate_explore::belief::HeightField;
+use palpate_explore::evidence::Contact;
 use palpate_explore::gp_settings::GpSettings;
-use palpate_explore::probe::{Contact, Touch};
 use palpate_explore::robot::Finger;
 use palpate_explore::task::{Target, Zone};
 
@@ -17,8 +17,7 @@ fn believe(finger: Finger, height_m: impl Fn(f64, f64) -> f64) -> HeightField {
         for j in 0..16 {
             let place = [i, j].map(|k| SIDE_M * f64::from(k) / 15.0);
             let p_wc = zone.point(&place, height_m(place[0], place[1]));
-            let contact = Contact::new(p_wc, Vector3::y());
-            belief.observe(&place, &Touch::Contact(contact));
+            belief.observe(&place.into(), &Contact::new(p_wc, Vector3::y()).into());
         }
     }
     belief.refit().unwrap();

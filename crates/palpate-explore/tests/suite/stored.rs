@@ -2,9 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
 use palpate_explore::gp_settings::GpSettings;
-use palpate_explore::probe::{Contact, Outcome, SweptVolume, Touch};
 use palpate_explore::robot::Finger;
+use palpate_explore::robot::sensor::TipSurface;
 use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::{Aim, Ball, Region, Target, Task, Zone};
 use palpate_explore::whole_object::{ImplicitSurface, SpatialGpSettings};
@@ -18,7 +19,7 @@ fn restored(belief: &Belief) -> Belief {
 /// or overloads.
 fn beliefs(task: &Task, count: usize, centre_w: Point3<f64>, gp: &GpSettings) -> Vec<Belief> {
     let finger = Finger::default();
-    let mut belief = Belief::new(task, (&finger, true), gp, &SpatialGpSettings::default());
+    let mut belief = Belief::new(task, &TipSurface::Skin, gp, &SpatialGpSettings::default());
     let mut all = vec![belief.clone()];
     for i in 0..count {
         let share = |step: f64| (i as f64 * step).fract();
@@ -32,14 +33,17 @@ fn beliefs(task: &Task, count: usize, centre_w: Point3<f64>, gp: &GpSettings) ->
         };
         let approach = task.approach(&target).unwrap();
         let p_wc = centre_w + outward * (0.03 + 0.005 * share(0.31));
-        let touch = match i % 5 {
-            3 => Touch::Miss,
-            4 => Touch::Overload,
-            _ => Touch::Contact(Contact::new(p_wc, outward)),
+        let end = match i % 5 {
+            3 => End::Miss,
+            4 => End::Overload,
+            _ => End::Contact,
         };
-        let swept = SweptVolume { finger: finger.clone(), p_wt: p_wc + outward * finger.radius_m };
-        let swept = (i != 2).then_some(swept);
-        belief.observe(&target, &approach, &Outcome { swept, ..touch.into() });
+        let contact = (end == End::Contact).then(|| Contact::new(p_wc, outward));
+        let p_wt = p_wc + outward * finger.radius_m;
+        let free = (i != 2).then(|| FreeVolume::new(finger.clone(), &approach, p_wt, end));
+        let points = contact.map(|contact| Evidence::Points(contact.into()));
+        let evidence = points.into_iter().chain(free.map(Evidence::Free)).collect();
+        belief.observe(&target, &Outcome::new(end, evidence));
         belief.refit().unwrap();
         all.push(belief.clone());
     }

@@ -229,9 +229,9 @@ impl Entries {
                     if !is_known.contains(&opcode) {
                         continue;
                     }
-                    let (known, at) = ((&mut self.schemas, &mut self.channels), self.at);
                     let record = mcap::parse_record(opcode, data);
-                    if let Some(entry) = entry(record, known, at)? {
+                    let (schemas, channels) = (&mut self.schemas, &mut self.channels);
+                    if let Some(entry) = entry(record, schemas, channels, self.at)? {
                         return Ok(Some(entry));
                     }
                 }
@@ -244,7 +244,8 @@ impl Entries {
 /// type.
 fn entry(
     record: McapResult<Record>,
-    (schemas, channels): (&mut HashMap<u16, Decode>, &mut HashMap<u16, Decode>),
+    schemas: &mut HashMap<u16, Decode>,
+    channels: &mut HashMap<u16, Decode>,
     at: usize,
 ) -> Result<Option<Entry>, InputError> {
     match record.map_err(|error| unreadable(at, error))? {

@@ -29,10 +29,9 @@ pub fn listen(
         .block_on(NodeHandle::new(master, &name))
         .map_err(cannot_open(&format!("a node at the master {master}")))?;
     let (inlet, outlet) = channel();
-    let link = (&runtime, &node, &inlet);
-    subscribe::<PointCloud2>(link, topics.view)?;
-    subscribe::<Image>(link, topics.view)?;
-    subscribe::<CameraInfo>(link, &topics.info())?;
+    subscribe::<PointCloud2>(&runtime, &node, &inlet, topics.view)?;
+    subscribe::<Image>(&runtime, &node, &inlet, topics.view)?;
+    subscribe::<CameraInfo>(&runtime, &node, &inlet, &topics.info())?;
     let end = Instant::now() + topics.timeout;
     while let Some(left) = end.checked_duration_since(Instant::now()) {
         let Ok(message) = outlet.recv_timeout(left) else { break };
@@ -44,7 +43,9 @@ pub fn listen(
 }
 
 fn subscribe<M>(
-    (runtime, node, inlet): (&Runtime, &NodeHandle, &Sender<CameraMessage>),
+    runtime: &Runtime,
+    node: &NodeHandle,
+    inlet: &Sender<CameraMessage>,
     name: &str,
 ) -> Result<(), InputError>
 where

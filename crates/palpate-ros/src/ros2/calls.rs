@@ -226,9 +226,6 @@ impl Response for SwitchControllerHumbleResponse {
     }
 }
 
-/// Node, poll, mapping and name with which a service is opened.
-pub(super) type Place<'a> = (&'a mut Node, &'a Poll, ServiceMapping, &'a str);
-
 fn type_name(service: &Service) -> ServiceTypeName {
     let name = service.type_name();
     let package = name.split('/').next().unwrap_or_default();
@@ -241,28 +238,38 @@ pub(super) trait OpenService: Sized {
     ///
     /// # Errors
     /// If it cannot be created.
-    fn typed<R: Request>(place: Place, service: Service) -> Result<Self, InputError>;
+    fn typed<R: Request>(
+        node: &mut Node,
+        poll: &Poll,
+        mapping: ServiceMapping,
+        name: &str,
+        service: Service,
+    ) -> Result<Self, InputError>;
 
     /// Creates one for calls of the kind of `service`, as laid out in `release`.
     ///
     /// # Errors
     /// If it cannot be created.
-    fn open(place: Place, service: Service, release: Release) -> Result<Self, InputError> {
-        match (&service, release) {
+    fn open(
+        node: &mut Node,
+        poll: &Poll,
+        mapping: ServiceMapping,
+        name: &str,
+        service: Service,
+        release: Release,
+    ) -> Result<Self, InputError> {
+        let typed = match (&service, release) {
             (Service::SwitchController(_), Release::Humble) => {
-                Self::typed::<SwitchControllerHumbleRequest>(place, service)
+                Self::typed::<SwitchControllerHumbleRequest>
             }
-            (Service::SwitchController(_), _) => {
-                Self::typed::<SwitchControllerRequest>(place, service)
-            }
+            (Service::SwitchController(_), _) => Self::typed::<SwitchControllerRequest>,
             (Service::ListControllers, Release::Humble) => {
-                Self::typed::<ListRequest<ListControllersHumbleResponse>>(place, service)
+                Self::typed::<ListRequest<ListControllersHumbleResponse>>
             }
-            (Service::ListControllers, _) => {
-                Self::typed::<ListRequest<ListControllersResponse>>(place, service)
-            }
-            _ => Self::typed::<TriggerRequest>(place, service),
-        }
+            (Service::ListControllers, _) => Self::typed::<ListRequest<ListControllersResponse>>,
+            _ => Self::typed::<TriggerRequest>,
+        };
+        typed(node, poll, mapping, name, service)
     }
 }
 
@@ -283,7 +290,10 @@ pub(super) struct ServiceClient {
 
 impl OpenService for ServiceClient {
     fn typed<R: Request>(
-        (node, poll, mapping, name): Place,
+        node: &mut Node,
+        poll: &Poll,
+        mapping: ServiceMapping,
+        name: &str,
         service: Service,
     ) -> Result<Self, InputError> {
         let path = Name::parse(name).map_err(cannot_open(name))?;
@@ -369,7 +379,10 @@ const REQUESTS_MAX: usize = 256;
 
 impl OpenService for ServiceServer {
     fn typed<R: Request>(
-        (node, poll, mapping, name): Place,
+        node: &mut Node,
+        poll: &Poll,
+        mapping: ServiceMapping,
+        name: &str,
         service: Service,
     ) -> Result<Self, InputError> {
         let path = Name::parse(name).map_err(cannot_open(name))?;

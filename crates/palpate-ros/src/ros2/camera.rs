@@ -32,10 +32,9 @@ pub fn listen(
     let _waker =
         rustdds::mio1::Waker::new(poll.registry(), WAKE).map_err(cannot_open("a waker"))?;
     let mut readers = Vec::new();
-    let mut link = (&mut node, &poll, &mut readers);
-    subscribe::<PointCloud2>(&mut link, topics.view)?;
-    subscribe::<Image>(&mut link, topics.view)?;
-    subscribe::<CameraInfo>(&mut link, &topics.info())?;
+    subscribe::<PointCloud2>(&mut node, &poll, &mut readers, topics.view)?;
+    subscribe::<Image>(&mut node, &poll, &mut readers, topics.view)?;
+    subscribe::<CameraInfo>(&mut node, &poll, &mut readers, &topics.info())?;
     let end = Instant::now() + topics.timeout;
     let mut events = Events::with_capacity(64);
     while let Some(left) = end.checked_duration_since(Instant::now()) {
@@ -64,7 +63,9 @@ pub fn listen(
 /// Subscribes twice: a driver that publishes without confirmation has no reliable reader, and a
 /// large message of another arrives in whole only by confirmations.
 fn subscribe<M>(
-    (node, poll, readers): &mut (&mut Node, &Poll, &mut Vec<Reader>),
+    node: &mut Node,
+    poll: &Poll,
+    readers: &mut Vec<Reader>,
     name: &str,
 ) -> Result<(), InputError>
 where

@@ -273,8 +273,9 @@ impl Ros2 {
         };
         for &clients in clients {
             let vendor = if clients == Clients::Cyclone { CYCLONE } else { [0, 0] };
-            let place = (&mut self.node, &self.poll, mapping(kind, vendor), &*name);
-            let server = ServiceServer::open(place, service.clone(), self.settings.release)?;
+            let (mapping, release) = (mapping(kind, vendor), self.settings.release);
+            let (node, poll, service) = (&mut self.node, &self.poll, service.clone());
+            let server = ServiceServer::open(node, poll, mapping, &name, service, release)?;
             self.servers.push(server.of(clients));
         }
         Ok(())
@@ -312,9 +313,10 @@ impl Ros2 {
             let guid = server.reader_proxy.remote_reader_guid.to_bytes();
             let mapping = mapping(self.settings.service_mapping, [guid[0], guid[1]]);
             let (service, release) = (service.clone(), self.settings.release);
-            let place = (&mut self.node, &self.poll, mapping, &*name);
+            let (node, poll) = (&mut self.node, &self.poll);
             // If it fails, the server stays unfound, and the caller's timeout reports it.
-            self.clients[i].1 = ServiceClient::open(place, service, release).ok();
+            self.clients[i].1 =
+                ServiceClient::open(node, poll, mapping, &name, service, release).ok();
         }
     }
 }

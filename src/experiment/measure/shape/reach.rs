@@ -59,7 +59,7 @@ impl FingerReach<'_> {
             ways.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
             ways.iter().any(|(_, back)| {
                 mesh.ray(&(tip_w + back.scale(aside_m)), back, f64::MAX).is_none()
-                    && self.rests_at((mesh, tolerance_m), spot, &tip_w.coords, back)
+                    && self.rests_at(mesh, tolerance_m, spot, &tip_w.coords, back)
             })
         };
         spots.par_iter().map(touches).collect()
@@ -69,7 +69,8 @@ impl FingerReach<'_> {
     /// `back`.
     fn rests_at(
         &self,
-        (mesh, tolerance_m): (&MeshBvh, f64),
+        mesh: &MeshBvh,
+        tolerance_m: f64,
         spot: &SurfacePoint,
         tip_w: &Vector3<f64>,
         back: &UnitVector3<f64>,

@@ -120,7 +120,7 @@ pub fn compare(
     let session = own.sessions.first().ok_or(FitError::Empty)?;
     let force_n = sheared.mean_normal_force_n;
     let against = |axis: Vector3<f64>, measured: &[f64; ELECTRODES]| {
-        let model = slopes(model, friction, (session, recording), force_n, &axis);
+        let model = slopes(model, friction, session, recording, force_n, &axis);
         Ok(SlopeComparison { measured: *measured, model: model.ok_or(FitError::NotFinite)? })
     };
     Ok(ShearComparison {
@@ -135,7 +135,8 @@ pub fn compare(
 fn slopes(
     model: &FingerConstants,
     friction: &FrictionEffect,
-    (session, recording): (&Session, &PlateRecording),
+    session: &Session,
+    recording: &PlateRecording,
     force_n: f64,
     axis_t: &Vector3<f64>,
 ) -> Option<[f64; ELECTRODES]> {

@@ -96,7 +96,8 @@ impl PacFilter {
     /// Returns PAC `dt_s` after the last sample.
     pub fn pac_counts(
         &mut self,
-        (fluid, vibration): (&FluidEffect, &VibrationEffect),
+        fluid: &FluidEffect,
+        vibration: &VibrationEffect,
         pressure_pa: f64,
         dt_s: f64,
         rng: &mut impl Rng,

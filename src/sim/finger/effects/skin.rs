@@ -235,7 +235,7 @@ impl Skin {
                 let direction_w = x_wt.rotation * sample.direction;
                 let start_w = x_wt * sample.start + direction_w.scale(skipped_m);
                 let reach_m = outer_m + self.bulge_m - skipped_m;
-                let hit = bvh.ray_near((near, met[i]), &start_w, &direction_w, reach_m);
+                let hit = bvh.ray_near(near, met[i], &start_w, &direction_w, reach_m);
                 if let Some(hit) = hit {
                     met[i] = Some(hit.triangle);
                     let slope = hit.normal.dot(&direction_w);

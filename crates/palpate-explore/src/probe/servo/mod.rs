@@ -8,15 +8,16 @@ mod slide;
 mod trajectory;
 mod zone_reach;
 
-use super::{Contact, Outcome, Probe, SweptVolume, Touch, check_finite};
+use super::{Probe, checked_approach};
 use crate::backend::{Backend, Command, Fault};
 use crate::control::{Controller, Goal, posture};
+use crate::evidence::{End, Evidence, FreeVolume, Outcome, SurfacePoints};
 use crate::robot::Robot;
 use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
 use crate::robot::sensor::{Doubt, SensedContact, Sensor};
 use crate::task::touch::TouchSettings;
-use crate::task::{Approach, Ball};
+use crate::task::{Action, Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use reach::PathSegment;
@@ -442,8 +443,8 @@ const SILENCE_S: f64 = 0.15;
 
 impl Probe for Servo {
     /// Moves the centre of the fingertip's hemisphere to the stand-off and along the approach.
-    fn execute(&mut self, approach: &Approach) -> Result<Outcome, Fault> {
-        check_finite(approach)?;
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
+        let approach = checked_approach(action)?;
         let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
         match &approach.obstacle {
@@ -456,27 +457,17 @@ impl Probe for Servo {
         self.rest(above, self.monitor.samples_of_tare())?;
         self.monitor.tare();
         let below = turning_point(&self.robot, approach);
-        let end = self.move_straight("the object", below, approach_m_s, true)?;
+        let stop = self.move_straight("the object", below, approach_m_s, true)?;
         let ahead_w = approach.direction_w();
         let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
-        let finger = self.robot.finger.clone();
-        let swept = Some(SweptVolume { finger, p_wt: reached_w.into() });
-        let mut located = Located::default();
-        let mut trail = None;
-        let touch = match end {
-            None => Touch::Miss,
-            Some(ApproachEnd::Overload) => Touch::Overload,
-            Some(ApproachEnd::Contact) => {
-                located = self.read(approach, &above)?;
-                match &located.sensed {
-                    Some((x_wt, sensed)) => {
-                        let mut contact = Contact::sensed(x_wt, sensed);
-                        trail = self.slide(approach, &mut contact, &above)?;
-                        Touch::Contact(contact)
-                    }
-                    None => Touch::Overload,
-                }
-            }
+        let located = match stop {
+            Some(ApproachEnd::Contact) => self.read(approach, &above)?,
+            None | Some(ApproachEnd::Overload) => Located::default(),
+        };
+        let mut points = located.sensed.as_ref().map(|(x_wt, it)| SurfacePoints::sensed(x_wt, it));
+        let trail = match &mut points {
+            Some(points) => self.slide(approach, points, &above)?,
+            None => None,
         };
         let has_left = match &trail {
             Some(trail) => self.leave_stroke(approach, trail, &above)?,
@@ -488,8 +479,17 @@ impl Probe for Servo {
             let back = Isometry3::from_parts(back_w.into(), above.rotation);
             self.move_straight("the retract position", back, travel_m_s, false)?;
         }
+        let end = match (stop, &points) {
+            (None, _) => End::Miss,
+            (Some(_), Some(_)) => End::Contact,
+            (Some(_), None) => End::Overload,
+        };
+        let finger = self.robot.finger.clone();
+        let free = FreeVolume::new(finger, approach, reached_w.into(), end);
+        let evidence = points.map(Evidence::Points).into_iter().chain([Evidence::Free(free)]);
         let Located { sensed, doubt } = located;
-        Ok(Outcome { touch, swept, sensed, doubt })
+        let outcome = Outcome::new(end, evidence.collect());
+        Ok(Outcome { time_s: self.time_s(), doubt, sensed, ..outcome })
     }
 
     fn time_s(&self) -> Option<f64> {

@@ -1,7 +1,8 @@
 //! Rehearsal of an approach: the finger moves as for a touch, and turns back before the surface.
 
 use super::{Fault, Probe as _, Servo, standoff};
-use crate::probe::check_finite;
+use crate::probe::checked_approach;
+use crate::task::Action;
 use crate::task::Approach;
 use nalgebra::Isometry3;
 
@@ -16,7 +17,7 @@ impl Servo {
     /// # Errors
     /// If the robot cannot follow.
     pub fn rehearse(&mut self, approach: &Approach) -> Result<f64, Fault> {
-        check_finite(approach)?;
+        checked_approach(&Action::Touch(*approach))?;
         let begun_s = self.time_s().unwrap_or_default();
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
         let (travel_m_s, approach_m_s) = (self.settings.travel_m_s, self.settings.approach_m_s);

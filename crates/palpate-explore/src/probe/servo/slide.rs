@@ -7,7 +7,7 @@ use super::trajectory::Path;
 use super::{PRESS_SPEED, PathEnd, Servo};
 use crate::backend::Fault;
 use crate::control::Goal;
-use crate::probe::Contact;
+use crate::evidence::{Contact, Source, SurfacePoints};
 use crate::task::Approach;
 use crate::task::stroke::{SAMPLE_M, STEEPEST};
 use crate::task::touch::TouchSettings;
@@ -79,17 +79,19 @@ fn yields_m(load: f64, per_m: f64) -> f64 {
 }
 
 impl Servo {
-    /// Slides along the way of `approach`, if it has one, after contact at `first`, and adds to its
-    /// patch the contacts along the way, up to where the surface ended, was too steep or too far,
+    /// Slides along the way of `approach`, if it has one, after contact at the first of `points`,
+    /// and adds the contacts along the way, up to where the surface ended, was too steep or too far,
     /// or the finger was stuck or overloaded. In a scene with strokes, `first` is corrected by what
     /// the finger yields. Returns the path.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
-        first: &mut Contact,
+        points: &mut SurfacePoints,
         tared: &Isometry3<f64>,
     ) -> Result<Option<Trail>, Fault> {
         let Some(stroke) = self.settings.stroke.clone() else { return Ok(None) };
+        points.source = approach.slide_w.map(|_| Source::Stroke);
+        let Some(first) = points.points.first_mut() else { return Ok(None) };
         let ahead_w = approach.direction_w();
         let way_w = approach.slide_w.unwrap_or_default();
         let across_w = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9);
@@ -185,7 +187,7 @@ impl Servo {
                     let turned_w = normal_w.lerp(&contact.normal_w, NEW_NORMAL);
                     normal_w = turned_w.try_normalize(1e-6).unwrap_or(normal_w);
                 }
-                first.patch.push(Contact { patch: Vec::new(), ..contact });
+                points.points.push(contact);
             }
             self.monitor.clear_samples();
             (sampled_m, sum_w, count) = (done_m, Vector3::zeros(), 0.0);

@@ -107,12 +107,19 @@ pub enum Obstacle {
     Object(OrientedBox),
 }
 
+/// A link and an obstacle that it must avoid.
+#[derive(Clone)]
+struct CollisionPair {
+    /// Index of the link.
+    link: usize,
+    obstacle: Obstacle,
+}
+
 /// The capsules of a robot with the obstacles that they must avoid.
 #[derive(Clone)]
 pub struct Clearance {
     links: Vec<LinkCapsule>,
-    /// Pairs of a link and an obstacle.
-    pairs: Vec<(usize, Obstacle)>,
+    pairs: Vec<CollisionPair>,
 }
 
 /// The pair that comes closest at a posture.
@@ -131,7 +138,7 @@ impl Clearance {
         for (i, link) in links.iter().enumerate() {
             let beside = links.iter().enumerate().skip(i + 1);
             let met = beside.filter(|(_, other)| link.can_collide(other));
-            pairs.extend(met.map(|(k, _)| (i, Obstacle::Link(k))));
+            pairs.extend(met.map(|(k, _)| CollisionPair { link: i, obstacle: Obstacle::Link(k) }));
         }
         Self { links, pairs }
     }
@@ -139,7 +146,8 @@ impl Clearance {
     /// Adds an obstacle for the links for which `meets` returns one.
     pub fn add(&mut self, meets: impl Fn(&LinkCapsule) -> Option<Obstacle>) {
         let links = self.links.iter().enumerate();
-        self.pairs.extend(links.filter_map(|(i, link)| Some((i, meets(link)?))));
+        let pair = |(link, capsule)| Some(CollisionPair { link, obstacle: meets(capsule)? });
+        self.pairs.extend(links.filter_map(pair));
     }
 
     /// The capsules.
@@ -154,8 +162,8 @@ impl Clearance {
 
     /// Returns the names of a pair.
     pub fn name(&self, pair: usize) -> String {
-        let (link, other) = &self.pairs[pair];
-        let other = match other {
+        let CollisionPair { link, obstacle } = &self.pairs[pair];
+        let other = match obstacle {
             Obstacle::Link(other) => &*self.links[*other].name,
             Obstacle::Table(_) => "the table",
             Obstacle::Object(_) => "the object",
@@ -164,19 +172,20 @@ impl Clearance {
     }
 
     /// Returns the distance of a pair with the links' frames at `frames`, m.
-    fn distance_m(&self, frames: &[Isometry3<f64>], (link, other): &(usize, Obstacle)) -> f64 {
+    fn distance_m(&self, frames: &[Isometry3<f64>], pair: &CollisionPair) -> f64 {
         let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
-        match other {
-            Obstacle::Link(other) => placed(*link).to_capsule_m(&placed(*other)),
-            Obstacle::Table(space) => placed(*link).to_half_space_m(space),
-            Obstacle::Object(object) => placed(*link).to_box_m(object),
+        let link = placed(pair.link);
+        match &pair.obstacle {
+            Obstacle::Link(other) => link.to_capsule_m(&placed(*other)),
+            Obstacle::Table(space) => link.to_half_space_m(space),
+            Obstacle::Object(object) => link.to_box_m(object),
         }
     }
 
     /// Returns the joints that change the distance of a pair.
-    fn joints(&self, (link, other): &(usize, Obstacle)) -> Range<usize> {
-        let link = self.links[*link].link;
-        match other {
+    fn joints(&self, pair: &CollisionPair) -> Range<usize> {
+        let link = self.links[pair.link].link;
+        match &pair.obstacle {
             Obstacle::Link(other) => {
                 let other = self.links[*other].link;
                 link.min(other)..link.max(other)
@@ -189,10 +198,10 @@ impl Clearance {
     pub fn nearest(&self, chain: &Chain, q: &Joints) -> Nearest {
         let frames = chain.frames(q);
         let mut nearest = Nearest { distance_m: f64::INFINITY, pair: 0 };
-        for (pair, meeting) in self.pairs.iter().enumerate() {
-            let distance_m = self.distance_m(&frames, meeting);
+        for (i, pair) in self.pairs.iter().enumerate() {
+            let distance_m = self.distance_m(&frames, pair);
             if distance_m < nearest.distance_m || distance_m.is_nan() {
-                nearest = Nearest { distance_m, pair };
+                nearest = Nearest { distance_m, pair: i };
             }
         }
         nearest
@@ -216,10 +225,10 @@ impl Clearance {
         }
         line.first_blocked(part.min(1.0), |q| {
             let frames = line.chain.frames(q);
-            let looks = self.pairs.iter().enumerate().map(|(pair, meeting)| {
-                let distance_m = self.distance_m(&frames, meeting);
-                let length_m = line.length_m(self.joints(meeting));
-                (part_free(distance_m, least_m, length_m), Nearest { distance_m, pair })
+            let looks = self.pairs.iter().enumerate().map(|(i, pair)| {
+                let distance_m = self.distance_m(&frames, pair);
+                let length_m = line.length_m(self.joints(pair));
+                (part_free(distance_m, least_m, length_m), Nearest { distance_m, pair: i })
             });
             let nothing = (Some(1.0), Nearest { distance_m: f64::INFINITY, pair: 0 });
             // `None` is less than every part.

@@ -180,61 +180,14 @@ impl ArmParts {
         let mut capsule: Vec<CapsuleModel> =
             self.base.iter().filter_map(|shape| capsule_of(shape, BASE, &previous, true)).collect();
         for (i, link) in self.links.iter().enumerate() {
-            let name = link.joint.clone();
-            let [low, high] = link.limits.unwrap_or([-TURN_RAD, TURN_RAD]);
-            let kind = usize::from(link.kind == JointType::Prismatic);
-            let speed = link.speed.unwrap_or(SPEED[kind]);
-            let acceleration = link.acceleration.unwrap_or(speed / SPEED_UP_S);
             let mass = link.mass().map_err(|cause| massless.push(cause)).ok();
-            let is_missing = [
-                link.limits.is_none(),
-                link.speed.is_none(),
-                link.acceleration.is_none(),
-                link.body.shapes.is_empty(),
-                mass.is_some() && link.motor.armature.is_none(),
-                mass.is_some() && link.motor.effort_limit.is_none(),
-            ];
-            for (is_missing, names) in is_missing.into_iter().zip(&mut without) {
+            for (is_missing, names) in link.lacks(mass.is_some()).into_iter().zip(&mut without) {
                 if is_missing {
-                    names.push(name.clone());
+                    names.push(link.joint.clone());
                 }
             }
             let at_home = home.get(i).copied().unwrap_or_default();
-            let (origin_m, axis) = ((link.origin - previous).into(), (*link.axis).into());
-            let dynamics = mass.map(|mass| {
-                let at = |i, j| mass.inertia_kg_m2[(i, j)];
-                JointDynamics {
-                    mass_kg: mass.mass_kg,
-                    centre_m: (mass.centre - link.origin).into(),
-                    inertia_kg_m2: [at(0, 0), at(1, 1), at(2, 2), at(0, 1), at(0, 2), at(1, 2)],
-                    armature: link.motor.armature.unwrap_or(ARMATURE),
-                    effort_limit: link.motor.effort_limit.unwrap_or(EFFORT),
-                    damping: link.motor.damping,
-                    friction: link.motor.friction,
-                }
-            });
-            joint.push(match link.kind {
-                JointType::Revolute => JointModel::Revolute {
-                    name,
-                    origin_m,
-                    axis,
-                    limits_deg: [low, high].map(f64::to_degrees),
-                    speed_rad_s: speed,
-                    acceleration_deg_s2: acceleration.to_degrees(),
-                    home_deg: at_home,
-                    dynamics,
-                },
-                JointType::Prismatic => JointModel::Prismatic {
-                    name,
-                    origin_m,
-                    axis,
-                    limits_m: [low, high],
-                    speed_m_s: speed,
-                    acceleration_m_s2: acceleration,
-                    home_m: at_home,
-                    dynamics,
-                },
-            });
+            joint.push(link.joint_model((link.origin - previous).into(), at_home, mass));
             previous = link.origin;
             capsule.extend(
                 link.body
@@ -243,16 +196,8 @@ impl ArmParts {
                     .filter_map(|shape| capsule_of(shape, &link.joint, &previous, i < NEAR_BASE)),
             );
         }
-        let assumed = [
-            "limits (assumed: a turn to both sides)".to_owned(),
-            format!("speeds (assumed: {} rad/s or {} m/s)", SPEED[0], SPEED[1]),
-            format!("accelerations (assumed: to the speed in {SPEED_UP_S} s)"),
-            "shapes of the links for collision checks".to_owned(),
-            format!("inertias of the rotors (assumed: {ARMATURE} kg m² or kg)"),
-            format!("largest efforts (assumed: {EFFORT} N m or N)"),
-        ];
         let masses = "masses, which simulator = \"dynamic\" needs,".to_owned();
-        let all = assumed.into_iter().zip(without).chain([(masses, massless.clone())]);
+        let all = assumptions().into_iter().zip(without).chain([(masses, massless.clone())]);
         for (what, names) in all.filter(|(_, names)| !names.is_empty()) {
             self.lacks.push(format!("{what} of {}", names.join(", ")));
         }
@@ -273,7 +218,80 @@ impl ArmParts {
     }
 }
 
+/// Returns what a file may lack, each with what is assumed instead, in the order of
+/// [`LinkParts::lacks`].
+fn assumptions() -> [String; 6] {
+    [
+        "limits (assumed: a turn to both sides)".to_owned(),
+        format!("speeds (assumed: {} rad/s or {} m/s)", SPEED[0], SPEED[1]),
+        format!("accelerations (assumed: to the speed in {SPEED_UP_S} s)"),
+        "shapes of the links for collision checks".to_owned(),
+        format!("inertias of the rotors (assumed: {ARMATURE} kg m² or kg)"),
+        format!("largest efforts (assumed: {EFFORT} N m or N)"),
+    ]
+}
+
 impl LinkParts {
+    /// Returns for each of [`assumptions`] whether the file lacks it; a motor counts only with a
+    /// mass.
+    fn lacks(&self, has_mass: bool) -> [bool; 6] {
+        [
+            self.limits.is_none(),
+            self.speed.is_none(),
+            self.acceleration.is_none(),
+            self.body.shapes.is_empty(),
+            has_mass && self.motor.armature.is_none(),
+            has_mass && self.motor.effort_limit.is_none(),
+        ]
+    }
+
+    /// Converts the joint to that of a model, with its origin in the frame before it, the position
+    /// `at_home`, deg or m, and the mass of the link.
+    fn joint_model(&self, origin_m: [f64; 3], at_home: f64, mass: Option<PartMass>) -> JointModel {
+        let (name, axis) = (self.joint.clone(), (*self.axis).into());
+        let [low, high] = self.limits.unwrap_or([-TURN_RAD, TURN_RAD]);
+        let kind = usize::from(self.kind == JointType::Prismatic);
+        let speed = self.speed.unwrap_or(SPEED[kind]);
+        let acceleration = self.acceleration.unwrap_or(speed / SPEED_UP_S);
+        let dynamics = mass.map(|mass| self.dynamics(&mass));
+        match self.kind {
+            JointType::Revolute => JointModel::Revolute {
+                name,
+                origin_m,
+                axis,
+                limits_deg: [low, high].map(f64::to_degrees),
+                speed_rad_s: speed,
+                acceleration_deg_s2: acceleration.to_degrees(),
+                home_deg: at_home,
+                dynamics,
+            },
+            JointType::Prismatic => JointModel::Prismatic {
+                name,
+                origin_m,
+                axis,
+                limits_m: [low, high],
+                speed_m_s: speed,
+                acceleration_m_s2: acceleration,
+                home_m: at_home,
+                dynamics,
+            },
+        }
+    }
+
+    /// Returns mass and motor of the joint, with the link's mass.
+    fn dynamics(&self, mass: &PartMass) -> JointDynamics {
+        let at = |i, j| mass.inertia_kg_m2[(i, j)];
+        JointDynamics {
+            mass_kg: mass.mass_kg,
+            centre_m: (mass.centre - self.origin).into(),
+            inertia_kg_m2: [at(0, 0), at(1, 1), at(2, 2), at(0, 1), at(0, 2), at(1, 2)],
+            armature: self.motor.armature.unwrap_or(ARMATURE),
+            effort_limit: self.motor.effort_limit.unwrap_or(EFFORT),
+            damping: self.motor.damping,
+            friction: self.motor.friction,
+        }
+    }
+
     /// Converts a position of the joint from rad to deg; m stay m.
     fn in_file_units(&self, q: f64) -> f64 {
         match self.kind {

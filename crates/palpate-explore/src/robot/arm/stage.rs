@@ -52,7 +52,8 @@ pub fn stage(p_wt: Point3<f64>, r_wt: UnitQuaternion<f64>) -> Chain {
 /// Creates the stage with a wrist, which reaches all around `middle_w` at distances up to
 /// `around_m`. Its home is at `p_wt` with the finger's attitude `r_wt`.
 pub fn stage_with_wrist(
-    (middle_w, around_m): (Point3<f64>, f64),
+    middle_w: Point3<f64>,
+    around_m: f64,
     p_wt: Point3<f64>,
     r_wt: UnitQuaternion<f64>,
 ) -> Chain {

@@ -21,7 +21,7 @@ pub use force_torque::{ForceTorqueTip, ForceTorqueTipSettings, point_on_hull};
 pub use gel_pad::GelPad;
 pub use ideal::IdealSensor;
 pub use kind::{SensorKind, Signal, TipParts};
-pub use model::{SensorModel, TipSurface};
+pub use model::{SensorModel, TipErrors, TipSurface};
 pub use sample::{Channels, DepthImage, IdealContact, Sample, Wrench};
 pub use settings::SensorSettings;
 pub use wrench_accuracy::WrenchAccuracy;

@@ -41,11 +41,11 @@ struct SeenPoint {
 }
 
 /// Evidence of one view.
-pub struct ViewEvidence {
+pub struct ViewMeasurement {
     points: Vec<SeenPoint>,
 }
 
-impl ViewEvidence {
+impl ViewMeasurement {
     /// Returns the evidence of a view; `None` if it shows nothing.
     pub fn new(seen: &SeenSurface) -> Option<Self> {
         let elements: Vec<CorrectedElement> = seen.distances(POINTS).collect();
@@ -226,7 +226,7 @@ mod tests {
 
     /// Points above the top of the cube, seen by a camera that may be up to `shift_m` (one
     /// deviation) too high.
-    fn view(heights_m: &[f64], shift_m: f64) -> ViewEvidence {
+    fn view(heights_m: &[f64], shift_m: f64) -> ViewMeasurement {
         let mut loadings_m = Errors::zeros();
         loadings_m[2] = shift_m;
         let point = |(i, height_m): (usize, &f64)| SeenPoint {
@@ -235,10 +235,10 @@ mod tests {
             loadings_m,
             range_m: 0.03,
         };
-        ViewEvidence { points: heights_m.iter().enumerate().map(point).collect() }
+        ViewMeasurement { points: heights_m.iter().enumerate().map(point).collect() }
     }
 
-    fn ratio(view: &ViewEvidence, x_wo: &Isometry3<f64>) -> LogLikelihood {
+    fn ratio(view: &ViewMeasurement, x_wo: &Isometry3<f64>) -> LogLikelihood {
         let mut sum = LogLikelihood::zero();
         view.add(&view.fit(&cube(), x_wo), &NOISE, 0.0, &mut sum);
         sum

@@ -12,11 +12,11 @@
 //! deviations, so that at a large one all poses are equal.
 
 use super::likelihood::{LogLikelihood, NoiseModel, Residual, Terms, inflation};
-use crate::probe::{Contact, Outcome, Touch};
+use crate::evidence::{Contact, End, FreeVolume, Outcome};
 use crate::recognition::library::{LibraryObject, Nearest};
 use crate::robot::Finger;
 use crate::robot::sensor::GelPad;
-use crate::task::{Approach, any_orthogonal};
+use crate::task::any_orthogonal;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use palpate_geometry::sweep::Capsule;
 use std::f64::consts::PI;
@@ -33,7 +33,7 @@ const UNKNOWN_MISS: f64 = 0.5;
 const POINTS: usize = 24;
 
 /// One point of a surface that a touch shows.
-struct MeasuredPoint {
+struct TouchedPoint {
     p_w: Point3<f64>,
     normal_w: Option<Vector3<f64>>,
     /// Deviation that its sensor states, m.
@@ -45,7 +45,7 @@ struct MeasuredPoint {
 }
 
 /// Evidence of one touch.
-pub struct TouchEvidence {
+pub struct TouchMeasurement {
     /// Hull at the start of its way.
     hull: Capsule,
     ahead_w: UnitVector3<f64>,
@@ -54,7 +54,7 @@ pub struct TouchEvidence {
     /// Depth by which the hull yields at contact, m.
     slack_m: f64,
     /// Points of contact; none for a miss.
-    points: Vec<MeasuredPoint>,
+    points: Vec<TouchedPoint>,
     /// Points of a pad's face at the end of the way.
     face_w: Vec<Point3<f64>>,
 }
@@ -74,33 +74,19 @@ struct PointFit {
     turn: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
-impl TouchEvidence {
-    /// Returns the evidence of a touch along `approach`, with a hull that yields by `slack_m` and
-    /// may have a pad; `None` after an overload, and without a hull.
-    pub fn new(
-        approach: &Approach,
-        outcome: &Outcome,
-        (slack_m, pad): (f64, Option<&GelPad>),
-    ) -> Option<Self> {
-        let (touch, swept) = (&outcome.touch, outcome.swept.as_ref()?);
-        let ahead_w = approach.direction_w();
-        let finger = &swept.finger;
+impl TouchMeasurement {
+    /// Returns the measurement of a touch, with a hull that yields by `slack_m` and may have a pad;
+    /// `None` after an overload, and without a hull.
+    pub fn new(outcome: &Outcome, slack_m: f64, pad: Option<&GelPad>) -> Option<Self> {
+        let free = outcome.free().filter(|free| free.end != End::Overload)?;
+        let FreeVolume { finger, p_wt: end_w, ahead_w, .. } = free;
         // The hull starts outside of the region, and the tip ends where it was at contact.
-        let whole_m = (approach.p_far_w - approach.p_near_w).dot(&ahead_w);
-        let end_w = match touch {
-            Touch::Overload => return None,
-            Touch::Contact(_) | Touch::Miss => swept.p_wt,
-        };
-        let at_m = (approach.p_near_w - end_w).dot(&ahead_w) - before_m(finger);
-        let hull = hull(finger, approach, end_w + ahead_w.scale(at_m));
-        let contact = match touch {
-            Touch::Contact(contact) => Some(contact),
-            Touch::Miss | Touch::Overload => None,
-        };
-        let points = contact.map(|contact| points(contact, whole_m)).unwrap_or_default();
-        let x_wt = Isometry3::from_parts(end_w.coords.into(), approach.r_wt());
+        let free_m = free.way_m + before_m(finger);
+        let hull = hull(finger, &free.r_wt, end_w - ahead_w.scale(free_m));
+        let points = points(outcome.points(), free.approach_m);
+        let x_wt = Isometry3::from_parts(end_w.coords.into(), free.r_wt);
         let face_w = pad.map(|pad| face_w(pad, &(x_wt * GelPad::x_tp(finger)))).unwrap_or_default();
-        Some(Self { hull, ahead_w, free_m: -at_m, slack_m, points, face_w })
+        Some(Self { hull, ahead_w: *ahead_w, free_m, slack_m, points, face_w })
     }
 
     /// Returns the residuals for `object` at the pose `x_wo`.
@@ -181,9 +167,9 @@ pub fn before_m(finger: &Finger) -> f64 {
     finger.radius_m + finger.length_m
 }
 
-/// Returns the hull of a finger on an approach with its tip at `p_wt`.
-pub fn hull(finger: &Finger, approach: &Approach, p_wt: Point3<f64>) -> Capsule {
-    let axis_w = approach.r_wt() * Vector3::x() * -finger.length_m;
+/// Returns the hull of a finger with this attitude and its tip at `p_wt`.
+pub fn hull(finger: &Finger, r_wt: &UnitQuaternion<f64>, p_wt: Point3<f64>) -> Capsule {
+    let axis_w = r_wt * Vector3::x() * -finger.length_m;
     Capsule { p0_w: p_wt, p1_w: p_wt + axis_w, radius_m: finger.radius_m }
 }
 
@@ -210,25 +196,25 @@ fn face_w(pad: &GelPad, x_wp: &Isometry3<f64>) -> Vec<Point3<f64>> {
     (0..FACE * FACE).map(point).collect()
 }
 
-/// Returns the points of a contact, thinned.
-fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
-    let further = contact.patch.len();
-    let step = further.div_ceil(POINTS).max(1);
-    let count = further.div_ceil(step);
+/// Returns the points of contact, thinned.
+fn points(contacts: &[Contact], whole_m: f64) -> Vec<TouchedPoint> {
+    let Some((contact, further)) = contacts.split_first() else { return Vec::new() };
+    let step = further.len().div_ceil(POINTS).max(1);
+    let count = further.len().div_ceil(step);
     let inflation = inflation(count);
-    let point = |point: &Contact, inflation: f64, range_m: f64| MeasuredPoint {
+    let point = |point: &Contact, inflation: f64, range_m: f64| TouchedPoint {
         p_w: point.p_wc,
         normal_w: point.has_normal.then_some(point.normal_w),
-        sd_m: point.sd_m.unwrap_or(0.0),
+        sd_m: point.sd_m().unwrap_or(0.0),
         inflation,
         range_m,
     };
     let first = point(contact, 1.0, whole_m);
     // Between the faces of an edge a patch has normals of neither, so that only places count.
-    let others = contact.patch.iter().step_by(step).map(|further| {
+    let others = further.iter().step_by(step).map(|further| {
         // An unknown surface may rise or fall by as much as the point is away.
         let range_m = 2.0 * (further.p_wc - contact.p_wc).norm().max(1e-4);
-        MeasuredPoint { normal_w: None, ..point(further, inflation, range_m) }
+        TouchedPoint { normal_w: None, ..point(further, inflation, range_m) }
     });
     std::iter::once(first).chain(others).collect()
 }
@@ -236,7 +222,7 @@ fn points(contact: &Contact, whole_m: f64) -> Vec<MeasuredPoint> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::SweptVolume;
+    use crate::evidence::Evidence;
     use crate::recognition::pose_prior::moved;
     use crate::task::{Aim, Ball};
     use nalgebra::Vector6;
@@ -254,22 +240,20 @@ mod tests {
     const NOISE: NoiseModel = NoiseModel { contact_sd_m: 1e-3, normal_sd_rad: 0.3, outliers: 1e-3 };
 
     /// A touch at `p_w` from a direction, with the tip where it rests if `is_contact`.
-    fn touch(p_w: [f64; 3], from: [f64; 3], is_contact: bool) -> TouchEvidence {
+    fn touch(p_w: [f64; 3], from: [f64; 3], is_contact: bool) -> TouchMeasurement {
         let ball = Ball { centre_w: Point3::origin(), radius_m: 0.1, lowest_m: None };
         let finger = Finger { pitch_deg: 0.0, ..Finger::default() };
         let aim = Aim::against(p_w.into(), &from.into());
         let approach = ball.approach(&aim, &finger, 0.01, 0.0);
         let normal_w = -approach.direction_w().into_inner();
         let p_wt = aim.p_w + normal_w * finger.radius_m;
-        let touch = match is_contact {
-            // The normal of a hull on the facets of a mesh has no derivative.
-            true => {
-                Touch::Contact(Contact { has_normal: false, ..Contact::new(aim.p_w, normal_w) })
-            }
-            false => Touch::Miss,
-        };
-        let swept = Some(SweptVolume { finger, p_wt });
-        TouchEvidence::new(&approach, &Outcome { swept, ..touch.into() }, (0.0, None)).unwrap()
+        // The normal of a hull on the facets of a mesh has no derivative.
+        let contact = Contact { has_normal: false, ..Contact::new(aim.p_w, normal_w) };
+        let end = if is_contact { End::Contact } else { End::Miss };
+        let free = FreeVolume::new(finger, &approach, p_wt, end);
+        let points = is_contact.then(|| Evidence::Points(contact.into()));
+        let evidence = points.into_iter().chain([Evidence::Free(free)]).collect();
+        TouchMeasurement::new(&Outcome::new(end, evidence), 0.0, None).unwrap()
     }
 
     /// The angle between normals is that of the rotation, for opposite ones too.
