@@ -133,12 +133,13 @@ impl Capability {
     }
 }
 
-/// Means at some points of two beliefs are equal to rounding.
+/// Means at some points of two beliefs are equal to a tenth of a micrometre: the slopes that a view
+/// takes depend on the search for the first fit, which is not stored.
 fn assert_alike(a: &Belief, b: &Belief) {
     let points = a.references(60).unwrap();
     let [a, b] = [a, b].map(|belief| belief.field().unwrap().means(&points));
     for (a, b) in a.iter().zip(&b) {
-        assert!((a - b).abs() < 1e-9, "{a} {b}");
+        assert!((a - b).abs() < 1e-7, "{a} {b}");
     }
 }
 
