@@ -18,7 +18,8 @@ pub(crate) struct PythonFactory {
     /// Name, `MODULE:CLASS`.
     pub(crate) name: String,
     /// Function that starts a planner from the zone (None around an object) and the seed. The
-    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> target`, whose exception is the reason for a missing target.
+    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> target`, whose
+    /// exception is the reason for a missing target.
     pub(crate) start: Py<PyAny>,
     /// Source code that determines the plans.
     pub(crate) source: String,

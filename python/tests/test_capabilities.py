@@ -8,18 +8,11 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import palpate
+import palpate.errors
 import palpate.gym
 import pytest
 
 TABLE = Path(__file__).parents[2] / "tests" / "capabilities.md"
-
-FORCE = {
-    "simulator": "kinematic",
-    "sensor.force_torque_tip": {},
-    "finger.pitch_deg": 0,
-    "effects": {"rigid_tip": {}, "wrench": {}},
-}
-
 
 def _scene(**settings: object) -> palpate.Scene:
     return palpate.Scene.load("container", **settings)
@@ -27,7 +20,7 @@ def _scene(**settings: object) -> palpate.Scene:
 
 def _tap() -> None:
     exploration = palpate.Exploration(_scene())
-    assert exploration.touch([0.0, 0.5]).contact is not None
+    assert exploration.touch([0.0, 0.5]).p_wc is not None
 
 
 def _tilt() -> None:
@@ -56,7 +49,10 @@ def _gel() -> None:
 
 
 def _hypotheses() -> None:
-    palpate.Exploration(palpate.Scene.load("digits"))
+    exploration = palpate.Exploration(palpate.Scene.load("digits"))
+    exploration.touch([0.0, 0.0])
+    probabilities = exploration.belief.hypotheses
+    assert probabilities is not None and abs(sum(probabilities.values()) - 1) < 1e-9
 
 
 def _gym(action: int, **settings: object) -> None:
@@ -110,6 +106,6 @@ def test_every_capability_works_or_is_refused_with_a_reason(door: str) -> None:
         try:
             check()
             cell = "works"
-        except (palpate.PalpateError, NotImplementedError, ValueError) as refused:
+        except (palpate.errors.PalpateError, NotImplementedError, ValueError) as refused:
             cell = str(refused).splitlines()[0]
         assert f"| {capability} | {door} | {cell} |" in text
