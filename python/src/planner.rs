@@ -6,7 +6,7 @@ use crate::known::Known;
 use crate::target::TargetInput;
 use crate::zone::Zone;
 use palpate::explore::planner::{
-    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, Refined,
+    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, RefinedPlanner,
 };
 use palpate::task;
 use pyo3::prelude::*;
@@ -36,7 +36,7 @@ impl PlannerFactory for PythonFactory {
 
     fn make(&self, _: &PlanningSettings, mut random: ChaCha8Rng) -> Box<dyn Planner> {
         let start = Python::attach(|py| self.start.clone_ref(py));
-        Box::new(Refined(PythonPlanner { start, seed: random.random(), begun: None }))
+        Box::new(RefinedPlanner(PythonPlanner { start, seed: random.random(), begun: None }))
     }
 }
 
