@@ -83,7 +83,8 @@ fn an_action_of_a_program_is_executed_and_observed() {
     let friction = |z_m: f64| 0.2 + 2.0 * (z_m - 0.4);
     let (found, belief) = press_and_twist::explore(&places, friction).unwrap();
     assert_eq!(belief.targets().len(), places.len());
-    for (i, (target, measured)) in found.iter().enumerate() {
+    for (i, found) in found.iter().enumerate() {
+        let press_and_twist::Twisted { target, friction: measured } = found;
         assert_eq!(measured.is_some(), i % 2 == 1);
         let z_m = target.place().unwrap()[1];
         assert!(measured.is_none_or(|measured| (measured - friction(z_m)).abs() < 0.02));

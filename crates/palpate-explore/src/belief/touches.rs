@@ -60,7 +60,7 @@ impl HeightField {
             }
             Evidence::Seen(seen) => {
                 self.presence.add_seen(&seen.presence);
-                self.seen.push(seen.clone());
+                self.seen.push((**seen).clone());
             }
         }
     }
