@@ -53,7 +53,9 @@ impl<P: Probe, F: Fn(f64) -> f64 + Send> Probe for TwistingProbe<P, F> {
 
 /// An executed target, with the friction that its twist has measured.
 pub struct Twisted {
+    /// Target.
     pub target: Target,
+    /// Friction coefficient; `None` for a tap.
     pub friction: Option<f64>,
 }
 

@@ -51,7 +51,7 @@ impl Probe for ExactProbe {
         let first = Contact::new(hit.point, hit.normal);
         let points = SurfacePoints {
             points: std::iter::once(first).chain(slide(environment, approach, rest)).collect(),
-            source: approach.slide_w.map(|_| Source::Stroke),
+            source: approach.slide_w.map(|_| ErrorSource::Stroke),
         };
         let free = FreeVolume::new(finger, approach, p_wt, End::Contact);
         let evidence = vec![Evidence::Points(points), Evidence::Free(free)];

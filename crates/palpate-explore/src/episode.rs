@@ -3,7 +3,7 @@
 
 use crate::backend::Fault;
 use crate::belief::Belief;
-use crate::evidence::{End, Outcome, Source};
+use crate::evidence::{End, ErrorSource, Outcome};
 use crate::planner::{Offer, StrokeOffer};
 use crate::probe::Probe;
 use crate::task::{Action, Target, Task};
@@ -135,7 +135,7 @@ impl<'a> Episode<'a> {
             self.costs.travelled_m += self.task.region().travel_m(last, target);
         }
         let points = outcome.surface_points();
-        if let Some(points) = points.filter(|points| points.source == Some(Source::Stroke)) {
+        if let Some(points) = points.filter(|points| points.source == Some(ErrorSource::Stroke)) {
             self.costs.slid_m += points.length_m();
         }
         self.last = Some(target.clone());

@@ -143,13 +143,13 @@ pub struct SurfacePoints {
     /// Source of an error that the points have in common, of the size that each states; if omitted,
     /// each point has an error of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source: Option<Source>,
+    pub source: Option<ErrorSource>,
 }
 
 /// Source of an error that points have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Source {
+pub enum ErrorSource {
     /// One stroke: the bias of its sensor stays the same while it slides.
     Stroke,
 }

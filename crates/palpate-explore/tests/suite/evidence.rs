@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, UnitVector3, Vector3};
 use palpate_explore::belief::{Belief, HeightField, RandomField, SurfaceBelief};
 use palpate_explore::evidence::{
-    Contact, End, Evidence, FreeVolume, Outcome, Source, SurfacePoints,
+    Contact, End, ErrorSource, Evidence, FreeVolume, Outcome, SurfacePoints,
 };
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner::{self, ActionKind, Offer, Plan, PlannerFactory, PlanningSettings};
@@ -59,7 +59,7 @@ proptest! {
         let aim = Aim::against(p.into(), &Vector3::x());
         let approach = ball.approach(&aim, &finger, 0.01, 0.3);
         let contact = Contact { has_normal, ..Contact::new(p.into(), Vector3::x()).with_sd_m(sd_m) };
-        let source = is_stroke.then_some(Source::Stroke);
+        let source = is_stroke.then_some(ErrorSource::Stroke);
         let points = SurfacePoints { points: vec![contact.clone(), contact], source };
         let free = FreeVolume::new(finger, &approach, p.into(), End::Contact);
         let evidence = vec![Evidence::Points(points), Evidence::Free(free)];
