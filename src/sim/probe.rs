@@ -5,7 +5,7 @@ use crate::sim::environment::{CLEARANCE_M, ObjectShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{
-    Contact, End, Evidence, FreeVolume, Outcome, Source, SurfacePoints,
+    Contact, End, ErrorSource, Evidence, FreeVolume, Outcome, SurfacePoints,
 };
 use palpate_explore::probe::{Probe, checked_approach};
 use palpate_explore::robot::sensor::SensedContact;
