@@ -128,7 +128,7 @@ fn out_of_range(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
     let coordinate = |value: f64| ("a coordinate", value, [-FAR_M, FAR_M]);
     let points = touch.outcome.points().iter().map(|point| point.p_wc.coords);
     let tip = touch.outcome.free().map(|free| free.p_wt.coords);
-    let places = points.chain(tip).flat_map(|place| <[f64; 3]>::from(place));
+    let places = points.chain(tip).flat_map(<[f64; 3]>::from);
     let coordinates = touch.target.numbers().into_iter().chain(places).map(coordinate);
     let measured = MEASURES.iter().filter_map(|measure| {
         Some((measure.id, measure.value_after_touch(touch)?, measure.unit.range))

@@ -77,7 +77,8 @@ impl Travel {
             let (_, place) =
                 self.search.maximum(zone, |places, gradients| field.variances(places, gradients));
             let is_last = places.len() + 1 >= self.search.settings.travel.tour as usize;
-            let fantasy = if is_last { None } else { field.fantasize(&[place.clone()]) };
+            let fantasy =
+                if is_last { None } else { field.fantasize(std::slice::from_ref(&place)) };
             places.push(place);
             let Some(fantasy) = fantasy else { break };
             after = Some(fantasy);
