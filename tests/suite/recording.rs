@@ -14,7 +14,7 @@ use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recordi
 use palpate::experiment::trial::replay::{self, Difference};
 use palpate::experiment::trial::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::planner::{self, PlannerFactory};
+use palpate::explore::planner;
 use palpate::robot::finger::Frame;
 use palpate::robot::sensor::{Channels, DepthImage};
 use palpate::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};

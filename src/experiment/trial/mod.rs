@@ -124,13 +124,11 @@ fn run_touches(
     let task = truth.environment.task();
     let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
     let belief = initial_belief(experiment, truth, &mut stream("hypotheses"));
-    let (is_around, name) = (task.ball().is_some(), factory.name());
-    if let Some(why) = factory.zone_only().filter(|_| is_around) {
+    let name = factory.name();
+    if let Some(why) = factory.zone_only().filter(|_| task.ball().is_some()) {
         return Err(format!("planner `{name}` does not support whole objects: {why}"));
     }
-    // Initial touches: random places in a zone, evenly spread directions around an object.
-    let start = planner::by_name(if is_around { "sobol" } else { "random" });
-    let start = start.ok_or("no planner for the initial touches")?;
+    let start = planner::initial(task.region()).ok_or("no planner for the initial touches")?;
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
     let most = match experiment.further_views {
