@@ -91,8 +91,8 @@ pub trait SurfaceBelief: Send + Sync {
         true
     }
 
-    /// Returns the heights at places of a zone: variances, and quantiles with the noise of a touch at
-    /// `probabilities` in (0, 1). `None` before the first fit.
+    /// Returns the heights at places of a zone: variances, and quantiles with the noise of a touch
+    /// at `probabilities` in (0, 1). `None` before the first fit.
     fn heights(&self, places: &[Vec<f64>], probabilities: &[f64]) -> Option<HeightPredictions> {
         let field = self.field()?;
         let (means, variances) = (field.means(places), field.variances(places, &mut []));

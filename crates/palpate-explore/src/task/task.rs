@@ -87,8 +87,9 @@ impl Region {
         }
     }
 
-    /// Returns the tap with these coordinates: (x) or (x, z) of a zone; x, y and z of a point and of
-    /// a direction around an object. `None` for another count, and for an aim without a direction.
+    /// Returns the tap with these coordinates: (x) or (x, z) of a zone; x, y and z of a point and
+    /// of a direction around an object. `None` for another count, and for an aim without a
+    /// direction.
     pub fn target(&self, coordinates: &[f64]) -> Option<Target> {
         match (self, coordinates) {
             (Self::Zone(zone), _) if coordinates.len() == zone.dimension() => {

@@ -127,12 +127,12 @@ impl SpatialEvidence {
         met.chain(self.free.iter().map(|free| free.distance_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the observations of the field relative to the prior mean. At each contact the field is
-    /// 0, with the normal as its gradient if normals are observed; points with a common error have it
-    /// in the size that each states. At the centre of each swept ball inside the model's ball it is
-    /// the distance to the nearest contact. That is the upper bound of a distance there, and the
-    /// swept radius the lower bound: the standard deviation is that of a uniform distribution between
-    /// them.
+    /// Returns the observations of the field relative to the prior mean. At each contact the field
+    /// is 0, with the normal as its gradient if normals are observed; points with a common error
+    /// have it in the size that each states. At the centre of each swept ball inside the model's
+    /// ball it is the distance to the nearest contact. That is the upper bound of a distance there,
+    /// and the swept radius the lower bound: the standard deviation is that of a uniform
+    /// distribution between them.
     pub(super) fn observations(&self, model: &ObservationModel) -> Observations {
         let ObservationModel { prior, ball, noise_m, normals, free_space_samples, .. } = *model;
         let mut all = Observations::new(3);

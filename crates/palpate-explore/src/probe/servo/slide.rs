@@ -180,9 +180,9 @@ impl Slide {
 
 impl Servo {
     /// Slides along the way of `approach`, if it has one, after contact at the first of `points`,
-    /// and adds the contacts along the way, up to where the surface ended, was too steep or too far,
-    /// or the finger was stuck or overloaded. In a scene with strokes, `first` is corrected by what
-    /// the finger yields. Returns the path.
+    /// and adds the contacts along the way, up to where the surface ended, was too steep or too
+    /// far, or the finger was stuck or overloaded. In a scene with strokes, the first point is
+    /// corrected by what the finger yields. Returns the path.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
