@@ -92,8 +92,8 @@ impl<'a> Episode<'a> {
     /// Returns the action at `target`.
     ///
     /// # Errors
-    /// If the region does not contain the target, the finger cannot reach it, or it is a stroke that
-    /// the task does not allow.
+    /// If the region does not contain the target, the finger cannot reach it, or it is a stroke
+    /// that the task does not allow.
     pub fn action(&self, target: &Target) -> Result<Action, InputError> {
         if let Target::Look { camera } = target {
             return Ok(Action::Look { camera: *camera });
