@@ -47,7 +47,7 @@ fn measure(name: &str, environment: Arc<Environment>, settings: [GpSettings; 2])
         return;
     };
     let [alone, seen] = settings;
-    let shown = || Evidence::Seen(SeenSurface::of_region(&view, environment.task().region()));
+    let shown = || Evidence::from(SeenSurface::of_region(&view, environment.task().region()));
     let taken_s = fastest(|| {
         let mut field = HeightField::new(zone.clone(), seen.clone());
         field.add(&shown());

@@ -51,12 +51,19 @@ impl<P: Probe, F: Fn(f64) -> f64 + Send> Probe for TwistingProbe<P, F> {
     }
 }
 
-/// Taps and twists the container in turn at `places`; returns the targets with the friction that
-/// each twist has measured, and the belief.
+/// An executed target, with the friction that its twist has measured.
+pub struct Twisted {
+    /// Target.
+    pub target: Target,
+    /// Friction coefficient; `None` for a tap.
+    pub friction: Option<f64>,
+}
+
+/// Taps and twists the container in turn at `places`; returns what was found, and the belief.
 pub fn explore(
     places: &[[f64; 2]],
     friction: impl Fn(f64) -> f64 + Send,
-) -> Result<(Vec<(Target, Option<f64>)>, Belief), Box<dyn std::error::Error>> {
+) -> Result<(Vec<Twisted>, Belief), Box<dyn std::error::Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/container.toml");
     let environment = Arc::new(Environment::build(Scene::load(path.as_ref(), &[])?)?);
     let zone = environment.task().zone().ok_or("no zone")?;
@@ -74,7 +81,7 @@ pub fn explore(
         let target = if i % 2 == 0 { tap } else { twist };
         let action = episode.action(&target)?;
         let outcome = episode.execute(&target, &action)?;
-        found.push((target, outcome.measured.get(FRICTION).copied()));
+        found.push(Twisted { friction: outcome.measured.get(FRICTION).copied(), target });
     }
     episode.fit()?;
     Ok((found, episode.into_belief()))
@@ -84,7 +91,7 @@ pub fn explore(
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let places = [[-0.02, 0.46], [0.0, 0.48], [0.02, 0.5], [0.01, 0.52]];
     let (found, _) = explore(&places, |z_m| 0.2 + 2.0 * (z_m - 0.4))?;
-    for (target, friction) in found {
+    for Twisted { target, friction } in found {
         match friction {
             Some(friction) => println!("{:?}: friction {friction:.2}", target.numbers()),
             None => println!("{:?}: tap", target.numbers()),

@@ -5,6 +5,7 @@
 //! `cargo run --release --example proximity_ray`
 
 use palpate::backend::Fault;
+use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::truth::Truth;
 use palpate::explore::belief::{Belief, HeightField};
 use palpate::explore::episode::Episode;
@@ -22,7 +23,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Standard deviation of a distance, m.
 // heuristic: a time-of-flight sensor near a surface.
-const SD_M: f64 = 1e-3;
+pub const SD_M: f64 = 1e-3;
 
 /// Probe that measures distances to the exact mesh.
 struct RangeFinder<'a> {
@@ -52,8 +53,8 @@ impl Probe for RangeFinder<'_> {
     }
 }
 
-/// Explores the front of the container with `count` rays; returns the error of the belief, m.
-pub fn explore(count: usize) -> Result<f64, Box<dyn std::error::Error>> {
+/// Explores the front of the container with `count` rays; returns the errors of the belief.
+pub fn explore(count: usize) -> Result<Metrics, Box<dyn std::error::Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/container.toml");
     let environment = Environment::build(Scene::load(path.as_ref(), &[])?)?;
     let task = environment.task();
@@ -70,12 +71,13 @@ pub fn explore(count: usize) -> Result<f64, Box<dyn std::error::Error>> {
         episode.fit()?;
     }
     let truth = Truth::sample(&environment, 31, &|_| ());
-    let field = episode.belief().field().ok_or("no fit")?;
-    truth.rmse_m(field).ok_or_else(|| "no truth".into())
+    truth.compare(episode.belief().surface()).ok_or_else(|| "no truth".into())
 }
 
 #[allow(dead_code)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("error after 40 rays: {:.2} mm", 1e3 * explore(40)?);
+    let metrics = explore(40)?;
+    let coverage = metrics.coverage.unwrap_or_default();
+    println!("after 40 rays: RMSE {:.2} mm, 95 % band holds {coverage:.2}", 1e3 * metrics.rmse_m);
     Ok(())
 }

@@ -85,7 +85,7 @@ class ProcessPlanner:
         self._begin: tuple[Any, int] | None = (zone, seed)
         self._child: PlannerProcess | None = None
 
-    def plan(self, belief: Any) -> list[float]:
+    def plan(self, belief: Any) -> list[float] | str:
         """Returns the next target.
 
         Raises:

@@ -296,8 +296,10 @@ class Scene:
     @property
     def notices(self) -> list[str]:
         """Warnings about likely configuration mistakes."""
-    def touch(self, target: Sequence[float] | _Array) -> Touch:
+    def touch(self, target: Sequence[float] | _Array | dict[str, Any]) -> Touch:
         """Makes a touch at a target, shape (d,), metres; around an object six numbers, as in `Ball`.
+
+        A dict names another target: `{"tilted": {"place": [x, z], "pitch_deg": 30}}`.
 
         Raises:
             ValueError: if the target is outside the zone or the ball, or unreachable.
@@ -317,11 +319,21 @@ class Exploration:
     """
 
     def __new__(cls, scene: Scene) -> Exploration: ...
-    def touch(self, target: Sequence[float] | _Array) -> Touch:
+    def touch(self, target: Sequence[float] | _Array | dict[str, Any]) -> Touch:
         """Makes a touch at a target and fits the belief.
 
         Raises:
             ValueError, SimulationError: as for `Scene.touch`.
+            PalpateError: if the fit fails.
+        """
+    def look(self, camera: int = 0) -> int:
+        """Looks from place `camera` of the scene's camera and fits the belief.
+
+        Returns:
+            The number of surface elements that it shows.
+
+        Raises:
+            SimulationError: if the scene has no camera, or the view shows nothing.
             PalpateError: if the fit fails.
         """
     @property
@@ -366,7 +378,7 @@ class Fitted:
 class PlannerChannel:
     def __new__(cls, limit_s: float) -> PlannerChannel: ...
     def next(self) -> Belief | None: ...
-    def answer(self, target: Sequence[float]) -> None: ...
+    def answer(self, target: Sequence[float] | str) -> None: ...
     def fail(self, reason: str) -> None: ...
 
 @final

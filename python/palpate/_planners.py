@@ -290,7 +290,7 @@ class InlinePlanner:
         self._make = (factory, zone, seed)
         self._planner: Any = None
 
-    def plan(self, belief: Any) -> list[float]:
+    def plan(self, belief: Any) -> list[float] | str:
         """Returns the next target, as a worker does."""
         try:
             if self._planner is None:

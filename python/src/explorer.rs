@@ -6,11 +6,15 @@ use crate::scene::{Scene, Touch};
 use crate::target::TargetInput;
 use crate::{errors, exploration, fork};
 use palpate::backend::Fault;
+use palpate::error::InputError;
+use palpate::experiment::trial;
 use palpate::explore::episode::Episode;
 use palpate::explore::evidence::Outcome;
 use palpate::explore::view::SeenSurface;
 use palpate::format::counted;
+use palpate::math::seed::stream;
 use palpate::sim::camera::probe::CameraProbe;
+use palpate::sim::library::LoadedLibrary;
 use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -33,13 +37,18 @@ impl Exploration {
     #[new]
     fn new(py: Python<'_>, scene: Py<Scene>) -> PyResult<Self> {
         let environment = scene.get().environment();
+        let seed = scene.get().seed();
         let (known, truth) = fork::detach(py, || {
-            (
-                known::empty_belief(environment),
-                GroundTruth::of(environment, exploration::TRUTH_PER_SIDE),
-            )
-        })?;
-        let seeds = [scene.get().seed(), 0];
+            let library = environment.scene().library.as_ref().map(LoadedLibrary::read);
+            let hypotheses = library.transpose()?.map(|library| {
+                let random = &mut stream(seed, 0, "hypotheses");
+                trial::hypotheses(environment, library.known, Default::default(), random)
+            });
+            let known = known::empty_belief(environment).with_hypotheses(hypotheses);
+            Ok::<_, InputError>((known, GroundTruth::of(environment, exploration::TRUTH_PER_SIDE)))
+        })?
+        .map_err(errors::scene)?;
+        let seeds = [seed, 0];
         let probe = CameraProbe::new(scene.get().probe(), scene.get().environment(), seeds);
         let episode = Episode::new(scene.get().environment().task(), known, probe);
         Ok(Self { episode: Mutex::new(episode), truth, scene })

@@ -6,7 +6,7 @@ use crate::known::Known;
 use crate::target::TargetInput;
 use crate::zone::Zone;
 use palpate::explore::planner::{
-    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, Refined,
+    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, RefinedPlanner,
 };
 use palpate::task;
 use pyo3::prelude::*;
@@ -18,7 +18,8 @@ pub(crate) struct PythonFactory {
     /// Name, `MODULE:CLASS`.
     pub(crate) name: String,
     /// Function that starts a planner from the zone (None around an object) and the seed. The
-    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> target`, whose exception is the reason for a missing target.
+    /// result has `close()`, and either `desk` with `abandon()` or `plan(belief) -> target`, whose
+    /// exception is the reason for a missing target.
     pub(crate) start: Py<PyAny>,
     /// Source code that determines the plans.
     pub(crate) source: String,
@@ -35,7 +36,7 @@ impl PlannerFactory for PythonFactory {
 
     fn make(&self, _: &PlanningSettings, mut random: ChaCha8Rng) -> Box<dyn Planner> {
         let start = Python::attach(|py| self.start.clone_ref(py));
-        Box::new(Refined(PythonPlanner { start, seed: random.random(), begun: None }))
+        Box::new(RefinedPlanner(PythonPlanner { start, seed: random.random(), begun: None }))
     }
 }
 

@@ -19,14 +19,14 @@ class Middle:
 
 
 class Strokes(Middle):
-    """Slides across from the place of the largest variance: (x, z) of the start, then of the end."""
+    """Slides across from the place of the largest variance."""
 
     def plan(self, belief):
         start = np.asarray(super().plan(belief))
         end = start.copy()
         middle = (self.zone.lower[0] + self.zone.upper[0]) / 2
         end[0] += 0.03 if start[0] < middle else -0.03
-        return [*start, *end]
+        return {"stroke": {"place": start, "to": end}}
 
 
 class Raises:

@@ -149,7 +149,7 @@ def test_an_exploration_is_touched_and_believes():
     assert len(belief.targets) == 8 and "8 touches" in repr(exploration)
     assert np.abs(belief.field(belief.contacts)[0]).max() < 5e-3
     assert 0 < exploration.metrics["iou"] < 1
-    with pytest.raises(ValueError, match="six numbers"):
+    with pytest.raises(ValueError, match="needs 6"):
         exploration.touch([0.0, 0.0])
     over_zone = palpate.Exploration(palpate.Scene.load("toy"))
     for x_m in (-1.0, 0.0, 1.0, 0.5):

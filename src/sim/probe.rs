@@ -5,10 +5,9 @@ use crate::sim::environment::{CLEARANCE_M, ObjectShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{
-    Contact, End, Evidence, FreeVolume, Outcome, Source, SurfacePoints,
+    Contact, End, ErrorSource, Evidence, FreeVolume, Outcome, SurfacePoints,
 };
 use palpate_explore::probe::{Probe, checked_approach};
-use palpate_explore::robot::Finger;
 use palpate_explore::robot::sensor::SensedContact;
 use palpate_explore::task::approach::BEYOND_M;
 use palpate_explore::task::stroke::{SAMPLE_M, STEEPEST};
@@ -41,7 +40,7 @@ impl Probe for ExactProbe {
             let p_wc = zone.point(&place, function.height_m(x_m));
             return Ok(Contact::new(p_wc, zone.x_wz().rotation * normal_z).into());
         }
-        let finger = pitched(environment, approach);
+        let finger = environment.scene().finger.with_attitude(&approach.r_at);
         let Some(rest) = resting_pose(environment, approach) else {
             let way_m = turnaround_distance_m(environment, approach);
             let p_wt = approach.p_far_w + approach.direction_w().scale(way_m);
@@ -52,7 +51,7 @@ impl Probe for ExactProbe {
         let first = Contact::new(hit.point, hit.normal);
         let points = SurfacePoints {
             points: std::iter::once(first).chain(slide(environment, approach, rest)).collect(),
-            source: approach.slide_w.map(|_| Source::Stroke),
+            source: approach.slide_w.map(|_| ErrorSource::Stroke),
         };
         let free = FreeVolume::new(finger, approach, p_wt, End::Contact);
         let evidence = vec![Evidence::Points(points), Evidence::Free(free)];
@@ -85,13 +84,6 @@ fn slide<'a>(
     })
 }
 
-/// Returns the finger with the pitch of an approach: its own, or a further one.
-fn pitched(environment: &Environment, approach: &Approach) -> Finger {
-    let finger = &environment.scene().finger;
-    let found = finger.pitched().find(|pitched| pitched.r_at() == approach.r_at);
-    found.unwrap_or_else(|| finger.clone())
-}
-
 /// Pose of the hull at rest on the object.
 #[derive(Clone, Copy)]
 pub struct RestingPose {
@@ -105,7 +97,7 @@ pub struct RestingPose {
 /// a mesh.
 pub fn resting_pose(environment: &Environment, approach: &Approach) -> Option<RestingPose> {
     let ObjectShape::Mesh { bvh, .. } = environment.shape() else { return None };
-    let finger = &pitched(environment, approach);
+    let finger = &environment.scene().finger.with_attitude(&approach.r_at);
     let (ahead_w, reach_m) = (approach.direction_w(), reach_m(environment));
     let start_w = approach.p_near_w - ahead_w.scale(reach_m);
     let axis_w = match approach.r_at == finger.r_at() {

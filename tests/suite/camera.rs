@@ -114,7 +114,7 @@ fn settings() -> GpSettings {
 fn touched(environment: &Arc<Environment>, view: &View, count: usize) -> HeightField {
     let zone = environment.task().zone().unwrap();
     let mut field = HeightField::new(zone.clone(), settings());
-    field.add(&Evidence::Seen(SeenSurface::of_region(view, environment.task().region())));
+    field.add(&Evidence::from(SeenSurface::of_region(view, environment.task().region())));
     let mut probe = exact_probe(Arc::clone(environment));
     let mut random = seed::stream(3, 0, "places");
     for _ in 0..count {
@@ -512,7 +512,7 @@ fn places_seen_through_are_kept() {
     let field = || HeightField::new(zone.clone(), settings()).with_finger(finger.clone());
     let [mut found, mut drawn] = [field(), field()];
     let seen = SeenSurface::of_region(&look(&environment, 0), environment.task().region());
-    let seen = Evidence::Seen(seen);
+    let seen = Evidence::from(seen);
     found.add(&seen);
     drawn.add(&serde_json::from_str(&serde_json::to_string(&seen).unwrap()).unwrap());
     let mut probe = exact_probe(Arc::clone(&environment));

@@ -1,5 +1,7 @@
 //! Tests of the programs in `examples/`.
 
+#[path = "../../examples/cell_belief.rs"]
+mod cell_belief;
 #[path = "../../crates/palpate-explore/examples/own_backend.rs"]
 mod own_backend;
 #[path = "../../examples/own_measure.rs"]
@@ -8,11 +10,18 @@ mod own_measure;
 mod own_planner;
 #[path = "../../examples/own_sensor.rs"]
 mod own_sensor;
+#[path = "../../examples/press_and_twist.rs"]
+mod press_and_twist;
+#[path = "../../examples/proximity_ray.rs"]
+mod proximity_ray;
 
-use crate::common::shipped::contact;
+use crate::common::shipped::{contact, environment};
 use palpate::experiment::statistics::summary::representative_value;
+use palpate::explore::probe::Probe;
+use palpate::sim::probe::exact_probe;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
+use palpate::task::{Action, Target};
 
 /// The servo drives a body without a simulator: contacts lie on the wall, because this body's
 /// readings are exact, and the belief finds the plane.
@@ -56,6 +65,58 @@ fn an_own_measure_is_found_from_rows() {
 fn an_own_sensor_ends_touches_and_places_them() {
     let below_m = own_sensor::touch().unwrap();
     assert!(below_m.abs() < 2e-3, "{below_m}");
+}
+
+/// With rays that are off by a millimetre each, the error falls below that, and the 95 % band holds
+/// about its share: three standard deviations of a share of thirty independent places below it.
+#[test]
+fn rays_are_evidence_as_sure_as_they_say() {
+    let [few, many] = [20, 120].map(|count| proximity_ray::explore(count).unwrap());
+    assert!(many.rmse_m < few.rmse_m && many.rmse_m < proximity_ray::SD_M, "{many:?}");
+    assert!(many.coverage.unwrap() > 0.95 - 3.0 * (0.95f64 * 0.05 / 30.0).sqrt(), "{many:?}");
+}
+
+/// A twist measures the friction where it touches, and its contact is evidence like that of a tap.
+#[test]
+fn an_action_of_a_program_is_executed_and_observed() {
+    let places = [[-0.02, 0.46], [0.0, 0.48], [0.02, 0.5], [0.01, 0.52]];
+    let friction = |z_m: f64| 0.2 + 2.0 * (z_m - 0.4);
+    let (found, belief) = press_and_twist::explore(&places, friction).unwrap();
+    assert_eq!(belief.targets().len(), places.len());
+    for (i, found) in found.iter().enumerate() {
+        let press_and_twist::Twisted { target, friction: measured } = found;
+        assert_eq!(measured.is_some(), i % 2 == 1);
+        let z_m = target.place().unwrap()[1];
+        assert!(measured.is_none_or(|measured| (measured - friction(z_m)).abs() < 0.02));
+        let json = serde_json::to_string(target).unwrap();
+        assert_eq!(&serde_json::from_str::<Target>(&json).unwrap(), target);
+    }
+    // A probe without the action refuses it by name.
+    let environment = environment("container.toml", &[]);
+    let approach = environment.task().approach(&places[0].into()).unwrap();
+    let (name, parameters) = (press_and_twist::ACTION.into(), vec![45.0]);
+    let action = Action::Custom { name, approach, parameters };
+    let refused = exact_probe(environment).execute(&action).unwrap_err().to_string();
+    assert!(refused.contains("press_and_twist"), "{refused}");
+}
+
+/// Every planner of a zone explores with a belief of independent cells, and reduces its variance;
+/// `active` never touches a cell again while there is one without a touch.
+#[test]
+fn planners_run_on_another_belief() {
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    for planner in cell_belief::planners() {
+        let belief = cell_belief::explore(planner, 12).unwrap();
+        assert_eq!(belief.targets().len(), 12, "{}", planner.name);
+        let (field, places) = (belief.field().unwrap(), belief.references(900).unwrap());
+        let variances = field.variances(&places, &mut []);
+        let touched =
+            variances.iter().filter(|variance| **variance < 0.5 * field.signal_sd().powi(2));
+        let share = touched.count() as f64 / places.len() as f64;
+        let fresh = planner.name != "ucb" && planner.name != "slope";
+        assert!(share > if fresh { 8.0 / 144.0 } else { 0.0 }, "{}: {share}", planner.name);
+        assert!(mean(variances) < field.signal_sd().powi(2), "{}", planner.name);
+    }
 }
 
 /// Built-in arms and one from a file, with six and seven joints, reach the same object and touch it

@@ -22,6 +22,7 @@ mod benchmark;
 mod broken;
 mod calibration;
 mod camera;
+mod capabilities;
 mod check;
 #[cfg(feature = "mujoco")]
 mod collisions;

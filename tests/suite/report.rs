@@ -142,7 +142,7 @@ fn rows_of_another_zone_are_refused() {
         format!("{:#}", report::write(&run, &Analysis::new(&run), folder.path()).unwrap_err());
     assert!(
         error.contains(
-            "surfaces: trial 0 of random, touch 5: target outside the zone's coordinates"
+            "surfaces: trial 0 of random, touch 1: the target [0.0] is not one of the region"
         ),
         "{error}"
     );

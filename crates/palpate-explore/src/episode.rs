@@ -3,7 +3,7 @@
 
 use crate::backend::Fault;
 use crate::belief::Belief;
-use crate::evidence::{End, Outcome, Source};
+use crate::evidence::{End, ErrorSource, Outcome};
 use crate::planner::{Offer, StrokeOffer};
 use crate::probe::Probe;
 use crate::task::{Action, Target, Task};
@@ -23,12 +23,12 @@ pub struct Episode<'a> {
     probe: Box<dyn Probe + 'a>,
     belief: Belief,
     last: Option<Target>,
-    spent: Spent,
+    costs: TouchCosts,
 }
 
 /// Touches so far, and their cost.
 #[derive(Default)]
-struct Spent {
+struct TouchCosts {
     touches: u32,
     /// Way between touches, m.
     travelled_m: f64,
@@ -44,18 +44,13 @@ impl<'a> Episode<'a> {
             probe: Box::new(probe),
             belief,
             last: None,
-            spent: Spent::default(),
+            costs: TouchCosts::default(),
         }
     }
 
     /// Belief after the last fit, with all evidence.
     pub fn belief(&self) -> &Belief {
         &self.belief
-    }
-
-    /// Returns the belief for a fit or a change of its settings.
-    pub fn belief_mut(&mut self) -> &mut Belief {
-        &mut self.belief
     }
 
     /// Returns the probe, e.g. for touches that the belief does not observe.
@@ -68,7 +63,7 @@ impl<'a> Episode<'a> {
         let touch_s = self.mean_touch_s(0.0);
         let touch = self.task.touch();
         let stroke = touch.stroke.as_ref().map(|stroke| {
-            let Spent { travelled_m, slid_m, .. } = self.spent;
+            let TouchCosts { travelled_m, slid_m, .. } = self.costs;
             let moved_s = travelled_m / touch.travel_m_s + slid_m / stroke.speed_m_s;
             StrokeOffer {
                 longest_m: stroke.longest_m,
@@ -83,7 +78,7 @@ impl<'a> Episode<'a> {
 
     /// Returns the mean time of a touch without looks, and without `moved_s` of all touches.
     fn mean_touch_s(&self, moved_s: f64) -> f64 {
-        let (touches, looked_s) = (self.spent.touches, self.probe.looked_s());
+        let (touches, looked_s) = (self.costs.touches, self.probe.looked_s());
         let time_s = self.probe.time_s().filter(|_| touches > 0);
         let mean_s = time_s.map(|time_s| (time_s - looked_s - moved_s) / f64::from(touches));
         mean_s.filter(|mean_s| *mean_s > 0.0).unwrap_or(TOUCH_S)
@@ -135,13 +130,13 @@ impl<'a> Episode<'a> {
         if outcome.end == End::Looked {
             return Ok(outcome);
         }
-        self.spent.touches += 1;
+        self.costs.touches += 1;
         if let Some(last) = &self.last {
-            self.spent.travelled_m += self.task.region().travel_m(last, target);
+            self.costs.travelled_m += self.task.region().travel_m(last, target);
         }
         let points = outcome.surface_points();
-        if let Some(points) = points.filter(|points| points.source == Some(Source::Stroke)) {
-            self.spent.slid_m += points.length_m();
+        if let Some(points) = points.filter(|points| points.source == Some(ErrorSource::Stroke)) {
+            self.costs.slid_m += points.length_m();
         }
         self.last = Some(target.clone());
         Ok(outcome)

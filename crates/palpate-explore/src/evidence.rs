@@ -97,7 +97,7 @@ impl Outcome {
     /// Returns the surface that a camera has seen, if it looked.
     pub fn seen(&self) -> Option<&SeenSurface> {
         self.evidence.iter().find_map(|evidence| match evidence {
-            Evidence::Seen(seen) => Some(seen),
+            Evidence::Seen(seen) => Some(&**seen),
             Evidence::Points(_) | Evidence::Free(_) => None,
         })
     }
@@ -126,7 +126,13 @@ pub enum Evidence {
     /// Space without an object.
     Free(FreeVolume),
     /// Surface that a camera has seen.
-    Seen(SeenSurface),
+    Seen(Box<SeenSurface>),
+}
+
+impl From<SeenSurface> for Evidence {
+    fn from(seen: SeenSurface) -> Self {
+        Self::Seen(Box::new(seen))
+    }
 }
 
 /// Points of the surface that one action has shown; the point of contact is the first.
@@ -137,13 +143,13 @@ pub struct SurfacePoints {
     /// Source of an error that the points have in common, of the size that each states; if omitted,
     /// each point has an error of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source: Option<Source>,
+    pub source: Option<ErrorSource>,
 }
 
 /// Source of an error that points have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Source {
+pub enum ErrorSource {
     /// One stroke: the bias of its sensor stays the same while it slides.
     Stroke,
 }

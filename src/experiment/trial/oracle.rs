@@ -14,7 +14,7 @@ use palpate_explore::planner::candidates::{Candidates, free_aim};
 use palpate_explore::planner::sample::random_target;
 use palpate_explore::planner::search::Search;
 use palpate_explore::planner::{
-    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, Refined,
+    Offer, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, RefinedPlanner,
 };
 use palpate_explore::task::{Region, Target};
 use palpate_explore::whole_object::ImplicitSurface;
@@ -81,7 +81,7 @@ impl PlannerFactory for OracleFactory {
 
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
         let search = Search::new(settings, random);
-        Box::new(Refined(Oracle { search, truth: Arc::clone(&self.0) }))
+        Box::new(RefinedPlanner(Oracle { search, truth: Arc::clone(&self.0) }))
     }
 }
 

@@ -43,6 +43,17 @@ pub struct TrialRow {
     pub verification: Vec<VerificationRow>,
 }
 
+/// One action of a trial.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    /// Target of the action.
+    pub target: &'a Target,
+    /// Outcome of the action.
+    pub outcome: &'a Outcome,
+    /// Fit after it, if there was one.
+    pub fit: Option<&'a Fit>,
+}
+
 /// One view of a camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ViewRow {
@@ -146,13 +157,18 @@ impl TrialRow {
         Self::without_touches(trial, planner, Some(format!("before the first touch: {fault}")))
     }
 
-    /// Returns targets and outcomes of all actions up to touch `touches`, in order.
-    pub fn actions(&self, touches: u32) -> impl Iterator<Item = (&Target, &Outcome)> {
+    /// Returns all actions up to touch `touches`, in order.
+    pub fn steps(&self, touches: u32) -> impl Iterator<Item = Step<'_>> {
         let touched = self.touches.iter().take(touches as usize).zip(0..);
         touched.flat_map(|(touch, before)| {
             let views = self.views.iter().filter(move |view| view.after == before);
-            let views = views.map(|view| (&view.target, &view.outcome));
-            views.chain([(&touch.target, &touch.outcome)])
+            let views = views.map(|ViewRow { target, outcome, fit, .. }| Step {
+                target,
+                outcome,
+                fit: fit.as_ref(),
+            });
+            let TouchRow { target, outcome, fit, .. } = touch;
+            views.chain([Step { target, outcome, fit: fit.as_ref() }])
         })
     }
 

@@ -19,9 +19,9 @@ impl TrialRow {
         count: u32,
     ) -> Result<Option<Belief>, InputError> {
         let Some(touches) = self.touches.get(..count as usize) else { return Ok(None) };
-        let Some(fit) = touches.last().and_then(|touch| touch.fit.as_ref()) else {
+        if touches.last().is_none_or(|touch| touch.fit.is_none()) {
             return Ok(None);
-        };
+        }
         let place =
             |count: usize| format!("trial {} of {}, touch {count}", self.trial, self.planner);
         let Some(mut belief) = initial(experiment)? else { return Ok(None) };
@@ -33,12 +33,18 @@ impl TrialRow {
                 return Err(InputError::new(message).at(place(number)));
             }
         }
-        self.actions(count).for_each(|(target, outcome)| belief.observe(target, outcome));
-        let of_view = self.views.iter().rfind(|view| view.after + 1 == count);
-        let of_touch = || touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
-        let before = of_view.and_then(|view| view.fit.as_ref()).or_else(of_touch);
-        let conditioned = belief.condition_on(before, fit);
-        conditioned.map_err(|error| InputError::new(error.to_string()).at(place(touches.len())))?;
+        let (mut before, mut steps) = (None, self.steps(count).peekable());
+        while let Some(step) = steps.next() {
+            belief.observe(step.target, step.outcome);
+            // What a view shows depends on the belief at each fit; other evidence does not.
+            let is_used = steps.peek().is_none() || !self.views.is_empty();
+            if let Some(fit) = step.fit.filter(|_| is_used) {
+                belief
+                    .condition_on(before, fit)
+                    .map_err(|error| InputError::new(error.to_string()).at(place(touches.len())))?;
+            }
+            before = step.fit.or(before);
+        }
         Ok(Some(belief))
     }
 }

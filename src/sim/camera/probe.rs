@@ -2,7 +2,7 @@
 
 use crate::sim::Environment;
 use palpate_explore::backend::Fault;
-use palpate_explore::evidence::{End, Evidence, Outcome};
+use palpate_explore::evidence::{End, Outcome};
 use palpate_explore::probe::Probe;
 use palpate_explore::task::{Action, Region};
 use palpate_explore::view::{LookOffer, SeenSurface, View};
@@ -49,7 +49,7 @@ impl<P: Probe> Probe for CameraProbe<P> {
         let seen = seen(&self.environment, *camera, &mut random)?;
         self.taken.push(*camera);
         self.probe.rest(self.look_s());
-        let outcome = Outcome::new(End::Looked, vec![Evidence::Seen(seen)]);
+        let outcome = Outcome::new(End::Looked, vec![seen.into()]);
         Ok(Outcome { time_s: self.time_s(), ..outcome })
     }
 

@@ -90,7 +90,7 @@ impl SurfaceBelief for HeightField {
         let (fit, references) = (self.fit()?, SurfaceBelief::references(self, LOOKED_AT)?);
         let seen = self.imagined(look, &references).filter(|seen| !seen.is_empty())?;
         let mut after = self.clone();
-        after.add(&Evidence::Seen(seen));
+        after.add(&Evidence::from(seen));
         after.condition(fit).ok()?;
         Some(Box::new(after))
     }

@@ -1,7 +1,7 @@
 //! Observations that a belief takes from touches and strokes.
 
 use super::HeightField;
-use crate::evidence::{Contact, End, Evidence, FreeVolume, Outcome, Source, SurfacePoints};
+use crate::evidence::{Contact, End, ErrorSource, Evidence, FreeVolume, Outcome, SurfacePoints};
 use crate::task::Target;
 use crate::task::stroke::FIRST_SOURCE;
 use nalgebra::Vector3;
@@ -60,7 +60,7 @@ impl HeightField {
             }
             Evidence::Seen(seen) => {
                 self.presence.add_seen(&seen.presence);
-                self.seen.push(seen.clone());
+                self.seen.push((**seen).clone());
             }
         }
     }
@@ -94,7 +94,7 @@ impl HeightField {
 
     /// Adds the free space above the points of a stroke, and that there is a surface at each.
     fn add_path(&mut self, points: &SurfacePoints, free: &FreeVolume) {
-        if points.source != Some(Source::Stroke) {
+        if points.source != Some(ErrorSource::Stroke) {
             return;
         }
         let thinned = points.thinned(self.stroke_step_m());

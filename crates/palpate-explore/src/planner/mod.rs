@@ -27,7 +27,7 @@ mod ucb;
 
 pub use offer::{ActionKind, LookOffer, Offer, StrokeOffer};
 pub use plan::{
-    Fallback, Plan, PlanError, Planner, PlannerEntry, PlannerFactory, Refined, zone_planner,
+    Fallback, Plan, PlanError, Planner, PlannerEntry, PlannerFactory, RefinedPlanner, zone_planner,
 };
 pub use sample::uniform;
 pub use settings::PlanningSettings;
@@ -92,5 +92,5 @@ pub fn initial(region: &Region) -> Option<&'static PlannerEntry> {
 pub fn restricted(name: &str) -> Option<Box<dyn PlannerFactory>> {
     let (base, actions) = name.strip_suffix(')')?.split_once('(')?;
     let (entry, actions) = (by_name(base)?, ActionKind::parse(actions)?);
-    Some(Box::new(plan::Restricted { name: name.into(), entry, actions }))
+    Some(Box::new(plan::RestrictedPlanner { name: name.into(), entry, actions }))
 }

@@ -38,9 +38,9 @@ pub trait Planner: Send {
 
 /// Planner whose taps are replaced by the look or stroke on offer that pays: one that reduces the
 /// variance over the surface more per time.
-pub struct Refined<P>(pub P);
+pub struct RefinedPlanner<P>(pub P);
 
-impl<P: Planner> Planner for Refined<P> {
+impl<P: Planner> Planner for RefinedPlanner<P> {
     fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
         let mut plan = self.0.plan(belief, offer)?;
         if let Some(look) = look::best(belief, offer, &plan.target) {
@@ -137,7 +137,7 @@ pub struct PlannerEntry {
     pub zone_only: Option<&'static str>,
     /// Whether it plans by hypotheses about the object, which need a library.
     pub needs_library: bool,
-    /// Whether it plans strokes itself; otherwise its taps are [`Refined`].
+    /// Whether it plans strokes itself; otherwise its taps are [`RefinedPlanner`].
     pub plans_strokes: bool,
     /// Creates a planner; the generator is its only source of randomness.
     pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
@@ -181,18 +181,18 @@ impl PlannerFactory for PlannerEntry {
 
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
         let planner = (self.make)(settings, random);
-        if self.plans_strokes { planner } else { Box::new(Refined(planner)) }
+        if self.plans_strokes { planner } else { Box::new(RefinedPlanner(planner)) }
     }
 }
 
 /// A built-in planner that is offered some kinds of actions only.
-pub(super) struct Restricted {
+pub(super) struct RestrictedPlanner {
     pub name: String,
     pub entry: &'static PlannerEntry,
     pub actions: Vec<ActionKind>,
 }
 
-impl PlannerFactory for Restricted {
+impl PlannerFactory for RestrictedPlanner {
     fn name(&self) -> &str {
         &self.name
     }

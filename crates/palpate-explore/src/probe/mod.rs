@@ -7,6 +7,7 @@ use crate::backend::Fault;
 use crate::evidence::Outcome;
 use crate::task::{Action, Approach};
 use crate::view::LookOffer;
+use std::ops::DerefMut;
 
 /// A robot, real or simulated, that executes actions.
 pub trait Probe: Send {
@@ -44,29 +45,7 @@ pub trait Probe: Send {
     fn rest(&mut self, _time_s: f64) {}
 }
 
-impl<P: Probe + ?Sized> Probe for &mut P {
-    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
-        (**self).execute(action)
-    }
-
-    fn looks(&self) -> Vec<LookOffer> {
-        (**self).looks()
-    }
-
-    fn looked_s(&self) -> f64 {
-        (**self).looked_s()
-    }
-
-    fn time_s(&self) -> Option<f64> {
-        (**self).time_s()
-    }
-
-    fn rest(&mut self, time_s: f64) {
-        (**self).rest(time_s);
-    }
-}
-
-impl<P: Probe + ?Sized> Probe for Box<P> {
+impl<P: DerefMut<Target: Probe> + Send> Probe for P {
     fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
         (**self).execute(action)
     }

@@ -140,7 +140,7 @@ impl SurfaceBelief for ImplicitSurface {
         let seen = self.imagined(look, points_w.iter().copied().zip(normals));
         let seen = seen.filter(|seen| !seen.is_empty())?;
         let mut after = self.clone();
-        after.add(&Evidence::Seen(seen));
+        after.add(&Evidence::from(seen));
         after.condition(Some(fit), fit).ok()?;
         Some(Box::new(after))
     }

@@ -91,7 +91,7 @@ impl SpatialEvidence {
                 None => points.clone(),
             }),
             Evidence::Free(free) => self.free.push(free.clone()),
-            Evidence::Seen(seen) => self.seen.push(seen.clone()),
+            Evidence::Seen(seen) => self.seen.push((**seen).clone()),
         }
     }
 

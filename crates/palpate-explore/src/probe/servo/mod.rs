@@ -484,7 +484,7 @@ impl Probe for Servo {
             (Some(_), Some(_)) => End::Contact,
             (Some(_), None) => End::Overload,
         };
-        let finger = self.robot.finger.clone();
+        let finger = self.robot.finger.with_attitude(&approach.r_at);
         let free = FreeVolume::new(finger, approach, reached_w.into(), end);
         let evidence = points.map(Evidence::Points).into_iter().chain([Evidence::Free(free)]);
         let Located { sensed, doubt } = located;

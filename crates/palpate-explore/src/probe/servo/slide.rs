@@ -7,7 +7,7 @@ use super::trajectory::Path;
 use super::{PRESS_SPEED, PathEnd, Servo};
 use crate::backend::Fault;
 use crate::control::Goal;
-use crate::evidence::{Contact, Source, SurfacePoints};
+use crate::evidence::{Contact, ErrorSource, SurfacePoints};
 use crate::task::Approach;
 use crate::task::stroke::{SAMPLE_M, STEEPEST};
 use crate::task::touch::TouchSettings;
@@ -234,7 +234,7 @@ impl Servo {
         points: &mut SurfacePoints,
     ) -> Result<Option<Slide>, Fault> {
         let Some(stroke) = self.settings.stroke.clone() else { return Ok(None) };
-        points.source = approach.slide_w.map(|_| Source::Stroke);
+        points.source = approach.slide_w.map(|_| ErrorSource::Stroke);
         let Some(first) = points.points.first_mut() else { return Ok(None) };
         let ahead_w = approach.direction_w();
         let way_w = approach.slide_w.unwrap_or_default();

@@ -56,6 +56,12 @@ impl Finger {
         Some(Self { pitch_deg, other_pitches_deg: Vec::new(), ..*self })
     }
 
+    /// Returns the finger with the pitch of an approach on which it has this attitude in `A`; with
+    /// its own for another attitude.
+    pub fn with_attitude(&self, r_at: &UnitQuaternion<f64>) -> Self {
+        self.pitched().find(|pitched| pitched.r_at() == *r_at).unwrap_or_else(|| self.clone())
+    }
+
     /// Returns the finger with its own pitch alone, then with each further one.
     pub fn pitched(&self) -> impl Iterator<Item = Self> {
         let others = self.other_pitches_deg.iter().copied().map(Some);
