@@ -50,7 +50,8 @@ impl Belief {
     fn values<'py>(
         &self,
         points: &Bound<'py, PyAny>,
-        (belief, posterior): (&HeightField, Option<&Posterior>),
+        belief: &HeightField,
+        posterior: Option<&Posterior>,
         of: impl FnOnce(&Posterior, &[Vec<f64>]) -> Vec<f64> + Send,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let places = Places::of(points, belief.zone().dimension())?;
@@ -64,7 +65,8 @@ impl Belief {
     fn gradients<'py>(
         &self,
         points: &Bound<'py, PyAny>,
-        (belief, posterior): (&HeightField, Option<&Posterior>),
+        belief: &HeightField,
+        posterior: Option<&Posterior>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let dimension = belief.zone().dimension();
         let places = Places::of(points, dimension)?;
@@ -108,13 +110,13 @@ impl Belief {
         let means = |posterior: &Posterior, places: &[Vec<f64>]| {
             posterior.means(places.iter().map(Vec::as_slice))
         };
-        self.values(points, (belief, belief.surface()), means)
+        self.values(points, belief, belief.surface(), means)
     }
 
     /// Variance of the height without touch noise, square metres.
     fn variance<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("variance")?;
-        self.values(points, (belief, belief.surface()), variances)
+        self.values(points, belief, belief.surface(), variances)
     }
 
     /// Quantiles of the height above the datum at the probabilities `p`, shape (..., len(p)),
@@ -150,7 +152,7 @@ impl Belief {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("variance_gradient")?;
-        self.gradients(points, (belief, belief.surface()))
+        self.gradients(points, belief, belief.surface())
     }
 
     /// Variance that a touch with this target can still reduce, square metres: `variance`,
@@ -161,7 +163,7 @@ impl Belief {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("explorable_variance")?;
-        self.values(points, (belief, belief.planning_posterior()), variances)
+        self.values(points, belief, belief.planning_posterior(), variances)
     }
 
     /// Gradient of `explorable_variance`, shape (..., d), metres.
@@ -170,7 +172,7 @@ impl Belief {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let belief = self.over_zone("explorable_variance_gradient")?;
-        self.gradients(points, (belief, belief.planning_posterior()))
+        self.gradients(points, belief, belief.planning_posterior())
     }
 
     /// Whether a surface is likely at each point: 1 or 0.

@@ -90,19 +90,14 @@ impl ExplorationScene {
         self.simulator.environment().task()
     }
 
-    /// Whether a whole object is explored.
-    pub(crate) fn is_around(&self) -> bool {
-        self.task().ball().is_some()
-    }
-
     /// Number of axes of the grid.
     pub(crate) fn axes(&self) -> usize {
-        self.task().zone().map_or(3, Zone::dimension)
+        self.task().region().dimension()
     }
 
     /// Number of values of an action.
     pub(crate) fn action(&self) -> usize {
-        self.task().zone().map_or(AIM, Zone::dimension)
+        self.task().region().tap_dimension()
     }
 
     /// Number of values of a touch's row.
@@ -112,7 +107,7 @@ impl ExplorationScene {
 
     /// Names of the measures.
     pub(crate) fn measured(&self) -> [&'static str; 3] {
-        if self.is_around() { AROUND } else { OVER_ZONE }
+        if self.task().ball().is_some() { AROUND } else { OVER_ZONE }
     }
 
     /// Unit of lengths in observations.

@@ -6,7 +6,6 @@ use palpate::experiment::truth::Truth;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::sim::Environment;
-use palpate::task::Zone;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
 
@@ -19,7 +18,7 @@ pub(crate) fn empty_belief(environment: &Environment) -> Known {
 
 /// Number of values of a target of `known`.
 pub(crate) fn target_numbers(known: &Known) -> usize {
-    known.region().zone().map_or(AIM, Zone::dimension)
+    known.region().tap_dimension()
 }
 
 /// Number of values of a target around an object.

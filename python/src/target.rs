@@ -41,7 +41,7 @@ impl TargetInput {
             }
             Self::Coordinates(coordinates) => coordinates,
         };
-        let wanted = region.zone().map_or(6, |zone| zone.dimension());
+        let wanted = region.tap_dimension();
         if coordinates.len() != wanted {
             let of = if region.zone().is_some() { "of this zone" } else { "around an object" };
             let found = coordinates.len();

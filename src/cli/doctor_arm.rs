@@ -36,7 +36,7 @@ pub(super) fn lines(experiment: &Experiment, save: Option<&Path>) -> anyhow::Res
         settings.further_topics().filter_map(|topic| further_line(topic, settings, &report)),
     );
     lines.extend(service_lines(settings, names.names(), &report));
-    lines.extend(frame_lines((settings, backend.start_checks.model_m), &chain, &report));
+    lines.extend(frame_lines(settings, backend.start_checks.model_m, &chain, &report));
     if let Some(path) = save {
         let text = report.description.as_deref().with_context(|| {
             let name = settings.topics.name(Topic::Description);
@@ -199,7 +199,8 @@ fn service_lines(settings: &RosSettings, names: &[String], report: &Report) -> V
 
 /// Compares the driver's frames with the arm's model; the fingertips may differ by `allowed_m`.
 fn frame_lines(
-    (settings, allowed_m): (&RosSettings, f64),
+    settings: &RosSettings,
+    allowed_m: f64,
     chain: &Chain,
     report: &Report,
 ) -> Vec<Line> {

@@ -201,7 +201,7 @@ fn mesh_file(
 ) -> anyhow::Result<Outcome> {
     let is_around = run.experiment.scene.whole_object.is_some();
     ensure!(
-        run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
+        !run.experiment.scene.is_curve(),
         "{} explored a curve, which has no mesh; use a file ending in .gif, or the figures of the run",
         args.path.display()
     );

@@ -86,7 +86,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
         if stop.load(Ordering::Relaxed) { Err(stopped) } else { Ok(None) }
     };
-    let row = recorded_trial::run(&simulation, (trial, planner), (None, None), &[], &mut observer);
+    let row = recorded_trial::run(&simulation, trial, planner, None, None, &[], &mut observer);
     if stop.load(Ordering::Relaxed) {
         return Ok(Outcome::Interrupted);
     }

@@ -3,6 +3,7 @@
 use super::terminal::print_stderr;
 use crate::experiment::Simulation;
 use crate::experiment::trial::NextTouch;
+use anyhow::Context;
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::{self, Offer, Planner};
 use palpate_explore::task::{Target, Task};
@@ -105,8 +106,8 @@ impl<'a, R: BufRead> Stepper<'a, R> {
     /// Creates a stepper that reads lines from `answers`.
     pub(super) fn new(simulation: &'a Simulation, answers: R) -> anyhow::Result<Self> {
         let experiment = simulation.experiment();
-        let name = if simulation.task().zone().is_some() { "random" } else { "sobol" };
-        let entry = planner::by_name(name).ok_or_else(|| anyhow::anyhow!("no planner {name}"))?;
+        let entry = planner::initial(simulation.task().region());
+        let entry = entry.context("no planner for a target of the region")?;
         let random = seed::stream(experiment.seed, 0, "skipped touches");
         Ok(Self { simulation, other: (entry.make)(&experiment.planning, random), answers })
     }

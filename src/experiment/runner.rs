@@ -176,11 +176,11 @@ pub fn run_caught(
     view: Option<&LiveView>,
     observer: &mut TrialObserver,
 ) -> TrialRow {
-    let run = || recorded_trial::run(simulation, job, (recorded, view), &[], observer);
+    let (trial, planner) = job;
+    let run = || recorded_trial::run(simulation, trial, planner, recorded, view, &[], observer);
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-        let (trial, planner) = job;
         TrialRow::without_touches(trial, planner.name(), Some(format!("panicked: {words}")))
     })
 }
@@ -253,12 +253,12 @@ impl RealRun<'_> {
         let name = planner.name();
         let made = journal.touches(trial, name);
         let path = self.recorded.map(|run| next_part(&recording_path(run, planner, trial)));
-        let shown = (path.as_deref(), self.view);
-        let simulation = self.simulation;
+        let (simulation, view) = (self.simulation, self.view);
         let mut stored =
             StoredTrial { run: self, journal, job, made: &made, is_asked: false, unstored: None };
         let mut observe = |event: &TrialEvent| stored.observe(event);
-        let row = recorded_trial::run(simulation, job, shown, &made, &mut observe);
+        let path = path.as_deref();
+        let row = recorded_trial::run(simulation, trial, planner, path, view, &made, &mut observe);
         let StoredTrial { is_asked, unstored, .. } = stored;
         if let Some(error) = unstored {
             return Err(error);

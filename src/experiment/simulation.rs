@@ -360,6 +360,6 @@ impl Simulation {
         trial: u32,
         observer: &mut TrialObserver,
     ) -> TrialRow {
-        trial::run(&self.experiment, &self.truth, probe, (planner, trial), observer)
+        trial::run(&self.experiment, &self.truth, probe, planner, trial, observer)
     }
 }

@@ -2,7 +2,6 @@
 
 use super::order::{Order, OrderError};
 use crate::experiment::experiment::Experiment;
-use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::trial::planner_names::HUMAN;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{NextTouch, TrialEvent};
@@ -470,11 +469,6 @@ impl Desk {
                 "target {numbers:?}: allowed are {form}, in metres, within the finger's reach"
             ))
         })
-    }
-
-    /// Measure of the error curve.
-    pub(super) fn measure(&self) -> Measure {
-        if self.task.ball().is_some() { CHAMFER } else { RMSE }
     }
 }
 

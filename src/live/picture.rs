@@ -18,7 +18,7 @@ const TRIANGLES: usize = 8000;
 
 /// Returns the state of the desk without beliefs.
 pub(super) fn state(desk: &Desk) -> Value {
-    let (experiment, measure) = (desk.experiment(), desk.measure());
+    let (experiment, measure) = (desk.experiment(), desk.experiment().error_measure());
     let state = desk.lock();
     let planner = |(name, track): (&String, &Track)| {
         let count = track.row.touches.len() as u32;
@@ -52,7 +52,7 @@ pub(super) fn state(desk: &Desk) -> Value {
         "phase": state.phase,
         "is_real": desk.is_real(),
         "moves": experiment.scene.simulator.moves_finger() || desk.is_real(),
-        "is_line": experiment.scene.zone.as_ref().is_some_and(|zone| zone.dimension() == 1),
+        "is_line": experiment.scene.is_curve(),
         "is_around": experiment.scene.whole_object.is_some(),
         "trial": state.trial,
         "trials": experiment.trials,
@@ -145,14 +145,22 @@ impl Picture {
     }
 }
 
-/// Scripts of the view of an experiment's beliefs.
-pub(super) fn scripts(is_around: bool) -> &'static [&'static str] {
-    if is_around { &solid::SCRIPTS } else { &explorer::zone::SCRIPTS }
+/// View of an experiment's beliefs.
+pub(super) struct BeliefView {
+    /// Scripts that draw it.
+    pub scripts: &'static [&'static str],
+    /// Names and labels of its colour maps.
+    pub colours: &'static [(&'static str, &'static str)],
 }
 
-/// Colour maps of the view, names and labels.
-pub(super) fn colours(is_around: bool) -> &'static [(&'static str, &'static str)] {
-    if is_around { &solid::COLOURS } else { &explorer::zone::COLOURS }
+impl BeliefView {
+    /// Returns the view of the desk's experiment, that of a zone before there is one.
+    pub(super) fn of(desk: Option<&Desk>) -> Self {
+        match desk.is_some_and(|desk| desk.experiment().scene.whole_object.is_some()) {
+            true => Self { scripts: &solid::SCRIPTS, colours: &solid::COLOURS },
+            false => Self { scripts: &explorer::zone::SCRIPTS, colours: &explorer::zone::COLOURS },
+        }
+    }
 }
 
 /// A desk with the picture of its trials.

@@ -6,7 +6,7 @@
 use super::desk::Desk;
 use super::guard::{Access, Passage};
 use super::order::Order;
-use super::picture::{self, Picture, Shown};
+use super::picture::{self, BeliefView, Picture, Shown};
 use crate::experiment::truth::Truth;
 use crate::report::canvas::escape;
 use crate::report::explorer::choice;
@@ -234,8 +234,8 @@ impl Server {
             (Method::GET, "/") => Ok(file("text/html; charset=utf-8", self.page())),
             (Method::GET, "/live.css") => Ok(file("text/css", STYLE.to_owned())),
             (Method::GET, "/live.js") => {
-                let is_around = shown.is_some_and(|shown| is_around(&shown.desk));
-                let scripts = [picture::scripts(is_around), &[SCRIPT]].concat();
+                let view = BeliefView::of(shown.as_ref().map(|shown| &*shown.desk));
+                let scripts = [view.scripts, &[SCRIPT]].concat();
                 Ok(file("text/javascript; charset=utf-8", scripts.join("\n")))
             }
             (Method::GET, "/events") => Ok(self.events(cut)),
@@ -297,8 +297,7 @@ impl Server {
     fn page(&self) -> String {
         let shown = self.shown();
         let name = shown.as_ref().map_or("Live", |shown| &shown.desk.experiment().name);
-        let is_around = shown.as_ref().is_some_and(|shown| is_around(&shown.desk));
-        let colours = picture::colours(is_around);
+        let BeliefView { colours, .. } = BeliefView::of(shown.as_ref().map(|shown| &*shown.desk));
         let planners = self.host.planners();
         let boxes: String = planners
             .iter()
@@ -385,10 +384,6 @@ struct Sent {
 }
 
 const HEAD: &str = "<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"/live.css\">\n<script src=\"/live.js\" defer></script>\n";
-
-fn is_around(desk: &Desk) -> bool {
-    desk.experiment().scene.whole_object.is_some()
-}
 
 fn full(text: String) -> Body {
     Full::new(Bytes::from(text)).boxed()

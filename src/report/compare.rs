@@ -3,7 +3,7 @@
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
-use super::findings::{CALIBRATED, by_verdict, clauses};
+use super::findings::{CALIBRATED, clauses, verdict_group};
 use super::glossary::explained;
 use super::html::{figure, fold, page, tables};
 use super::legend::{FigureLayout, Swatch};
@@ -141,16 +141,16 @@ pub fn note(against: &str) -> String {
 fn sentence(compared: &SuiteComparison) -> Option<String> {
     let against = &compared.reference;
     let others = compared.contenders.iter().filter(|it| it.name != *against);
-    let verdicts = others.map(|it| {
+    let groups = others.map(|it| {
         let interval = geometric_mean(&it.scores(), SEED).and_then(|error| error.interval);
-        (it.name.as_str(), verdict(interval, 1.0, Direction::Minimise))
+        (it.name.as_str(), verdict_group(verdict(interval, 1.0, Direction::Minimise)))
     });
     let words = [
         format!("a smaller error than {against}"),
         format!("a larger error than {against}"),
         format!("no established difference from {against}"),
     ];
-    let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
+    let clauses = clauses(groups, ["has", "have"], words)?;
     let objects = counted(compared.objects.len(), "object");
     Some(format!("Over {objects}, {clauses} (95 % intervals)."))
 }

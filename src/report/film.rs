@@ -248,7 +248,7 @@ impl<'a> FilmLayout<'a> {
             errors: (experiment.first_fit()..=last).filter_map(error).collect(),
             panel_px,
             width_px: (panel_px[0] * panels as f64).max(WIDTH_MIN_PX),
-            has_bar: run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
+            has_bar: !run.experiment.scene.is_curve(),
         }
     }
 

@@ -313,15 +313,16 @@ fn final_errors<'a>(
 fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let found = final_errors(run, analysis, baseline);
     let trials = found.clone().map(|it| it.paired.trials).max()?;
-    let verdicts =
-        found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));
+    let groups = found.map(|it| {
+        (it.planner, verdict_group(verdict(it.paired.interval, 0.0, it.measure.direction)))
+    });
     let error = run.experiment.error_measure().title;
     let words = [
         format!("a smaller {error} than {baseline}"),
         format!("a larger {error} than {baseline}"),
         format!("no established difference in {error} from {baseline}"),
     ];
-    let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
+    let clauses = clauses(groups, ["has", "have"], words)?;
     let touches = counted(run.experiment.touches, "touch");
     Some(format!("After {touches}, {clauses} ({trials} trials, 95 % intervals)."))
 }
@@ -331,11 +332,12 @@ fn touches_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Str
     let id = run.experiment.error_measure().id;
     let found = analysis.equal_errors.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
-    let verdicts =
-        found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Minimise)));
+    let groups = found.map(|it| {
+        (it.planner, verdict_group(verdict(it.ratio.interval, 1.0, Direction::Minimise)))
+    });
     let words = ["fewer touches", "more touches", "about as many (no established difference)"];
     let words = words.map(String::from);
-    let clauses = clauses(verdicts.map(by_verdict), ["needs", "need"], words)?;
+    let clauses = clauses(groups, ["needs", "need"], words)?;
     Some(format!("To reach the final error of {baseline}, {clauses}."))
 }
 
@@ -359,9 +361,9 @@ fn calibration(run: &Run) -> Option<String> {
     Some(format!("Calibration of the last belief: {clauses}."))
 }
 
-/// Returns a planner with its group: better, worse, neither.
-pub(super) fn by_verdict<'a>((planner, verdict): (&'a str, Option<&str>)) -> (&'a str, usize) {
-    (planner, verdict.map_or(2, |word| usize::from(word != "better")))
+/// Returns the number of a verdict's group: better, worse, neither.
+pub(super) fn verdict_group(verdict: Option<&str>) -> usize {
+    verdict.map_or(2, |word| usize::from(word != "better"))
 }
 
 /// Returns a clause for each of three groups of planners that is not empty; `None` without

@@ -282,7 +282,12 @@ impl Scene {
         }
     }
 
-    /// Returns whether the region is a zone with two coordinates.
+    /// Whether the region is a zone with one coordinate, over which the surface is a curve.
+    pub fn is_curve(&self) -> bool {
+        self.zone.as_ref().is_some_and(|zone| zone.z_m.is_none())
+    }
+
+    /// Whether the region is a zone with two coordinates.
     fn is_flat(&self) -> bool {
         self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some())
     }
@@ -346,8 +351,12 @@ impl Scene {
     fn check_camera(&self, rules: &mut Rules) {
         if let Some(camera) = &self.camera {
             rules.table("camera", camera);
-            let is_curve = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_none());
-            forbid_given(rules, "camera", is_curve, "no camera: a zone without z_m is a curve");
+            forbid_given(
+                rules,
+                "camera",
+                self.is_curve(),
+                "no camera: a zone without z_m is a curve",
+            );
         }
     }
 

@@ -99,7 +99,7 @@ proptest! {
         let stated = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
         let (p, pivot) = (Point3::from(p), Point3::from(pivot));
         let (shift, turn) = (Vector3::from(shift), Vector3::from(turn));
-        let actual = corrected_pose(&stated, &pivot, (&shift, &turn));
+        let actual = corrected_pose(&stated, &pivot, &shift, &turn);
         let seen = stated * actual.inverse_transform_point(&p);
         let expected = pivot + UnitQuaternion::from_scaled_axis(turn) * (p - pivot) + shift;
         prop_assert!((seen - expected).norm() < 1e-12);
@@ -192,7 +192,7 @@ fn a_view_is_registered_to_contacts() {
             let view = look(&environment, number);
             let mut random = seed::stream(number, 0, "view");
             let drawn: [f64; 6] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
-            let mut seen = SeenSurface::new(&view, (|_: &Point3<f64>| true, 120), |n| **n);
+            let mut seen = SeenSurface::new(&view, |_: &Point3<f64>| true, 120, |n| **n);
             seen.register(&[]);
             let unknown = seen.rigid_error();
             assert_eq!((unknown.shift_m, unknown.shift_sd_m), ([0.0; 3], [position_m; 3]));

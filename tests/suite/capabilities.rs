@@ -200,7 +200,7 @@ fn in_recording(capability: &Capability, _: &Trial) -> Cell {
     let path = folder.path().join("trial.mcap");
     let factory = simulation.planner(capability.planner).ok_or("no planner")?;
     let row =
-        recorded_trial::run(&simulation, (0, factory), (Some(&path), None), &[], &mut |_| Ok(None));
+        recorded_trial::run(&simulation, 0, factory, Some(&path), None, &[], &mut |_| Ok(None));
     if let Some(failure) = row.failure {
         return Err(failure);
     }

@@ -14,7 +14,7 @@ use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recordi
 use palpate::experiment::trial::replay::{self, Difference};
 use palpate::experiment::trial::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::planner::{self, PlannerFactory};
+use palpate::explore::planner;
 use palpate::robot::finger::Frame;
 use palpate::robot::sensor::{Channels, DepthImage};
 use palpate::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
@@ -544,7 +544,7 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
     let path = recording_path(folder, active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     let row =
-        recorded_trial::run(&simulation, (0, active), (Some(&path), None), &[], &mut |_| Ok(None));
+        recorded_trial::run(&simulation, 0, active, Some(&path), None, &[], &mut |_| Ok(None));
     let bare = simulation.trial(active, 0);
     assert_eq!(row.failure, None);
     assert_eq!(serde_json::to_string(&row).unwrap(), serde_json::to_string(&bare).unwrap());
@@ -681,8 +681,8 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
                 false => Ok(None),
             }
         };
-        let job: (u32, &dyn PlannerFactory) = (0, active);
-        let row = recorded_trial::run(&simulation, job, (Some(&part), None), &made, &mut interrupt);
+        let part = Some(part.as_path());
+        let row = recorded_trial::run(&simulation, 0, active, part, None, &made, &mut interrupt);
         assert_eq!(row.touches, kept);
         assert_eq!(row.touches.len(), after as usize);
     }

@@ -266,7 +266,8 @@ pub struct FreeVolume {
 }
 
 impl FreeVolume {
-    /// Creates the volume that `finger` has swept on `approach` up to `p_wt`, where the touch ended.
+    /// Creates the volume that `finger` has swept on `approach` up to `p_wt`, where the touch
+    /// ended.
     pub fn new(finger: Finger, approach: &Approach, p_wt: Point3<f64>, end: End) -> Self {
         let ahead_w = approach.direction_w();
         Self {

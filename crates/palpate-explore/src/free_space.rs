@@ -76,7 +76,7 @@ impl FreeSpaceBound {
 
     /// Returns the highest bound within a step of the grid and `beside_m` around `place`, m: beside
     /// an edge that of the higher side.
-    pub(super) fn around_m(&self, zone: &Zone, (place, beside_m): (&[f64], f64)) -> f64 {
+    pub(super) fn around_m(&self, zone: &Zone, place: &[f64], beside_m: f64) -> f64 {
         let step_m = |side: &f64| side / (PER_SIDE - 1) as f64;
         let reach_m: Vec<f64> =
             zone.extents_m().iter().map(|side| step_m(side) + beside_m).collect();

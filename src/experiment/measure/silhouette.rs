@@ -25,9 +25,9 @@ pub struct SilhouetteMetrics {
 }
 
 impl SilhouetteMetrics {
-    /// Compares `silhouette` with the ground truth at the test points. Returns `None` if every point
-    /// has a surface, if the points without one are unknown, or before any observed sweep of the
-    /// finger.
+    /// Compares `silhouette` with the ground truth at the test points. Returns `None` if every
+    /// point has a surface, if the points without one are unknown, or before any observed sweep of
+    /// the finger.
     pub fn of(silhouette: &Silhouette, truth: &Truth) -> Option<Self> {
         let count = truth.places.len();
         if !truth.is_complete || truth.surface_count() == count {

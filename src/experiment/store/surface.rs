@@ -48,8 +48,7 @@ fn obj(mesh: &Mesh) -> String {
 
 /// Returns the ground truth as CSV.
 fn text(experiment: &Experiment, truth: &Truth) -> String {
-    let is_interval = experiment.scene.zone.as_ref().is_some_and(|zone| zone.z_m.is_none());
-    let mut text = String::from(if is_interval { "x_m" } else { "x_m,z_m" });
+    let mut text = String::from(if experiment.scene.is_curve() { "x_m" } else { "x_m,z_m" });
     text += ",height_m,is_reachable\n";
     for (i, place) in truth.places.iter().enumerate() {
         for coordinate in place {

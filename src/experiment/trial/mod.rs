@@ -25,7 +25,7 @@ use crate::sim::camera::probe::CameraProbe;
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::episode::Episode;
-use palpate_explore::planner::{self, Fallback, Offer, Plan, PlannerFactory};
+use palpate_explore::planner::{self, Fallback, Offer, Plan, Planner, PlannerFactory};
 use palpate_explore::probe::Probe;
 use palpate_explore::recognition::{Library, ObjectHypotheses, RecognitionSettings};
 use palpate_explore::task::{Action, Approach, Target};
@@ -100,11 +100,12 @@ pub(in crate::experiment) fn run(
     experiment: &Experiment,
     truth: &GroundTruth,
     probe: &mut dyn Probe,
-    (factory, trial): (&dyn PlannerFactory, u32),
+    factory: &dyn PlannerFactory,
+    trial: u32,
     observer: &mut TrialObserver,
 ) -> TrialRow {
     let mut row = TrialRow::without_touches(trial, factory.name(), None);
-    row.failure = run_touches(experiment, truth, probe, (factory, &mut row), observer).err();
+    row.failure = run_touches(experiment, truth, probe, factory, &mut row, observer).err();
     row
 }
 
@@ -116,19 +117,18 @@ fn run_touches(
     experiment: &Experiment,
     truth: &GroundTruth,
     probe: &mut dyn Probe,
-    (factory, row): (&dyn PlannerFactory, &mut TrialRow),
+    factory: &dyn PlannerFactory,
+    row: &mut TrialRow,
     observer: &mut TrialObserver,
 ) -> Result<(), String> {
     let task = truth.environment.task();
     let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
     let belief = initial_belief(experiment, truth, &mut stream("hypotheses"));
-    let (is_around, name) = (task.ball().is_some(), factory.name());
-    if let Some(why) = factory.zone_only().filter(|_| is_around) {
+    let name = factory.name();
+    if let Some(why) = factory.zone_only().filter(|_| task.ball().is_some()) {
         return Err(format!("planner `{name}` does not support whole objects: {why}"));
     }
-    // Initial touches: random places in a zone, evenly spread directions around an object.
-    let start = planner::by_name(if is_around { "sobol" } else { "random" });
-    let start = start.ok_or("no planner for the initial touches")?;
+    let start = planner::initial(task.region()).ok_or("no planner for the initial touches")?;
     let mut start = start.make(&experiment.planning, stream("initial touches"));
     let mut planner = factory.make(&experiment.planning, stream(name));
     let most = match experiment.further_views {
@@ -150,16 +150,7 @@ fn run_touches(
         let mut plan = if count <= experiment.initial_touches {
             start.plan(episode.belief(), &Offer::default()).map_err(|error| failed(&error))?
         } else {
-            loop {
-                let offer = episode.offer().only(factory.actions());
-                let plan =
-                    planner.plan(episode.belief(), &offer).map_err(|error| failed(&error))?;
-                let Target::Look { .. } = plan.target else { break plan };
-                let mut view = look(&mut episode, plan.target, count - 1)?;
-                episode.fit().map_err(|error| format!("fit before touch {count}: {error}"))?;
-                view.fit = episode.belief().fit().cloned();
-                row.views.push(view);
-            }
+            plan_touch(&mut *planner, factory, &mut episode, count, &mut row.views)?
         };
         let mut action = episode.action(&plan.target).map_err(|error| failed(&error))?;
         if let Action::Touch(approach) = &action {
@@ -174,7 +165,7 @@ fn run_touches(
         let outcome = episode.execute(&plan.target, &action).map_err(|fault| failed(&fault))?;
         let mut touch_row = TouchRow::new(plan, outcome);
         let fitted = match count >= experiment.initial_touches {
-            true => evaluate(experiment, truth, &mut episode, (count, &mut touch_row)),
+            true => evaluate(experiment, truth, &mut episode, count, &mut touch_row),
             false => Ok(()),
         };
         let touched = FinishedTouch {
@@ -193,6 +184,30 @@ fn run_touches(
         view.error = Some(error);
     }
     verify(experiment, &mut episode, row)
+}
+
+/// Plans touch `count`, after the looks that the planner asks for before it, which are added to
+/// `views`.
+///
+/// # Errors
+/// If the planner fails, a look shows nothing, or the fit after it fails.
+fn plan_touch(
+    planner: &mut dyn Planner,
+    factory: &dyn PlannerFactory,
+    episode: &mut Episode,
+    count: u32,
+    views: &mut Vec<ViewRow>,
+) -> Result<Plan, String> {
+    loop {
+        let offer = episode.offer().only(factory.actions());
+        let plan = planner.plan(episode.belief(), &offer);
+        let plan = plan.map_err(|error| format!("touch {count}: {error}"))?;
+        let Target::Look { .. } = plan.target else { return Ok(plan) };
+        let mut view = look(episode, plan.target, count - 1)?;
+        episode.fit().map_err(|error| format!("fit before touch {count}: {error}"))?;
+        view.fit = episode.belief().fit().cloned();
+        views.push(view);
+    }
 }
 
 /// Returns the belief of a trial before its first action.
@@ -237,7 +252,8 @@ fn evaluate(
     experiment: &Experiment,
     truth: &GroundTruth,
     episode: &mut Episode,
-    (count, row): (u32, &mut TouchRow),
+    count: u32,
+    row: &mut TouchRow,
 ) -> Result<(), CovarianceError> {
     row.recognition = episode
         .belief()

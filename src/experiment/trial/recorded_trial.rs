@@ -46,8 +46,10 @@ fn part(path: &Path, number: usize) -> PathBuf {
 /// view shows a body that moves, and sets its pace.
 pub fn run(
     simulation: &Simulation,
-    (trial, planner): (u32, &dyn PlannerFactory),
-    (path, view): (Option<&Path>, Option<&LiveView>),
+    trial: u32,
+    planner: &dyn PlannerFactory,
+    path: Option<&Path>,
+    view: Option<&LiveView>,
     earlier_touches: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> TrialRow {
@@ -59,7 +61,7 @@ pub fn run(
             let mut probe = ResumedProbe::new(earlier_touches.to_vec(), &mut *probe);
             return Ok(simulation.trial_with(&mut probe, planner, trial, observer));
         };
-        record(simulation, (trial, planner), (path, view), earlier_touches, observer)
+        record(simulation, trial, planner, path, view, earlier_touches, observer)
     };
     run().unwrap_or_else(|fault: Fault| TrialRow::not_started(trial, planner.name(), &fault))
 }
@@ -67,8 +69,10 @@ pub fn run(
 /// Records a trial of `planner` to `path`, continuing after the touches `made`.
 fn record(
     simulation: &Simulation,
-    (trial, planner): (u32, &dyn PlannerFactory),
-    (path, view): (&Path, Option<&LiveView>),
+    trial: u32,
+    planner: &dyn PlannerFactory,
+    path: &Path,
+    view: Option<&LiveView>,
     made: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> Result<TrialRow, Fault> {

@@ -25,7 +25,7 @@ impl TrialRow {
         let place =
             |count: usize| format!("trial {} of {}, touch {count}", self.trial, self.planner);
         let Some(mut belief) = initial(experiment)? else { return Ok(None) };
-        let dimension = belief.region().zone().map_or(3, |zone| zone.dimension());
+        let dimension = belief.region().dimension();
         for (touch, number) in touches.iter().zip(1..) {
             if touch.target.point().is_none_or(|point| point.len() != dimension) {
                 let target = touch.target.numbers();

@@ -142,7 +142,7 @@ impl CameraSettings {
         let (shift, turn) =
             (draw(error.position_sd_m), draw(error.rotation_sd_deg.map(f64::to_radians)));
         let scale = 1.0 + error.scale_sd * normal(rng);
-        (corrected_pose(stated, pivot_w, (&shift, &turn)), scale)
+        (corrected_pose(stated, pivot_w, &shift, &turn), scale)
     }
 
     /// Returns the exact depths from the pose `x_wc`.

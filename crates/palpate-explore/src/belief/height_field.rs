@@ -113,7 +113,7 @@ impl HeightField {
         let (posterior, zone) = (self.surface.as_ref()?, &self.zone);
         let scratch = &mut Scratch::default();
         let mut point = |place: &Vec<f64>| {
-            let (height_m, gradient_w) = mean_with_gradient((zone, posterior), place, scratch);
+            let (height_m, gradient_w) = mean_with_gradient(zone, posterior, place, scratch);
             (zone.point(place, height_m), UnitVector3::new_normalize(gradient_w))
         };
         let points: Vec<_> = places.iter().map(&mut point).collect();
@@ -121,10 +121,10 @@ impl HeightField {
             let place = zone.place(p_w);
             !zone.contains(&place) || zone.height_m(p_w) > posterior.mean(&place, scratch)
         };
-        let hides = (zone.widest_m(), is_free);
+        let (points, hides_m) = (points.into_iter(), zone.widest_m());
         let region = zone.clone().into();
         let gradient = |normal_w: &UnitVector3<f64>| field_gradient(&region, normal_w);
-        Some(SeenSurface::imagined(offer, points.into_iter(), hides, gradient))
+        Some(SeenSurface::imagined(offer, points, hides_m, is_free, gradient))
     }
 
     /// The surfaces that cameras have seen, one per view.
@@ -166,7 +166,7 @@ impl HeightField {
         let (zone, ceiling) = (&self.zone, &self.ceiling);
         let inside_m = |p_w: &Point3<f64>, beside_m: f64| match ceiling {
             Some(ceiling) => {
-                zone.height_m(p_w) - ceiling.around_m(zone, (&zone.place(p_w), beside_m))
+                zone.height_m(p_w) - ceiling.around_m(zone, &zone.place(p_w), beside_m)
             }
             None => f64::NEG_INFINITY,
         };
@@ -180,7 +180,7 @@ impl HeightField {
         let mut field_gradient = |p_w: &Point3<f64>| {
             let place = zone.place(p_w);
             let is_in = zone.contains(&place);
-            is_in.then(|| mean_with_gradient((zone, posterior), &place, scratch).1)
+            is_in.then(|| mean_with_gradient(zone, posterior, &place, scratch).1)
         };
         let mut is_changed = false;
         for seen in &mut self.seen {
@@ -433,7 +433,8 @@ impl HeightField {
 
 /// Returns the mean height at `place`, and the gradient in `W` of the height above the mean.
 fn mean_with_gradient(
-    (zone, posterior): (&Zone, &Posterior),
+    zone: &Zone,
+    posterior: &Posterior,
     place: &[f64],
     scratch: &mut Scratch,
 ) -> (f64, Vector3<f64>) {

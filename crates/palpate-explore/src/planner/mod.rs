@@ -32,6 +32,8 @@ pub use plan::{
 pub use sample::uniform;
 pub use settings::PlanningSettings;
 
+use crate::task::Region;
+
 /// Lists the planners of some modules.
 macro_rules! planners {
     ($($module:ident: $name:literal,)*) => {
@@ -74,6 +76,15 @@ pub fn is_external(name: &str) -> bool {
 /// Returns the planner with this name.
 pub fn by_name(name: &str) -> Option<&'static PlannerEntry> {
     PLANNERS.iter().find(|entry| entry.name == name)
+}
+
+/// Returns the planner of the initial touches: random places in a zone, evenly spread directions
+/// around a whole object.
+pub fn initial(region: &Region) -> Option<&'static PlannerEntry> {
+    by_name(match region {
+        Region::Zone(_) => "random",
+        Region::Ball(_) => "sobol",
+    })
 }
 
 /// Returns the factory of a built-in planner that is offered only some kinds of actions:

@@ -85,7 +85,8 @@ impl Raster {
         Aim::against(ball.centre_w, &Vector3::new(out * cosine, out * sine, up))
     }
 
-    /// Returns the stroke that continues the line from `tap` on, or the tap if that is out of reach.
+    /// Returns the stroke that continues the line from `tap` on, or the tap if that is out of
+    /// reach.
     fn stroke(&mut self, belief: &Belief, offer: &StrokeOffer, tap: Target) -> Target {
         let region = belief.region();
         // `plan` took the whole line, of which this is one of equal parts.

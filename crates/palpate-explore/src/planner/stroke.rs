@@ -138,7 +138,7 @@ fn around(surface: &ImplicitSurface, offer: &StrokeOffer, aim: &Aim) -> Option<T
     let mut candidates = Vec::new();
     for heading in 0..HEADINGS {
         let across_w = aim.across_w(std::f64::consts::TAU * heading as f64 / HEADINGS as f64);
-        let line = line_along(believed, (start_w, across_w), aim, step_m);
+        let line = line_along(believed, aim, &start_w, &across_w, step_m);
         let points: Vec<&[f64]> = line.iter().map(|p_w| p_w.coords.as_slice()).collect();
         let gains = reduction.along(&points);
         let mut consider = |target: Target, gain: f64| {
@@ -178,18 +178,19 @@ fn first_point(ball: &Ball, surface: &Surface, aim: &Aim) -> Option<Point3<f64>>
 /// to where it is too steep.
 fn line_along(
     surface: &Surface,
-    (start_w, across_w): (Point3<f64>, Vector3<f64>),
     aim: &Aim,
+    start_w: &Point3<f64>,
+    across_w: &Vector3<f64>,
     step_m: f64,
 ) -> Vec<Point3<f64>> {
     let ahead_w = aim.direction_w.into_inner();
-    let (mut line, mut p_w, mut slope) = (vec![start_w], start_w, 0.0);
+    let (mut line, mut p_w, mut slope) = (vec![*start_w], *start_w, 0.0);
     for _ in 0..POINTS {
         p_w += (across_w + ahead_w * slope) * step_m;
         for _ in 0..NEWTON {
             let found = surface.field(&p_w);
             let facing = -found.gradient.dot(&ahead_w);
-            slope = found.gradient.dot(&across_w) / facing;
+            slope = found.gradient.dot(across_w) / facing;
             // Also false if it faces away, or nothing is finite.
             if !(facing > 0.0 && slope.abs() <= STEEPEST) {
                 return line;

@@ -382,7 +382,7 @@ impl ObjectHypotheses {
         let start_w = approach.p_near_w - ahead_w.scale(before_m);
         let hull = hull(finger, &approach.r_wt(), start_w);
         let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + finger.radius_m;
-        let hit = object.sweep(&hypothesis.x_wo, (&hull, &ahead_w), way_m)?;
+        let hit = object.sweep(&hypothesis.x_wo, &hull, &ahead_w, way_m)?;
         let p_wt = start_w + ahead_w.scale(hit.travel_m);
         let behind_m = (hit.point - p_wt).dot(&(hull.p1_w - hull.p0_w)) / finger.length_m;
         Some(Prediction {

@@ -61,7 +61,8 @@ impl LibraryObject {
     pub(super) fn sweep(
         &self,
         x_wo: &Isometry3<f64>,
-        (hull_w, ahead_w): (&Capsule, &UnitVector3<f64>),
+        hull_w: &Capsule,
+        ahead_w: &UnitVector3<f64>,
         way_m: f64,
     ) -> Option<SweepHit> {
         let hull = Capsule {

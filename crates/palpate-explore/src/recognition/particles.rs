@@ -85,9 +85,9 @@ impl Particles {
         }
         let mut tau_m = f64::INFINITY;
         while tau_m > 0.0 {
-            let before = self.logs((model, known), tau_m);
+            let before = self.logs(model, known, tau_m);
             let gains = |tau_m: f64| -> Vec<f64> {
-                let after = self.logs((model, known), tau_m);
+                let after = self.logs(model, known, tau_m);
                 after.iter().zip(&before).map(|(after, before)| after - before).collect()
             };
             let (next_m, gained) = self.next_temperature(tau_m, &gains);
@@ -96,7 +96,7 @@ impl Particles {
             if self.effective_share() < ESS * 1.5 || tau_m > 0.0 {
                 self.resample(random);
                 for _ in 0..MOVES {
-                    self.advance((model, known), tau_m, random);
+                    self.advance(model, known, tau_m, random);
                 }
             }
         }
@@ -104,7 +104,7 @@ impl Particles {
 
     /// Log-likelihood ratio of the evidence from number `known` on for each particle at a
     /// temperature; 0 at an infinite one.
-    fn logs(&self, (model, known): (&Model, usize), tau_m: f64) -> Vec<f64> {
+    fn logs(&self, model: &Model, known: usize, tau_m: f64) -> Vec<f64> {
         let log = |particle: &Particle| {
             let mut sum = LogLikelihood::zero();
             if tau_m.is_finite() {
@@ -170,13 +170,13 @@ impl Particles {
     }
 
     /// Moves every particle by one step with the posterior at the temperature as its invariant.
-    fn advance(&mut self, (model, known): (&Model, usize), tau_m: f64, random: &mut impl Rng) {
+    fn advance(&mut self, model: &Model, known: usize, tau_m: f64, random: &mut impl Rng) {
         let free = model.prior.free();
         for particle in &mut self.particles {
             let normals =
                 Vector6::from_fn(|i, _| if free[i] { StandardNormal.sample(random) } else { 0.0 });
             let accepts: f64 = random.random();
-            let here = Langevin::new((model, known), &particle.fits, tau_m);
+            let here = Langevin::new(model, known, &particle.fits, tau_m);
             let step = here.step(&normals);
             let x_wo = moved(&particle.x_wo, &step);
             if !model.prior.contains(model.object, &x_wo) {
@@ -184,7 +184,7 @@ impl Particles {
             }
             let fits: Vec<MeasurementFit> =
                 model.evidence.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
-            let there = Langevin::new((model, known), &fits, tau_m);
+            let there = Langevin::new(model, known, &fits, tau_m);
             let log =
                 there.value - here.value + there.log_density(&-step) - here.log_density(&step);
             if accepts.ln() < log {
@@ -202,7 +202,7 @@ struct Langevin {
 }
 
 impl Langevin {
-    fn new((model, known): (&Model, usize), fits: &[MeasurementFit], tau_m: f64) -> Self {
+    fn new(model: &Model, known: usize, fits: &[MeasurementFit], tau_m: f64) -> Self {
         let mut sum = LogLikelihood::zero();
         for (i, (touch, fit)) in model.evidence.iter().zip(fits).enumerate() {
             let tau_m = if i < known { 0.0 } else { tau_m };

@@ -37,6 +37,16 @@ impl Region {
         }
     }
 
+    /// Number of coordinates of a point of the belief's domain: those of a place, or 3.
+    pub fn dimension(&self) -> usize {
+        self.zone().map_or(3, Zone::dimension)
+    }
+
+    /// Number of coordinates of a tap, from which [`target`](Self::target) makes it.
+    pub fn tap_dimension(&self) -> usize {
+        self.zone().map_or(6, Zone::dimension)
+    }
+
     /// Whether a point of `W` belongs to the region, or may do so if it is off by `margin_m`.
     pub fn is_near(&self, p_w: &Point3<f64>, margin_m: f64) -> bool {
         match self {
@@ -77,8 +87,9 @@ impl Region {
         }
     }
 
-    /// Returns the tap with these coordinates: (x) or (x, z) of a zone; x, y and z of a point and of
-    /// a direction around an object. `None` for another count, and for an aim without a direction.
+    /// Returns the tap with these coordinates: (x) or (x, z) of a zone; x, y and z of a point and
+    /// of a direction around an object. `None` for another count, and for an aim without a
+    /// direction.
     pub fn target(&self, coordinates: &[f64]) -> Option<Target> {
         match (self, coordinates) {
             (Self::Zone(zone), _) if coordinates.len() == zone.dimension() => {

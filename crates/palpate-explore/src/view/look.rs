@@ -35,7 +35,7 @@ impl SeenSurface {
             Region::Ball(_) => OF_OBJECT,
         };
         let gradient = |normal_w: &UnitVector3<f64>| field_gradient(region, normal_w);
-        let mut seen = Self::new(view, (wanted, count), gradient);
+        let mut seen = Self::new(view, wanted, count, gradient);
         seen.presence = region.zone().map(|zone| presence(zone, view)).unwrap_or_default();
         seen
     }

@@ -32,7 +32,8 @@ impl SeenSurface {
     pub fn imagined(
         offer: &LookOffer,
         points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
-        (hides_m, mut is_free): (f64, impl FnMut(&Point3<f64>) -> bool),
+        hides_m: f64,
+        mut is_free: impl FnMut(&Point3<f64>) -> bool,
         gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
     ) -> Self {
         let x_cw = offer.x_wc.inverse();
@@ -56,6 +57,7 @@ impl SeenSurface {
             let sd_m = offer.accuracy.noise.sd_m(p_c.z);
             elements.push(SurfaceElement { p_c, normal_c, sd_m, count: 1 });
         }
-        Self::of(elements, (&offer.x_wc, &offer.pivot_w, &offer.accuracy.pose_error), gradient)
+        let LookOffer { x_wc, pivot_w, accuracy, .. } = offer;
+        Self::of(elements, x_wc, pivot_w, &accuracy.pose_error, gradient)
     }
 }

@@ -124,7 +124,7 @@ impl SeenSurface {
                 continue;
             }
             off_m -= weight * along_m;
-            loadings_m += self.loadings((&p_w, &away_w), &normal_w) * weight;
+            loadings_m += self.loadings(&p_w, &away_w, &normal_w) * weight;
             weights += weight;
         }
         (weights > 0.0).then(|| Offset {

@@ -54,7 +54,7 @@ impl SeenSurface {
             if !through[start] || is_reached[start] {
                 continue;
             }
-            let surface = connected((&all, &near_m), start, &mut is_reached);
+            let surface = connected(&all, &near_m, start, &mut is_reached);
             let gone = surface.iter().filter(|&&element| through[element]).count();
             if gone >= FEWEST && !surface.iter().any(|&element| is_touched(element)) {
                 surface.into_iter().for_each(|element| self.rejected[element] = true);
@@ -71,7 +71,8 @@ impl SeenSurface {
 
 /// Returns the elements of the surface that element `start` is on.
 fn connected(
-    (all, near_m): (&[CorrectedElement], &[f64]),
+    all: &[CorrectedElement],
+    near_m: &[f64],
     start: usize,
     is_reached: &mut [bool],
 ) -> Vec<usize> {

@@ -97,17 +97,20 @@ impl SeenSurface {
     /// elements. `gradient` gives that of the field before there is a belief, from a normal.
     pub fn new(
         view: &View,
-        (wanted, enough): (impl Fn(&Point3<f64>) -> bool, usize),
+        wanted: impl Fn(&Point3<f64>) -> bool,
+        enough: usize,
         gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
     ) -> Self {
-        let camera = (&view.x_wc, &view.pivot_w, &view.accuracy.pose_error);
-        Self::of(thin(view, wanted, enough), camera, gradient)
+        let View { x_wc, pivot_w, accuracy, .. } = view;
+        Self::of(thin(view, wanted, enough), x_wc, pivot_w, &accuracy.pose_error, gradient)
     }
 
     /// Creates it from surface elements, the camera's stated pose, its pivot and its error.
     pub(super) fn of(
         elements: Vec<SurfaceElement>,
-        (x_wc, pivot_w, pose_error): (&Isometry3<f64>, &Point3<f64>, &PoseError),
+        x_wc: &Isometry3<f64>,
+        pivot_w: &Point3<f64>,
+        pose_error: &PoseError,
         gradient: impl Fn(&UnitVector3<f64>) -> Vector3<f64>,
     ) -> Self {
         let normal_w = |element: &SurfaceElement| x_wc.rotation * element.normal_c;
@@ -147,7 +150,7 @@ impl SeenSurface {
         let moved = self.errors.component_mul(&self.sds());
         let [shift, turn] =
             [0, 3].map(|row| self.x_wc.rotation * moved.fixed_rows::<3>(row).into_owned());
-        corrected_pose(&self.x_wc, &self.pivot_w, (&shift, &turn))
+        corrected_pose(&self.x_wc, &self.pivot_w, &shift, &turn)
     }
 
     /// Returns the places of the elements in `W` by the stated pose.
@@ -164,7 +167,8 @@ impl SeenSurface {
     /// the camera, per standard deviation of each error.
     pub(super) fn loadings(
         &self,
-        (p_w, away_w): (&Point3<f64>, &Vector3<f64>),
+        p_w: &Point3<f64>,
+        away_w: &Vector3<f64>,
         gradient_w: &Vector3<f64>,
     ) -> SVector<f64, ERRORS> {
         let turned_w = (p_w - self.pivot_w).cross(gradient_w);
@@ -188,7 +192,7 @@ impl SeenSurface {
         let (x_wc, scale) = (self.corrected(), self.scale());
         self.elements.iter().step_by(step).map(move |element| {
             let normal_w = (x_wc.rotation * element.normal_c).into_inner();
-            self.corrected_element((&x_wc, scale), element, &normal_w)
+            self.corrected_element(&x_wc, scale, element, &normal_w)
         })
     }
 
@@ -201,21 +205,22 @@ impl SeenSurface {
     pub(super) fn all(&self) -> impl Iterator<Item = CorrectedElement> {
         let (x_wc, scale) = (self.corrected(), self.scale());
         self.elements.iter().zip(&self.gradients_w).map(move |(element, gradient_w)| {
-            self.corrected_element((&x_wc, scale), element, gradient_w)
+            self.corrected_element(&x_wc, scale, element, gradient_w)
         })
     }
 
     /// Returns an element, corrected by the camera's pose and scale, in a field with this gradient.
     fn corrected_element(
         &self,
-        (x_wc, scale): (&Isometry3<f64>, f64),
+        x_wc: &Isometry3<f64>,
+        scale: f64,
         element: &SurfaceElement,
         gradient_w: &Vector3<f64>,
     ) -> CorrectedElement {
         let p_w = x_wc * Point3::from(element.p_c.coords / scale);
         let normal_w = x_wc.rotation * element.normal_c;
         let away = p_w.coords - x_wc.translation.vector;
-        let loadings = self.factor.tr_mul(&self.loadings((&p_w, &away), gradient_w)).into();
+        let loadings = self.factor.tr_mul(&self.loadings(&p_w, &away, gradient_w)).into();
         let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
         CorrectedElement { p_w, normal_w, sd, loadings }
     }
@@ -260,7 +265,8 @@ impl SeenSurface {
 pub fn corrected_pose(
     stated: &Isometry3<f64>,
     pivot_w: &Point3<f64>,
-    (shift, turn): (&Vector3<f64>, &Vector3<f64>),
+    shift: &Vector3<f64>,
+    turn: &Vector3<f64>,
 ) -> Isometry3<f64> {
     // A point p appears at exp(r)·(p − q) + q + t.
     let back = UnitQuaternion::from_scaled_axis(-turn);

@@ -62,6 +62,22 @@ pub(super) enum CameraPose {
     Uncertain,
 }
 
+/// Model by which the evidence becomes observations of the field.
+pub(super) struct ObservationModel<'a> {
+    /// Prior mean, to which the observations are relative.
+    pub prior: &'a PriorMean,
+    /// Ball around the object.
+    pub ball: &'a Ball,
+    /// Unit of the noise, m.
+    pub noise_m: f64,
+    /// Whether normals are observed, as gradients of the field.
+    pub normals: bool,
+    /// Number of free points along a path to a contact.
+    pub free_space_samples: u32,
+    /// Assumption about the cameras' poses.
+    pub pose: CameraPose,
+}
+
 /// Smallest standard deviation of a free point's field, as a fraction of its distance from the
 /// contacts: the field is close to a distance, but not exact; a heuristic.
 const SURE: f64 = 0.1;
@@ -111,18 +127,14 @@ impl SpatialEvidence {
         met.chain(self.free.iter().map(|free| free.distance_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the observations of the field relative to `prior`. At each contact the field is 0,
-    /// with the normal as its gradient if `normals` is set; points with a common error have it in the
-    /// size that each states. At the centre of each swept ball inside `ball`, `places` along a path
-    /// to a contact, it is the distance to the nearest contact. That is the upper bound of a distance
-    /// there, and the swept radius the lower bound: the standard deviation is that of a uniform
-    /// distribution between them. `noise_m` is the unit of the noise.
-    pub fn observations(
-        &self,
-        (prior, ball): (&PriorMean, &Ball),
-        (normals, places): (bool, u32),
-        (noise_m, pose): (f64, CameraPose),
-    ) -> Observations {
+    /// Returns the observations of the field relative to the prior mean. At each contact the field
+    /// is 0, with the normal as its gradient if normals are observed; points with a common error
+    /// have it in the size that each states. At the centre of each swept ball inside the model's
+    /// ball it is the distance to the nearest contact. That is the upper bound of a distance there,
+    /// and the swept radius the lower bound: the standard deviation is that of a uniform
+    /// distribution between them.
+    pub(super) fn observations(&self, model: &ObservationModel) -> Observations {
+        let ObservationModel { prior, ball, noise_m, normals, free_space_samples, .. } = *model;
         let mut all = Observations::new(3);
         let mut source = FIRST_SOURCE;
         for points in &self.points {
@@ -148,13 +160,13 @@ impl SpatialEvidence {
             source += usize::from(is_common);
         }
         for number in 0..self.seen.len() {
-            self.push_seen((prior, ball.radius_m), number, (noise_m, pose), &mut all);
+            self.push_seen(model, number, &mut all);
         }
         let points: Vec<Point3<f64>> = self.points().collect();
-        let swept = self
-            .free
-            .iter()
-            .flat_map(|free| free.places_w(ball, places).map(|p_w| (p_w, free.finger.radius_m)));
+        let swept = self.free.iter().flat_map(|free| {
+            let places_w = free.places_w(ball, free_space_samples);
+            places_w.map(|p_w| (p_w, free.finger.radius_m))
+        });
         for (p_w, radius_m) in swept {
             let distances_m = points.iter().map(|point| (point - p_w).norm());
             let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
@@ -171,17 +183,12 @@ impl SpatialEvidence {
         all
     }
 
-    /// Adds what view `source` shows of an object of this radius: the field is 0 at each element,
-    /// but for its own error and the one that the view has in common, and positive in the free
-    /// space before every second one.
-    pub(super) fn push_seen(
-        &self,
-        (prior, radius_m): (&PriorMean, f64),
-        source: usize,
-        (noise_m, pose): (f64, CameraPose),
-        all: &mut Observations,
-    ) {
-        let before_m = BEFORE * radius_m;
+    /// Adds what view `source` shows of the object: the field is 0 at each element, but for its own
+    /// error and the one that the view has in common, and positive in the free space before every
+    /// second one.
+    fn push_seen(&self, model: &ObservationModel, source: usize, all: &mut Observations) {
+        let &ObservationModel { prior, ball, noise_m, pose, .. } = model;
+        let before_m = BEFORE * ball.radius_m;
         for (i, element) in self.seen[source].elements().enumerate() {
             // A surface that is seen too far out is inside of what was seen.
             let loadings = element.loadings.map(|loading| -loading);

@@ -1,7 +1,7 @@
 //! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
 //! inside (Williams & Fitzgibbon 2007).
 
-use super::evidence::{CameraPose, PriorMean, SpatialEvidence};
+use super::evidence::{CameraPose, ObservationModel, PriorMean, SpatialEvidence};
 use super::scope::ExplorationSetup;
 use super::settings::SpatialGpSettings;
 use super::surface::Surface;
@@ -120,8 +120,10 @@ impl ImplicitSurface {
         points: impl Iterator<Item = (Point3<f64>, UnitVector3<f64>)>,
     ) -> Option<SeenSurface> {
         let surface = self.surface()?;
-        let hides = (2.0 * self.scope.ball.radius_m, |p_w: &Point3<f64>| surface.value(p_w) > 0.0);
-        Some(SeenSurface::imagined(offer, points, hides, |normal_w| normal_w.into_inner()))
+        let hides_m = 2.0 * self.scope.ball.radius_m;
+        let is_free = |p_w: &Point3<f64>| surface.value(p_w) > 0.0;
+        let gradient = |normal_w: &UnitVector3<f64>| normal_w.into_inner();
+        Some(SeenSurface::imagined(offer, points, hides_m, is_free, gradient))
     }
 
     /// The surfaces that cameras have seen, one per view.
@@ -157,7 +159,7 @@ impl ImplicitSurface {
             }
             None => (self.search(start.as_ref(), &observations)?, None),
         };
-        self.conclude((prior, observations), start, (fit, posterior))
+        self.conclude(prior, observations, start, fit, posterior)
     }
 
     /// Returns the last fit with its likelihood of `observations`, and the posterior, unless errors
@@ -219,15 +221,17 @@ impl ImplicitSurface {
         start: Option<Hyperparameters>,
         fit: &Fit,
     ) -> Result<(), CovarianceError> {
-        let made = self.observations(start.as_ref());
-        self.conclude(made, start, (fit.clone(), None)).map(|_| ())
+        let (prior, observations) = self.observations(start.as_ref());
+        self.conclude(prior, observations, start, fit.clone(), None).map(|_| ())
     }
 
     fn conclude(
         &mut self,
-        (prior, observations): (PriorMean, Observations),
+        prior: PriorMean,
+        observations: Observations,
         start: Option<Hyperparameters>,
-        (fit, known): (Fit, Option<Posterior>),
+        fit: Fit,
+        known: Option<Posterior>,
     ) -> Result<(&Fit, &Surface), CovarianceError> {
         let posterior = |all| Posterior::new(self.kernel, fit.hyperparameters.clone(), all);
         let (mut posterior, pose_errors) = match (known, self.evidence.seen.is_empty()) {
@@ -242,9 +246,8 @@ impl ImplicitSurface {
         };
         posterior.inflate(self.settings.sd_inflation);
         let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
-        let points = self.points();
-        let surface =
-            Surface::new(&self.scope, prior, (posterior, pose_errors), (points.iter(), offset_m));
+        let (scope, points) = (&self.scope, self.points());
+        let surface = Surface::new(scope, prior, posterior, pose_errors, points.iter(), offset_m);
         self.start = start;
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
@@ -281,9 +284,14 @@ impl ImplicitSurface {
         let ball = self.scope.estimated_ball(points.iter());
         let prior = PriorMean::about(self.settings.prior, &ball, points.iter());
         let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
-        let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
-        let sampled = (self.normals(), self.settings.free_space_samples);
-        let observations = self.evidence.observations((&prior, &ball), sampled, (noise_m, pose));
+        let observations = self.evidence.observations(&ObservationModel {
+            prior: &prior,
+            ball: &ball,
+            noise_m: last.map_or(unknown_m, |last| last.noise_sd),
+            normals: self.normals(),
+            free_space_samples: self.settings.free_space_samples,
+            pose,
+        });
         (prior, observations)
     }
 

@@ -66,8 +66,10 @@ impl Surface {
     pub(super) fn new<'a>(
         scope: &ExplorationSetup,
         prior: PriorMean,
-        (posterior, pose_errors): (Posterior, Vec<MeanField>),
-        (contacts, offset_m): (impl Iterator<Item = &'a Point3<f64>>, f64),
+        posterior: Posterior,
+        pose_errors: Vec<MeanField>,
+        contacts: impl Iterator<Item = &'a Point3<f64>>,
+        offset_m: f64,
     ) -> Self {
         let contacts: Vec<Point3<f64>> = contacts.copied().collect();
         let Ball { centre_w, radius_m, .. } = &scope.ball;

@@ -6,7 +6,7 @@ use crate::backend::interlock::defaults;
 use crate::control::posture;
 use crate::robot::Robot;
 use crate::robot::arm::{Chain, Clearance, JointType, Joints, Obstacle};
-use crate::task::{Aim, Approach, Task};
+use crate::task::{Aim, Approach, Region, Task};
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_geometry::distance::{HalfSpace, OrientedBox};
 use palpate_geometry::low_discrepancy::directions;
@@ -119,12 +119,11 @@ fn poses(robot: &Robot, task: &Task) -> Vec<Isometry3<f64>> {
 
 /// Returns the approach to the zone's middle, or those from all sides of a whole object.
 fn approaches(task: &Task) -> Vec<Approach> {
-    match (task.zone(), task.ball()) {
-        (Some(zone), _) => task.approach(&zone.at(&[0.5, 0.5]).into()).into_iter().collect(),
-        (_, Some(ball)) => directions(SIDES)
+    match task.region() {
+        Region::Zone(zone) => task.approach(&zone.at(&[0.5, 0.5]).into()).into_iter().collect(),
+        Region::Ball(ball) => directions(SIDES)
             .filter_map(|side_w| task.approach(&Aim::against(ball.centre_w, &side_w).into()))
             .collect(),
-        _ => Vec::new(),
     }
 }
 

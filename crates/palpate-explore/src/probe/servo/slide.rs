@@ -1,7 +1,7 @@
 //! Slide along the surface: speed along its tangent, load along the approach, until the way is
 //! done or the surface ends.
 
-use super::contact_monitor::ApproachEnd;
+use super::contact_monitor::{ApproachEnd, ContactMonitor};
 use super::reach::{standoff, turning_point};
 use super::trajectory::Path;
 use super::{PRESS_SPEED, PathEnd, Servo};
@@ -68,6 +68,7 @@ pub(super) struct Trail {
 }
 
 /// Load that is held, in the unit of the sensor, and its rise per metre of depth along the normal.
+#[derive(Clone, Copy)]
 struct Hold {
     load: f64,
     per_m: f64,
@@ -78,25 +79,167 @@ fn yields_m(load: f64, per_m: f64) -> f64 {
     (load / per_m).clamp(0.0, PRESSED_M)
 }
 
+/// Returns the twist of a fingertip that does not turn.
+fn twist(velocity_w: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(velocity_w.x, velocity_w.y, velocity_w.z, 0.0, 0.0, 0.0)
+}
+
+/// State of a finger that slides.
+struct Slide {
+    /// Direction of the approach.
+    ahead_w: UnitVector3<f64>,
+    /// Direction of the stroke, across that of the approach.
+    across_w: UnitVector3<f64>,
+    /// Length of the stroke.
+    length_m: f64,
+    speed_m_s: f64,
+    /// Place of the tip at the start, and the deepest that the approach allows.
+    start_w: Vector3<f64>,
+    deepest_w: Vector3<f64>,
+    hold: Hold,
+    /// Whether the sensor states a load; it may state none without contact.
+    has_load: bool,
+    is_on_hull: bool,
+    trail: Trail,
+    /// Length at the last place of the trail, and at the last contact.
+    left_m: f64,
+    sampled_m: f64,
+    /// Set point of the tip.
+    goal: Isometry3<f64>,
+    /// Estimate of the normal.
+    normal_w: Vector3<f64>,
+    /// Time since contact was last certain, and since the load was last below that of a wall.
+    off_s: f64,
+    hard_s: f64,
+    /// Sum and number of the places of the tip since the last contact.
+    sum_w: Vector3<f64>,
+    count: f64,
+}
+
+impl Slide {
+    /// Returns the length slid so far, m.
+    fn done_m(&self) -> f64 {
+        (self.goal.translation.vector - self.start_w).dot(&self.across_w)
+    }
+
+    /// Returns the slope of the surface along the stroke, positive if it falls away.
+    fn slope(&self) -> f64 {
+        -self.normal_w.dot(&self.across_w) / self.normal_w.dot(&self.ahead_w).min(-1e-3)
+    }
+
+    /// Whether the stroke is done, too steep, too deep, or without a surface, or a wall is ahead.
+    fn is_over(&self, done_m: f64) -> bool {
+        let is_beyond = (self.goal.translation.vector - self.deepest_w).dot(&self.ahead_w) > 0.0;
+        let is_over = done_m >= self.length_m || self.slope().abs() > STEEPEST || is_beyond;
+        is_over || self.off_s > LASTS_S || self.hard_s > LASTS_S
+    }
+
+    /// Returns the load on the finger, 0 if the sensor states none without contact.
+    fn load(&self, monitor: &ContactMonitor) -> Option<f64> {
+        self.has_load.then(|| monitor.load().unwrap_or(0.0))
+    }
+
+    /// Returns the velocity along the estimated surface that corrects `load`.
+    fn velocity_w(&self, load: Option<f64>) -> Vector3<f64> {
+        let (hold, wall, steep) = (&self.hold, self.trail.wall, self.slope());
+        let most_m_s = STEEPEST * self.speed_m_s;
+        // A surface that rises ahead presses the finger: it goes on as the load falls again.
+        let eased = load.map_or(1.0, |load| (wall - load) / (wall - hold.load).max(1e-9));
+        let across_m_s = eased.clamp(0.0, 1.0) * self.speed_m_s / (1.0 + steep * steep).sqrt();
+        let push_m_s = load.map_or(0.0, |load| {
+            (RATE_PER_S * (hold.load - load) / hold.per_m).clamp(-most_m_s, most_m_s)
+        });
+        self.across_w.scale(across_m_s) + self.ahead_w.scale(across_m_s * steep + push_m_s)
+    }
+
+    /// Counts the time without contact and that at the load of a wall. Returns whether the contact
+    /// is neither, so that it can be measured.
+    fn count_time(&mut self, load: Option<f64>, passed_s: f64) -> bool {
+        let is_off = load.is_some_and(|load| load < LOST * self.hold.load);
+        self.off_s = if is_off { self.off_s + passed_s } else { 0.0 };
+        let is_hard = load.is_some_and(|load| load > HARD * self.trail.wall);
+        self.hard_s = if is_hard { self.hard_s + passed_s } else { 0.0 };
+        !is_off && !is_hard
+    }
+
+    /// Adds the place of the tip to the trail, if it is a sample from the last, and to the mean.
+    fn pass(&mut self, p_w: &Vector3<f64>, done_m: f64) {
+        if done_m >= self.left_m + SAMPLE_M {
+            self.trail.places_w.push(*p_w);
+            self.left_m = done_m;
+        }
+        self.sum_w += p_w;
+        self.count += 1.0;
+    }
+
+    /// Starts the mean place of the tip again.
+    fn clear_samples(&mut self) {
+        (self.sum_w, self.count) = (Vector3::zeros(), 0.0);
+    }
+}
+
 impl Servo {
     /// Slides along the way of `approach`, if it has one, after contact at the first of `points`,
-    /// and adds the contacts along the way, up to where the surface ended, was too steep or too far,
-    /// or the finger was stuck or overloaded. In a scene with strokes, `first` is corrected by what
-    /// the finger yields. Returns the path.
+    /// and adds the contacts along the way, up to where the surface ended, was too steep or too
+    /// far, or the finger was stuck or overloaded. In a scene with strokes, the first point is
+    /// corrected by what the finger yields. Returns the path.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
         points: &mut SurfacePoints,
         tared: &Isometry3<f64>,
     ) -> Result<Option<Trail>, Fault> {
+        let Some(mut slide) = self.begin_slide(approach, points)? else { return Ok(None) };
+        self.monitor.clear_samples();
+        loop {
+            let done_m = slide.done_m();
+            if slide.is_over(done_m) {
+                break;
+            }
+            let velocity_w = slide.velocity_w(slide.load(&self.monitor));
+            let passed_s = self.passed_s();
+            slide.goal.translation.vector += velocity_w * passed_s;
+            self.tick(&Goal { x_wt: slide.goal, twist: twist(&velocity_w) })?;
+            let here = self.x_wt();
+            let behind_m = (slide.goal.translation.vector - here.translation.vector).norm();
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) || behind_m > STUCK_M {
+                break;
+            }
+            let load = slide.load(&self.monitor);
+            if load.is_some_and(|load| load > slide.trail.wall) {
+                break;
+            }
+            let is_clear = slide.count_time(load, passed_s);
+            slide.pass(&here.translation.vector, done_m);
+            let is_read = self.monitor.last_sample_s().is_none()
+                || self.monitor.collected() >= self.settings.frames;
+            if is_clear && (!is_read || done_m < slide.sampled_m + SAMPLE_M) {
+                continue;
+            }
+            if is_clear {
+                points.points.extend(self.slide_contact(&mut slide, here, tared, load));
+                slide.sampled_m = done_m;
+            }
+            self.monitor.clear_samples();
+            slide.clear_samples();
+        }
+        Ok(Some(slide.trail))
+    }
+
+    /// Presses the finger for the stroke of `approach` and corrects the first of `points` by what
+    /// the finger yields. Returns `None` without a stroke, or at overload.
+    fn begin_slide(
+        &mut self,
+        approach: &Approach,
+        points: &mut SurfacePoints,
+    ) -> Result<Option<Slide>, Fault> {
         let Some(stroke) = self.settings.stroke.clone() else { return Ok(None) };
         points.source = approach.slide_w.map(|_| ErrorSource::Stroke);
         let Some(first) = points.points.first_mut() else { return Ok(None) };
         let ahead_w = approach.direction_w();
         let way_w = approach.slide_w.unwrap_or_default();
         let across_w = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9);
-        let mut normal_w = if first.has_normal { first.normal_w } else { -ahead_w.into_inner() };
-        let facing = -normal_w.dot(&ahead_w);
+        let normal_w = if first.has_normal { first.normal_w } else { -ahead_w.into_inner() };
         let is_on_hull = self.monitor.locates_on_hull();
         let load = self.monitor.load().unwrap_or(0.0);
         if let (None, Some(per_m)) = (across_w, self.yields_n_m.filter(|_| is_on_hull)) {
@@ -105,7 +248,8 @@ impl Servo {
         if across_w.is_none() && (self.yields_n_m.is_some() || !is_on_hull) {
             return Ok(None);
         }
-        let Some(hold) = self.press_for_slide((&ahead_w, facing), stroke.force_n)? else {
+        let facing = -normal_w.dot(&ahead_w);
+        let Some(hold) = self.press_for_slide(&ahead_w, facing, stroke.force_n)? else {
             return Ok(None);
         };
         if is_on_hull {
@@ -113,86 +257,53 @@ impl Servo {
             first.p_wc += first.normal_w * yields_m(load, hold.per_m);
         }
         let Some(across_w) = across_w else { return Ok(None) };
-        let start = self.x_wt();
-        let mut goal = start;
-        let deepest_w = turning_point(&self.robot, approach).translation.vector;
-        // A sensor that tells a load may tell none without contact.
-        let is_felt = self.monitor.load().is_some();
-        let wall = WALL * hold.load.max(self.monitor.load().unwrap_or(0.0));
-        let mut trail = Trail { places_w: vec![start.translation.vector], wall };
-        let (mut sampled_m, mut left_m, mut off_s, mut hard_s) = (0.0, 0.0, 0.0, 0.0);
-        let (mut sum_w, mut count) = (Vector3::zeros(), 0.0);
-        self.monitor.clear_samples();
-        loop {
-            let steep = -normal_w.dot(&across_w) / normal_w.dot(&ahead_w).min(-1e-3);
-            let done_m = (goal.translation.vector - start.translation.vector).dot(&across_w);
-            let is_beyond = (goal.translation.vector - deepest_w).dot(&ahead_w) > 0.0;
-            let is_over = done_m >= way_w.norm() || steep.abs() > STEEPEST || is_beyond;
-            if is_over || off_s > LASTS_S || hard_s > LASTS_S {
-                break;
-            }
-            let most_m_s = STEEPEST * stroke.speed_m_s;
-            let load = is_felt.then(|| self.monitor.load().unwrap_or(0.0));
-            // A surface that rises ahead presses the finger: it goes on as the load falls again.
-            let eased = load.map_or(1.0, |load| (wall - load) / (wall - hold.load).max(1e-9));
-            let across_m_s =
-                eased.clamp(0.0, 1.0) * stroke.speed_m_s / (1.0 + steep * steep).sqrt();
-            let push_m_s = load.map_or(0.0, |load| {
-                (RATE_PER_S * (hold.load - load) / hold.per_m).clamp(-most_m_s, most_m_s)
-            });
-            let velocity_w =
-                across_w.scale(across_m_s) + ahead_w.scale(across_m_s * steep + push_m_s);
-            let passed_s = self.passed_s();
-            goal.translation.vector += velocity_w * passed_s;
-            let twist = Vector6::new(velocity_w.x, velocity_w.y, velocity_w.z, 0.0, 0.0, 0.0);
-            self.tick(&Goal { x_wt: goal, twist })?;
-            let here = self.x_wt();
-            let behind_m = (goal.translation.vector - here.translation.vector).norm();
-            if self.monitor.approach_end() == Some(ApproachEnd::Overload) || behind_m > STUCK_M {
-                break;
-            }
-            let load = is_felt.then(|| self.monitor.load().unwrap_or(0.0));
-            if load.is_some_and(|load| load > wall) {
-                break;
-            }
-            let is_off = load.is_some_and(|load| load < LOST * hold.load);
-            off_s = if is_off { off_s + passed_s } else { 0.0 };
-            let is_hard = load.is_some_and(|load| load > HARD * wall);
-            hard_s = if is_hard { hard_s + passed_s } else { 0.0 };
-            if done_m >= left_m + SAMPLE_M {
-                trail.places_w.push(here.translation.vector);
-                left_m = done_m;
-            }
-            sum_w += here.translation.vector;
-            count += 1.0;
-            let is_read = self.monitor.last_sample_s().is_none()
-                || self.monitor.collected() >= self.settings.frames;
-            let is_unclear = is_off || is_hard;
-            if !is_read || is_unclear || done_m < sampled_m + SAMPLE_M {
-                if is_unclear {
-                    self.monitor.clear_samples();
-                    (sum_w, count) = (Vector3::zeros(), 0.0);
-                }
-                continue;
-            }
-            // The samples are of the way since the last ones, on average of its middle.
-            let x_wt = Isometry3::from_parts((sum_w / count).into(), here.rotation);
-            let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
-            if let Ok(sensed) = self.monitor.contact(&self.robot.finger, moved_m) {
-                let mut contact = Contact::sensed(&x_wt, &sensed);
-                if let Some(load) = load.filter(|_| is_on_hull) {
-                    contact.p_wc += contact.normal_w * yields_m(load, hold.per_m);
-                }
-                if contact.has_normal {
-                    let turned_w = normal_w.lerp(&contact.normal_w, NEW_NORMAL);
-                    normal_w = turned_w.try_normalize(1e-6).unwrap_or(normal_w);
-                }
-                points.points.push(contact);
-            }
-            self.monitor.clear_samples();
-            (sampled_m, sum_w, count) = (done_m, Vector3::zeros(), 0.0);
+        let goal = self.x_wt();
+        let start_w = goal.translation.vector;
+        let load = self.monitor.load();
+        let wall = WALL * hold.load.max(load.unwrap_or(0.0));
+        Ok(Some(Slide {
+            ahead_w,
+            across_w,
+            length_m: way_w.norm(),
+            speed_m_s: stroke.speed_m_s,
+            start_w,
+            deepest_w: turning_point(&self.robot, approach).translation.vector,
+            hold,
+            has_load: load.is_some(),
+            is_on_hull,
+            trail: Trail { places_w: vec![start_w], wall },
+            left_m: 0.0,
+            sampled_m: 0.0,
+            goal,
+            normal_w,
+            off_s: 0.0,
+            hard_s: 0.0,
+            sum_w: Vector3::zeros(),
+            count: 0.0,
+        }))
+    }
+
+    /// Returns the contact that the samples show, and updates the estimate of the normal.
+    fn slide_contact(
+        &self,
+        slide: &mut Slide,
+        here: Isometry3<f64>,
+        tared: &Isometry3<f64>,
+        load: Option<f64>,
+    ) -> Option<Contact> {
+        // The samples are of the way since the last ones, on average of its middle.
+        let x_wt = Isometry3::from_parts((slide.sum_w / slide.count).into(), here.rotation);
+        let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
+        let sensed = self.monitor.contact(&self.robot.finger, moved_m).ok()?;
+        let mut contact = Contact::sensed(&x_wt, &sensed);
+        if let Some(load) = load.filter(|_| slide.is_on_hull) {
+            contact.p_wc += contact.normal_w * yields_m(load, slide.hold.per_m);
         }
-        Ok(Some(trail))
+        if contact.has_normal {
+            let turned_w = slide.normal_w.lerp(&contact.normal_w, NEW_NORMAL);
+            slide.normal_w = turned_w.try_normalize(1e-6).unwrap_or(slide.normal_w);
+        }
+        Some(contact)
     }
 
     /// Leaves the surface at the end of `trail` for the stand-off there, and returns true; or, if
@@ -247,14 +358,15 @@ impl Servo {
     /// `None` at overload.
     fn press_for_slide(
         &mut self,
-        (ahead_w, facing): (&UnitVector3<f64>, f64),
+        ahead_w: &UnitVector3<f64>,
+        facing: f64,
         force_n: f64,
     ) -> Result<Option<Hold>, Fault> {
         let wanted = self.monitor.measures_force().then_some(force_n);
         let (start, first) = (self.x_wt(), self.monitor.load().unwrap_or(0.0));
         let speed_m_s = PRESS_SPEED * self.settings.approach_m_s;
         let velocity_w = ahead_w.scale(speed_m_s);
-        let twist = Vector6::new(velocity_w.x, velocity_w.y, velocity_w.z, 0.0, 0.0, 0.0);
+        let twist = twist(&velocity_w);
         let mut goal = start;
         loop {
             let depth_m = (self.x_wt().translation.vector - start.translation.vector).dot(ahead_w);

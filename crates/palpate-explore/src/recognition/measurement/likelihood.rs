@@ -37,11 +37,7 @@ pub struct Residual {
 impl Residual {
     /// Returns the distance along `n` of the object's point `p_w` from a fixed point. It changes
     /// with the motion of p along n by n·(v + ω × p).
-    pub fn along(
-        value_m: f64,
-        n: &Vector3<f64>,
-        (p_w, x_wo): (&Point3<f64>, &Isometry3<f64>),
-    ) -> Self {
+    pub fn along(value_m: f64, n: &Vector3<f64>, p_w: &Point3<f64>, x_wo: &Isometry3<f64>) -> Self {
         let lever = (p_w.coords - x_wo.translation.vector).cross(n);
         Self { value_m, slope: Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z) }
     }
@@ -60,7 +56,7 @@ impl Residual {
             true => (p_w - q_w) / *distance_m,
             false => *face_w,
         };
-        (Self::along(*distance_m, &-n, (q_w, x_wo)), nearest)
+        (Self::along(*distance_m, &-n, q_w, x_wo), nearest)
     }
 }
 

@@ -92,7 +92,7 @@ impl TouchMeasurement {
     /// Returns the residuals for `object` at the pose `x_wo`.
     pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> TouchFit {
         let reach_m = self.free_m + self.hull.radius_m;
-        let met = object.sweep(x_wo, (&self.hull, &self.ahead_w), reach_m);
+        let met = object.sweep(x_wo, &self.hull, &self.ahead_w, reach_m);
         let points: Vec<PointFit> = (self.points.iter())
             .map(|point| {
                 let (distance, Nearest { q_w, face_w, .. }) =
@@ -111,11 +111,11 @@ impl TouchMeasurement {
             // The turn of the normal is left out of the slope: it only counts deep inside.
             let facing = (-hit.normal.dot(&self.ahead_w)).max(0.0);
             let value_m = (self.free_m - hit.travel_m) * facing;
-            Residual::along(value_m, &hit.normal, (&hit.point, x_wo))
+            Residual::along(value_m, &hit.normal, &hit.point, x_wo)
         });
         let of_face = self.face_w.iter().filter_map(|p_w| {
             let Nearest { q_w, face_w, distance_m } = object.nearest(x_wo, p_w);
-            let inside = || Residual::along(-distance_m, &face_w, (&q_w, x_wo));
+            let inside = || Residual::along(-distance_m, &face_w, &q_w, x_wo);
             (distance_m < 0.0).then(inside)
         });
         let deepest =

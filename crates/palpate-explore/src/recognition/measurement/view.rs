@@ -87,7 +87,7 @@ impl ViewMeasurement {
         to.value += peaks[0].log_integral + second.ln_1p();
         let share = second / (1.0 + second);
         for (peak, share) in peaks.iter().zip([1.0 - share, share]) {
-            self.add_derivatives(peak, share, (fit, &sds_m), to);
+            self.add_derivatives(peak, share, fit, &sds_m, to);
         }
     }
 
@@ -129,7 +129,8 @@ impl ViewMeasurement {
         &self,
         peak: &Peak,
         share: f64,
-        (fit, sds_m): (&[Residual], &[f64]),
+        fit: &[Residual],
+        sds_m: &[f64],
         to: &mut LogLikelihood,
     ) {
         let mut across = SMatrix::<f64, ERRORS, 6>::zeros();

@@ -172,6 +172,53 @@ fn beside_m(finger: &Finger, wrench: &Wrench) -> f64 {
     ((away - out * away.dot(&out)).norm() - finger.radius_m).max(0.0)
 }
 
+/// Returns the standard deviation of the place of a force's line of action, m; unlike the contact,
+/// the line does not end at the hull. `off_by` gives the wrench with one reading off by a multiple
+/// of its standard deviation.
+///
+/// # Errors
+/// If the force has a moment about its line, or the line misses the hull.
+fn line_of_action_sd_m(
+    finger: &Finger,
+    wrench: &Wrench,
+    off_by: &dyn Fn(usize, f64) -> Wrench,
+) -> Result<f64, Doubt> {
+    let moment_nm = |w: &Wrench| w.force_n.dot(&w.torque_nm) / w.force_n.norm();
+    let ends = (0..6).map(|i| {
+        let [low, high] = [-1.0, 1.0].map(|sign| moment_nm(&off_by(i, sign)));
+        0.25 * (high - low).powi(2)
+    });
+    let moment_sd_nm = ends.sum::<f64>().sqrt();
+    let free_nm = MOMENT * wrench.force_n.norm() * finger.radius_m;
+    if moment_nm(wrench).abs() > free_nm + SIGMAS * moment_sd_nm {
+        return Err(Doubt::Unbalanced);
+    }
+    let feet = (0..6).map(|i| (off_by(i, 1.0).foot() - off_by(i, -1.0).foot()) * 0.5);
+    let line_sd_m = (feet.map(|off| off.norm_squared()).sum::<f64>() / 2.0).sqrt();
+    match beside_m(finger, wrench) > MOMENT * finger.radius_m + SIGMAS * line_sd_m {
+        true => Err(Doubt::BesideTip),
+        false => Ok(line_sd_m),
+    }
+}
+
+/// Returns the covariance of a contact across the hull's normal there, m²; `None` if a wrench
+/// within the noise has none. `off_by` is that of [`line_of_action_sd_m`].
+fn covariance_on_hull(
+    finger: &Finger,
+    normal: &Vector3<f64>,
+    off_by: &dyn Fn(usize, f64) -> Wrench,
+) -> Option<Matrix3<f64>> {
+    let mut across = Matrix3::zeros();
+    let flat = Matrix3::identity() - normal * normal.transpose();
+    for i in 0..6 {
+        let ends = [-1.0, 1.0].map(|sign| point_on_hull(finger, &off_by(i, sign)));
+        let [Some((low, _)), Some((high, _))] = ends else { return None };
+        let off = flat * (high - low) * 0.5;
+        across += off * off.transpose();
+    }
+    Some(across)
+}
+
 impl Sensor for ForceTorqueTip {
     fn push(&mut self, time_s: f64, _: &[Sample], wrench: Option<&Wrench>) {
         if let Some(wrench) = wrench {
@@ -229,40 +276,14 @@ impl Sensor for ForceTorqueTip {
         if along_n > SIGMAS * force_sd_n {
             return Err(Doubt::Pulled);
         }
-        // Moment about the force, and its distance from the hull, with their standard deviations.
-        let moment_nm = |w: &Wrench| w.force_n.dot(&w.torque_nm) / w.force_n.norm();
-        let spread = |value: &dyn Fn(&Wrench) -> f64| {
-            let ends = (0..6).map(|i| {
-                let [low, high] = [-1.0, 1.0].map(|sign| value(&off_by(i, sign)));
-                0.25 * (high - low).powi(2)
-            });
-            ends.sum::<f64>().sqrt()
-        };
-        let radius_m = finger.radius_m;
-        let free_nm = MOMENT * force_n * radius_m;
-        if moment_nm(&wrench).abs() > free_nm + SIGMAS * spread(&moment_nm) {
-            return Err(Doubt::Unbalanced);
-        }
-        // Spread of the line of action; unlike the contact, it does not end at the hull.
-        let feet = (0..6).map(|i| (off_by(i, 1.0).foot() - off_by(i, -1.0).foot()) * 0.5);
-        let line_sd_m = (feet.map(|off| off.norm_squared()).sum::<f64>() / 2.0).sqrt();
-        if beside_m(finger, &wrench) > MOMENT * radius_m + SIGMAS * line_sd_m {
-            return Err(Doubt::BesideTip);
-        }
+        let line_sd_m = line_of_action_sd_m(finger, &wrench, &off_by)?;
         let (p_tc, normal) = point_on_hull(finger, &wrench).ok_or(Doubt::NoSignal)?;
-        let mut across = Matrix3::zeros();
-        let flat = Matrix3::identity() - normal * normal.transpose();
-        for i in 0..6 {
-            let ends = [-1.0, 1.0].map(|sign| point_on_hull(finger, &off_by(i, sign)));
-            let [Some((low, _)), Some((high, _))] = ends else { return too_light() };
-            let off = flat * (high - low) * 0.5;
-            across += off * off.transpose();
-        }
+        let Some(across) = covariance_on_hull(finger, &normal, &off_by) else { return too_light() };
         let variance_m2 = across.trace() / 2.0;
-        if variance_m2.sqrt().max(line_sd_m) > TURNED_RAD * radius_m {
+        if variance_m2.sqrt().max(line_sd_m) > TURNED_RAD * finger.radius_m {
             return too_light();
         }
-        let offset_m = CURVED * variance_m2 / radius_m;
+        let offset_m = CURVED * variance_m2 / finger.radius_m;
         let doubt = self.now.change().and_then(|(change, sds)| {
             let noise_n = accuracy.noise_n.iter().copied().fold(0.0, f64::max);
             let limit_n = SLIPPED * force_n + SIGMAS * sds * noise_n;

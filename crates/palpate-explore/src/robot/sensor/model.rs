@@ -44,8 +44,8 @@ const HARD: TipErrors = TipErrors {
 };
 
 /// Errors of a BioTac, whose electrodes are misled by edges. The offset is that of the estimated
-/// surfaces of the twelve tuning objects, in 36 trials of 60 touches: 0.1 to 0.8 mm outwards, median
-/// 0.3 mm.
+/// surfaces of the twelve tuning objects, in 36 trials of 60 touches: 0.1 to 0.8 mm outwards,
+/// median 0.3 mm.
 // heuristic: on eight objects of the suite, poses are then within their stated distance; slack: the
 // press depth and its margin.
 const SOFT: TipErrors = TipErrors {
