@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::{Direction, MEASURES};
-use crate::experiment::trial::row::{TouchRow, TrialRow, ViewRow};
+use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::report::table::{Cell, Column, Table};
 use palpate_explore::evidence::{Contact, FreeVolume, Outcome};
 use palpate_gp::fit::Fit;
@@ -208,13 +208,12 @@ fn record<T: JsonSchema>() -> String {
 /// Returns the fields of a line of `trials.jsonl`, of each of its touches and of their parts.
 pub fn rows() -> String {
     format!(
-        "{}\nEach of `touches`:\n\n{}\nEach of `views`:\n\n{}\n`outcome` of a touch or view:\n\n{}\n\
+        "{}\nEach of `touches`:\n\n{}\n`outcome` of each of `touches` and `views`:\n\n{}\n\
          Its `evidence` is a list of `points`, `free` and `seen`. `points`, a list of these with their \
          `source`:\n\n{}\n`free`:\n\n{}\n`metrics` of a touch:\n\n{}\n`shape` of a touch:\n\n{}\n\
          `fit` of a touch:\n\n{}",
         record::<TrialRow>(),
         record::<TouchRow>(),
-        record::<ViewRow>(),
         record::<Outcome>(),
         record::<Contact>(),
         record::<FreeVolume>(),

@@ -247,8 +247,7 @@ impl Contact {
 pub struct FreeVolume {
     /// The finger's hull.
     pub finger: Finger,
-    /// Centre of the fingertip's hemisphere in `W` at the end of its motion: at rest on the
-    /// surface, or, after a miss, at the turning point.
+    /// Centre of the fingertip's hemisphere in `W` at the end of its motion.
     #[schemars(with = "[f64; 3]")]
     pub p_wt: Point3<f64>,
     /// Attitude of the fingertip in `W`, a unit quaternion (x, y, z, w).
@@ -257,7 +256,7 @@ pub struct FreeVolume {
     /// Direction of the motion in `W`.
     #[schemars(with = "[f64; 3]")]
     pub ahead_w: UnitVector3<f64>,
-    /// Length of the motion from the start of the region on, m.
+    /// Length of the motion in the region, m.
     pub way_m: f64,
     /// Length of the whole approach through the region, m.
     pub approach_m: f64,
