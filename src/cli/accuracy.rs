@@ -5,7 +5,7 @@ use super::find::{SCENES, find};
 use super::output::{Overwrite, make_folder};
 use super::prepare::needs_zone;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::statistics::PairedDifference;
 use crate::experiment::store::write_whole;
 use crate::report::table::with_interval;
@@ -109,7 +109,7 @@ const INTERVAL_NOTE: &str = "\
 intervals: 95 %, over touches, trials and timings of this build; code placement in another build can change
 times by some percent";
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     needs_zone(&scene, &args.scene)?;
     let path = args.scene.display();
@@ -140,16 +140,16 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     }
     print(&format!("results and figure in {}", out.display()))?;
     if is_stopped() {
-        return Ok(Outcome::Interrupted);
+        return Ok(Completion::Interrupted);
     }
     let Some(criterion) = study.of(origin).and_then(|compared| compared.criterion) else {
-        return Ok(Outcome::Done);
+        return Ok(Completion::Done);
     };
     let within = format!("{} from {}", criterion_text(criterion), origin.name());
     let Some(cheapest) = cheapest else {
         ensure!(origin == Origin::Scene, "no level is within {within}; no scene written");
         print(&format!("no effect of the scene can be removed within {within}"))?;
-        return Ok(Outcome::Done);
+        return Ok(Completion::Done);
     };
     let described = cheapest_text(&cheapest, criterion, origin);
     let described =
@@ -159,7 +159,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     let scene = tables::text(&cheapest.scene)?;
     write_whole(&path, format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
     print(&format!("{described}\nscene: {}", path.display()))?;
-    Ok(if cheapest.is_confirmed { Outcome::Done } else { Outcome::Failed })
+    Ok(if cheapest.is_confirmed { Completion::Done } else { Completion::Failed })
 }
 
 /// Comparisons that the options ask for.

@@ -5,7 +5,7 @@ use super::host::Host;
 use super::output::{Overwrite, make_folder};
 use super::prepare::set_thread_count;
 use super::run::{self, name_objects};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::store::{Run, write_whole};
 use crate::experiment::sweep::sweep_cases;
@@ -51,7 +51,7 @@ const SUITE: &str = "experiments/suite";
 /// Number of objects, and the settings, of the quick variant.
 const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 
-pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
     let name = format!("benchmark-{PROTOCOL}");
     let path = find(Path::new(&name), SUITE)?;
     let suffix = if args.quick { "-quick" } else { "" };
@@ -80,13 +80,13 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         let made =
             run::run_missing(&options, experiment, Some(part.clone()), &mut stop, talk, host)?;
         match made.outcome(talk) {
-            Outcome::Done => runs.push((part.display().to_string(), Run::read(&part)?)),
-            Outcome::Interrupted => {
+            Completion::Done => runs.push((part.display().to_string(), Run::read(&part)?)),
+            Completion::Interrupted => {
                 let folder = folder.display();
                 talk.note(format!(
                     "stopped; the trials are in {folder}; repeat the command to continue"
                 ));
-                return Ok(Outcome::Interrupted);
+                return Ok(Completion::Interrupted);
             }
             other => return Ok(other),
         }
@@ -105,5 +105,5 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     write_whole(json, serde_json::to_string_pretty(&result)? + "\n")?;
     write_whole(table_file, markdown(&result))?;
     print(&format!("{}\n{} and {}", table(&result).text(), json.display(), table_file.display()))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

@@ -2,7 +2,7 @@
 
 use super::columns::{aligned, cell};
 use super::find::find_input;
-use super::terminal::{Outcome, print};
+use super::terminal::{Completion, print};
 use crate::sim::finger::calibration::constants::FingerConstants;
 use crate::sim::finger::calibration::fit::{Fit, FreeParameters, fit};
 use crate::sim::finger::calibration::score::{
@@ -59,7 +59,7 @@ enum Skin {
     Shell,
 }
 
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &Args) -> anyhow::Result<Completion> {
     let name = args.recordings.display();
     let recordings: Recordings = read(&args.recordings)?;
     recordings.check().with_context(|| format!("{name}: not a recording"))?;
@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             let found = compare(&start, &friction, recording, of).with_context(refused)?;
             print(&shear_table(&found, friction.stiffness_n_m))?;
         }
-        return Ok(Outcome::Done);
+        return Ok(Completion::Done);
     }
     let free =
         if args.attitude_only { FreeParameters::Sessions } else { FreeParameters::Constants };
@@ -112,7 +112,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             None => print(&format!("\n{text}"))?,
         }
     }
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {

@@ -6,7 +6,7 @@ use super::output::{Overwrite, make_folder};
 use super::prepare::{needs_zone, set_thread_count};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::slow_steps::report_slow_steps;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::planner_names::ORACLE;
@@ -70,7 +70,7 @@ struct BandTable {
     band: LearnedBand,
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let path = find(&args.experiment, "experiments")?;
     let name = args.experiment.file_stem().map_or("band".into(), |stem| stem.to_string_lossy());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/band-{name}")));
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         path.display()
     );
     let Some(objects) = sample(args, experiments, &name, talk)? else {
-        return Ok(Outcome::Interrupted);
+        return Ok(Completion::Interrupted);
     };
 
     let all: Vec<&ObjectSamples> = objects.iter().collect();
@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         text += &format!("\n\n{band}");
     }
     print(&format!("{text}\nin {}", out.display()))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Loads the experiments at `path`, one per object.

@@ -5,7 +5,7 @@ use super::host::Host;
 use super::output::Overwrite;
 use super::prepare::{planners_setting, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
@@ -77,7 +77,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
     share.ok_or("allowed is 0.0001 to 10, as in 0.05".into())
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let mut sets = args.set.clone();
     if !args.planner.is_empty() {
@@ -127,11 +127,11 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
     bar.finish_and_clear();
     print_results(args, &name, &old, &held, &rules)?;
     Ok(match held.is_stopped {
-        true => Outcome::Interrupted,
+        true => Completion::Interrupted,
         false => match held.verdict() {
-            Verdict::Identical | Verdict::Better | Verdict::Ok => Outcome::Done,
-            Verdict::Undecided => Outcome::Undecided,
-            Verdict::Worse | Verdict::Missing => Outcome::Failed,
+            Verdict::Identical | Verdict::Better | Verdict::Ok => Completion::Done,
+            Verdict::Undecided => Completion::Undecided,
+            Verdict::Worse | Verdict::Missing => Completion::Failed,
         },
     })
 }
@@ -177,7 +177,7 @@ fn accept_baseline(
     why: &str,
     stop: &AtomicBool,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     args.force.check_file(&args.baseline)?;
     let jobs = runner::missing_jobs(simulation, &[])?;
     let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
@@ -186,12 +186,12 @@ fn accept_baseline(
     let rows = runner::run_in_memory(simulation, jobs, threads, stop, &tick)?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {
-        return Ok(Outcome::Interrupted);
+        return Ok(Completion::Interrupted);
     }
     let new = accepted(simulation, &rows, why, old, !args.planner.is_empty(), &rules(args))?;
     write_whole(&args.baseline, &new.text()?)?;
     let mut text = format!("{} in {}", counted(rows.len(), "trial"), args.baseline.display());
     new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
     print(&text)?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

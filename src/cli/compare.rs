@@ -1,7 +1,7 @@
 //! Command `palpate compare`.
 
 use super::output::{Overwrite, make_folder};
-use super::terminal::{Outcome, print};
+use super::terminal::{Completion, print};
 use crate::experiment::store::{Run, write_whole};
 use crate::report::compare::{file, html, interquartiles, overall, per_object_table, profiles};
 use crate::study::compare::{SuiteComparison, compare};
@@ -36,7 +36,7 @@ pub(super) struct Args {
     force: Overwrite,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
     let read = |path: &PathBuf| anyhow::Ok((path.display().to_string(), Run::read(path)?));
     let runs: Vec<(String, Run)> = args.runs.iter().map(read).collect::<Result<_, _>>()?;
     let compared = compare(&runs, &args.against)?;
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
         text += &format!("\npage: {}\n", write(folder, &name, "", &compared)?.display());
     }
     print(text.trim_end())?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 const PAGE: &str = "suite.html";

@@ -1,6 +1,6 @@
 //! Command `palpate completions`.
 
-use super::terminal::{Outcome, print};
+use super::terminal::{Completion, print};
 use clap_complete::{Shell, generate};
 
 #[derive(clap::Args)]
@@ -14,9 +14,9 @@ pub(super) struct Args {
     shell: Shell,
 }
 
-pub(super) fn run(args: &Args, mut command: clap::Command) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, mut command: clap::Command) -> anyhow::Result<Completion> {
     let mut script = Vec::new();
     generate(args.shell, &mut command, "palpate", &mut script);
     print(String::from_utf8_lossy(&script).trim_end())?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

@@ -3,7 +3,7 @@
 use super::doctor_arm;
 use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::host::Host;
-use super::terminal::{Line, Outcome, State, print};
+use super::terminal::{Completion, Line, State, print};
 use crate::experiment::Experiment;
 use palpate_ros::network::{discovery_note, network};
 use palpate_ros::settings::RosSettings;
@@ -34,7 +34,7 @@ pub(super) struct Args {
     set: Vec<String>,
 }
 
-pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Completion> {
     let lines = match &args.arm {
         None => parts(host),
         Some(path) => {
@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
     };
     print(lines.iter().map(line).collect::<String>().trim_end())?;
     let is_wrong = lines.iter().any(|(_, state, _)| *state == State::Wrong);
-    Ok(if is_wrong { Outcome::Failed } else { Outcome::Done })
+    Ok(if is_wrong { Completion::Failed } else { Completion::Done })
 }
 
 /// Returns the lines about this machine.

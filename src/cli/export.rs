@@ -5,7 +5,7 @@ use super::output::Overwrite;
 use super::prepare::check_applicable;
 use super::scan::{Grid, ScanArgs, grid, scan};
 use super::slow_steps::report_slow_steps;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::experiment::trial::row::planner_rows;
@@ -86,7 +86,7 @@ impl Args {
 }
 
 /// Exports a run's belief as a mesh, or the contacts of a grid of touches on a scene.
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let is_run = args.path.is_dir();
     ensure!(
         !is_mesh_file(&args.path),
@@ -131,7 +131,7 @@ fn format(out: &Path) -> anyhow::Result<Format> {
 
 const ENDINGS: &str = ".ply or .obj (mesh), .gif or .mp4 (film)";
 
-fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let out = args.out.as_ref();
     let out = out.with_context(|| format!("--out FILE: allowed is a file ending in {ENDINGS}"))?;
     let format = format(out)?;
@@ -162,7 +162,7 @@ fn film_file(
     format: &Format,
     out: &Path,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     ensure!(args.grid.is_none(), "--grid applies only to a mesh (.ply, .obj)");
     let planner = args.planner();
     let row = replay::row(run, planner).context("the trial is missing")?;
@@ -188,7 +188,7 @@ fn film_file(
         counts.len(),
         film::rank_words(run, planner, row.trial),
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Writes the belief after some touches as a mesh, with a picture.
@@ -198,7 +198,7 @@ fn mesh_file(
     touches: u32,
     write: fn(&PointCloud) -> String,
     out: &Path,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     let is_around = run.experiment.scene.whole_object.is_some();
     ensure!(
         !run.experiment.scene.is_curve(),
@@ -226,7 +226,7 @@ fn mesh_file(
         film::rank_words(&run, args.planner(), run.experiment.report.trial),
         out.with_extension("png").display()
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Closed mean surface of an object, and its error.

@@ -3,7 +3,7 @@
 use super::find::{SCENES, find, find_input, is_experiment};
 use super::prepare::{prepare_arm, prepare_simulation};
 use super::progress::stop_on_interrupt;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::recognition::{NONE, RecognitionMetrics};
 use crate::experiment::trial::TrialEvent;
@@ -59,7 +59,7 @@ fn probability(text: &str) -> Result<f64, String> {
     value.ok_or("allowed is 0.5 to below 1".into())
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let experiment = experiment(args)?;
     let trial = args.trial;
     let mut simulation = prepare_simulation(experiment, talk)?;
@@ -88,7 +88,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     };
     let row = recorded_trial::run(&simulation, trial, planner, None, None, &[], &mut observer);
     if stop.load(Ordering::Relaxed) {
-        return Ok(Outcome::Interrupted);
+        return Ok(Completion::Interrupted);
     }
     let Some((count, found)) = last else {
         bail!("{}", row.failure.unwrap_or_else(|| "no touch was made".into()))
@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         bail!("{reason}");
     }
     print(&conclusion(count, &found, is_sure))?;
-    Ok(if is_sure { Outcome::Done } else { Outcome::Undecided })
+    Ok(if is_sure { Completion::Done } else { Completion::Undecided })
 }
 
 /// Returns the experiment of one trial.

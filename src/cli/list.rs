@@ -1,7 +1,7 @@
 //! Command `palpate list`.
 
 use super::find::{EXPERIMENTS, SCENES, file_stems, find};
-use super::terminal::{Outcome, print};
+use super::terminal::{Completion, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::MEASURES;
 use crate::experiment::trial::planner_names;
@@ -45,12 +45,12 @@ const KINDS: &[(Kind, &str, Lister)] = &[
     (Kind::Effects, "effects ([effects.NAME])", effects),
 ];
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
     let wanted = KINDS.iter().filter(|(kind, ..)| args.kind.is_none_or(|wanted| wanted == *kind));
     let sections: Vec<String> =
         wanted.map(|(_, title, lines)| format!("{title}\n{}", two_columns(&lines()))).collect();
     print(sections.join("\n").trim_end())?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 fn experiments() -> Vec<[String; 2]> {

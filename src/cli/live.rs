@@ -6,7 +6,7 @@ use super::new::{self, Written};
 use super::prepare::{connect_arm, load_experiment, planners_setting, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::run::with_planners;
-use super::terminal::{Outcome, Verbosity, command_line, error, print};
+use super::terminal::{Completion, Verbosity, command_line, error, print};
 use crate::experiment::Experiment;
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{RESOLVED, Run, RunFolder};
@@ -107,7 +107,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 /// Wait for a start on the page.
 const LOOK: Duration = Duration::from_millis(200);
 
-pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Result<Completion> {
     let interrupt = stop_on_interrupt("touches")?;
     let (wishes, starts) = channel();
     let page = Page { folder: Path::new("runs").join("live"), brought: Mutex::new(None), wishes };
@@ -119,7 +119,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Re
     print(&format!("live page: {}", server.url()))?;
     let _entry = if args.no_browser { None } else { open_browser(&server.url()) };
     let live = Live { args, talk, program, server, interrupt };
-    let mut outcome = work.map_or(Ok(Outcome::Done), |work| live.show(work))?;
+    let mut outcome = work.map_or(Ok(Completion::Done), |work| live.show(work))?;
     while let Some(experiment) = live.next(&starts) {
         // A mistake on the page leaves the page open.
         let path = new_folder(&experiment.name);
@@ -210,14 +210,14 @@ impl Live<'_> {
         None
     }
 
-    fn show(&self, work: Work) -> anyhow::Result<Outcome> {
+    fn show(&self, work: Work) -> anyhow::Result<Completion> {
         match work {
             Work::Run(path) => {
                 let run = Run::read(&path)?;
                 let simulation = prepare_simulation(run.experiment.clone(), self.talk)?;
                 let desk = replay(&run, simulation.task().clone());
                 self.server.show(desk, run.truth, &path);
-                Ok(Outcome::Done)
+                Ok(Completion::Done)
             }
             Work::Experiment(experiment) => {
                 let name = &experiment.name;
@@ -229,7 +229,7 @@ impl Live<'_> {
     }
 
     /// Runs an experiment's trials that the folder lacks.
-    fn explore(&self, experiment: Experiment, path: PathBuf) -> anyhow::Result<Outcome> {
+    fn explore(&self, experiment: Experiment, path: PathBuf) -> anyhow::Result<Completion> {
         let (own, lacking) = self.program.load_planners(&experiment.planners);
         if let Some(why) = lacking {
             return Err(why);
@@ -266,7 +266,7 @@ impl Live<'_> {
         }
         print(&line)?;
         desk.close(rows, &line);
-        Ok(if is_whole { Outcome::Done } else { Outcome::Interrupted })
+        Ok(if is_whole { Completion::Done } else { Completion::Interrupted })
     }
 }
 

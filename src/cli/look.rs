@@ -2,7 +2,7 @@
 
 use super::output::Overwrite;
 use super::serve::kind;
-use super::terminal::{Outcome, print};
+use super::terminal::{Completion, print};
 use crate::experiment::store::write_whole;
 use crate::report::points::binary_ply;
 use anyhow::ensure;
@@ -47,7 +47,7 @@ pub(super) struct Args {
     force: Overwrite,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
     let is_ply = args.out.extension().is_some_and(|extension| extension == "ply");
     ensure!(is_ply, "--out {}: allowed is a file ending in .ply", args.out.display());
     args.force.check_file(&args.out)?;
@@ -70,5 +70,5 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
         args.out.display(),
         cloud.frame
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

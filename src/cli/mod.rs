@@ -50,7 +50,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use setting_tip::with_setting_tip;
 use std::ffi::OsString;
 use std::process::ExitCode;
-use terminal::{Outcome, Verbosity, print};
+use terminal::{Completion, Verbosity, print};
 
 /// A testbed for active touch: a robot finger explores an object without vision.
 #[derive(Parser)]
@@ -185,10 +185,10 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
         },
     );
     match outcome {
-        Ok(Outcome::Done) => 0,
-        Ok(Outcome::Failed) => 1,
-        Ok(Outcome::Undecided) => 3,
-        Ok(Outcome::Interrupted) => 130,
+        Ok(Completion::Done) => 0,
+        Ok(Completion::Failed) => 1,
+        Ok(Completion::Undecided) => 3,
+        Ok(Completion::Interrupted) => 130,
         Err(error) => {
             terminal::error(format!("{error:#}"));
             2
@@ -196,7 +196,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
     }
 }
 
-fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcome> {
+fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Completion> {
     match command {
         Command::New(args) => new::run(&args, talk),
         Command::Run(args) => run::run(&args, talk, host),
@@ -219,7 +219,7 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Outcom
         Command::List(args) => list::run(&args),
         Command::Doctor(args) => doctor::run(&args, host),
         Command::Completions(args) => completions::run(&args, Cli::command()),
-        Command::Reference(_) => print(reference().trim_end()).map(|()| Outcome::Done),
+        Command::Reference(_) => print(reference().trim_end()).map(|()| Completion::Done),
     }
 }
 

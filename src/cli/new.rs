@@ -5,7 +5,7 @@ use super::find::{find_input, is_experiment};
 use super::output::{Overwrite, make_folder, sealed};
 use super::picture::picture;
 use super::prepare::prepare_environment;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::experiment::is_name_character;
 use crate::experiment::store::write_whole;
 use crate::report::files::png;
@@ -200,7 +200,7 @@ pub(super) struct Written {
     takes: &'static str,
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let Written { words, files, experiment, picture, takes } = write(args, talk)?;
     print(&format!(
         "{words}\nwrote {}\n\nnext\n  look at {}: is the object upright, and has it the right size?\n  \
@@ -209,7 +209,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         picture.display(),
         experiment.display(),
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Writes experiment, scene and picture of a mesh.

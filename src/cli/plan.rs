@@ -3,7 +3,7 @@
 use super::columns::{aligned, duration};
 use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::runner::{self, Shard};
 use palpate_input::format::counted;
@@ -24,7 +24,7 @@ pub(super) fn plan(
     shards: u32,
     threads: u16,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     let begun = Instant::now();
     let simulation = prepare_simulation(experiment, talk)?;
     let set_up_s = begun.elapsed().as_secs_f64();
@@ -40,7 +40,7 @@ pub(super) fn plan(
     let begun = Instant::now();
     runner::run_in_memory(&simulation, jobs, threads, &stop, &|_| ())?;
     if stop.load(Ordering::Relaxed) {
-        return Ok(Outcome::Interrupted);
+        return Ok(Completion::Interrupted);
     }
     let each_s = begun.elapsed().as_secs_f64() / tried as f64;
     let memory = peak_bytes().map_or("–".into(), |bytes| format!("{:.0} MB", 1e-6 * bytes));
@@ -60,7 +60,7 @@ pub(super) fn plan(
         duration(each_s),
         duration(set_up_s)
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Peak memory of this process, if the system reports it.

@@ -6,13 +6,13 @@ use super::output::Overwrite;
 use super::prepare::{prepare_arm, prepare_simulator};
 use super::progress::{progress_bar, step};
 use super::register_cloud::{CloudArgs, register_cloud};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::backend_settings::BackendSettings;
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
 use anyhow::Context;
-use palpate_explore::evidence::Outcome as TouchOutcome;
+use palpate_explore::evidence::Outcome;
 use palpate_explore::registration::{RegistrationDesign, register};
 use palpate_gp::math::seed;
 use std::path::PathBuf;
@@ -60,7 +60,7 @@ pub(super) struct Args {
     force: Overwrite,
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let name = if args.cloud.cloud.is_some() { "align.toml" } else { "registration.toml" };
     let out = args.out.clone().unwrap_or_else(|| name.into());
     args.force.check_file(&out)?;
@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
     };
     let bar = progress_bar(talk, "register", "touches", of as u64, 0);
-    let made = &mut |_: &TouchOutcome| step(talk, &bar);
+    let made = &mut |_: &Outcome| step(talk, &bar);
     let found = register(&mut *probe, &robot, touch, &body, &design, made)?;
     bar.finish_and_clear();
     let before = scene.arm.as_ref().and_then(|arm| arm.correction());
@@ -115,5 +115,5 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     for remark in found.remarks(&robot) {
         talk.note(remark);
     }
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

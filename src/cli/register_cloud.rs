@@ -2,7 +2,7 @@
 
 use super::known_body::numbers;
 use super::slow_steps::report_slow_steps;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan_truth::read_cloud;
 use crate::sim::scene::Unit;
@@ -40,7 +40,7 @@ pub(super) fn register_cloud(
     args: &CloudArgs,
     out: &Path,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     let points = read_cloud(cloud)?;
     let mesh = report_slow_steps(talk, |tell| {
         tell(&format!("reading {}", mesh.display()));
@@ -55,5 +55,5 @@ pub(super) fn register_cloud(
     );
     write_whole(out, &text)?;
     print(&format!("{text}\nfile: {}", out.display()))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

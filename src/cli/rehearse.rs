@@ -2,7 +2,7 @@
 
 use super::prepare::{prepare_arm, prepare_simulation};
 use super::progress::stop_on_interrupt;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::backend_settings::arm_tables;
 use anyhow::{Context, bail};
@@ -22,7 +22,7 @@ pub(super) fn run(
     mut experiment: Experiment,
     clears_fault: bool,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     experiment.backend.dry = true;
     let mut simulation = prepare_simulation(experiment, talk)?;
     if !simulation.is_real() {
@@ -60,5 +60,5 @@ pub(super) fn run(
         counted(followed, "approach"),
         pace::now_s() - begun_s
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

@@ -1,7 +1,7 @@
 //! Command `palpate replay`.
 
 use super::prepare::prepare_simulation;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::trial::recorded_trial::parts;
 use crate::experiment::trial::replay::{self, Difference, ReplayResult};
 use anyhow::Context;
@@ -32,7 +32,7 @@ pub(super) struct Args {
     json: bool,
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let parts = parts(&args.file).into_iter().map(|file| ReplayedPart::of(file, args, talk));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
     match args.json {
@@ -48,7 +48,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         false => print(&parts.iter().map(ReplayedPart::text).collect::<Vec<_>>().join("\n"))?,
     }
     let is_same = parts.iter().all(|part| part.replay.difference.is_none());
-    Ok(if is_same { Outcome::Done } else { Outcome::Failed })
+    Ok(if is_same { Completion::Done } else { Completion::Failed })
 }
 
 /// Recording file of a trial and its replay.

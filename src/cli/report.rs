@@ -1,7 +1,7 @@
 //! Command `palpate report`.
 
 use super::host::Host;
-use super::terminal::{Outcome, print, print_fitted};
+use super::terminal::{Completion, print, print_fitted};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;
@@ -32,7 +32,7 @@ pub(super) struct Args {
     wide: bool,
 }
 
-pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Completion> {
     if !args.merge.is_empty() {
         let count = store::merge(&args.folder, &args.merge, host.commit)?;
         print(&format!("{} in {}", counted(count, "trial"), args.folder.display()))?;
@@ -49,5 +49,5 @@ pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Outcome> {
         report::tables::summary::text(&run, args.wide),
         args.folder.join("report.html").display()
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }

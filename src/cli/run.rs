@@ -8,7 +8,7 @@ use super::prepare::{connect_arm, planners_setting, prepare_simulation, set_thre
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::rehearse;
 use super::step::{Stepper, is_unregistered};
-use super::terminal::{Outcome, Verbosity, command_line, error, print, print_fitted};
+use super::terminal::{Completion, Verbosity, command_line, error, print, print_fitted};
 use crate::experiment::Simulation;
 use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::experiment::Experiment;
@@ -172,7 +172,7 @@ impl Args {
     }
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cases = sweep_cases(&path)?;
     set_thread_count(args.threads)?;
@@ -205,14 +205,14 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<O
         let part = if args.out.is_none() { args.suffix() } else { String::new() };
         paths.push(folder.join(format!("{}{part}", experiment.name)));
         match run_one(args, experiment, paths.last().cloned(), &mut stop, talk, host)? {
-            Outcome::Done => (),
+            Completion::Done => (),
             other => return Ok(other),
         }
     }
     if args.shard.is_none() {
         compare_cells(args, &first, name, &folder, paths)?;
     }
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Preferred reference planner of a sweep's comparison.
@@ -286,7 +286,7 @@ impl RunResult {
     }
 
     /// Returns the outcome; prints to stderr the number of failed trials and the first failure.
-    pub(super) fn outcome(&self, talk: Verbosity) -> Outcome {
+    pub(super) fn outcome(&self, talk: Verbosity) -> Completion {
         let RowCounts { trials, failed } = &self.tally;
         let all_failed = *trials > 0 && failed.len() == *trials;
         if let Some((TrialId { trial, planner }, reason)) = failed.first() {
@@ -300,9 +300,9 @@ impl RunResult {
             }
         }
         match () {
-            () if !self.is_finished() => Outcome::Interrupted,
-            () if all_failed => Outcome::Failed,
-            () => Outcome::Done,
+            () if !self.is_finished() => Completion::Interrupted,
+            () if all_failed => Completion::Failed,
+            () => Completion::Done,
         }
     }
 }
@@ -395,7 +395,7 @@ fn run_one(
     stop: &mut Option<Arc<AtomicBool>>,
     talk: Verbosity,
     host: &Host,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     let made = run_missing(args, experiment, out, stop, talk, host)?;
     let RunResult { path, summary: words, total, halt, .. } = &made;
     // A shard is not summarised: its rows may not fit in memory.

@@ -3,7 +3,7 @@
 use super::output::{Overwrite, make_folder};
 use super::prepare::{needs_zone, prepare_environment, prepare_simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan;
 use crate::report::points::PointCloud;
@@ -11,7 +11,7 @@ use crate::report::{files, scan as drawing};
 use crate::sim::Scene;
 use anyhow::Context;
 use palpate_explore::backend::Fault;
-use palpate_explore::evidence;
+use palpate_explore::evidence::Outcome;
 use palpate_input::format::counted;
 use std::path::Path;
 
@@ -48,7 +48,7 @@ pub(super) fn scan(
     grid: Option<Grid>,
     force: Overwrite,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     let scene = Scene::load(path, &args.set)?;
     needs_zone(&scene, path)?;
     let environment = prepare_environment(scene, talk)?;
@@ -68,7 +68,7 @@ pub(super) fn scan(
     let threads = args.threads.into();
     let touches = scan::scan(&simulator, &targets, grid[0], threads, &stop, &|| step(talk, &bar))?;
     bar.finish_and_clear();
-    let Some(touches) = touches else { return Ok(Outcome::Interrupted) };
+    let Some(touches) = touches else { return Ok(Completion::Interrupted) };
 
     let contacts = touches.iter().filter_map(|touch| touch.as_ref().ok()?.contact());
     let points = contacts.map(|contact| (contact.p_wc, contact.normal_w));
@@ -99,11 +99,11 @@ pub(super) fn scan(
         counted(faults, "fault"),
         folder.display()
     ))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Returns a CSV line per target: its position, the outcome, the contact point and its normal.
-fn csv(targets: &[Vec<f64>], touches: &[Result<evidence::Outcome, Fault>]) -> String {
+fn csv(targets: &[Vec<f64>], touches: &[Result<Outcome, Fault>]) -> String {
     let mut text =
         String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");
     for (target, touch) in targets.iter().zip(touches) {

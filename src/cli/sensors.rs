@@ -3,7 +3,7 @@
 use super::find::{EXPERIMENTS, find};
 use super::output::{Overwrite, make_folder};
 use super::progress::{progress_bar, stop_on_interrupt};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::runner::Progress;
 use crate::experiment::store::write_whole;
 use crate::experiment::sweep::sweep_cases;
@@ -46,7 +46,7 @@ pub(super) struct Args {
 
 const PAGE: &str = "sensors.html";
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("runs/sensors"));
     args.force.check_file(&out.join(PAGE))?;
     let by_name = |name: &String| KITS.into_iter().find(|kit| kit.name == name);
@@ -97,5 +97,5 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         let count = counted(results.len(), "object");
         print(&format!("{count}: page, table and figure in {}", out.display()))?;
     }
-    Ok(if is_whole { Outcome::Done } else { Outcome::Interrupted })
+    Ok(if is_whole { Completion::Done } else { Completion::Interrupted })
 }

@@ -4,7 +4,7 @@ use super::find::{EXPERIMENTS, SCENES, find, is_experiment};
 use super::known_body::{KnownBodyArgs, array};
 use super::prepare::{prepare_environment, prepare_simulator};
 use super::progress::stop_on_interrupt;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use crate::sim::{Scene, known_body};
@@ -100,7 +100,7 @@ fn pose(text: &str) -> Result<Isometry3<f64>, String> {
     pose.ok_or("allowed are six numbers X,Y,Z,RX,RY,RZ, as in 0,0,0.12,0,0,0".into())
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let experiment = experiment(args)?;
     let settings = settings(args, &experiment)?;
     let mut scene = experiment.scene;
@@ -157,7 +157,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
     written?;
     let counts = json!({ "overruns": twin.overruns(), "refused": twin.refused() });
     print(&json!({ "ended": counts }).to_string())?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Touches of the experiment for a scene; the server makes no touches itself.

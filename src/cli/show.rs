@@ -6,7 +6,7 @@ use super::output::Overwrite;
 use super::picture::picture;
 use super::prepare::{check_applicable, prepare_environment, prepare_simulator};
 use super::slow_steps::report_slow_steps;
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use super::watch::{WatchArgs, watch};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
@@ -82,7 +82,7 @@ pub(super) struct Args {
     force: Overwrite,
 }
 
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
+pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let path = match args.path.exists() {
         true => args.path.clone(),
         false => find(&args.path, SCENES)?,
@@ -133,7 +133,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Outcome> {
         }
     };
     print(text.trim_end())?;
-    Ok(Outcome::Done)
+    Ok(Completion::Done)
 }
 
 /// Test points along each side of the zone, for the summary of a scene's heights.

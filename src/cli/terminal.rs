@@ -6,8 +6,8 @@ use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use terminal_size::{Width, terminal_size_of};
 
-/// Outcome of a command that did not fail with an error.
-pub(super) enum Outcome {
+/// Completion of a command that did not fail with an error.
+pub(super) enum Completion {
     /// The command completed.
     Done,
     /// A test failed.

@@ -1,14 +1,14 @@
 //! `palpate show --watch`: shows a running trial in a window.
 
 use super::prepare::{load_experiment, prepare_simulation};
-use super::terminal::{Outcome, Verbosity, print};
+use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::trial::row::TrialRow;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
-use palpate_explore::evidence::{self, End};
+use palpate_explore::evidence::{End, Outcome};
 use palpate_explore::planner;
 use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::Probe;
@@ -48,7 +48,7 @@ pub(super) fn watch(
     sets: &[String],
     args: &WatchArgs,
     talk: Verbosity,
-) -> anyhow::Result<Outcome> {
+) -> anyhow::Result<Completion> {
     let experiment = experiment(path, sets, args)?;
     let planner = planner(args, &experiment)?;
     let simulation = prepare_simulation(experiment, talk)?;
@@ -76,7 +76,7 @@ pub(super) fn watch(
     if worker.join().is_err() {
         bail!("the trial panicked");
     }
-    drawn.map(|()| Outcome::Done)
+    drawn.map(|()| Completion::Done)
 }
 
 fn experiment(path: &Path, sets: &[String], args: &WatchArgs) -> anyhow::Result<Experiment> {
@@ -108,7 +108,7 @@ struct ReportingProbe {
 }
 
 impl Probe for ReportingProbe {
-    fn execute(&mut self, action: &Action) -> Result<evidence::Outcome, Fault> {
+    fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
         let outcome = self.servo.execute(action)?;
         self.count += 1;
         let found = match (outcome.end, outcome.contact()) {

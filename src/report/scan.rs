@@ -34,7 +34,7 @@ const FLAT_M: f64 = 5e-4;
 pub type Heights<'a> = &'a dyn Fn(&[f64]) -> Option<f64>;
 
 /// Point of contact with its normal, in `W`.
-type Contact = (Point3<f64>, Vector3<f64>);
+type CloudPoint = (Point3<f64>, Vector3<f64>);
 
 /// Draws a mesh in `W` with the outline of the zone on it as SVG, coloured by its height above the
 /// datum; `None` without a second coordinate or a surface.
@@ -51,7 +51,7 @@ pub fn picture(
     zone: &Zone,
     mesh: &Mesh,
     height_m: Heights,
-    contacts: &[Contact],
+    contacts: &[CloudPoint],
 ) -> Option<String> {
     let heights_m = contacts.iter().map(|(p_w, _)| zone.height_m(p_w));
     draw(zone, mesh, height_m, &Axis::around(heights_m, 0.04, 5.0)?, Some(contacts))
@@ -63,7 +63,7 @@ fn draw(
     mesh: &Mesh,
     height_m: Heights,
     axis: &Axis,
-    contacts: Option<&[Contact]>,
+    contacts: Option<&[CloudPoint]>,
 ) -> Option<String> {
     let space = Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: axis.range().into() };
     let unit = Length::of(zone);
@@ -88,7 +88,7 @@ fn draw(
         let panel = ReliefPanel::new(unit, Area { left: width, ..first }, space);
         panel.frame(&mut canvas, &format!("{} of contact", counted(contacts.len(), "point")), "");
         let (camera, x_zw) = (&panel.camera, zone.x_wz().inverse());
-        let in_zone = |(p_w, normal_w): &Contact| {
+        let in_zone = |(p_w, normal_w): &CloudPoint| {
             let p_z = (x_zw * p_w).coords - zone.datum_y_m() * Vector3::y();
             (p_z, x_zw.rotation * normal_w)
         };

@@ -1,6 +1,6 @@
 //! Order of convergence of the force error with the resolution, all other settings fixed.
 
-use super::level::{FidelityLevel, SensorModel};
+use super::level::{FidelityLevel, FingerModel};
 use super::touches::{TargetTrials, noise_free};
 use crate::experiment::statistics::mean;
 use crate::sim::environment::ObjectShape;
@@ -95,7 +95,7 @@ pub fn in_time_step(
     ConvergenceOrder::new(["time step", "ticks per second"], &TICKS_PER_S, |ticks_per_s| {
         let level = FidelityLevel::new(
             SimulatorKind::Kinematic,
-            SensorModel::Dry,
+            FingerModel::Dry,
             STEPPED_SAMPLES,
             1.0 / ticks_per_s,
         );
@@ -115,7 +115,7 @@ pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<C
     ConvergenceOrder::new(["points of the skin"; 2], &SAMPLES, |samples| {
         let level = FidelityLevel::new(
             SimulatorKind::Kinematic,
-            SensorModel::Fluid,
+            FingerModel::Fluid,
             samples as usize,
             0.01,
         );
@@ -142,7 +142,7 @@ pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<C
 /// If the scene cannot be built or simulated.
 pub fn in_contact(scene: &Scene) -> anyhow::Result<Option<ConvergenceOrder>> {
     let level =
-        FidelityLevel::new(SimulatorKind::Dynamic, SensorModel::Dry, STEPPED_SAMPLES, PERIOD_S);
+        FidelityLevel::new(SimulatorKind::Dynamic, FingerModel::Dry, STEPPED_SAMPLES, PERIOD_S);
     if !level.is_built() {
         return Ok(None);
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Part of the finger that a level simulates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum SensorModel {
+pub enum FingerModel {
     /// Rigid hull.
     Rigid,
     /// Soft skin without fluid; the contact point is exact.
@@ -27,7 +27,7 @@ pub struct FidelityLevel {
     /// Simulator.
     pub body: SimulatorKind,
     /// Simulated part of the finger.
-    pub senses: SensorModel,
+    pub senses: FingerModel,
     /// Points of the skin's foundation; 0 for another skin model.
     pub samples: usize,
     /// Cells along and around a thin-shell skin.
@@ -46,46 +46,46 @@ pub struct FidelityLevel {
 /// if stopped at once (`docs/physics.md`).
 const RIGID_APPROACH_M_S: f64 = 0.005;
 
-const fn kinematic(senses: SensorModel, samples: usize, period_s: f64) -> FidelityLevel {
+const fn kinematic(senses: FingerModel, samples: usize, period_s: f64) -> FidelityLevel {
     FidelityLevel::new(SimulatorKind::Kinematic, senses, samples, period_s)
 }
 
 const fn dynamic(samples: usize, period_s: f64) -> FidelityLevel {
-    FidelityLevel::new(SimulatorKind::Dynamic, SensorModel::Full, samples, period_s)
+    FidelityLevel::new(SimulatorKind::Dynamic, FingerModel::Full, samples, period_s)
 }
 
 const fn rigid(collision: Collision) -> FidelityLevel {
-    let level = FidelityLevel::new(SimulatorKind::Dynamic, SensorModel::Rigid, 0, 0.002);
+    let level = FidelityLevel::new(SimulatorKind::Dynamic, FingerModel::Rigid, 0, 0.002);
     FidelityLevel { collision: Some(collision), ..level }
 }
 
 const fn shell(cells: [usize; 2], period_s: f64) -> FidelityLevel {
-    FidelityLevel { shell: Some(cells), ..kinematic(SensorModel::Full, 0, period_s) }
+    FidelityLevel { shell: Some(cells), ..kinematic(FingerModel::Full, 0, period_s) }
 }
 
 /// All levels. The last six approach the last, the reference, in points and time step together;
 /// their distances from it show whether they converge. They start with ticks shorter than a tactile
 /// frame, because longer ticks see every frame at the instant of sampling.
 pub const LEVELS: &[FidelityLevel] = &[
-    FidelityLevel::new(SimulatorKind::Swept, SensorModel::Rigid, 0, 0.01),
+    FidelityLevel::new(SimulatorKind::Swept, FingerModel::Rigid, 0, 0.01),
     rigid(Collision::Hull),
     rigid(Collision::HeightField),
     rigid(Collision::Sdf),
-    kinematic(SensorModel::Dry, 60, 0.01),
-    kinematic(SensorModel::Dry, 125, 0.01),
-    kinematic(SensorModel::Dry, 500, 0.01),
-    kinematic(SensorModel::Dry, 2000, 0.01),
-    kinematic(SensorModel::Fluid, 125, 0.01),
-    kinematic(SensorModel::Fluid, 500, 0.01),
-    kinematic(SensorModel::Fluid, 2000, 0.01),
-    kinematic(SensorModel::Full, 60, 0.01),
-    kinematic(SensorModel::Full, 125, 0.01),
-    kinematic(SensorModel::Full, 250, 0.01),
-    kinematic(SensorModel::Full, 500, 0.02),
-    kinematic(SensorModel::Full, 500, 0.01),
-    kinematic(SensorModel::Full, 500, 0.005),
-    kinematic(SensorModel::Full, 500, 0.002),
-    kinematic(SensorModel::Full, 500, 0.001),
+    kinematic(FingerModel::Dry, 60, 0.01),
+    kinematic(FingerModel::Dry, 125, 0.01),
+    kinematic(FingerModel::Dry, 500, 0.01),
+    kinematic(FingerModel::Dry, 2000, 0.01),
+    kinematic(FingerModel::Fluid, 125, 0.01),
+    kinematic(FingerModel::Fluid, 500, 0.01),
+    kinematic(FingerModel::Fluid, 2000, 0.01),
+    kinematic(FingerModel::Full, 60, 0.01),
+    kinematic(FingerModel::Full, 125, 0.01),
+    kinematic(FingerModel::Full, 250, 0.01),
+    kinematic(FingerModel::Full, 500, 0.02),
+    kinematic(FingerModel::Full, 500, 0.01),
+    kinematic(FingerModel::Full, 500, 0.005),
+    kinematic(FingerModel::Full, 500, 0.002),
+    kinematic(FingerModel::Full, 500, 0.001),
     dynamic(500, 0.002),
     FidelityLevel { on_pa10: true, ..dynamic(500, 0.002) },
     dynamic(500, 0.001),
@@ -97,12 +97,12 @@ pub const LEVELS: &[FidelityLevel] = &[
     shell([24, 16], 0.01),
     shell([24, 16], 0.002),
     shell([36, 24], 0.002),
-    kinematic(SensorModel::Full, 1000, 0.005),
-    kinematic(SensorModel::Full, 2000, 0.002),
-    kinematic(SensorModel::Full, 4000, 0.001),
-    kinematic(SensorModel::Full, 8000, 0.0005),
-    kinematic(SensorModel::Full, 16000, 0.00025),
-    kinematic(SensorModel::Full, 32000, 0.00025),
+    kinematic(FingerModel::Full, 1000, 0.005),
+    kinematic(FingerModel::Full, 2000, 0.002),
+    kinematic(FingerModel::Full, 4000, 0.001),
+    kinematic(FingerModel::Full, 8000, 0.0005),
+    kinematic(FingerModel::Full, 16000, 0.00025),
+    kinematic(FingerModel::Full, 32000, 0.00025),
 ];
 
 /// Levels that converge to the reference.
@@ -114,7 +114,7 @@ impl FidelityLevel {
     /// Creates a level with the settings that every simulator has.
     pub const fn new(
         body: SimulatorKind,
-        senses: SensorModel,
+        senses: FingerModel,
         samples: usize,
         period_s: f64,
     ) -> Self {
@@ -154,9 +154,9 @@ impl FidelityLevel {
             scene.touch.approach_m_s = RIGID_APPROACH_M_S;
         }
         let effects = &mut scene.effects;
-        set_effect(&mut effects.skin, self.senses != SensorModel::Rigid);
-        set_effect(&mut effects.fluid, self.senses >= SensorModel::Fluid);
-        set_effect(&mut effects.electrodes, self.senses == SensorModel::Full);
+        set_effect(&mut effects.skin, self.senses != FingerModel::Rigid);
+        set_effect(&mut effects.fluid, self.senses >= FingerModel::Fluid);
+        set_effect(&mut effects.electrodes, self.senses == FingerModel::Full);
         match (&mut effects.skin, self.shell) {
             (Some(skin), Some(cells)) => {
                 skin.model = SkinModel::Shell;
@@ -195,7 +195,7 @@ impl FidelityLevel {
     }
 }
 
-impl SensorModel {
+impl FingerModel {
     /// Name in tables and legends.
     pub fn name(self) -> &'static str {
         match self {
