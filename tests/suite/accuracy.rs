@@ -10,7 +10,7 @@ use palpate::sim::{Environment, Scene};
 use palpate::study::accuracy::comparison::{AccuracyComparison, MeasurementCounts};
 use palpate::study::accuracy::convergence;
 use palpate::study::accuracy::deviation::{ErrorStatistics, Quantity};
-use palpate::study::accuracy::level::{LEVELS, SensorModel, converging};
+use palpate::study::accuracy::level::{FingerModel, LEVELS, converging};
 use palpate::study::accuracy::tolerance::{Origin, Tolerance};
 use palpate::study::accuracy::touches::{
     ReferenceLoad, TargetTrials, TouchResults, noise_free, targets, touch_all,
@@ -33,7 +33,7 @@ fn every_level_is_a_scene_that_can_be_built_and_saved() {
         let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
         std::fs::write(file.path(), text).unwrap();
         assert_eq!(Scene::load(file.path(), &[]).unwrap(), changed, "{}", level.name());
-        assert_eq!(level.senses == SensorModel::Rigid, changed.effects == Effects::default());
+        assert_eq!(level.senses == FingerModel::Rigid, changed.effects == Effects::default());
     }
     let names: BTreeSet<String> = LEVELS.iter().map(|level| level.name()).collect();
     assert_eq!(names.len(), LEVELS.len());
