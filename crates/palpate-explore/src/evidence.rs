@@ -27,7 +27,7 @@ pub struct Outcome {
     /// Reason why a contact is less certain than usual, or was not located.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<Doubt>,
-    /// Further quantities that a custom action has measured, by name.
+    /// Quantities that a custom action has measured.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub measured: BTreeMap<String, f64>,
     /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the contact, and what
@@ -195,7 +195,7 @@ impl From<Vec<Contact>> for SurfacePoints {
 /// A measured point of the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Contact {
-    /// The point in `W`, m; its place may differ from the target.
+    /// The point in `W`, m.
     #[schemars(with = "[f64; 3]")]
     pub p_wc: Point3<f64>,
     /// Unit normal in `W`, from the surface towards the finger.
@@ -258,7 +258,7 @@ pub struct FreeVolume {
     pub ahead_w: UnitVector3<f64>,
     /// Length of the motion in the region, m.
     pub way_m: f64,
-    /// Length of the whole approach through the region, m.
+    /// Length of the approach through the region, m.
     pub approach_m: f64,
     /// End of the touch.
     pub end: End,
