@@ -75,13 +75,13 @@ impl ParallelExplorations {
     #[getter]
     fn sizes(&self) -> (usize, usize, usize) {
         let world = &self.worlds[0];
-        (world.action(), world.row(), world.axes())
+        (world.action(), world.space().row_size(), world.axes())
     }
 
     /// Names of the measures.
     #[getter]
     fn measures(&self) -> Vec<&'static str> {
-        self.worlds[0].measured().to_vec()
+        self.worlds[0].space().measures().to_vec()
     }
 
     /// Belief of an exploration.
@@ -148,7 +148,7 @@ impl ParallelExplorations {
         let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
         let count = each.len();
         let step = PyDict::new(py);
-        let width = self.worlds[0].row();
+        let width = self.worlds[0].space().row_size();
         let touches: Vec<f32> =
             each.iter().flat_map(|env| env.observations.iter().copied()).collect();
         let touches = touches.into_pyarray(py).reshape([count, self.how.touches, width])?;
@@ -163,7 +163,7 @@ impl ParallelExplorations {
         }
         step.set_item("reward", column(|env| env.reward))?;
         step.set_item("over", PyArray1::from_iter(py, each.iter().map(|env| env.is_over)))?;
-        for (i, name) in self.worlds[0].measured().iter().enumerate() {
+        for (i, name) in self.worlds[0].space().measures().iter().enumerate() {
             step.set_item(*name, PyArray1::from_iter(py, each.iter().map(|env| env.measures[i])))?;
         }
         let failures: Vec<Option<&str>> = each.iter().map(|env| env.failure.as_deref()).collect();

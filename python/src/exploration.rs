@@ -1,9 +1,9 @@
 //! One exploration: an episode of touches with observations and rewards.
 
+use crate::action_space::{self, ActionSpace};
 use crate::errors;
 use crate::fork;
-use crate::known::{self, AIM, BeliefErrors, GroundTruth};
-use nalgebra::{Point3, Vector3};
+use crate::known::{self, BeliefErrors, GroundTruth};
 use palpate::backend::Fault;
 use palpate::experiment::trial;
 use palpate::explore::belief::Belief;
@@ -14,7 +14,7 @@ use palpate::explore::recognition::Library;
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::task::{Aim, Ball, Region, Target, Task, Zone};
+use palpate::task::{Target, Task};
 use pyo3::prelude::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -37,6 +37,7 @@ const CELLS: u32 = 32;
 pub(crate) struct ExplorationScene {
     simulator: Simulator,
     truth: GroundTruth,
+    space: Box<dyn ActionSpace>,
     /// Points on which the belief is observed.
     grid: Vec<Vec<f64>>,
     /// Objects of the hypotheses.
@@ -58,21 +59,19 @@ impl ExplorationScene {
         fork::detach(py, || {
             let environment = Arc::new(Environment::build(scene).map_err(errors::scene)?);
             let truth = GroundTruth::of(&environment, TRUTH_PER_SIDE);
-            let grid = match (grid, environment.task().region()) {
-                (0, _) => Vec::new(),
-                (grid, Region::Zone(zone)) => zone.grid(grid),
-                (grid, Region::Ball(ball)) => cube(ball, grid),
-            };
+            let space = action_space::of(environment.task().region());
+            let grid = if grid == 0 { Vec::new() } else { space.grid(grid) };
             let simulator = Simulator::new(environment).map_err(errors::scene)?;
             simulator.check_reach().map_err(errors::scene)?;
-            Ok(Arc::new(Self { simulator, truth, grid, library: None }))
+            Ok(Arc::new(Self { simulator, truth, space, grid, library: None }))
         })?
     }
 
     /// Creates the scene of an episode of recognition, without a ground truth of the surface.
     pub(crate) fn of_library(simulator: Simulator, library: Arc<Library>) -> Arc<Self> {
+        let space = action_space::of(simulator.environment().task().region());
         let (truth, grid) = (GroundTruth::Around(None), Vec::new());
-        Arc::new(Self { simulator, truth, grid, library: Some(library) })
+        Arc::new(Self { simulator, truth, space, grid, library: Some(library) })
     }
 
     /// Returns a belief without touches.
@@ -100,84 +99,23 @@ impl ExplorationScene {
         self.task().region().tap_dimension()
     }
 
-    /// Number of values of a touch's row.
-    pub(crate) fn row(&self) -> usize {
-        self.task().zone().map_or(AIM + 7, |zone| 2 * zone.dimension() + 2)
+    /// Actions and observations of the region.
+    pub(crate) fn space(&self) -> &dyn ActionSpace {
+        &*self.space
     }
 
-    /// Names of the measures.
-    pub(crate) fn measured(&self) -> [&'static str; 3] {
-        if self.task().ball().is_some() { AROUND } else { OVER_ZONE }
-    }
-
-    /// Unit of lengths in observations.
-    fn unit_m(&self) -> f64 {
-        match self.task().region() {
-            Region::Zone(zone) => 0.5 * zone.widest_m(),
-            Region::Ball(ball) => ball.radius_m,
-        }
-    }
-
-    /// Converts an action to a target: a place of the zone; around an object the side from which
-    /// the finger approaches, and the aimed point as an offset from the centre, clipped to the
-    /// ball.
+    /// Converts an action to a target.
     fn target(&self, action: &[f32]) -> Target {
-        let clamped = action.iter().map(|at| f64::from(at.clamp(-1.0, 1.0)));
-        match self.task().region() {
-            Region::Zone(zone) => {
-                let fractions: Vec<f64> = clamped.map(|at| 0.5 * (at + 1.0)).collect();
-                zone.at(&fractions).into()
-            }
-            Region::Ball(ball) => {
-                let six: Vec<f64> = clamped.collect();
-                let offset = Vector3::from_column_slice(&six[3..]).cap_magnitude(1.0);
-                let p_w = ball.centre_w + offset * ball.radius_m;
-                Aim::against(p_w, &Vector3::from_column_slice(&six[..3])).into()
-            }
-        }
+        let clamped: Vec<f64> = action.iter().map(|at| f64::from(at.clamp(-1.0, 1.0))).collect();
+        self.space.target(&clamped)
     }
 
     /// Row of a touch: its target, contact and 1, or zeros without contact.
-    fn touch_row(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
-        let mut row = match (self.task().region(), target.place(), target.aim()) {
-            (Region::Zone(zone), Some(place), _) => self.zone_row(zone, place, met),
-            (Region::Ball(ball), _, Some(aim)) => {
-                let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
-                let mut row: Vec<f64> = aim.direction_w.iter().map(|ahead| -ahead).collect();
-                row.extend(within(aim.p_w).iter());
-                if let Some(contact) = met {
-                    row.extend(within(contact.p_wc).iter().chain(contact.normal_w.iter()));
-                    row.push(1.0);
-                }
-                row
-            }
-            _ => Vec::new(),
-        };
-        row.resize(self.row(), 0.0);
+    fn touch_row(&self, target: &Target, contact: Option<&Contact>) -> Vec<f64> {
+        let mut row = self.space.row(target, contact);
+        row.resize(self.space.row_size(), 0.0);
         row
     }
-
-    fn zone_row(&self, zone: &Zone, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
-        let fraction = |(at, [low, high]): (&f64, [f64; 2])| 2.0 * (at - low) / (high - low) - 1.0;
-        let mut row: Vec<f64> = target.iter().zip(zone.sides()).map(fraction).collect();
-        if let Some(contact) = met {
-            row.extend(zone.place(&contact.p_wc).iter().zip(zone.sides()).map(fraction));
-            row.extend([zone.height_m(&contact.p_wc) / self.unit_m(), 1.0]);
-        }
-        row
-    }
-}
-
-/// Points on an even grid over the cube around a ball, x fastest, then y, then z.
-fn cube(ball: &Ball, per_side: usize) -> Vec<Vec<f64>> {
-    let step = 2.0 / (per_side.max(2) - 1) as f64;
-    let at = |i: usize| if per_side > 1 { step * i as f64 - 1.0 } else { 0.0 };
-    let all = (0..per_side.pow(3)).map(|i| [i, i / per_side, i / per_side.pow(2)]);
-    all.map(|each| {
-        let offset = Vector3::from(each.map(|i| at(i % per_side)));
-        (ball.centre_w + offset * ball.radius_m).coords.as_slice().to_vec()
-    })
-    .collect()
 }
 
 /// Settings of an episode.
@@ -271,7 +209,7 @@ impl ExplorationEnv {
         let probe = world.simulator.probe(self.random.random());
         self.world = Arc::clone(world);
         let belief = world.empty_belief(&mut self.random);
-        self.observations = vec![0.0; self.how.touches * world.row()];
+        self.observations = vec![0.0; self.how.touches * world.space().row_size()];
         self.believed = vec![0.0; 2 * world.grid.len()];
         (self.count, self.is_over, self.failure) = (0, false, None);
         let made = probe.and_then(|probe| {
@@ -330,7 +268,7 @@ impl ExplorationEnv {
         }
         self.episode.fit().map_err(|error| error.to_string())?;
         let (world, known) = (&self.world, self.episode.belief());
-        let unit_m = world.unit_m();
+        let unit_m = world.space().unit_m();
         match world.truth.measure(known, CELLS) {
             Some(BeliefErrors::Zone(metrics)) => {
                 self.measures = [metrics.rmse_m, metrics.centred_r, metrics.max_error_m];

@@ -3,6 +3,7 @@
 //! It returns arrays and plain values. Data frames, progress, and the conventions of scikit-learn
 //! and Gymnasium are in the package's Python files.
 
+mod action_space;
 mod ball;
 mod belief;
 mod columns;

@@ -75,7 +75,7 @@ impl RecognitionEpisode {
     #[getter]
     fn sizes(&self) -> (usize, usize) {
         let state = self.lock();
-        (state.episode.world().action(), state.episode.world().row())
+        (state.episode.world().action(), state.episode.world().space().row_size())
     }
 
     /// Draws an object and a pose.

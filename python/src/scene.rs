@@ -126,11 +126,8 @@ impl Scene {
         let found = target.in_region(task.region()).map_err(PyValueError::new_err)?;
         let approach = task.approach(&found).filter(|_| task.contains(&found));
         let approach = approach.ok_or_else(|| {
-            let words = match task.ball() {
-                None => "is outside the zone",
-                Some(_) => "is not a reachable aim into the ball",
-            };
-            PyValueError::new_err(format!("{:?} {words}", found.numbers()))
+            let beyond = task.region().outside();
+            PyValueError::new_err(format!("{:?} is {beyond}", found.numbers()))
         })?;
         Ok((found, approach))
     }

@@ -458,13 +458,8 @@ impl Desk {
             let is_inside = self.task.region().contains(target);
             is_inside && self.task.approach(target).is_some()
         });
-        let whole = self.task.ball().is_some();
         target.ok_or_else(|| {
-            let form = if whole {
-                "x, y, z and a direction inside the ball"
-            } else {
-                "x and z inside the zone"
-            };
+            let form = self.task.region().tap_form();
             OrderError(format!(
                 "target {numbers:?}: allowed are {form}, in metres, within the finger's reach"
             ))

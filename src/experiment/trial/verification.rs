@@ -8,7 +8,7 @@ use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
 use palpate_explore::episode::Episode;
 use palpate_explore::evidence::End;
 use palpate_explore::planner::sample::target_from_fractions;
-use palpate_explore::task::{Target, Zone};
+use palpate_explore::task::Target;
 use palpate_gp::math::seed;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -70,11 +70,10 @@ fn band_m(field: &HeightField, p_w: &Point3<f64>) -> Option<[f64; 2]> {
 /// Returns `count` targets of a Halton sequence over the unit square, shifted by `random` (Cranley
 /// and Patterson 1976).
 fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Target> {
-    let dimension = belief.region().zone().map_or(2, Zone::dimension);
-    let shifts: Vec<f64> = (0..dimension).map(|_| random.random()).collect();
-    let mut i = 0;
-    let mut next = |_| {
+    let (mut i, mut shifts) = (0, Vec::new());
+    let mut next = |dimension: usize| {
         i += 1;
+        shifts.resize_with(dimension, || random.random::<f64>());
         let axes = [2, 3].into_iter().zip(&shifts);
         axes.map(|(base, shift)| (radical_inverse(i, base) + shift).fract()).collect()
     };

@@ -113,7 +113,7 @@ impl Raster {
 impl Planner for Raster {
     fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
         let region = belief.region();
-        let is_curve = region.zone().is_some_and(|zone| zone.dimension() == 1);
+        let is_curve = region.dimension() == 1;
         for _ in 0..TRIED {
             let length_m = self.length_m(&region);
             if is_curve || self.done_m >= length_m * (1.0 - ROUNDING) {

@@ -47,6 +47,14 @@ impl Region {
         self.zone().map_or(6, Zone::dimension)
     }
 
+    /// Describes the coordinates of a tap, in metres.
+    pub fn tap_form(&self) -> &'static str {
+        match self {
+            Self::Zone(_) => "x and z inside the zone",
+            Self::Ball(_) => "x, y, z and a direction inside the ball",
+        }
+    }
+
     /// Whether a point of `W` belongs to the region, or may do so if it is off by `margin_m`.
     pub fn is_near(&self, p_w: &Point3<f64>, margin_m: f64) -> bool {
         match self {
