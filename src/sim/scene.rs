@@ -429,12 +429,17 @@ impl Scene {
         rules.require(&key, "(given)", !is_blind, || allowed.into());
     }
 
-    /// Checks that contact is detected: above the noise, and before the skin is compressed.
+    /// Checks that contact is detected: above the noise, below the force that breaks a touch off,
+    /// and before the skin is compressed.
     fn check_detection(&self, rules: &mut Rules) {
-        if let (Some(wrench), false) = (&self.effects.wrench, self.detects_by_frames()) {
-            let least_n = CONTACT_SIGMAS * wrench.noise_max_n();
-            let values = self.touch.detection_n >= least_n;
-            rules.require("touch.detection_n", self.touch.detection_n, values, || {
+        let TouchSettings { detection_n, force_limit_n, .. } = self.touch;
+        if !self.detects_by_frames() {
+            rules.require("touch.detection_n", detection_n, detection_n < force_limit_n, || {
+                format!("less than touch.force_limit_n, {force_limit_n} N")
+            });
+            let least_n = CONTACT_SIGMAS
+                * self.effects.wrench.as_ref().map_or(0.0, |wrench| wrench.noise_max_n());
+            rules.require("touch.detection_n", detection_n, detection_n >= least_n, || {
                 format!(
                     "at least {least_n} N, {CONTACT_SIGMAS} standard deviations of effects.wrench, \
                      because contact is detected from the force alone"
@@ -529,10 +534,11 @@ impl Scene {
         Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
     }
 
-    /// Returns whether contact is detected from tactile frames instead of force.
+    /// Returns whether contact is detected from a BioTac's frames instead of force.
     fn detects_by_frames(&self) -> bool {
         let effects = self.effective_effects();
-        self.touch.detection.by.is_supported(effects.fluid.is_some(), effects.electrodes.is_some())
+        let (pressure, electrodes) = (effects.fluid.is_some(), effects.electrodes.is_some());
+        self.sensor.kind().is_none() && self.touch.detection.by.is_supported(pressure, electrodes)
     }
 
     /// Reads a scene file and applies `--set` assignments.

@@ -12,12 +12,14 @@ use palpate::robot::sensor::{
 };
 use palpate::sim::finger::effects::rigid_tip::RigidTipEffect;
 use palpate::sim::finger::effects::wrench::{WrenchEffect, WrenchSensor};
+use palpate::sim::scene::Scene;
 use palpate::sim::simulator::Simulator;
 use palpate_geometry::bvh::MeshBvh;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Readings per window, 0.01 s apart.
@@ -305,6 +307,24 @@ fn every_sensor_touches_the_container() {
 
 /// A ball on a force/torque sensor, carried by an arm with masses and servos, lands on the
 /// container within what its servos and its contact yield, and its force stays below the limit.
+#[test]
+fn a_contact_by_force_lies_between_the_noise_and_the_limit() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
+    let load = |detection_n: &str, sets: &[&str]| {
+        let detection = format!("touch.detection_n={detection_n}");
+        let sets = sets.iter().map(|set| set.to_string()).chain([detection]).collect::<Vec<_>>();
+        Scene::load(&path, &sets).map(|_| ()).map_err(|error| error.to_string())
+    };
+    let by_force = ["sensor.contact={}", "touch.force_limit_n=2"];
+    assert_eq!(load("1.99", &by_force), Ok(()));
+    let error = load("2", &by_force).unwrap_err();
+    assert!(error.contains("`touch.detection_n` = 2: allowed is less than"), "{error}");
+    let error = load("0.01", &["sensor.contact={}", "effects.wrench={}"]).unwrap_err();
+    assert!(error.contains("standard deviations of effects.wrench"), "{error}");
+    // A pressure that is detected from frames needs no force.
+    assert_eq!(load("2", &["touch.force_limit_n=2"]), Ok(()));
+}
+
 #[test]
 fn a_ball_tip_on_a_moving_arm_touches_the_container() {
     let sets = [

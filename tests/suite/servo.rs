@@ -87,7 +87,7 @@ fn past_the_object_is_a_miss_and_too_much_force_is_broken_off() {
     assert_eq!(end(&wide, &[0.19, 0.5]), Ok(End::Miss));
     let careful = environment("container_finger.toml", &["touch.pressure_limit_counts=5"]);
     assert_eq!(end(&careful, &[0.0, 0.5]), Ok(End::Overload));
-    let strong = ["touch.force_limit_n=0.02", "effects={skin={}}"];
+    let strong = ["touch.force_limit_n=0.02", "touch.detection_n=0.01", "effects={skin={}}"];
     let strong = environment("container_finger.toml", &strong);
     assert_eq!(end(&strong, &[0.0, 0.5]), Ok(End::Overload));
 }
