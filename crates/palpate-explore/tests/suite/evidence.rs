@@ -159,7 +159,7 @@ fn a_name_restricts_the_offer() {
     assert_eq!((tapping.name(), tapping.actions()), ("active(tap)", &[ActionKind::Tap][..]));
     let both = planner::restricted("sobol(tap, look)").unwrap();
     assert_eq!(both.actions(), [ActionKind::Tap, ActionKind::Look]);
-    for name in ["active", "active()", "active(taps)", "nobody(tap)", "active(tap"] {
+    for name in ["active", "active()", "active(taps)", "unknown(tap)", "active(tap"] {
         assert!(planner::restricted(name).is_none(), "{name}");
     }
 }
