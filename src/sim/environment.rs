@@ -6,6 +6,7 @@ use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::sim::finger::Fingertip;
+use crate::sim::finger::effects::registration::RegistrationEffect;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
@@ -591,6 +592,8 @@ fn whole_object_task(
 pub(super) fn robot(scene: &Scene, chain: Chain) -> Robot {
     let effects = &scene.effects;
     let wrench = effects.wrench.as_ref().map(WrenchEffect::accuracy);
-    let sensor = SensorModel { settings: scene.sensor.clone(), surface: effects.surface(), wrench };
+    let pose_sds = effects.registration.as_ref().map(RegistrationEffect::pose_sds);
+    let settings = scene.sensor.clone();
+    let sensor = SensorModel { settings, surface: effects.surface(), wrench, pose_sds };
     Robot { chain, finger: scene.finger.clone(), sensor }
 }

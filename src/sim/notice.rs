@@ -1,10 +1,13 @@
 //! Warnings about likely configuration mistakes in a scene that can be built; each says how to
 //! change it.
 
-use super::scene::Unit;
+use super::scene::{Scene, Unit};
 use clap::ValueEnum;
 use nalgebra::{Point3, UnitVector3, Vector2};
+use palpate_explore::robot::arm::Chain;
+use palpate_explore::robot::finger::frame::FRAME_S;
 use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
+use palpate_explore::robot::sensor::Signal;
 use palpate_explore::task::{DIRECTIONS, Task, Zone};
 use palpate_geometry::holes::{Hole, description};
 use palpate_geometry::low_discrepancy::directions;
@@ -45,6 +48,26 @@ pub(super) fn scaled_finger(radius_m: f64) -> String {
          0.007, 0.46 at 0.008 and 0.79 at 0.010, so gp.noise_sd_m of the shipped experiments may be too \
          small (docs/finger.md)"
     )
+}
+
+/// Returns a notice if contacts of `detection_n` are lost in the noise of the force/torque sensor
+/// that locates them on the finger at the end of `chain`.
+pub(super) fn vague_contacts(scene: &Scene, chain: &Chain) -> Option<String> {
+    let effect =
+        scene.effects.wrench.as_ref().filter(|_| scene.sensor.signal() == Some(Signal::Wrench))?;
+    let touch = &scene.touch;
+    let readings = touch.frames as f64 * FRAME_S / scene.period_s();
+    let lever_m = chain.tool.translation.vector.norm();
+    let least_n = effect.accuracy().least_located_n(&scene.finger, lever_m, readings);
+    let frames = (touch.frames as f64 * (least_n / touch.detection_n).powi(2)).ceil();
+    let or = if frames <= 100.0 { format!(" or touch.frames = {frames}") } else { String::new() };
+    (touch.detection_n < least_n).then(|| {
+        format!(
+            "touch.detection_n = {}: the force/torque sensor tells contact, but not its place on the tip, \
+             which takes {least_n:.1} N{or}",
+            touch.detection_n
+        )
+    })
 }
 
 /// Notice that a share of a region, 0 to 1, lies over holes of the mesh.

@@ -57,7 +57,10 @@ impl Simulator {
     /// the simulation.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = self.environment.notices().to_vec();
-        let foot_w = self.environment.chain().map(|chain| match self.environment.scene().arm {
+        let chain = self.environment.chain();
+        let scene = self.environment.scene();
+        notices.extend(chain.as_ref().and_then(|chain| notice::vague_contacts(scene, chain)));
+        let foot_w = chain.map(|chain| match scene.arm {
             Some(_) => chain.base.translation.vector.into(),
             None => chain.forward(&chain.home).translation.vector.into(),
         });

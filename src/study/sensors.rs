@@ -70,7 +70,7 @@ pub const KITS: [SensorKit; 8] = [
         ],
     },
     SensorKit {
-        name: "ball_ur5e",
+        name: "switch_ur5e",
         sets: &[
             "effects={sensor=\"ur5e\",rigid_tip={},wrench={}}",
             "sensor={force_torque_tip={}}",
@@ -80,7 +80,7 @@ pub const KITS: [SensorKit; 8] = [
         ],
     },
     SensorKit {
-        name: "ball_fr3",
+        name: "switch_fr3",
         sets: &[
             "effects={sensor=\"fr3\",rigid_tip={},wrench={}}",
             "sensor={force_torque_tip={}}",

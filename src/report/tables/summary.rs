@@ -234,7 +234,11 @@ fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
     let counts = [
         (events.failures, "failed trial", ""),
         (events.misses, "touch", " without contact"),
-        (events.overloads, "touch", " aborted: force limit, or no contact location"),
+        (
+            events.overloads,
+            "touch",
+            " aborted: limit of force, pressure or depth, or no contact location",
+        ),
         (
             events.no_variance,
             "random target",

@@ -61,6 +61,12 @@ impl Validate for RegistrationEffect {
 }
 
 impl RegistrationEffect {
+    /// Returns what an explorer may know: the standard deviations of the fingertip's position along
+    /// each axis, m, and of its attitude about each, rad.
+    pub fn pose_sds(&self) -> [f64; 2] {
+        [self.finger_position_sd_m, self.finger_attitude_sd_deg.to_radians()]
+    }
+
     /// Returns the true pose of the finger's `T` in the `T` of the kinematics, which the arm's
     /// settings move by `correction` from the end of the mount, before random errors.
     pub fn nominal_error(&self, correction: Option<Isometry3<f64>>) -> Option<Isometry3<f64>> {

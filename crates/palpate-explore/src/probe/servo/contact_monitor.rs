@@ -120,6 +120,13 @@ impl ContactMonitor {
         }
     }
 
+    /// Returns the mean force since [`clear_samples`](Self::clear_samples), relative to that at rest,
+    /// in `T`, N.
+    pub(super) fn mean_force_n(&self) -> Option<Vector3<f64>> {
+        let (sum_n, count) = self.forces;
+        self.force_at_rest_n.filter(|_| count > 0.0).map(|rest_n| sum_n / count - rest_n)
+    }
+
     /// Number of samples required by the next [`tare`](Self::tare).
     pub(super) fn samples_of_tare(&self) -> usize {
         let wanted = self.sensors.iter().map(|sensor| sensor.tare_sample_count());

@@ -1,9 +1,11 @@
 //! Servo: carries out a touch with a backend: travel, tare, approach, settle, read, retract.
 
+mod compliance;
 mod contact_monitor;
 mod home;
 mod reach;
 mod rehearsal;
+mod relief;
 mod slide;
 mod trajectory;
 mod zone_reach;
@@ -15,9 +17,10 @@ use crate::evidence::{End, Evidence, FreeVolume, Outcome, SurfacePoints};
 use crate::robot::Robot;
 use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
-use crate::robot::sensor::{Doubt, SensedContact, Sensor};
+use crate::robot::sensor::{Doubt, SensedContact, Sensor, TipRadius};
 use crate::task::touch::TouchSettings;
 use crate::task::{Action, Approach, Ball};
+use compliance::Compliance;
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use reach::PathSegment;
@@ -58,8 +61,11 @@ pub struct Servo {
     q: Vec<f64>,
     /// Reach of an arm, which checks each path around an object before moving.
     reach: Option<ArmReach>,
-    /// Force per depth by which the finger yields, N/m, if the scene allows strokes.
-    yields_n_m: Option<f64>,
+    /// Compliance of a rigid tip in the last touch that measured it.
+    compliance: Option<Compliance>,
+    tip_radius: TipRadius,
+    /// Mean place of a rigid tip in `W` during the last rest, m.
+    rested_w: Option<Vector3<f64>>,
 }
 
 impl Servo {
@@ -92,7 +98,9 @@ impl Servo {
             applied_ratio: 1.0,
             q,
             reach,
-            yields_n_m: None,
+            compliance: None,
+            tip_radius: TipRadius::default(),
+            rested_w: None,
         })
     }
 
@@ -325,15 +333,22 @@ impl Servo {
         self.monitor.clear_samples();
         let here = Goal::at_rest(x_wt);
         let until_s = self.time_s + count as f64 * FRAME_S;
+        let is_on_hull = self.monitor.locates_on_hull();
+        let (mut sum_w, mut ticks) = (Vector3::zeros(), 0.0);
         while self.monitor.collected() < count {
             if self.monitor.last_sample_s().is_none() && self.time_s >= until_s {
                 break;
             }
             self.tick(&here)?;
+            if is_on_hull {
+                sum_w += self.x_wt().translation.vector;
+                ticks += 1.0;
+            }
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
                 return Ok(Some(ApproachEnd::Overload));
             }
         }
+        self.rested_w = (ticks > 0.0).then(|| sum_w / ticks);
         Ok(None)
     }
 
@@ -387,7 +402,12 @@ impl Servo {
         }
         let x_wt = self.x_wt();
         let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
-        let located = self.monitor.contact(&self.robot.finger, moved_m);
+        let mut located = self.monitor.contact(&self.robot.finger, moved_m);
+        if let Ok(sensed) = &mut located {
+            self.relieve(sensed, moved_m)?;
+            self.robot.sensor.pose_sds.iter().for_each(|sds| sensed.misplace(*sds));
+            sensed.doubt = self.tip_radius.doubt(&self.robot.finger).or(sensed.doubt);
+        }
         let doubt = located.as_ref().map_or_else(|doubt| Some(*doubt), |sensed| sensed.doubt);
         Ok(Located { sensed: located.ok().map(|sensed| (x_wt, sensed)), doubt })
     }
@@ -434,7 +454,8 @@ fn applied_ratio(command: &Command, applied: &Command) -> f64 {
     if found >= wanted || applied.qdot.is_empty() { 1.0 } else { found / wanted }
 }
 
-/// Indentation of the skin during which the finger can still stop; a heuristic: the fluid's gap.
+/// Indentation of a skin during which the finger can still stop, and way into an object at an
+/// overload; a heuristic: the fluid's gap.
 const GIVES_WAY_M: f64 = 1.5e-3;
 
 /// Time without samples after which a sensor counts as lost; a heuristic: three batches of five
@@ -459,7 +480,7 @@ impl Probe for Servo {
         let below = turning_point(&self.robot, approach);
         let stop = self.move_straight("the object", below, approach_m_s, true)?;
         let ahead_w = approach.direction_w();
-        let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
+        let stopped_w = self.x_wt().translation.vector;
         let located = match stop {
             Some(ApproachEnd::Contact) => self.read(approach, &above)?,
             None | Some(ApproachEnd::Overload) => Located::default(),
@@ -485,6 +506,14 @@ impl Probe for Servo {
             (Some(_), None) => End::Overload,
         };
         let finger = self.robot.finger.with_attitude(&approach.r_at);
+        let gives_way_m = match (end, &self.compliance) {
+            (End::Miss, _) if !self.robot.yields() => 0.0,
+            (End::Contact, compliance) if !self.robot.yields() => {
+                compliance.map_or(0.0, |it| it.m_per_n * self.settings.detection_n)
+            }
+            _ => GIVES_WAY_M,
+        };
+        let reached_w = stopped_w - ahead_w.scale(gives_way_m);
         let free = FreeVolume::new(finger, approach, reached_w.into(), end);
         let evidence = points.map(Evidence::Points).into_iter().chain([Evidence::Free(free)]);
         let Located { sensed, doubt } = located;

@@ -74,11 +74,6 @@ struct Hold {
     per_m: f64,
 }
 
-/// Distance by which a finger yields under a load, m.
-fn yields_m(load: f64, per_m: f64) -> f64 {
-    (load / per_m).clamp(0.0, PRESSED_M)
-}
-
 /// Returns the twist of a fingertip that does not turn.
 fn twist(velocity_w: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(velocity_w.x, velocity_w.y, velocity_w.z, 0.0, 0.0, 0.0)
@@ -99,7 +94,6 @@ struct Slide {
     hold: Hold,
     /// Whether the sensor states a load; it may state none without contact.
     has_load: bool,
-    is_on_hull: bool,
     trail: Trail,
     /// Length at the last place of the trail, and at the last contact.
     left_m: f64,
@@ -181,8 +175,7 @@ impl Slide {
 impl Servo {
     /// Slides along the way of `approach`, if it has one, after contact at the first of `points`,
     /// and adds the contacts along the way, up to where the surface ended, was too steep or too
-    /// far, or the finger was stuck or overloaded. In a scene with strokes, the first point is
-    /// corrected by what the finger yields. Returns the path.
+    /// far, or the finger was stuck or overloaded. Returns the path.
     pub(super) fn slide(
         &mut self,
         approach: &Approach,
@@ -217,7 +210,7 @@ impl Servo {
                 continue;
             }
             if is_clear {
-                points.points.extend(self.slide_contact(&mut slide, here, tared, load));
+                points.points.extend(self.slide_contact(&mut slide, here, tared));
                 slide.sampled_m = done_m;
             }
             self.monitor.clear_samples();
@@ -226,8 +219,8 @@ impl Servo {
         Ok(Some(slide.trail))
     }
 
-    /// Presses the finger for the stroke of `approach` and corrects the first of `points` by what
-    /// the finger yields. Returns `None` without a stroke, or at overload.
+    /// Presses the finger for the stroke of `approach`. Returns `None` without a stroke, or at
+    /// overload.
     fn begin_slide(
         &mut self,
         approach: &Approach,
@@ -235,28 +228,16 @@ impl Servo {
     ) -> Result<Option<Slide>, Fault> {
         let Some(stroke) = self.settings.stroke.clone() else { return Ok(None) };
         points.source = approach.slide_w.map(|_| ErrorSource::Stroke);
-        let Some(first) = points.points.first_mut() else { return Ok(None) };
+        let Some(first) = points.points.first() else { return Ok(None) };
         let ahead_w = approach.direction_w();
         let way_w = approach.slide_w.unwrap_or_default();
         let across_w = UnitVector3::try_new(way_w - ahead_w.scale(way_w.dot(&ahead_w)), 1e-9);
         let normal_w = if first.has_normal { first.normal_w } else { -ahead_w.into_inner() };
-        let is_on_hull = self.monitor.locates_on_hull();
-        let load = self.monitor.load().unwrap_or(0.0);
-        if let (None, Some(per_m)) = (across_w, self.yields_n_m.filter(|_| is_on_hull)) {
-            first.p_wc += first.normal_w * yields_m(load, per_m);
-        }
-        if across_w.is_none() && (self.yields_n_m.is_some() || !is_on_hull) {
-            return Ok(None);
-        }
+        let Some(across_w) = across_w else { return Ok(None) };
         let facing = -normal_w.dot(&ahead_w);
         let Some(hold) = self.press_for_slide(&ahead_w, facing, stroke.force_n)? else {
             return Ok(None);
         };
-        if is_on_hull {
-            self.yields_n_m = Some(hold.per_m);
-            first.p_wc += first.normal_w * yields_m(load, hold.per_m);
-        }
-        let Some(across_w) = across_w else { return Ok(None) };
         let goal = self.x_wt();
         let start_w = goal.translation.vector;
         let load = self.monitor.load();
@@ -270,7 +251,6 @@ impl Servo {
             deepest_w: turning_point(&self.robot, approach).translation.vector,
             hold,
             has_load: load.is_some(),
-            is_on_hull,
             trail: Trail { places_w: vec![start_w], wall },
             left_m: 0.0,
             sampled_m: 0.0,
@@ -289,16 +269,16 @@ impl Servo {
         slide: &mut Slide,
         here: Isometry3<f64>,
         tared: &Isometry3<f64>,
-        load: Option<f64>,
     ) -> Option<Contact> {
         // The samples are of the way since the last ones, on average of its middle.
         let x_wt = Isometry3::from_parts((slide.sum_w / slide.count).into(), here.rotation);
         let moved_m = (x_wt.translation.vector - tared.translation.vector).norm();
-        let sensed = self.monitor.contact(&self.robot.finger, moved_m).ok()?;
-        let mut contact = Contact::sensed(&x_wt, &sensed);
-        if let Some(load) = load.filter(|_| slide.is_on_hull) {
-            contact.p_wc += contact.normal_w * yields_m(load, slide.hold.per_m);
+        let mut sensed = self.monitor.contact(&self.robot.finger, moved_m).ok()?;
+        if let Some(compliance) = &self.compliance {
+            compliance.correct(&mut sensed);
         }
+        self.robot.sensor.pose_sds.iter().for_each(|sds| sensed.misplace(*sds));
+        let contact = Contact::sensed(&x_wt, &sensed);
         if contact.has_normal {
             let turned_w = slide.normal_w.lerp(&contact.normal_w, NEW_NORMAL);
             slide.normal_w = turned_w.try_normalize(1e-6).unwrap_or(slide.normal_w);

@@ -51,6 +51,7 @@ pub(super) fn foremost(finger: &Finger, doubt: Option<Doubt>) -> SensedContact {
         doubt,
         patch: Vec::new(),
         load: None,
+        force_sd_n: 0.0,
     }
 }
 

@@ -234,6 +234,7 @@ impl DepthPatch {
             doubt,
             patch: Vec::new(),
             load: None,
+            force_sd_n: 0.0,
         }
     }
 

@@ -27,6 +27,8 @@ pub enum Doubt {
     Unbalanced,
     /// The force passes beside the tip, or the load beside the pad.
     BesideTip,
+    /// The lines of action of several forces cross elsewhere than on the tip.
+    TipRadius,
     /// The rim of the pad is pressed: most of the contact may be beside it.
     OnRim,
 }
@@ -48,6 +50,10 @@ impl fmt::Display for Doubt {
             Self::Unbalanced => {
                 "the torque does not fit one point of contact; check the axes of the \
                  force/torque sensor and whether something else touches the finger"
+            }
+            Self::TipRadius => {
+                "the force/torque sensor feels a tip of another radius; measure it with palpate \
+                 register --ball and correct finger.radius_m"
             }
             Self::OnRim => "the rim of the pad was pressed; most of the contact may be beside it",
             Self::BesideTip => {

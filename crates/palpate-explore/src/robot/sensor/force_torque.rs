@@ -9,6 +9,7 @@ use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3, Vector6};
 use palpate_geometry::primitives::nearest_on_segment;
+use palpate_gp::math::normal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -48,7 +49,15 @@ const MOMENT: f64 = 0.05;
 /// Relative rounding of a reading that was transformed back and forth.
 const ROUNDING: f64 = 1e-9;
 
-/// Change of the force during a reading that shows slip, as a fraction of it.
+/// Probability of a healthy axis to repeat its value so often that it counts as frozen.
+// heuristic: no false alarm in a thousand hours at 1 kHz.
+const FROZEN: f64 = 1e-12;
+
+/// Least probability that a healthy axis repeats a value.
+// heuristic: a driver rounds and filters by unknown amounts.
+const LEAST_REPEATED: f64 = 0.5;
+
+/// Change of the force across itself during a reading that shows slip, as a fraction of it.
 // heuristic: far above the relaxation of a servo at rest.
 const SLIPPED: f64 = 0.1;
 
@@ -67,6 +76,28 @@ pub struct ForceTorqueTip {
     x_mt: Isometry3<f64>,
     at_rest: Option<Window>,
     now: Window,
+    repeats: Repeats,
+}
+
+/// Unchanged readings of each axis.
+#[derive(Clone, Debug, Default)]
+struct Repeats {
+    last: Vector6<f64>,
+    /// Readings since an axis last changed, without those in which no axis did: a message that is
+    /// read twice shows no defect.
+    counts: [u32; 6],
+}
+
+impl Repeats {
+    fn push(&mut self, reading: &Vector6<f64>) {
+        let moved = (reading - self.last).map(|change| change.abs() > ROUNDING * reading.amax());
+        if moved.iter().any(|moved| *moved) {
+            for (count, moved) in self.counts.iter_mut().zip(&moved) {
+                *count = if *moved { 0 } else { count.saturating_add(1) };
+            }
+        }
+        self.last = *reading;
+    }
 }
 
 /// Sums of the readings of a time span, in the sensor's frame.
@@ -80,16 +111,13 @@ struct Window {
     time_s2: f64,
     moved: Vector6<f64>,
     sum: Vector6<f64>,
-    first: Vector6<f64>,
-    /// Axes whose reading has changed.
-    varies: [bool; 6],
     largest: Vector6<f64>,
 }
 
 impl Window {
     fn push(&mut self, time_s: f64, reading: &Vector6<f64>) {
         if self.count == 0.0 {
-            (self.begun_s, self.first) = (time_s, *reading);
+            self.begun_s = time_s;
         }
         let since_s = time_s - self.begun_s;
         self.count += 1.0;
@@ -97,9 +125,6 @@ impl Window {
         self.time_s2 += since_s * since_s;
         self.moved += reading * since_s;
         self.sum += reading;
-        for (i, varies) in self.varies.iter_mut().enumerate() {
-            *varies |= (reading[i] - self.first[i]).abs() > ROUNDING * self.first.amax();
-        }
         self.largest = self.largest.sup(&reading.abs());
     }
 
@@ -222,7 +247,9 @@ fn covariance_on_hull(
 impl Sensor for ForceTorqueTip {
     fn push(&mut self, time_s: f64, _: &[Sample], wrench: Option<&Wrench>) {
         if let Some(wrench) = wrench {
-            self.now.push(time_s, &wrench.moved(&self.x_mt).stacked());
+            let reading = wrench.moved(&self.x_mt).stacked();
+            self.now.push(time_s, &reading);
+            self.repeats.push(&reading);
         }
     }
 
@@ -257,7 +284,7 @@ impl Sensor for ForceTorqueTip {
             let (p_tc, normal) = point_on_hull(finger, &wrench).ok_or(Doubt::NoSignal)?;
             return Ok(SensedContact { load: Some(wrench), ..SensedContact::new(p_tc, -normal) });
         };
-        accuracy.check_readings(rest, &self.now)?;
+        accuracy.check_readings(rest, &self.now, &self.repeats)?;
         let sds = accuracy.sds(rest, &self.now, moved_m);
         let force_n = wrench.force_n.norm();
         let force_sd_n = sds.fixed_rows::<3>(0).max();
@@ -267,8 +294,10 @@ impl Sensor for ForceTorqueTip {
             load[i] += sign * sds[i];
             in_tip(&load)
         };
-        let too_light =
-            || Ok(SensedContact { load: Some(wrench), ..foremost(finger, Some(Doubt::TooLight)) });
+        let too_light = || {
+            let contact = foremost(finger, Some(Doubt::TooLight));
+            Ok(SensedContact { load: Some(wrench), force_sd_n, ..contact })
+        };
         if force_n <= SIGMAS * force_sd_n || force_n == 0.0 {
             return too_light();
         }
@@ -287,7 +316,10 @@ impl Sensor for ForceTorqueTip {
         let doubt = self.now.change().and_then(|(change, sds)| {
             let noise_n = accuracy.noise_n.iter().copied().fold(0.0, f64::max);
             let limit_n = SLIPPED * force_n + SIGMAS * sds * noise_n;
-            (change.fixed_rows::<3>(0).norm() > limit_n).then_some(Doubt::Slipping)
+            // A force that only grows acts at the same point.
+            let along = load.fixed_rows::<3>(0).normalize();
+            let turned_n = change.fixed_rows::<3>(0).cross(&along).norm();
+            (turned_n > limit_n).then_some(Doubt::Slipping)
         });
         Ok(SensedContact {
             p_tc,
@@ -297,6 +329,7 @@ impl Sensor for ForceTorqueTip {
             doubt,
             patch: Vec::new(),
             load: Some(wrench),
+            force_sd_n,
         })
     }
 }
@@ -317,12 +350,19 @@ impl WrenchAccuracy {
         largest(&self.noise_nm).hypot(largest(&self.noise_n) * lever_m)
     }
 
+    /// Returns the force, N, from which the noise lets a contact be located on the tip of `finger`,
+    /// `lever_m` from the sensor, by as many `readings` as at rest.
+    pub fn least_located_n(&self, finger: &Finger, lever_m: f64, readings: f64) -> f64 {
+        let line_nm = self.torque_sd_nm(lever_m) * (2.0 / readings).sqrt();
+        line_nm / (TURNED_RAD * finger.radius_m)
+    }
+
     fn noise(&self) -> Vector6<f64> {
         stacked(&self.noise_n, &self.noise_nm)
     }
 
     /// Returns the doubt that the readings raise by themselves.
-    fn check_readings(&self, rest: &Window, now: &Window) -> Result<(), Doubt> {
+    fn check_readings(&self, rest: &Window, now: &Window, repeats: &Repeats) -> Result<(), Doubt> {
         let largest = rest.largest.sup(&now.largest);
         let range = stacked(&self.range_n, &self.range_nm);
         let is_beyond = |i: usize| range[i] > 0.0 && largest[i] >= (1.0 - ROUNDING) * range[i];
@@ -330,9 +370,12 @@ impl WrenchAccuracy {
             return Err(Doubt::Saturated);
         }
         let (noise, step) = (self.noise(), stacked(&self.resolution_n, &self.resolution_nm));
-        // A coarse sensor repeats its value without a defect.
-        let is_frozen =
-            |i: usize| noise[i] > step[i] && now.count > 2.0 && !now.varies[i] && !rest.varies[i];
+        let is_frozen = |i: usize| {
+            // A value is repeated at most as often as noise about the middle of a step stays in it.
+            let stays = 2.0 * normal::cumulative(0.5 * step[i] / noise[i]) - 1.0;
+            let repeated = stays.max(LEAST_REPEATED);
+            noise[i] > 0.0 && repeated.ln() * f64::from(repeats.counts[i]) < FROZEN.ln()
+        };
         if (0..6).any(is_frozen) { Err(Doubt::FrozenAxis) } else { Ok(()) }
     }
 

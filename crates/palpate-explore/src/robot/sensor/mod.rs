@@ -11,6 +11,7 @@ mod kind;
 mod model;
 mod sample;
 mod settings;
+mod tip_radius;
 mod wrench_accuracy;
 
 pub use biotac::BioTac;
@@ -24,6 +25,7 @@ pub use kind::{SensorKind, Signal, TipParts};
 pub use model::{SensorModel, TipErrors, TipSurface};
 pub use sample::{Channels, DepthImage, IdealContact, Sample, Wrench};
 pub use settings::SensorSettings;
+pub use tip_radius::TipRadius;
 pub use wrench_accuracy::WrenchAccuracy;
 
 use super::finger::Finger;
@@ -46,6 +48,8 @@ pub struct SensedContact {
     pub patch: Vec<SensedContact>,
     /// Load on the tip, relative to that at rest, if the sensor measures it.
     pub load: Option<Wrench>,
+    /// Largest standard deviation of the load's force along an axis, N; 0 if it is not known.
+    pub force_sd_n: f64,
 }
 
 impl SensedContact {
@@ -59,7 +63,26 @@ impl SensedContact {
             doubt: None,
             patch: Vec::new(),
             load: None,
+            force_sd_n: 0.0,
         }
+    }
+
+    /// Moves the point by `out_m` along the normal, and adds its error to the covariance.
+    pub fn raise(&mut self, out_m: f64, sd_m: f64) {
+        self.p_tc += self.normal_t * out_m;
+        if let Some(covariance_t) = &mut self.covariance_t {
+            *covariance_t += self.normal_t * self.normal_t.transpose() * (sd_m * sd_m);
+        }
+    }
+
+    /// Adds to the covariance that of a tip's pose, with standard deviations as in
+    /// [`SensorModel::pose_sds`]: σ² I + τ² (p² I − p pᵀ) for a point p in `T`.
+    pub fn misplace(&mut self, [position_sd_m, attitude_sd_rad]: [f64; 2]) {
+        let p = self.p_tc.coords;
+        let turned = Matrix3::identity() * p.norm_squared() - p * p.transpose();
+        let added = Matrix3::identity() * position_sd_m.powi(2) + turned * attitude_sd_rad.powi(2);
+        self.covariance_t = self.covariance_t.map(|covariance_t| covariance_t + added);
+        self.patch.iter_mut().for_each(|point| point.misplace([position_sd_m, attitude_sd_rad]));
     }
 
     /// Standard deviation of the surface along its normal, m, if the covariance is known.

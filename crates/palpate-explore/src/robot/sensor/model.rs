@@ -80,6 +80,9 @@ pub struct SensorModel {
     pub surface: TipSurface,
     /// Accuracy of the force/torque sensor, if known.
     pub wrench: Option<WrenchAccuracy>,
+    /// Standard deviations of the fingertip's pose, if known: of its position along each axis, m,
+    /// and of its attitude about each, rad.
+    pub pose_sds: Option<[f64; 2]>,
 }
 
 impl SensorModel {
