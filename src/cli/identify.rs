@@ -24,8 +24,9 @@ Examples:
   palpate identify my-parts/ my-cell.toml --set library.unit='\"mm\"'    on the arm of [backend]
 
 LIBRARY is a folder of meshes. A scene without [object] draws one of them at a pose of its table [pose]; in a scene with \
-[object], or on a real arm, the object is what is there. Touches end when an object, or none of these, has the \
-probability --sure. Over ROS 2 the estimated pose is published on /tf as the frame `object`.
+[object], or on a real arm, the object is what is there. Touches end when none of these has the probability --sure, or \
+an object has it, also by those touches alone that were made since it was named. Over ROS 2 the estimated pose is \
+published on /tf as the frame `object`.
 
 Exit codes: 0 sure, 3 undecided after --touches.")]
 pub(super) struct Args {
@@ -78,7 +79,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
             if let Some(arm) = arm {
                 arm.show_object(&pose(found.pose.position_m, found.pose.rotation_deg));
             }
-            let is_sure = found.confidence() >= args.sure;
+            let is_sure = found.is_identified(args.sure);
             last = Some((touched.count, found.clone()));
             if is_sure {
                 return Err(stopped);
@@ -93,7 +94,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let Some((count, found)) = last else {
         bail!("{}", row.failure.unwrap_or_else(|| "no touch was made".into()))
     };
-    let is_sure = found.confidence() >= args.sure;
+    let is_sure = found.is_identified(args.sure);
     if let Some(reason) = row.failure.filter(|_| !is_sure) {
         bail!("{reason}");
     }

@@ -249,6 +249,7 @@ fn recognition() -> RecognitionMetrics {
     RecognitionMetrics {
         object: "box".into(),
         probabilities: [("box".to_owned(), 0.9), (NONE.to_owned(), 0.1)].into(),
+        predictive_nats: 3.0,
         pose: PoseRow { position_m, rotation_deg, distance_95_m: 1e-3 },
         error: Some(RecognitionError {
             object: "box".into(),

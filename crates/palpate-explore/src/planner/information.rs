@@ -5,7 +5,11 @@
 //! with the outcome o_h: a miss, or a contact with a depth and a normal. With the density p(o|h) of
 //! an outcome, the information about object and pose is the mean of ln p(o_h|h) − ln p(o_h)
 //! (Lindley 1956). That about the object's class is the mean of ln p(o_h|class of h) − ln p(o_h);
-//! that about the pose is their difference.
+//! that about the pose is their difference. About the object, *none of these* competes too: with
+//! the probability of that, a touch tells it from the hypotheses where they predict a depth with
+//! the variance v, and a shape near to them may have another one with the variance v + n, by
+//! ½ ln(1 + n/v). n grows with the distance from earlier contacts, so that what seems certain is
+//! touched where it is not yet.
 
 use super::active;
 use super::offer::Offer;
@@ -79,6 +83,7 @@ struct InformationPlanner {
 impl Planner for InformationPlanner {
     fn plan(&mut self, belief: &Belief, offer: &Offer) -> Result<Plan, PlanError> {
         let hypotheses = belief.hypotheses().ok_or("it needs a scene with a library")?;
+        let open = hypotheses.open_probability();
         if hypotheses.is_unknown() && belief.fit().is_some() {
             return self.surface.plan(belief, offer);
         }
@@ -90,7 +95,7 @@ impl Planner for InformationPlanner {
                 true => random_target(belief.surface(), &mut self.rng),
                 false => self.on_a_surface(belief, hypotheses, &drawn),
             };
-            let Some(gain) = self.information(hypotheses, &drawn, &target) else { continue };
+            let Some(gain) = self.information(hypotheses, open, &drawn, &target) else { continue };
             if gain > best.0 {
                 best = (gain, Some(target));
             }
@@ -119,6 +124,7 @@ impl InformationPlanner {
     fn information(
         &self,
         hypotheses: &ObjectHypotheses,
+        open: f64,
         drawn: &[Hypothesis],
         target: &Target,
     ) -> Option<f64> {
@@ -147,8 +153,24 @@ impl InformationPlanner {
                 Goal::Pose => -same.ln(),
             };
         }
-        Some(sum / count)
+        let against_none = match self.goal {
+            Goal::Both | Goal::Object => open * information_against_none(hypotheses, &outcomes),
+            Goal::Pose => 0.0,
+        };
+        Some(sum / count + against_none)
     }
+}
+
+/// Returns the expected log-likelihood ratio of a touch against a near shape, nats.
+fn information_against_none(hypotheses: &ObjectHypotheses, outcomes: &[Option<Prediction>]) -> f64 {
+    let ways_m: Vec<f64> = outcomes.iter().flatten().map(|it| it.way_m).collect();
+    let Some(middle) = outcomes.iter().flatten().nth(ways_m.len() / 2) else { return 0.0 };
+    let count = ways_m.len() as f64;
+    let mean_m = ways_m.iter().sum::<f64>() / count;
+    let variance = ways_m.iter().map(|way_m| (way_m - mean_m).powi(2)).sum::<f64>() / count;
+    let near = hypotheses.near_sd_m(&middle.p_w).powi(2);
+    let ratio = near / (variance + DEPTH_SD_M * DEPTH_SD_M);
+    0.5 * ratio.ln_1p() * count / outcomes.len() as f64
 }
 
 /// Density of an outcome where another is predicted, relative to its largest value.

@@ -4,7 +4,9 @@ use super::library::{Library, LibraryObject};
 use super::measurement::{
     Measurement, NoiseModel, TouchMeasurement, ViewMeasurement, before_m, hull,
 };
-use super::particles::{Model, Particles, log_sum_exp, systematic};
+use super::model::Model;
+use super::object_posterior::{HOPELESS, ObjectPosterior, Search};
+use super::particles::{Particles, log_sum_exp, systematic};
 use super::pose_prior::PosePrior;
 use crate::evidence::Outcome;
 use crate::robot::sensor::{GelPad, TipSurface};
@@ -67,15 +69,17 @@ const NEAR_SHAPE: NoiseModel =
 /// Part of the poses that the hypothesis of a near shape has.
 const NEAR_PART: u32 = 4;
 
-/// Logarithm of the probability, relative to the best object, below which an object is left out of
-/// further touches.
-// heuristic: three contacts that fit exactly would not make up for it.
-const HOPELESS: f64 = -30.0;
+/// Number of peaks of the best object that are starts for the others.
+const GUESSES: usize = 2;
 
-/// Counts of touches after which posteriors may be found anew, and the probability of the best
-/// object, and its log-odds against none of these, below which they are.
+/// Length over which a shape differs alike from one of the library, m.
+// heuristic: half the size of an object for a hand.
+const ALIKE_M: f64 = 0.03;
+
+/// Counts of touches after which the prior may be searched once more for all objects, and the
+/// probability of the best object, and its log-odds against none of these, below which it is.
 // heuristic: often at first, when touches are few and poses many.
-const RESTARTS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
+const SEARCHES: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 30];
 const UNDECIDED: f64 = 0.9;
 const DOUBT: f64 = 8.0;
 
@@ -95,6 +99,8 @@ pub struct Prediction {
     pub way_m: f64,
     /// Normal in `W`, from the surface towards the finger.
     pub normal_w: Vector3<f64>,
+    /// Point of the surface that is touched, in `W`.
+    pub p_w: Point3<f64>,
     /// Whether the tip touches; otherwise the shaft does, where no sensor is.
     pub is_on_tip: bool,
 }
@@ -130,15 +136,15 @@ pub struct ObjectHypotheses {
     evidence: Vec<Arc<Measurement>>,
     objects: Vec<ObjectPosterior>,
     near: Vec<ObjectPosterior>,
+    tested: Option<TestedClass>,
 }
 
-/// Poses of an object with their own random numbers, so that objects are updated side by side.
-#[derive(Clone)]
-struct ObjectPosterior {
-    particles: Particles,
-    random: ChaCha8Rng,
-    /// Whether it still takes part.
-    is_possible: bool,
+/// The named class, with the log-likelihood ratio against none of these of the touches since, each
+/// predicted by those before.
+#[derive(Clone, Copy)]
+struct TestedClass {
+    class: usize,
+    predictive_nats: f64,
 }
 
 impl ObjectHypotheses {
@@ -173,6 +179,7 @@ impl ObjectHypotheses {
             evidence: Vec::new(),
             objects: Vec::new(),
             near: Vec::new(),
+            tested: None,
         };
         let mut bank = |count: u32, noise: NoiseModel| -> Vec<ObjectPosterior> {
             let numbers = 0..made.library.objects().len();
@@ -180,7 +187,7 @@ impl ObjectHypotheses {
                 let mut random: ChaCha8Rng = rand::SeedableRng::from_rng(&mut *random);
                 let particles =
                     Particles::new(&made.model(number, &[], noise), count as usize, &mut random);
-                ObjectPosterior { particles, random, is_possible: true }
+                ObjectPosterior::new(particles, random)
             });
             posterior.collect()
         };
@@ -223,10 +230,14 @@ impl ObjectHypotheses {
     fn push(&mut self, evidence: Option<Measurement>) {
         let Some(evidence) = evidence else { return };
         self.evidence.push(Arc::new(evidence));
+        let before = self.tested.map(|tested| self.log_ratio(tested.class));
         self.update_all();
-        if RESTARTS.contains(&self.evidence.len()) && self.is_doubtful() {
-            self.restart();
+        if let (Some(tested), Some(before)) = (self.tested, before) {
+            let predictive_nats = tested.predictive_nats + self.log_ratio(tested.class) - before;
+            self.tested = Some(TestedClass { predictive_nats, ..tested });
         }
+        self.revise(SEARCHES.contains(&self.evidence.len()) && self.is_doubtful());
+        self.name_likeliest();
     }
 
     /// Takes in new touches for all objects that are possible.
@@ -239,7 +250,6 @@ impl ObjectHypotheses {
                 posterior.particles.update(&model, &mut posterior.random);
             });
         }
-        self.leave_out();
     }
 
     /// Leaves out hopeless objects.
@@ -260,40 +270,87 @@ impl ObjectHypotheses {
         best < UNDECIDED || none.ln() > best.ln() - DOUBT
     }
 
-    /// Finds the posteriors of all objects anew from the prior, because few particles may have
-    /// missed a pose that explains all touches.
-    fn restart(&mut self) {
-        let fresh = |mut posterior: ObjectPosterior, number: usize| {
-            let model = self.model(number, &self.evidence, self.noise);
-            let count = self.settings.particles as usize;
-            let mut found = Particles::new(&model, count, &mut posterior.random);
-            found.update(&model, &mut posterior.random);
-            // A mean of estimates, because each is unbiased.
-            let logs = [found.log_evidence, posterior.particles.log_evidence];
-            if found.log_evidence > posterior.particles.log_evidence {
-                posterior.particles = found;
-                posterior.is_possible = true;
-            }
-            posterior.particles.log_evidence = log_sum_exp(&logs) - 2f64.ln();
-            posterior
-        };
-        let each = self.objects.clone().into_par_iter().enumerate();
-        self.objects = each.map(|(number, posterior)| fresh(posterior, number)).collect();
+    /// Looks for poses that particles have missed, over the whole prior if `is_wide`: first for the
+    /// best object, then for all others at its poses too, so that none is left out whose shape fits
+    /// there.
+    fn revise(&mut self, is_wide: bool) {
+        let Self { library, prior, evidence, noise, objects, settings, .. } = self;
+        let log = |posterior: &ObjectPosterior| posterior.particles.log_evidence;
+        let numbers = 0..objects.len();
+        let first = numbers.max_by(|a, b| log(&objects[*a]).total_cmp(&log(&objects[*b])));
+        let Some(first) = first else { return };
+        let (noise, wanted) = (*noise, settings.particles as usize);
+        let model =
+            |number: usize| Model { object: &library.objects()[number], prior, evidence, noise };
+        let search = Search { guesses: &[], best: log(&objects[first]), is_wide, wanted };
+        objects[first].revise(&model(first), &search);
+        let guesses: Vec<_> = objects[first].peaks.iter().take(GUESSES).copied().collect();
+        let search = Search { guesses: &guesses, best: log(&objects[first]), ..search };
+        let others = objects.par_iter_mut().enumerate().filter(|(number, _)| *number != first);
+        others.for_each(|(number, posterior)| posterior.revise(&model(number), &search));
         self.leave_out();
+    }
+
+    /// Names the likeliest class, once it is likely at a known pose: the touches from then on test
+    /// it. Another pose would explain them too before.
+    fn name_likeliest(&mut self) {
+        let probabilities = self.class_probabilities();
+        let likeliest = probabilities.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+        let Some((class, probability)) = likeliest else { return };
+        if self.tested.is_none_or(|tested| tested.class != class) {
+            let is_named = *probability >= UNDECIDED
+                && class < self.library.classes().len()
+                && self.estimate().distance_95_m < NEAR_SHAPE.contact_sd_m;
+            self.tested = is_named.then_some(TestedClass { class, predictive_nats: 0.0 });
+        }
+    }
+
+    /// Log-likelihood ratio, against none of these, of the touches since the likeliest class was
+    /// named, nats: each is predicted by those before. It is 0 before a class is named.
+    pub fn predictive_nats(&self) -> f64 {
+        self.tested.map_or(0.0, |tested| tested.predictive_nats)
+    }
+
+    /// Logarithm of the evidence for a class over that for none of these.
+    fn log_ratio(&self, class: usize) -> f64 {
+        let objects = self.objects.iter().enumerate();
+        let of_class = objects.filter(|(number, _)| self.library.class_of(*number) == class);
+        let logs: Vec<f64> = of_class.map(|(_, it)| it.particles.log_evidence).collect();
+        log_sum_exp(&logs) - (logs.len() as f64).ln() - self.log_evidence_of_none()
+    }
+
+    /// Logarithm of the evidence for none of these: half of the other shapes are near to one of the
+    /// library.
+    fn log_evidence_of_none(&self) -> f64 {
+        let near: Vec<f64> = self.near.iter().map(|it| it.particles.log_evidence).collect();
+        log_sum_exp(&[0.0, log_sum_exp(&near) - (near.len() as f64).ln()]) - 2f64.ln()
+    }
+
+    /// Deviation of the surface of a shape near to one of the library, at a point in `W`, m: it
+    /// grows with the distance from the contacts so far.
+    pub fn near_sd_m(&self, p_w: &Point3<f64>) -> f64 {
+        let contacts = self.evidence.iter().filter_map(|measurement| measurement.contact_w());
+        let nearest_m = contacts.map(|at_w| (at_w - p_w).norm()).fold(f64::INFINITY, f64::min);
+        // What a squared exponential kernel leaves of the prior's variance.
+        let left = -(-(nearest_m / ALIKE_M).powi(2)).exp_m1();
+        NEAR_SHAPE.contact_sd_m * left.sqrt()
+    }
+
+    /// Probability of none of these, or that of its prior if it is less: objects that no touch was
+    /// chosen against remain possible.
+    pub fn open_probability(&self) -> f64 {
+        let none = self.probabilities().last().copied().unwrap_or(0.0);
+        none.max(self.settings.none_probability)
     }
 
     /// Probability of each object, then that of none of these.
     pub fn probabilities(&self) -> Vec<f64> {
         let count = self.objects.len() as f64;
         let none = self.settings.none_probability;
-        let each = |bank: &[ObjectPosterior]| -> Vec<f64> {
-            bank.iter().map(|it| it.particles.log_evidence).collect()
-        };
-        let mut logs = each(&self.objects);
-        logs.iter_mut().for_each(|log| *log += ((1.0 - none) / count).ln());
-        // Half of the other shapes are near to one of the library.
-        let near = log_sum_exp(&each(&self.near)) - count.ln();
-        logs.push(none.ln() + log_sum_exp(&[0.0, near]) - 2f64.ln());
+        let share = ((1.0 - none) / count).ln();
+        let mut logs: Vec<f64> =
+            self.objects.iter().map(|it| it.particles.log_evidence + share).collect();
+        logs.push(none.ln() + self.log_evidence_of_none());
         let sum = log_sum_exp(&logs);
         logs.into_iter().map(|log| (log - sum).exp()).collect()
     }
@@ -388,6 +445,7 @@ impl ObjectHypotheses {
         Some(Prediction {
             way_m: hit.travel_m - before_m,
             normal_w: hit.normal,
+            p_w: hit.point,
             is_on_tip: finger.length_m == 0.0 || behind_m <= finger.radius_m,
         })
     }

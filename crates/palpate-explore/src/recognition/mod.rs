@@ -4,10 +4,15 @@
 //! hypothesis *none of these* competes with the objects: a shape near to one of the library's, or
 //! an unknown one.
 
+#[cfg(test)]
+mod boxes;
 mod hypotheses;
 mod library;
 mod measurement;
+mod model;
+mod object_posterior;
 mod particles;
+mod peaks;
 mod pose_prior;
 
 pub use hypotheses::{Hypothesis, ObjectHypotheses, PoseEstimate, Prediction, RecognitionSettings};

@@ -2,13 +2,12 @@
 //! at a falling temperature, and particles move by a preconditioned Langevin step (Girolami &
 //! Calderhead 2011) on all evidence so far.
 
-use super::library::LibraryObject;
-use super::measurement::{LogLikelihood, Measurement, MeasurementFit, NoiseModel};
-use super::pose_prior::{PosePrior, moved};
-use nalgebra::{Cholesky, Const, Isometry3, Matrix6, Vector6};
+use super::measurement::{LogLikelihood, MeasurementFit};
+use super::model::{Model, Quadratic};
+use super::pose_prior::moved;
+use nalgebra::{Isometry3, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
-use std::sync::Arc;
 
 /// Effective number of particles that a step of the temperature keeps, over their wanted number.
 // heuristic: usual for tempering.
@@ -31,9 +30,9 @@ const STEP: f64 = 1.0;
 
 /// A pose with its residuals.
 #[derive(Clone)]
-struct Particle {
-    x_wo: Isometry3<f64>,
-    fits: Vec<MeasurementFit>,
+pub(super) struct Particle {
+    pub x_wo: Isometry3<f64>,
+    pub fits: Vec<MeasurementFit>,
 }
 
 /// Posterior of one object's pose, and the evidence for the object.
@@ -48,26 +47,45 @@ pub(super) struct Particles {
     pub log_evidence: f64,
 }
 
-/// Object, prior and data that particles share.
-pub(super) struct Model<'a> {
-    pub object: &'a LibraryObject,
-    pub prior: &'a PosePrior,
-    pub evidence: &'a [Arc<Measurement>],
-    pub noise: NoiseModel,
-}
-
 impl Particles {
     /// Draws poses from the prior, evenly spread, of which `wanted` remain.
     pub fn new(model: &Model, wanted: usize, random: &mut impl Rng) -> Self {
         let count = wanted * DRAWN_FIRST;
-        let seed = random.next_u32();
-        let pose = |i: usize| {
-            let number = |axis| f64::from(sobol_burley::sample(i as u32, axis, seed));
-            model.prior.at(model.object, std::array::from_fn(|axis| number(axis as u32)))
-        };
-        let particles = (0..count).map(|i| Particle { x_wo: pose(i), fits: Vec::new() }).collect();
+        let poses = model.prior.spread(model.object, count as u32, random.next_u32());
+        let particles = poses.map(|x_wo| Particle { x_wo, fits: Vec::new() }).collect();
         let log_weights = vec![-(count as f64).ln(); count];
         Self { particles, log_weights, wanted, log_evidence: 0.0 }
+    }
+
+    /// Creates particles from weighted poses: `logs` are the weights' logarithms, whose sum over
+    /// the number of draws estimates the evidence.
+    pub fn from_draws(
+        model: &Model,
+        (draws, logs): (Vec<Particle>, Vec<f64>),
+        drawn: usize,
+        wanted: usize,
+        random: &mut impl Rng,
+    ) -> Self {
+        let sum = log_sum_exp(&logs);
+        let log_weights = logs.iter().map(|log| log - sum).collect();
+        let log_evidence = sum - (drawn as f64).ln();
+        let mut made = Self { particles: draws, log_weights, wanted, log_evidence };
+        if log_evidence.is_finite() {
+            made.resample(random);
+            for _ in 0..MOVES {
+                made.advance(model, model.evidence.len(), 0.0, random);
+            }
+        }
+        made
+    }
+
+    /// Returns the pose that explains the evidence best.
+    pub fn likeliest(&self, model: &Model) -> Option<Isometry3<f64>> {
+        let scored = self
+            .particles
+            .iter()
+            .map(|particle| (model.log_likelihood(&particle.fits, 0.0), particle.x_wo));
+        scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, x_wo)| x_wo)
     }
 
     /// Returns the poses and their weights.
@@ -171,22 +189,22 @@ impl Particles {
 
     /// Moves every particle by one step with the posterior at the temperature as its invariant.
     fn advance(&mut self, model: &Model, known: usize, tau_m: f64, random: &mut impl Rng) {
-        let free = model.prior.free();
         for particle in &mut self.particles {
-            let normals =
-                Vector6::from_fn(|i, _| if free[i] { StandardNormal.sample(random) } else { 0.0 });
+            let normals = free_normals(model, random);
             let accepts: f64 = random.random();
-            let here = Langevin::new(model, known, &particle.fits, tau_m);
-            let step = here.step(&normals);
+            let here = model.quadratic(&particle.fits, known, tau_m);
+            let step = drift(&here) + here.deviation(&normals) * STEP;
             let x_wo = moved(&particle.x_wo, &step);
             if !model.prior.contains(model.object, &x_wo) {
                 continue;
             }
-            let fits: Vec<MeasurementFit> =
-                model.evidence.iter().map(|touch| touch.fit(model.object, &x_wo)).collect();
-            let there = Langevin::new(model, known, &fits, tau_m);
+            let fits = model.fits(&x_wo);
+            let there = model.quadratic(&fits, known, tau_m);
+            let log_density = |from: &Quadratic, step: Vector6<f64>| {
+                from.log_density(&(step - drift(from)), STEP, 0.0)
+            };
             let log =
-                there.value - here.value + there.log_density(&-step) - here.log_density(&step);
+                there.value - here.value + log_density(&there, -step) - log_density(&here, step);
             if accepts.ln() < log {
                 *particle = Particle { x_wo, fits };
             }
@@ -194,47 +212,15 @@ impl Particles {
     }
 }
 
-/// Proposal of a Langevin step from a pose.
-struct Langevin {
-    value: f64,
-    drift: Vector6<f64>,
-    information: Cholesky<f64, Const<6>>,
+/// Mean of a Langevin step.
+fn drift(here: &Quadratic) -> Vector6<f64> {
+    here.to_peak * (0.5 * STEP * STEP)
 }
 
-impl Langevin {
-    fn new(model: &Model, known: usize, fits: &[MeasurementFit], tau_m: f64) -> Self {
-        let mut sum = LogLikelihood::zero();
-        for (i, (touch, fit)) in model.evidence.iter().zip(fits).enumerate() {
-            let tau_m = if i < known { 0.0 } else { tau_m };
-            touch.add(fit, &model.noise, tau_m, &mut sum);
-        }
-        let free = model.prior.free();
-        let is_free = |i: usize, j: usize| if free[i] && free[j] { 1.0 } else { 0.0 };
-        let mask = Matrix6::from_fn(is_free);
-        let information = sum.information.component_mul(&mask) + model.prior.precision();
-        let gradient = sum.gradient.component_mul(&mask.diagonal());
-        // The precision of the prior is positive, so that only overflow fails.
-        let information =
-            Cholesky::new(information).unwrap_or_else(|| Cholesky::pack_dirty(Matrix6::identity()));
-        let drift = information.solve(&gradient) * (0.5 * STEP * STEP);
-        Self { value: sum.value, drift, information }
-    }
-
-    /// Returns the step for standard normal numbers.
-    fn step(&self, normals: &Vector6<f64>) -> Vector6<f64> {
-        let mut across = *normals;
-        // Lᵀ x = z gives the covariance (L Lᵀ)⁻¹.
-        self.information.l_dirty().tr_solve_lower_triangular_mut(&mut across);
-        self.drift + across * STEP
-    }
-
-    /// Logarithm of the density of a step, up to a constant.
-    fn log_density(&self, step: &Vector6<f64>) -> f64 {
-        let lower = self.information.l();
-        let off = (lower.transpose() * (step - self.drift)) / STEP;
-        let log_determinant: f64 = lower.diagonal().iter().map(|x| x.ln()).sum();
-        log_determinant - 0.5 * off.norm_squared()
-    }
+/// Returns standard normal numbers along the directions in which a pose can change.
+pub(super) fn free_normals(model: &Model, random: &mut impl Rng) -> Vector6<f64> {
+    let free = model.prior.free();
+    Vector6::from_fn(|i, _| if free[i] { StandardNormal.sample(random) } else { 0.0 })
 }
 
 /// Returns the numbers of `count` items drawn with these weights at equal steps from the offset
@@ -271,46 +257,17 @@ pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
-    use crate::recognition::measurement::TouchMeasurement;
-    use crate::recognition::pose_prior::Turn;
-    use crate::robot::Finger;
-    use crate::task::{Aim, Ball};
-    use nalgebra::{Point3, Vector3};
-    use palpate_geometry::mesh::Mesh;
-    use palpate_geometry::solids::box_mesh;
+    use crate::recognition::boxes::{NOISE, prior, touched_box, touches};
+    use crate::recognition::peaks;
+    use nalgebra::Vector3;
     use palpate_gp::math::seed;
 
-    /// Touches of a box whose front and right side are 2 mm and 3 mm off.
-    fn touches() -> Vec<Arc<Measurement>> {
-        let ball = Ball { centre_w: Point3::origin(), radius_m: 0.15, lowest_m: None };
-        let finger = Finger { pitch_deg: 0.0, ..Finger::default() };
-        [([0.01, 0.032, 0.0], Vector3::y()), ([0.053, 0.0, 0.01], Vector3::x())]
-            .into_iter()
-            .map(|(p_w, normal_w)| {
-                let aim = Aim::against(p_w.into(), &normal_w);
-                let approach = ball.approach(&aim, &finger, 0.01, 0.0);
-                let p_wt = aim.p_w + normal_w * finger.radius_m;
-                let contact = Contact::new(aim.p_w, normal_w);
-                let free = FreeVolume::new(finger.clone(), &approach, p_wt, End::Contact);
-                let evidence = vec![Evidence::Points(contact.into()), Evidence::Free(free)];
-                let outcome = Outcome::new(End::Contact, evidence);
-                let evidence = TouchMeasurement::new(&outcome, 0.0, None);
-                Arc::new(Measurement::Touch(evidence.unwrap()))
-            })
-            .collect()
-    }
-
     /// The evidence of particles is the integral of the likelihood over the prior, and their mean
-    /// is that of the posterior: a sum over a grid is the slow twin.
+    /// is that of the posterior: a sum over a grid is the slow twin. So is that of draws around the
+    /// peaks.
     #[test]
     fn particles_are_an_integral_over_the_prior() {
-        let (vertices, triangles) = box_mesh([-0.05, -0.03, -0.04], [0.05, 0.03, 0.04]);
-        let object = LibraryObject::new("box", &Mesh::new(&vertices, &triangles).unwrap().0);
-        let half_width_m = [0.02, 0.02, 0.0];
-        let prior = PosePrior { position_m: [0.0, 0.0, -0.04], half_width_m, turn: Turn::None };
-        let noise = NoiseModel { contact_sd_m: 1e-3, normal_sd_rad: 0.2, outliers: 1e-3 };
-        let touches = touches();
+        let (object, prior, noise, touches) = (touched_box(), prior(), NOISE, touches());
         let per_side = 400;
         let (mut logs, mut means) = (Vec::new(), [0.0; 2]);
         for i in 0..per_side * per_side {
@@ -350,6 +307,10 @@ mod tests {
             });
             assert!((mean.x - means[0]).abs() < 4e-4, "{mean} {means:?}");
             assert!((mean.y - means[1]).abs() < 4e-4, "{mean} {means:?}");
+            let model = model(2);
+            let starts = prior.spread(&object, 32, number as u32);
+            let drawn = peaks::sample(&model, &peaks::find(&model, starts), 256, &mut random);
+            assert!((drawn.log_evidence - expected).abs() < 0.3, "{}", drawn.log_evidence);
         }
         let mean = evidences.iter().sum::<f64>() / evidences.len() as f64;
         assert!((mean - expected).abs() < 0.2, "{evidences:?}, expected {expected}");

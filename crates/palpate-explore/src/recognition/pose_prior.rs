@@ -78,6 +78,17 @@ impl PosePrior {
         Isometry3::from_parts(p_w.into(), rotation)
     }
 
+    /// Returns `count` poses spread evenly.
+    pub(super) fn spread(
+        &self,
+        object: &LibraryObject,
+        count: u32,
+        seed: u32,
+    ) -> impl Iterator<Item = Isometry3<f64>> {
+        let number = move |i, axis| f64::from(sobol_burley::sample(i, axis, seed));
+        (0..count).map(move |i| self.at(object, std::array::from_fn(|axis| number(i, axis as u32))))
+    }
+
     /// Whether the pose `x_wo` of an object is possible, if its turn is.
     pub fn contains(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> bool {
         let offset = Point3::from(x_wo.translation.vector) - self.middle(object);
@@ -90,6 +101,52 @@ impl PosePrior {
         let [x, y, z] = self.half_width_m.map(|half_m| half_m > 0.0);
         let (is_free, is_turned) = (self.turn == Turn::Free, self.turn != Turn::None);
         [x, y, z, is_free, is_free, is_turned]
+    }
+
+    /// Returns the pose moved into the box.
+    pub(super) fn clamped(&self, object: &LibraryObject, x_wo: Isometry3<f64>) -> Isometry3<f64> {
+        let (middle, half_m) = (self.middle(object), Vector3::from(self.half_width_m));
+        let offset = x_wo.translation.vector - middle.coords;
+        let within = offset.zip_map(&half_m, |off, half_m| off.clamp(-half_m, half_m));
+        Isometry3::from_parts((middle + within).into(), x_wo.rotation)
+    }
+
+    /// Logarithm of the density of a possible pose, per m and per rad of a small motion.
+    pub(super) fn log_density(&self) -> f64 {
+        let sides_m = self.half_width_m.iter().filter(|half_m| **half_m > 0.0).map(|it| 2.0 * it);
+        let turns = match self.turn {
+            Turn::None => 1.0,
+            Turn::Yaw => TAU,
+            // Volume of the rotations, in rotation vectors of small ones.
+            Turn::Free => 8.0 * PI * PI,
+        };
+        -sides_m.map(f64::ln).sum::<f64>() - turns.ln()
+    }
+
+    /// Logarithm of the volume of poses over that of motions, at the motion `by`; 0 at a small one.
+    pub(super) fn log_volume(&self, by: &Vector6<f64>) -> f64 {
+        let half = 0.5 * by.fixed_rows::<3>(3).norm();
+        // Determinant of the exponential map's derivative (Chirikjian 2011, section 10.6).
+        if self.turn == Turn::Free && half > 1e-6 { 2.0 * (half.sin() / half).ln() } else { 0.0 }
+    }
+
+    /// Turns, about the axes of an object, that often make it look alike.
+    pub(super) fn quarter_turns(&self) -> Vec<UnitQuaternion<f64>> {
+        let about = |axis, quarters: &[i32]| -> Vec<UnitQuaternion<f64>> {
+            let turn = |n: &i32| UnitQuaternion::from_axis_angle(&axis, f64::from(*n) * PI / 2.0);
+            quarters.iter().map(turn).collect()
+        };
+        let yaws = about(Vector3::z_axis(), &[0, 1, 2, 3]);
+        match self.turn {
+            Turn::None => vec![UnitQuaternion::identity()],
+            Turn::Yaw => yaws,
+            Turn::Free => {
+                let ups =
+                    [about(Vector3::x_axis(), &[0, 1, 2, 3]), about(Vector3::y_axis(), &[1, 3])];
+                let each = |up: &UnitQuaternion<f64>| yaws.iter().map(|yaw| up * yaw).collect();
+                ups.concat().iter().flat_map(|up| -> Vec<_> { each(up) }).collect()
+            }
+        }
     }
 
     /// Inverse variances of the prior along and about the axes; 1 where the pose cannot change.
@@ -110,4 +167,11 @@ pub(super) fn moved(x_wo: &Isometry3<f64>, by: &Vector6<f64>) -> Isometry3<f64> 
     let mut rotation = turn * x_wo.rotation;
     rotation.renormalize();
     Isometry3::from_parts((x_wo.translation.vector + along).into(), rotation)
+}
+
+/// Returns the motion that moves the pose `from` to `to`.
+pub(super) fn motion(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
+    let along = to.translation.vector - from.translation.vector;
+    let about = (to.rotation * from.rotation.inverse()).scaled_axis();
+    Vector6::new(along.x, along.y, along.z, about.x, about.y, about.z)
 }

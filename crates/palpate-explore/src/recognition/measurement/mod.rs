@@ -10,7 +10,7 @@ pub use view::ViewMeasurement;
 
 use super::library::LibraryObject;
 use likelihood::Residual;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use touch::TouchFit;
 
 /// Measurement of one touch or view.
@@ -31,6 +31,14 @@ pub enum MeasurementFit {
 }
 
 impl Measurement {
+    /// Returns the point that a touch has met, in `W`.
+    pub fn contact_w(&self) -> Option<Point3<f64>> {
+        match self {
+            Self::Touch(touch) => touch.contact_w(),
+            Self::View(_) => None,
+        }
+    }
+
     /// Returns the residuals for `object` at the pose `x_wo`.
     pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> MeasurementFit {
         match self {

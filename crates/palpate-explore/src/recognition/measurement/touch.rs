@@ -89,6 +89,11 @@ impl TouchMeasurement {
         Some(Self { hull, ahead_w: *ahead_w, free_m, slack_m, points, face_w })
     }
 
+    /// Returns the point of contact, in `W`; `None` for a miss.
+    pub fn contact_w(&self) -> Option<Point3<f64>> {
+        self.points.first().map(|point| point.p_w)
+    }
+
     /// Returns the residuals for `object` at the pose `x_wo`.
     pub fn fit(&self, object: &LibraryObject, x_wo: &Isometry3<f64>) -> TouchFit {
         let reach_m = self.free_m + self.hull.radius_m;
