@@ -193,7 +193,8 @@ fn a_view_is_registered_to_contacts() {
             let mut random = seed::stream(number, 0, "view");
             let drawn: [f64; 6] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
             let mut seen = SeenSurface::new(&view, |_: &Point3<f64>| true, 120, |n| **n);
-            seen.register(&[]);
+            let nowhere = |_: usize, _: &Point3<f64>, _: f64| f64::NEG_INFINITY;
+            seen.align(&[], 0, 0, nowhere);
             let unknown = seen.rigid_error();
             assert_eq!((unknown.shift_m, unknown.shift_sd_m), ([0.0; 3], [position_m; 3]));
             let contacts: Vec<Contact> = (0..8)
@@ -204,7 +205,7 @@ fn a_view_is_registered_to_contacts() {
                     mesh.ray(&eye_w, &ahead, 2.0).map(|hit| Contact::new(hit.point, hit.normal))
                 })
                 .collect();
-            seen.register(&contacts);
+            seen.align(&contacts, 0, 0, nowhere);
             let RigidError { shift_m, shift_sd_m, turn_deg: turns, turn_sd_deg, .. } =
                 seen.rigid_error();
             for i in 0..6 {
@@ -357,6 +358,8 @@ fn one_touch_corrects_a_view() {
         assert!(rmse_m(1) < 2e-3 && rmse_m(6) < 5e-4);
         let error = row.views[0].error.as_ref().unwrap();
         assert!(error.prior_sds < 4.5 && error.shift_sd_m[2] < 0.5e-3, "{error:?}");
+        let truth_m = row.views[0].true_error.as_ref().unwrap().shift_m[2];
+        assert!((truth_m - error.shift_m[2]).abs() < 5.0 * error.shift_sd_m[2], "{truth_m}");
     }
 }
 
@@ -412,6 +415,7 @@ fn views_are_read_from_files() {
         assert_eq!(read.points_c.len(), view.points_c.len());
         let off = read.points_c.iter().zip(&view.points_c).map(|(a, b)| (a - b).norm());
         assert!(off.fold(0.0, f64::max) < 1e-9, "{name}");
+        assert_eq!(read.image, view.image, "{name}");
     }
     // Without its unit nothing of it is in the zone.
     let path = folder.path().join("mm.ply");
@@ -440,6 +444,9 @@ fn views_are_read_from_files() {
         assert_eq!(read.points_c.len(), view.points_c.len());
         let off = read.points_c.iter().zip(&view.points_c).map(|(a, b)| (a - b).norm());
         assert!(off.fold(0.0, f64::max) < 1.2e-3);
+        let ends = [read.image, view.image].map(|image| image.unwrap().concat());
+        let off = ends[0].iter().zip(&ends[1]).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-4);
     }
 }
 

@@ -126,4 +126,5 @@ mod sweeps;
 mod toml_files;
 mod twin;
 mod twin_faults;
+mod views;
 mod whole;

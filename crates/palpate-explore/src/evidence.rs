@@ -280,6 +280,23 @@ impl FreeVolume {
         }
     }
 
+    /// Returns the depth of a point of `W` within the volume and up to `beside_m` beside it, m;
+    /// negative outside.
+    pub(crate) fn depth_m(&self, zone: &Zone, p_w: &Point3<f64>, beside_m: f64) -> f64 {
+        let place = zone.place(p_w);
+        let moved = |axis: usize, by_m: f64| {
+            let mut moved = place.clone();
+            moved[axis] += by_m;
+            moved
+        };
+        let beside =
+            (0..place.len()).flat_map(|axis| [-beside_m, beside_m].map(|by| moved(axis, by)));
+        let around: Vec<Vec<f64>> = std::iter::once(place.clone()).chain(beside).collect();
+        let bounds_m = self.upper_bounds_m(zone, around.iter().map(Vec::as_slice));
+        let highest_m = bounds_m.map(|bound_m| bound_m.unwrap_or(f64::INFINITY));
+        zone.height_m(p_w) - highest_m.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Returns the upper bound of the surface's height above the datum at each of `places` of
     /// `zone`, along whose axis the finger moved; `None` where the hull did not pass.
     pub fn upper_bounds_m<'a>(

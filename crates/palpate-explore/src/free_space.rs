@@ -74,20 +74,6 @@ impl FreeSpaceBound {
         }
     }
 
-    /// Returns the highest bound within a step of the grid and `beside_m` around `place`, m: beside
-    /// an edge that of the higher side.
-    pub(super) fn around_m(&self, zone: &Zone, place: &[f64], beside_m: f64) -> f64 {
-        let step_m = |side: &f64| side / (PER_SIDE - 1) as f64;
-        let reach_m: Vec<f64> =
-            zone.extents_m().iter().map(|side| step_m(side) + beside_m).collect();
-        let is_near = |at: &[f64]| {
-            at.iter().zip(place).zip(&reach_m).all(|((at, x), reach_m)| (at - x).abs() <= *reach_m)
-        };
-        let near = self.places.iter().zip(&self.heights_m).filter(|(at, _)| is_near(at));
-        let highest_m = near.map(|(_, height_m)| *height_m).reduce(f64::max);
-        highest_m.unwrap_or(f64::INFINITY)
-    }
-
     /// Truncates the belief where its mean exceeds the bound by more than its softness, largest
     /// violation first, once per place. Places are skipped where the absence of a surface is more
     /// likely than a surface below the bound.

@@ -54,9 +54,12 @@ pub struct SurfaceEvidence {
     misses: Vec<Stadium>,
     /// Hull of the last touch; for another target it is translated.
     hull: Option<Stadium>,
-    /// Places where a camera saw a surface, or that there is none, with its probability.
+    /// Places of strokes, with the probability of a surface.
     #[serde(default)]
     seen: Vec<(Vector2<f64>, f64)>,
+    /// Places where cameras saw a surface, or that there is none, with its probability.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    views: Vec<(Vector2<f64>, f64)>,
     zone: Zone,
 }
 
@@ -70,6 +73,7 @@ impl SurfaceEvidence {
             misses: Vec::new(),
             hull: None,
             seen: Vec::new(),
+            views: Vec::new(),
             zone: zone.clone(),
         }
     }
@@ -97,14 +101,20 @@ impl SurfaceEvidence {
         self.hull = Some(hull);
     }
 
-    /// Adds places where a view tells whether there is a surface.
-    pub(super) fn add_seen(&mut self, presence: &[([f64; 2], f64)]) {
-        self.seen.extend(presence.iter().map(|(place, share)| (Vector2::from(*place), *share)));
+    /// Adds a place of a stroke, on a surface.
+    pub(super) fn add_slid(&mut self, place: [f64; 2]) {
+        self.seen.push((place.into(), 1.0));
+    }
+
+    /// Sets the places where views tell whether there is a surface.
+    pub(super) fn set_views<'a>(&mut self, views: impl Iterator<Item = &'a [([f64; 2], f64)]>) {
+        let places = views.flatten().map(|(place, share)| (Vector2::from(*place), *share));
+        self.views = places.collect();
     }
 
     /// Returns the places where a camera saw that there is no surface.
     pub(super) fn seen_through(&self) -> Vec<Vec<f64>> {
-        let empty = self.seen.iter().filter(|(_, presence)| *presence < 0.5);
+        let empty = self.views.iter().filter(|(_, presence)| *presence < 0.5);
         empty.map(|(place, _)| place.as_slice()[..self.zone.dimension()].into()).collect()
     }
 
@@ -133,7 +143,7 @@ impl SurfaceEvidence {
                 labels.push((miss.start + miss.along * (i as f64 / (MISS_PLACES - 1) as f64), 0.0));
             }
         }
-        labels.extend(&self.seen);
+        labels.extend(self.seen.iter().chain(&self.views));
         labels
     }
 }

@@ -21,7 +21,7 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
 use crate::sim::Environment;
-use crate::sim::camera::probe::CameraProbe;
+use crate::sim::camera::{self, probe::CameraProbe};
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::episode::Episode;
@@ -182,6 +182,9 @@ fn run_touches(
     }
     for (view, error) in row.views.iter_mut().zip(episode.belief().rigid_errors()) {
         view.error = Some(error);
+        if let Target::Look { camera } = view.target {
+            view.true_error = camera::probe::true_error(&truth.environment, camera, seeds);
+        }
     }
     verify(experiment, &mut episode, row)
 }
@@ -228,7 +231,7 @@ fn initial_belief(experiment: &Experiment, truth: &GroundTruth, random: &mut Cha
 fn look(episode: &mut Episode, target: Target, after: u32) -> Result<ViewRow, String> {
     let action = episode.action(&target).map_err(|error| error.to_string())?;
     let outcome = episode.execute(&target, &action).map_err(|fault| fault.to_string())?;
-    Ok(ViewRow { after, target, outcome, fit: None, error: None })
+    Ok(ViewRow { after, target, outcome, fit: None, error: None, true_error: None })
 }
 
 /// Returns the hypotheses about the object of an environment before the first touch.

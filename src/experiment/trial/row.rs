@@ -4,6 +4,7 @@ use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::measure::recognition::RecognitionMetrics;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::silhouette::SilhouetteMetrics;
+use crate::sim::camera::TrueError;
 use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};
@@ -70,6 +71,9 @@ pub struct ViewRow {
     /// Error of the camera's pose after the last touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<RigidError>,
+    /// True error of a simulated camera's pose.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub true_error: Option<TrueError>,
 }
 
 /// One touch and the belief after it.
@@ -184,6 +188,21 @@ impl TrialRow {
         });
         // The sum of no lengths is −0.
         Some(lengths.sum::<f64>() + 0.0)
+    }
+}
+
+impl ViewRow {
+    /// Returns the errors of the six components of the found pose, over their stated deviations;
+    /// those without a deviation are left out. `None` if the true pose is not known.
+    pub fn pose_deviations(&self) -> Option<Vec<f64>> {
+        let (found, truth) = (self.error.as_ref()?, self.true_error.as_ref()?);
+        let part = |found: &[f64; 3], truth: &[f64; 3], sds: &[f64; 3]| {
+            let known = (0..3).filter(|i| sds[*i] > 0.0);
+            known.map(|i| (found[i] - truth[i]) / sds[i]).collect::<Vec<f64>>()
+        };
+        let shifts = part(&found.shift_m, &truth.shift_m, &found.shift_sd_m);
+        let turns = part(&found.turn_deg, &truth.turn_deg, &found.turn_sd_deg);
+        Some(shifts.into_iter().chain(turns).collect())
     }
 }
 

@@ -7,8 +7,10 @@ use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
 use crate::experiment::statistics::{mean, mean_interval};
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::planner_rows;
+use crate::experiment::trial::row::{ViewRow, planner_rows};
 use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
+use palpate_explore::view::ViewDoubt;
+use palpate_gp::math::normal::BAND_95;
 use palpate_input::format::counted;
 use serde_json::{Value, json};
 
@@ -214,10 +216,10 @@ const FAR_OFF: f64 = 4.5;
 /// Returns the error of the camera's pose in a planner's first trial, and the number of trials in
 /// which it is beyond what was expected; `None` without a view.
 fn camera_line(run: &Run, planner: &str) -> Option<String> {
-    let rows = planner_rows(&run.rows, planner);
-    let mut errors = rows.flat_map(|row| row.views.iter().filter_map(|view| view.error.as_ref()));
-    let first = errors.next()?;
-    let far_off = std::iter::once(first).chain(errors).filter(|error| error.prior_sds > FAR_OFF);
+    let views = || planner_rows(&run.rows, planner).flat_map(|row| &row.views);
+    let all = || views().filter_map(|view| view.error.as_ref());
+    let first = all().next()?;
+    let far_off = all().filter(|error| error.prior_sds > FAR_OFF);
     let far_off = match far_off.count() {
         0 => String::new(),
         count => format!(
@@ -226,7 +228,27 @@ fn camera_line(run: &Run, planner: &str) -> Option<String> {
             counted(count, "view")
         ),
     };
-    Some(format!("{planner}: in the first trial the camera is off by {first}{far_off}"))
+    let doubts: Vec<ViewDoubt> = all().filter_map(|error| error.doubt).collect();
+    let doubted = doubts.first().map_or(String::new(), |doubt| {
+        format!(
+            "; {} left out, because touches contradict what is seen (in the first, {doubt}): check \
+             object, pose, unit, frame and side",
+            counted(doubts.len(), "view")
+        )
+    });
+    let z: Vec<f64> = views().filter_map(ViewRow::pose_deviations).flatten().collect();
+    let within = z.iter().filter(|z| z.abs() <= BAND_95).count();
+    let within = match z.len() {
+        0 => String::new(),
+        count => format!(
+            "; true errors of simulated poses are within 1.96 stated deviations in {:.0} % of {count} \
+             components",
+            100.0 * within as f64 / count as f64
+        ),
+    };
+    Some(format!(
+        "{planner}: in the first trial the camera is off by {first}{far_off}{doubted}{within}"
+    ))
 }
 
 /// Returns the events in a planner's trials, in a line; `None` without events.

@@ -15,15 +15,27 @@ use std::path::Path;
 // heuristic: a cloud of ten million points.
 const LARGEST: u64 = 1 << 29;
 
-/// Returns the points of the file that `camera` names, in the camera's frame, for its stated pose.
+/// Content of a file.
+pub(super) struct Seen {
+    /// Points in the camera's frame.
+    pub points_c: Vec<Point3<f64>>,
+    /// Lowest and highest (x/z, y/z) of the image, if it is known.
+    pub image: Option<[[f64; 2]; 2]>,
+}
+
+/// Largest share of the points beside the image of stated intrinsics.
+// heuristic: rounding of numbers in a text file.
+const BESIDE: f64 = 1e-3;
+
+/// Returns what the file that `camera` names shows, for its stated pose.
 ///
 /// # Errors
 /// If the file cannot be read, or is neither a PLY or PCD cloud nor a 16-bit grey PNG.
-pub(super) fn points(
+pub(super) fn read(
     camera: &CameraSettings,
     path: &Path,
     x_wc: &Isometry3<f64>,
-) -> Result<Vec<Point3<f64>>, InputError> {
+) -> Result<Seen, InputError> {
     let at = |error: InputError| error.at(path.display());
     let unreadable = |cause| at(InputError::new(format!("cannot be read: {cause}")));
     let bytes = files::bytes(path, LARGEST).map_err(unreadable)?;
@@ -46,15 +58,21 @@ pub(super) fn points(
     };
     // A pixel without a depth is no number.
     let is_seen = |p: &Point3<f64>| p.iter().all(|x| x.is_finite());
-    Ok(cloud.into_iter().filter(is_seen).map(moved).collect())
+    let points_c: Vec<Point3<f64>> = cloud.into_iter().filter(is_seen).map(moved).collect();
+    // The image of a cloud is that of the camera's model or intrinsics.
+    let image = camera.pixels.map(|_| camera.image()).filter(|[low, high]| {
+        let is_in = |p: &&Point3<f64>| {
+            let at = [p.x / p.z, p.y / p.z];
+            (0..2).all(|axis| (low[axis]..=high[axis]).contains(&at[axis]))
+        };
+        let beside = points_c.iter().filter(|p| !is_in(p)).count();
+        beside as f64 <= BESIDE * points_c.len() as f64
+    });
+    Ok(Seen { points_c, image })
 }
 
-/// Returns the points of an image of depths; 0 is a pixel without one.
-fn depths(
-    camera: &CameraSettings,
-    bytes: &[u8],
-    scale: f64,
-) -> Result<Vec<Point3<f64>>, InputError> {
+/// Returns what an image of depths shows; 0 is a pixel without one.
+fn depths(camera: &CameraSettings, bytes: &[u8], scale: f64) -> Result<Seen, InputError> {
     let invalid = |cause: png::DecodingError| InputError::new(format!("no PNG image: {cause}"));
     let mut decoder = Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(Transformations::IDENTITY);
@@ -82,5 +100,7 @@ fn depths(
         let depth = u16::from_be_bytes(*bytes);
         (depth > 0).then(|| Point3::from(camera.ray(i) * (f64::from(depth) * scale)))
     };
-    Ok(data.as_chunks::<2>().0.iter().take(width * height).enumerate().filter_map(point).collect())
+    let pixels = data.as_chunks::<2>().0.iter().take(width * height);
+    let points_c = pixels.enumerate().filter_map(point).collect();
+    Ok(Seen { points_c, image: Some(camera.image()) })
 }

@@ -9,6 +9,7 @@ pub mod settings;
 pub use settings::CameraSettings;
 
 use crate::sim::finger::noise::normal;
+use file::Seen;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_explore::robot::Robot;
 use palpate_explore::view::{LookOffer, PixelNoise, View, corrected_pose};
@@ -17,6 +18,8 @@ use palpate_geometry::primitives::nearest_of_segments;
 use palpate_geometry::sweep::Capsule;
 use palpate_input::error::InputError;
 use rand::{Rng, RngExt};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use settings::FlyingPixels;
 
 /// Largest depth, m.
@@ -26,6 +29,18 @@ const FARTHEST_M: f64 = 5.0;
 /// Step of the depth between neighbouring pixels, as a fraction of it, that is an edge.
 // heuristic: a surface at 75° to the ray has a step of a hundredth at 640 pixels.
 const EDGE: f64 = 0.02;
+
+/// Error of a simulated camera's stated pose, in the terms of
+/// [`RigidError`](palpate_explore::view::RigidError).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrueError {
+    /// Shift of the seen points at the middle of the region along x, y and z of the camera, m.
+    pub shift_m: [f64; 3],
+    /// Rotation of the seen points about the same axes, deg.
+    pub turn_deg: [f64; 3],
+    /// Relative error of the depths.
+    pub scale: f64,
+}
 
 /// Scene before a camera.
 pub struct VisibleScene<'a> {
@@ -59,8 +74,8 @@ impl CameraSettings {
         let stated = self.x_wc(&scene.middle_w);
         let (pivot_w, accuracy) = (self.target_w(&scene.middle_w), self.accuracy());
         if let Some(path) = &self.file {
-            let points_c = file::points(self, path, &stated)?;
-            return Ok(View { x_wc: stated, points_c, image: None, pivot_w, accuracy });
+            let Seen { points_c, image } = file::read(self, path, &stated)?;
+            return Ok(View { x_wc: stated, points_c, image, pivot_w, accuracy });
         }
         let (x_wc, scale) = self.true_pose(&stated, &pivot_w, rng);
         let mut image = self.render(scene, &x_wc);
@@ -78,9 +93,13 @@ impl CameraSettings {
         }
         let seen = image.depths_m.iter().enumerate().filter(|(_, depth_m)| depth_m.is_finite());
         let points_c = seen.map(|(i, depth_m)| (self.ray(i) * *depth_m).into()).collect();
-        let corner = |i| [self.ray(i).x, self.ray(i).y];
-        let image = Some([0, self.pixels()[0] * self.pixels()[1] - 1].map(corner));
-        Ok(View { x_wc: stated, points_c, image, pivot_w, accuracy })
+        Ok(View { x_wc: stated, points_c, image: Some(self.image()), pivot_w, accuracy })
+    }
+
+    /// Returns (x/z, y/z) at the corners of its image.
+    fn image(&self) -> [[f64; 2]; 2] {
+        let [width, height] = self.pixels();
+        [0, width * height - 1].map(|i| [self.ray(i).x, self.ray(i).y])
     }
 
     /// Returns the offer of view `number` from here.
@@ -128,6 +147,18 @@ impl CameraSettings {
         [fx * p_c.x / p_c.z + cx, fy * p_c.y / p_c.z + cy]
     }
 
+    /// Draws the error of the stated pose that a view with this `rng` has; `None` for a file.
+    pub fn true_error(&self, rng: &mut impl Rng) -> Option<TrueError> {
+        self.file.is_none().then(|| self.draw_error(rng))
+    }
+
+    fn draw_error(&self, rng: &mut impl Rng) -> TrueError {
+        let Some(error) = &self.pose_error else { return TrueError::default() };
+        let mut draw = |sds: [f64; 3]| sds.map(|sd| sd * normal(rng));
+        let (shift_m, turn_deg) = (draw(error.position_sd_m), draw(error.rotation_sd_deg));
+        TrueError { shift_m, turn_deg, scale: error.scale_sd * normal(rng) }
+    }
+
     /// Draws where the camera is, and the scale of its depths; the inverse of the correction by
     /// [`SeenSurface`](palpate_explore::view::SeenSurface).
     fn true_pose(
@@ -136,13 +167,13 @@ impl CameraSettings {
         pivot_w: &Point3<f64>,
         rng: &mut impl Rng,
     ) -> (Isometry3<f64>, f64) {
-        let Some(error) = &self.pose_error else { return (*stated, 1.0) };
-        let mut draw =
-            |sds: [f64; 3]| stated.rotation * Vector3::from(sds.map(|sd| sd * normal(rng)));
-        let (shift, turn) =
-            (draw(error.position_sd_m), draw(error.rotation_sd_deg.map(f64::to_radians)));
-        let scale = 1.0 + error.scale_sd * normal(rng);
-        (corrected_pose(stated, pivot_w, &shift, &turn), scale)
+        if self.pose_error.is_none() {
+            return (*stated, 1.0);
+        }
+        let TrueError { shift_m, turn_deg, scale } = self.draw_error(rng);
+        let [shift, turn] =
+            [shift_m, turn_deg.map(f64::to_radians)].map(|of| stated.rotation * Vector3::from(of));
+        (corrected_pose(stated, pivot_w, &shift, &turn), 1.0 + scale)
     }
 
     /// Returns the exact depths from the pose `x_wc`.

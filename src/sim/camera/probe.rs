@@ -1,5 +1,6 @@
 //! Probe with a camera: it looks itself, and passes touches on.
 
+use super::TrueError;
 use crate::sim::Environment;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};
@@ -10,6 +11,7 @@ use palpate_gp::math::seed;
 use palpate_input::error::InputError;
 use palpate_input::format::counted;
 use rand::Rng;
+use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// Probe with the camera of a scene.
@@ -44,8 +46,7 @@ impl<P: Probe> CameraProbe<P> {
 impl<P: Probe> Probe for CameraProbe<P> {
     fn execute(&mut self, action: &Action) -> Result<Outcome, Fault> {
         let Action::Look { camera } = action else { return self.probe.execute(action) };
-        let [root, trial] = self.seeds;
-        let mut random = seed::stream(root, trial, &format!("view {camera}"));
+        let mut random = stream(self.seeds, *camera);
         let seen = seen(&self.environment, *camera, &mut random)?;
         self.taken.push(*camera);
         self.probe.rest(self.look_s());
@@ -71,6 +72,18 @@ impl<P: Probe> Probe for CameraProbe<P> {
     fn rest(&mut self, time_s: f64) {
         self.probe.rest(time_s);
     }
+}
+
+/// Returns the random numbers of a view.
+fn stream([root, trial]: [u64; 2], number: u32) -> ChaCha8Rng {
+    seed::stream(root, trial, &format!("view {number}"))
+}
+
+/// Returns the true error of the camera's pose in view `number` of a trial with the `seeds`, root
+/// and trial; `None` for a file.
+pub fn true_error(environment: &Environment, number: u32, seeds: [u64; 2]) -> Option<TrueError> {
+    let camera = environment.scene().camera.as_ref()?.at(number as usize);
+    camera.true_error(&mut stream(seeds, number))
 }
 
 /// Returns what view `number` shows of the region.

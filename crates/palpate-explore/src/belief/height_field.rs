@@ -7,7 +7,7 @@ use crate::robot::Finger;
 use crate::surface_evidence::SurfaceEvidence;
 use crate::task::Zone;
 use crate::view::look::{SEEN_NORMAL_Y_MIN, field_gradient};
-use crate::view::{LookOffer, RigidError, SeenSurface};
+use crate::view::{CorrectedElement, LookOffer, RigidError, SeenSurface};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
@@ -25,6 +25,12 @@ use serde::{Deserialize, Serialize};
 /// the camera's pose.
 // heuristic: ten times what a surface of these heights needs.
 const SEEN_SIGNAL_MAX: f64 = 10.0;
+
+/// Height of a contact above a seen element at its place, m, and in standard deviations of the
+/// element, beyond which the element is behind the front.
+// heuristic: thicker than a sheet that bends under a finger.
+const BEFORE_M: f64 = 5e-3;
+const BEFORE_SIGMAS: f64 = 4.0;
 
 /// Number of seen heights of a view that a fit uses.
 // heuristic: a fit's time grows as their cube, and its lengths hardly change.
@@ -55,7 +61,7 @@ pub struct HeightField {
     /// Upper bound from free space, if that is enabled.
     ceiling: Option<FreeSpaceBound>,
     pub(super) presence: SurfaceEvidence,
-    /// Space swept by the touches with contact, if the band uses it.
+    /// Space swept by the touches.
     #[serde(default)]
     pub(super) swept: Vec<FreeVolume>,
     /// Finger of the touches, if known.
@@ -155,22 +161,29 @@ impl HeightField {
                 continue;
             }
             let height = self.zone.height_m(&element.p_w);
+            if self.touched.iter().any(|contact| is_before(&self.zone, contact, &element)) {
+                continue;
+            }
             let variance = element.sd * element.sd;
             let known = Some(KnownError { variance, source, loadings: &element.loadings });
             all.push(&Observation { place: &place, height, noise: 1.0, slope: None, known });
         }
     }
 
-    /// Registers the views to the contacts, and leaves out what the finger went through.
-    fn register(&mut self) {
-        let (zone, ceiling) = (&self.zone, &self.ceiling);
-        let inside_m = |p_w: &Point3<f64>, beside_m: f64| match ceiling {
-            Some(ceiling) => {
-                zone.height_m(p_w) - ceiling.around_m(zone, &zone.place(p_w), beside_m)
-            }
-            None => f64::NEG_INFINITY,
+    /// Registers the views to the contacts, and leaves out what the touches contradict; a part of a
+    /// [fit](Self::refit).
+    pub fn register(&mut self) {
+        let (zone, swept) = (&self.zone, &self.swept);
+        let inside_m = |touch: usize, p_w: &Point3<f64>, beside_m: f64| {
+            swept[touch].depth_m(zone, p_w, beside_m)
         };
-        self.seen.iter_mut().for_each(|seen| seen.align(&self.touched, inside_m));
+        let align = |seen: &mut SeenSurface| {
+            let touched = &self.touched;
+            let shown = touched.iter().filter(|contact| seen.tells_at(zone, &contact.p_wc)).count();
+            seen.align(touched, shown, swept.len(), inside_m);
+        };
+        self.seen.iter_mut().for_each(align);
+        self.presence.set_views(self.seen.iter().map(SeenSurface::presence));
     }
 
     /// Takes the slopes of `posterior` for the seen surface. Returns whether that changes the
@@ -191,11 +204,9 @@ impl HeightField {
 
     /// Adds free space above the surface; a miss has found none.
     pub(super) fn lower(&mut self, free: &FreeVolume) {
+        self.swept.push(free.clone());
         if free.end == End::Miss {
             return;
-        }
-        if self.settings.band.learned().is_some() {
-            self.swept.push(free.clone());
         }
         if let Some(ceiling) = &mut self.ceiling {
             ceiling.lower(&self.zone, free);
@@ -429,6 +440,17 @@ impl HeightField {
     pub fn targets(&self) -> &[Vec<f64>] {
         &self.targets
     }
+}
+
+/// Whether a contact is before a seen element along the approach, which is then not the front.
+fn is_before(zone: &Zone, contact: &Contact, element: &CorrectedElement) -> bool {
+    let away = zone.x_wz().inverse_transform_vector(&(element.p_w - contact.p_wc));
+    let away_m = away.xz().norm();
+    let normal_y = zone.x_wz().inverse_transform_vector(&element.normal_w).y;
+    let rise_m = away_m * (1.0 - normal_y * normal_y).max(0.0).sqrt() / normal_y;
+    let sds: f64 = element.loadings.iter().map(|sd| sd * sd).sum();
+    let clear_m = BEFORE_M + BEFORE_SIGMAS * (element.sd * element.sd + sds).sqrt();
+    away_m < 0.5 * element.side_m && -away.y > rise_m + clear_m
 }
 
 /// Returns the mean height at `place`, and the gradient in `W` of the height above the mean.

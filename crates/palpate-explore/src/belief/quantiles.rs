@@ -2,6 +2,7 @@
 
 use super::HeightField;
 use crate::band::BandFeatures;
+use crate::evidence::End;
 use palpate_gp::batch::Prediction;
 use palpate_gp::math::normal;
 use palpate_gp::posterior::Scratch;
@@ -92,7 +93,7 @@ impl HeightField {
         let noise_sd = self.surface.as_ref().map_or(0.0, |it| it.hyperparameters().noise_sd);
         let margin_m = normal::BAND_95 * noise_sd;
         let mut bounds_m = vec![self.depth_limits_m()[1]; places.len()];
-        for swept in &self.swept {
+        for swept in self.swept.iter().filter(|swept| swept.end != End::Miss) {
             let ceilings_m = swept.upper_bounds_m(&self.zone, places.iter().map(AsRef::as_ref));
             for (bound_m, ceiling_m) in bounds_m.iter_mut().zip(ceilings_m) {
                 *bound_m =

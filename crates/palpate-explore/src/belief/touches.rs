@@ -4,6 +4,7 @@ use super::HeightField;
 use crate::evidence::{Contact, End, ErrorSource, Evidence, FreeVolume, Outcome, SurfacePoints};
 use crate::task::Target;
 use crate::task::stroke::FIRST_SOURCE;
+use crate::view::SeenSurface;
 use nalgebra::Vector3;
 use palpate_gp::{KnownError, Observation, Slope};
 
@@ -59,8 +60,8 @@ impl HeightField {
                 self.lower(free);
             }
             Evidence::Seen(seen) => {
-                self.presence.add_seen(&seen.presence);
                 self.seen.push((**seen).clone());
+                self.presence.set_views(self.seen.iter().map(SeenSurface::presence));
             }
         }
     }
@@ -102,7 +103,7 @@ impl HeightField {
             let p_wt = point.p_wc + point.normal_w * free.finger.radius_m;
             self.lower(&FreeVolume { p_wt, ..free.clone() });
             let place = self.zone.local(&self.zone.place(&point.p_wc), 0.0);
-            self.presence.add_seen(&[([place.x, place.z], 1.0)]);
+            self.presence.add_slid([place.x, place.z]);
         }
     }
 

@@ -25,6 +25,17 @@ const SEEN_PER_SIDE: usize = 12;
 // heuristic: a steep wall may have left a hole in the view.
 const SEEN_THROUGH: f64 = 0.1;
 
+/// Standard deviations of noise and rotation by which a surface is nearer that covers a point.
+const COVERED_SIGMAS: f64 = 3.0;
+
+/// Number of hidden points before a seen one that show a surface before it.
+// heuristic: a single one may be a flying pixel.
+const COVERING: usize = 2;
+
+/// Largest number of points before a seen one.
+// heuristic: as many as an image has cells along a side.
+const STEPS_MAX: f64 = 256.0;
+
 impl SeenSurface {
     /// Creates the evidence of `view` for a belief over `region`.
     pub fn of_region(view: &View, region: &Region) -> Self {
@@ -36,9 +47,43 @@ impl SeenSurface {
         };
         let gradient = |normal_w: &UnitVector3<f64>| field_gradient(region, normal_w);
         let mut seen = Self::new(view, wanted, count, gradient);
-        seen.presence = region.zone().map(|zone| presence(zone, view)).unwrap_or_default();
+        if let Some(zone) = region.zone() {
+            let step_m = step_m(zone);
+            let map = DepthMap::new(view, 0.25 * step_m);
+            seen.presence = presence(zone, view, step_m, &map);
+            let covered = seen.stated().map(|p_w| is_covered(zone, view, &map, &p_w));
+            seen.covered = seen.with_neighbours(&covered.collect::<Vec<bool>>());
+        }
         seen
     }
+
+    /// Returns which elements are `covered` or beside one that is: the edge of what covers them is
+    /// as uncertain as the camera's pose.
+    fn with_neighbours(&self, covered: &[bool]) -> Vec<bool> {
+        let sides_m = self.elements.iter().map(|element| element.side_m);
+        let all: Vec<(Point3<f64>, f64)> = self.stated().zip(sides_m).collect();
+        let is_beside = |(a, a_m): &(Point3<f64>, f64), (b, b_m): &(Point3<f64>, f64)| {
+            (a - b).norm() < a_m + b_m
+        };
+        let is_covered = |(element, is_covered): (&(Point3<f64>, f64), &bool)| {
+            let mut others = all.iter().zip(covered).filter(|(_, is_covered)| **is_covered);
+            *is_covered || others.any(|(other, _)| is_beside(element, other))
+        };
+        all.iter().zip(covered).map(is_covered).collect()
+    }
+
+    /// Whether the view tells at the place of a point of `W` whether there is a surface.
+    pub(crate) fn tells_at(&self, zone: &Zone, p_w: &Point3<f64>) -> bool {
+        let p_z = zone.local(&zone.place(p_w), 0.0);
+        let near_m = 0.5 * step_m(zone);
+        let is_near = |[x, z]: &[f64; 2]| (x - p_z.x).abs().max((z - p_z.z).abs()) <= near_m;
+        self.presence.iter().any(|(place, _)| is_near(place))
+    }
+}
+
+/// Distance between the places of which a view tells the presence of a surface.
+fn step_m(zone: &Zone) -> f64 {
+    zone.widest_m() / SEEN_PER_SIDE as f64
 }
 
 /// Returns the gradient in `W` of a belief's field at a surface with this normal: of the height
@@ -53,11 +98,9 @@ pub(crate) fn field_gradient(region: &Region, normal_w: &UnitVector3<f64>) -> Ve
 
 /// Returns what a view says of the presence of a surface, at a few places of the zone: places (x,
 /// z) with a probability; none if the zone has no depth.
-fn presence(zone: &Zone, view: &View) -> Vec<([f64; 2], f64)> {
+fn presence(zone: &Zone, view: &View, step_m: f64, map: &DepthMap) -> Vec<([f64; 2], f64)> {
     let Some([near_m, far_m]) = zone.depth_m else { return Vec::new() };
-    let step_m = zone.widest_m() / SEEN_PER_SIDE as f64;
     let margin_m = view.accuracy.pose_error.position_sd_m.into_iter().fold(0.0, f64::max);
-    let map = DepthMap::new(view, 0.25 * step_m);
     let counts = zone.extents_m().into_iter().map(|side| ((side / step_m).round() as usize).max(1));
     let counts: Vec<usize> = counts.collect();
     let deep = ((far_m - near_m) / (0.25 * step_m)).ceil().max(1.0) as usize;
@@ -79,4 +122,24 @@ fn presence(zone: &Zone, view: &View) -> Vec<([f64; 2], f64)> {
         Some(([p_z.x, p_z.z], presence))
     };
     (0..counts.iter().product()).filter_map(verdict).collect()
+}
+
+/// Whether a surface is before a seen point along the approach, as an overhang under which the
+/// camera sees: it hides the points before it. A camera that sees a point of a height field sees
+/// all points before it too.
+fn is_covered(zone: &Zone, view: &View, map: &DepthMap, p_w: &Point3<f64>) -> bool {
+    let Some([near_m, _]) = zone.depth_m else { return false };
+    let accuracy = &view.accuracy;
+    let turn_sd = accuracy.pose_error.rotation_sd_deg.into_iter().fold(0.0, f64::max).to_radians();
+    let depth_m = view.x_wc.inverse_transform_point(p_w).z;
+    let noise_m = COVERED_SIGMAS * accuracy.noise.sd_m(depth_m) + map.width_m(depth_m);
+    let before_m = -near_m - zone.x_wz().inverse_transform_point(p_w).y;
+    let up_w = zone.x_wz() * Vector3::y();
+    let step_m = map.width_m(depth_m).max(f64::MIN_POSITIVE);
+    let steps = (before_m / step_m).clamp(0.0, STEPS_MAX) as usize;
+    let hidden = (1..=steps).map(|step| step as f64 * step_m).filter(|before_m| {
+        let margin_m = noise_m + COVERED_SIGMAS * turn_sd * before_m;
+        map.is_hidden(&(p_w + up_w * *before_m), margin_m)
+    });
+    hidden.take(COVERING).count() == COVERING
 }

@@ -4,6 +4,7 @@
 //! [`thin`] turns the thousands of points of a [`View`] into a few hundred surface elements. A
 //! [`SeenSurface`] is the evidence that a belief takes from them.
 
+mod doubt;
 pub(crate) mod look;
 mod offer;
 mod register;
@@ -12,6 +13,7 @@ mod seen;
 mod sight;
 mod thin;
 
+pub use doubt::ViewDoubt;
 pub use offer::LookOffer;
 pub use seen::{CorrectedElement, ERRORS, RigidError, SeenSurface, corrected_pose};
 pub use sight::{DepthMap, Sight};

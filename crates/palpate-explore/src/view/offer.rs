@@ -55,9 +55,13 @@ impl SeenSurface {
             }
             let normal_c = x_cw.rotation * normal_w;
             let sd_m = offer.accuracy.noise.sd_m(p_c.z);
-            elements.push(SurfaceElement { p_c, normal_c, sd_m, count: 1 });
+            elements.push(SurfaceElement { p_c, normal_c, sd_m, count: 1, side_m: 0.0 });
         }
         let LookOffer { x_wc, pivot_w, accuracy, .. } = offer;
-        Self::of(elements, x_wc, pivot_w, &accuracy.pose_error, gradient)
+        let mut seen = Self::of(elements, x_wc, pivot_w, &accuracy.pose_error, gradient);
+        for (element, spacing_m) in seen.spacings_m().into_iter().enumerate() {
+            seen.elements[element].side_m = spacing_m;
+        }
+        seen
     }
 }

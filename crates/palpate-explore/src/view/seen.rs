@@ -11,6 +11,7 @@
 //! rougher. So [registration](SeenSurface::register) to the contacts finds them, and the belief
 //! gets its mean and covariance as their prior.
 
+use super::doubt::ViewDoubt;
 use super::{PoseError, SurfaceElement, View, thin};
 use nalgebra::{
     Isometry3, Point3, SMatrix, SVector, Translation3, UnitQuaternion, UnitVector3, Vector3,
@@ -32,7 +33,7 @@ pub struct SeenSurface {
     #[schemars(with = "serde_json::Value")]
     x_wc: Isometry3<f64>,
     #[schemars(with = "[f64; 3]")]
-    pivot_w: Point3<f64>,
+    pub(super) pivot_w: Point3<f64>,
     pose_error: PoseError,
     pub(super) elements: Vec<SurfaceElement>,
     /// Gradients in `W`, at the elements, of a field that is 0 on the surface and positive outside.
@@ -46,10 +47,19 @@ pub struct SeenSurface {
     /// Whether each element is not on the object; empty if all are.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<bool>,
+    /// Whether each element is behind another surface along the approach; empty around an object.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) covered: Vec<bool>,
+    /// Reason for which the view is left out of the belief.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) doubt: Option<ViewDoubt>,
     /// Places (x, z) of a zone where the view tells whether there is a surface, with its
     /// probability.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) presence: Vec<([f64; 2], f64)>,
+    /// Logarithm of the evidence of the touches for the view.
+    #[serde(default)]
+    pub(super) log_evidence: f64,
     /// Cholesky factor of their covariance.
     #[schemars(with = "[[f64; ERRORS]; ERRORS]")]
     pub(super) factor: SMatrix<f64, ERRORS, ERRORS>,
@@ -63,6 +73,8 @@ pub struct CorrectedElement {
     pub p_w: Point3<f64>,
     /// Unit normal of the surface fitted to its points, towards the camera.
     pub normal_w: UnitVector3<f64>,
+    /// Side of the square across the ray over which its points spread.
+    pub side_m: f64,
     /// Standard deviation of its own error.
     pub sd: f64,
     /// Change per standard deviation of each of the remaining, independent errors of the camera.
@@ -90,6 +102,13 @@ pub struct RigidError {
     pub position_m: [f64; 3],
     /// Corrected rotation of the camera, as a unit quaternion (x, y, z, w).
     pub rotation: [f64; 4],
+    /// Reason for which the view is left out of the belief.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<ViewDoubt>,
+    /// Logarithm of the evidence of the touches for the view, over that for a view of something
+    /// else.
+    #[serde(default)]
+    pub log_evidence: f64,
 }
 
 impl SeenSurface {
@@ -123,6 +142,9 @@ impl SeenSurface {
             errors: SVector::zeros(),
             factor: SMatrix::identity(),
             rejected: Vec::new(),
+            covered: Vec::new(),
+            doubt: None,
+            log_evidence: 0.0,
             presence: Vec::new(),
         }
     }
@@ -147,10 +169,15 @@ impl SeenSurface {
 
     /// Pose of the camera in `W`, corrected by the present errors.
     pub(super) fn corrected(&self) -> Isometry3<f64> {
-        let moved = self.errors.component_mul(&self.sds());
+        self.pose_at(&self.errors).0
+    }
+
+    /// Returns the pose of the camera in `W`, corrected by `errors`, and the scale of its depths.
+    pub(super) fn pose_at(&self, errors: &SVector<f64, ERRORS>) -> (Isometry3<f64>, f64) {
+        let moved = errors.component_mul(&self.sds());
         let [shift, turn] =
             [0, 3].map(|row| self.x_wc.rotation * moved.fixed_rows::<3>(row).into_owned());
-        corrected_pose(&self.x_wc, &self.pivot_w, &shift, &turn)
+        (corrected_pose(&self.x_wc, &self.pivot_w, &shift, &turn), 1.0 + moved[ERRORS - 1])
     }
 
     /// Returns the places of the elements in `W` by the stated pose.
@@ -160,7 +187,7 @@ impl SeenSurface {
 
     /// Depths that the camera states, over the true ones.
     pub(super) fn scale(&self) -> f64 {
-        1.0 + self.errors[ERRORS - 1] * self.pose_error.scale_sd
+        self.pose_at(&self.errors).1
     }
 
     /// Returns the change of a field with a gradient in `W` at a seen point, which is `away_w` from
@@ -180,9 +207,21 @@ impl SeenSurface {
     }
 
     /// Returns the surface elements of the object, corrected by the errors that registration has
-    /// found.
+    /// found; none of a view [in doubt](Self::doubt).
     pub fn elements(&self) -> impl Iterator<Item = CorrectedElement> {
-        self.all().enumerate().filter(|(i, _)| self.is_kept(*i)).map(|(_, element)| element)
+        let is_shown = |i: &usize| self.doubt.is_none() && self.is_kept(*i);
+        self.all().enumerate().filter(move |(i, _)| is_shown(i)).map(|(_, element)| element)
+    }
+
+    /// Reason for which the view is left out of the belief, after a registration.
+    pub fn doubt(&self) -> Option<ViewDoubt> {
+        self.doubt
+    }
+
+    /// Returns the places (x, z) of a zone where the view tells whether there is a surface, with
+    /// its probability.
+    pub(crate) fn presence(&self) -> &[([f64; 2], f64)] {
+        if self.doubt.is_some() { &[] } else { &self.presence }
     }
 
     /// Returns at most `count` of the elements with the errors of their distance along the normal,
@@ -196,9 +235,9 @@ impl SeenSurface {
         })
     }
 
-    /// Whether an element is on the object.
+    /// Whether an element is on the object, and a touch can reach it.
     pub(super) fn is_kept(&self, element: usize) -> bool {
-        !self.rejected.get(element).is_some_and(|is_rejected| *is_rejected)
+        ![&self.rejected, &self.covered].into_iter().any(|out| out.get(element) == Some(&true))
     }
 
     /// Returns all surface elements, corrected.
@@ -222,7 +261,7 @@ impl SeenSurface {
         let away = p_w.coords - x_wc.translation.vector;
         let loadings = self.factor.tr_mul(&self.loadings(&p_w, &away, gradient_w)).into();
         let sd = element.sd_m * away.normalize().dot(gradient_w).abs();
-        CorrectedElement { p_w, normal_w, sd, loadings }
+        CorrectedElement { p_w, normal_w, side_m: element.side_m, sd, loadings }
     }
 
     /// Takes the `gradient` of the belief's field at each corrected element in `W`, if there is
@@ -256,6 +295,8 @@ impl SeenSurface {
             prior_sds: mean.amax(),
             position_m: x_wc.translation.vector.into(),
             rotation: [rotation.x, rotation.y, rotation.z, rotation.w],
+            doubt: self.doubt,
+            log_evidence: self.log_evidence,
         }
     }
 }

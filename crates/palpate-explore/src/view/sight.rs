@@ -74,6 +74,20 @@ impl<'a> DepthMap<'a> {
         is_inside.then(|| steps.map(|step| step as usize))
     }
 
+    /// Whether all that the view saw in the direction of `p_w` is nearer by more than `margin_m`.
+    pub fn is_hidden(&self, p_w: &Point3<f64>, margin_m: f64) -> bool {
+        let p_c = self.view.x_wc.inverse_transform_point(p_w);
+        self.cell(&p_c).is_some_and(|[i, j]| {
+            let [nearest_m, farthest_m] = self.depths_m[j * self.counts[0] + i];
+            nearest_m <= farthest_m && farthest_m + margin_m < p_c.z
+        })
+    }
+
+    /// Distance between the middles of neighbouring cells at a depth, m.
+    pub fn width_m(&self, depth_m: f64) -> f64 {
+        self.step * depth_m
+    }
+
     /// Returns what the view says of a line of `points`, given in `W`, none farther from the next
     /// than a cell: `margin_m` is by how much it may be off. A cell without a point counts as seen
     /// through, if none of its neighbours has a nearer one.

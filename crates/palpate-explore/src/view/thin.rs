@@ -24,6 +24,9 @@ pub struct SurfaceElement {
     pub sd_m: f64,
     /// Number of points.
     pub count: usize,
+    /// Side of the square across the ray over which points would spread as far.
+    #[serde(default)]
+    pub side_m: f64,
 }
 
 /// Number of levels of the quadtree below the whole image.
@@ -283,6 +286,9 @@ impl Image {
         if !(sd_m.is_finite() && p_c.coords.iter().all(|x| x.is_finite())) {
             return None;
         }
-        Some((SurfaceElement { p_c, normal_c, sd_m, count }, misfit))
+        let off2 = |[x, y, _]: &[f64; 3]| (x - u).powi(2) + (y - v).powi(2);
+        // The mean square distance from the middle of a square is a sixth of that of its side.
+        let side_m = z * (6.0 * kept.iter().map(off2).sum::<f64>() / n).sqrt();
+        Some((SurfaceElement { p_c, normal_c, sd_m, count, side_m }, misfit))
     }
 }

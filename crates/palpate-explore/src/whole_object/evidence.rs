@@ -210,15 +210,14 @@ impl SpatialEvidence {
         }
     }
 
-    /// Registers the views to the contacts, and leaves out what the finger went through.
+    /// Registers the views to the contacts, and leaves out what the touches contradict.
     pub(super) fn register(&mut self) {
         let free = &self.free;
-        let inside_m = |p_w: &Point3<f64>, beside_m: f64| {
-            let depths_m = free.iter().map(|free| -free.distance_m(p_w) - beside_m);
-            depths_m.fold(f64::NEG_INFINITY, f64::max)
+        let inside_m = |touch: usize, p_w: &Point3<f64>, beside_m: f64| {
+            -free[touch].distance_m(p_w) - beside_m
         };
         let contacts: Vec<Contact> = self.touched().cloned().collect();
-        self.seen.iter_mut().for_each(|seen| seen.align(&contacts, inside_m));
+        self.seen.iter_mut().for_each(|seen| seen.align(&contacts, 0, free.len(), inside_m));
     }
 }
 
