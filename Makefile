@@ -14,7 +14,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test test-code test-arms check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test test-code test-arms check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection camera growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -240,6 +240,10 @@ strokes: setup
 # Force at which contact is detected, and rate of false detections.
 detection: setup
 	cargo bench --locked --bench detection
+
+# Errors of registered views, and how often a wrong view is named.
+camera: setup
+	cargo bench --locked --bench camera
 
 # Cost over the number of touches; draws docs/growth.svg.
 growth: setup
