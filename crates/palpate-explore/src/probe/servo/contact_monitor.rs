@@ -120,8 +120,8 @@ impl ContactMonitor {
         }
     }
 
-    /// Returns the mean force since [`clear_samples`](Self::clear_samples), relative to that at rest,
-    /// in `T`, N.
+    /// Returns the mean force since [`clear_samples`](Self::clear_samples), relative to that at
+    /// rest, in `T`, N.
     pub(super) fn mean_force_n(&self) -> Option<Vector3<f64>> {
         let (sum_n, count) = self.forces;
         self.force_at_rest_n.filter(|_| count > 0.0).map(|rest_n| sum_n / count - rest_n)

@@ -8,8 +8,8 @@ use crate::robot::sensor::SensedContact;
 use nalgebra::{Isometry3, Vector3};
 
 /// Part of the load that is left at the second reading, and the bounds that are good enough.
-// heuristic: the lighter the second load, the smaller the error of the line's zero, but contact must
-// remain: at these loads the error is 1.3 to 4 times that of the force over the stiffness.
+// heuristic: the lighter the second load, the smaller the error of the line's zero, but contact
+// must remain: at these loads the error is 1.3 to 4 times that of the force over the stiffness.
 const LEFT: f64 = 0.45;
 const LEFT_BOUNDS: [f64; 2] = [0.2, 0.7];
 
