@@ -85,7 +85,7 @@ impl Servo {
                 Some(free_m) => wanted_m.unwrap_or(0.0).max(0.5 * (touching_m + free_m)),
                 None => wanted_m.unwrap_or(grown_m).clamp(touching_m, grown_m),
             };
-            if next_m > LONGEST_M || next_m < SHORTEST_M {
+            if !(SHORTEST_M..=LONGEST_M).contains(&next_m) {
                 break;
             }
             back_m = next_m;
