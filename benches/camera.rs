@@ -79,7 +79,8 @@ fn environments(half: &str, mm: f64, deg: f64) -> Vec<Arc<Environment>> {
     let text = text.unwrap_or_default();
     let names =
         text.lines().filter_map(|line| line.trim().strip_prefix("\"../../")?.split('"').next());
-    let scenes = names.filter_map(|name| Scene::load(&home.join(name), &[camera.clone()]).ok());
+    let scenes =
+        names.filter_map(|name| Scene::load(&home.join(name), std::slice::from_ref(&camera)).ok());
     scenes.filter_map(|scene| Environment::build(scene).ok().map(Arc::new)).collect()
 }
 
