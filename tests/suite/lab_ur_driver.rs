@@ -55,7 +55,7 @@ fn a_ur_touches_where_the_surface_is() {
         let network = network(number);
         let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&network, &touch(&network, touches, folder.path(), &sets));
+        let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets));
         println!("{options:?}: off by {off_mm:.3?} mm");
         assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
         let ended = twin.end();
@@ -92,7 +92,7 @@ fn a_calibrated_ur_touches_where_the_surface_is() {
     }
     let calibrated = format!("scene.arm.calibration=\"{}\"", model.display());
     let row = touch(&network, count("PALPATE_UR_TOUCHES", 6), &out, &[&calibrated]);
-    let off_mm = off_mm(&network, &row);
+    let off_mm = off_mm(&row);
     println!("calibrated: off by {off_mm:.3?} mm");
     assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
     twin.end();
@@ -186,7 +186,7 @@ fn a_paused_ur_is_waited_for() {
         let network = network(number);
         let twin = driver(PEER, &network, &["--from-motion", "--event", event]);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&network, &touch(&network, 2, folder.path(), &[]));
+        let off_mm = off_mm(&touch(&network, 2, folder.path(), &[]));
         assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{event}: {off_mm:?}");
         twin.end();
     }

@@ -68,11 +68,8 @@ pub fn touch(network: &Network, touches: u32, out: &Path, sets: &[&str]) -> Tria
     row
 }
 
-/// Distances, mm, of a row's contacts from the plane, less what the surface yields to the detected
-/// force.
-pub fn off_mm(network: &Network, row: &TrialRow) -> Vec<f64> {
-    let touch = Experiment::load(Path::new(network.experiment), &[]).unwrap().scene.touch;
-    let surface_m = PLANE_Y_M - touch.detection_n / STIFFNESS_N_M;
-    let contact = |y_m: f64| 1e3 * (y_m - surface_m).abs();
+/// Distances, mm, of a row's contacts from the plane.
+pub fn off_mm(row: &TrialRow) -> Vec<f64> {
+    let contact = |y_m: f64| 1e3 * (y_m - PLANE_Y_M).abs();
     row.touches.iter().map(|touch| contact(touch.contact().unwrap().y)).collect()
 }
