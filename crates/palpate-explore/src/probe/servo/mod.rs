@@ -506,9 +506,12 @@ impl Probe for Servo {
             (Some(_), None) => End::Overload,
         };
         let finger = self.robot.finger.with_attitude(&approach.r_at);
+        // Beside a contact of unknown normal an exact bound pulls the belief below flat faces.
+        let is_exact = !self.robot.yields()
+            && points.as_ref().is_none_or(|points| points.points.iter().all(|it| it.has_normal));
         let gives_way_m = match (end, &self.compliance) {
-            (End::Miss, _) if !self.robot.yields() => 0.0,
-            (End::Contact, compliance) if !self.robot.yields() => {
+            (End::Miss, _) if is_exact => 0.0,
+            (End::Contact, compliance) if is_exact => {
                 compliance.map_or(0.0, |it| it.m_per_n * self.settings.detection_n)
             }
             _ => GIVES_WAY_M,
