@@ -46,7 +46,7 @@ fn an_fr3_touches_where_the_surface_is() {
         let folder = tempfile::tempdir().unwrap();
         let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets));
         println!("{options:?}: off by {off_mm:.3?} mm");
-        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
+        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{off_mm:?}");
         let ended = twin.end();
         println!("{ended}");
         assert_eq!(ended["dropped"], json!({}), "{ended}");

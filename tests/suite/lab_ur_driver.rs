@@ -57,7 +57,7 @@ fn a_ur_touches_where_the_surface_is() {
         let folder = tempfile::tempdir().unwrap();
         let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets));
         println!("{options:?}: off by {off_mm:.3?} mm");
-        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
+        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{off_mm:?}");
         let ended = twin.end();
         assert_eq!(ended["dropped"], json!({}), "{ended}");
         let active = ended["active"].to_string();
@@ -94,7 +94,7 @@ fn a_calibrated_ur_touches_where_the_surface_is() {
     let row = touch(&network, count("PALPATE_UR_TOUCHES", 6), &out, &[&calibrated]);
     let off_mm = off_mm(&row);
     println!("calibrated: off by {off_mm:.3?} mm");
-    assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{off_mm:?}");
+    assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{off_mm:?}");
     twin.end();
 }
 
@@ -187,7 +187,7 @@ fn a_paused_ur_is_waited_for() {
         let twin = driver(PEER, &network, &["--from-motion", "--event", event]);
         let folder = tempfile::tempdir().unwrap();
         let off_mm = off_mm(&touch(&network, 2, folder.path(), &[]));
-        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.3), "{event}: {off_mm:?}");
+        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{event}: {off_mm:?}");
         twin.end();
     }
 }
