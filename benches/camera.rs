@@ -7,6 +7,7 @@
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::{Evidence, Outcome};
 use palpate::explore::view::{SeenSurface, View};
+use palpate::math::normal::BAND_95;
 use palpate::math::seed::stream;
 use palpate::sim::probe::exact_probe;
 use palpate::sim::{Environment, Scene};
@@ -26,9 +27,6 @@ const VIEWS: u64 = 3;
 
 /// Shift of a cloud, m.
 const OFF_M: f64 = 0.02;
-
-/// Standard deviations of a 95 % interval.
-const BAND: f64 = 1.96;
 
 /// Share of some cases.
 #[derive(Clone, Copy, Default)]
@@ -100,12 +98,7 @@ fn measure(environments: &[Arc<Environment>]) -> ([Share; 2], [Share; 6]) {
             for (count, within) in COUNTS.into_iter().zip(&mut within) {
                 let Some(found) = field(here, &view, &touches[..count]) else { continue };
                 let found = found.rigid_errors().remove(0);
-                for i in 0..3 {
-                    let shift_m = found.shift_m[i] - truth.shift_m[i];
-                    within.add(shift_m.abs() <= BAND * found.shift_sd_m[i]);
-                    let turn_deg = found.turn_deg[i] - truth.turn_deg[i];
-                    within.add(turn_deg.abs() <= BAND * found.turn_sd_deg[i]);
-                }
+                truth.deviations(&found).iter().for_each(|z| within.add(z.abs() <= BAND_95));
             }
             let other = &environments[(object + 1 + draw as usize) % environments.len()];
             let Ok(other) = other.look(0, &mut stream(number, 1, "view")) else { continue };

@@ -1,16 +1,14 @@
 //! Tests of depth cameras: exact depths, each error, the rigid error of the pose, and files.
 
 use crate::common::shipped::{environment, scene};
+use crate::common::touched::{belief, rmse_m, settings, touches};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use palpate::config::Loader;
 use palpate::experiment::{Experiment, Simulation, real_robot};
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::{Contact, End, Evidence};
-use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::view::{
     CameraAccuracy, PixelNoise, PoseError, RigidError, SeenSurface, View, corrected_pose, thin,
 };
-use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
 use palpate::ros::settings::RosSettings;
 use palpate::sim::Environment;
@@ -19,7 +17,6 @@ use palpate_geometry::bvh::MeshBvh;
 use proptest::prelude::*;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
-use std::path::Path;
 use std::sync::Arc;
 
 /// A camera in front of the container, to its right and above it, of few pixels.
@@ -106,37 +103,11 @@ proptest! {
     }
 }
 
-fn settings() -> GpSettings {
-    Loader::read(Path::new("experiments/beliefs/camera.toml")).unwrap().finish().unwrap()
-}
-
 /// Touches the container at `count` places, and returns the belief that has seen `view`.
 fn touched(environment: &Arc<Environment>, view: &View, count: usize) -> HeightField {
-    let zone = environment.task().zone().unwrap();
-    let mut field = HeightField::new(zone.clone(), settings());
-    field.add(&Evidence::from(SeenSurface::of_region(view, environment.task().region())));
-    let mut probe = exact_probe(Arc::clone(environment));
-    let mut random = seed::stream(3, 0, "places");
-    for _ in 0..count {
-        let target = zone.at(&[(); 2].map(|()| random.random_range(0.05..0.95)));
-        let target = target.into();
-        let outcome = probe.touch(&environment.task().approach(&target).unwrap()).unwrap();
-        assert!(outcome.contact().is_some());
-        field.observe(&target, &outcome);
-    }
-    field.refit().unwrap();
-    field
-}
-
-fn rmse_m(environment: &Environment, field: &HeightField) -> f64 {
-    let (scratch, mut squares, mut count) = (&mut Scratch::default(), 0.0, 0.0);
-    for place in field.zone().grid(21) {
-        if let Some(height_m) = environment.true_height_m(&place) {
-            squares += (field.surface().unwrap().mean(&place, scratch) - height_m).powi(2);
-            count += 1.0;
-        }
-    }
-    (squares / count).sqrt()
+    let touches = touches(environment, count);
+    assert!(touches.iter().all(|(_, outcome)| outcome.contact().is_some()));
+    belief(environment, Some(view), &touches)
 }
 
 /// The errors of the pose are found within their stated deviations, and the view corrected by them

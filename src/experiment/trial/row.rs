@@ -192,17 +192,9 @@ impl TrialRow {
 }
 
 impl ViewRow {
-    /// Returns the errors of the six components of the found pose, over their stated deviations;
-    /// those without a deviation are left out. `None` if the true pose is not known.
+    /// Returns the deviations of the found pose from the true one, if that is known.
     pub fn pose_deviations(&self) -> Option<Vec<f64>> {
-        let (found, truth) = (self.error.as_ref()?, self.true_error.as_ref()?);
-        let part = |found: &[f64; 3], truth: &[f64; 3], sds: &[f64; 3]| {
-            let known = (0..3).filter(|i| sds[*i] > 0.0);
-            known.map(|i| (found[i] - truth[i]) / sds[i]).collect::<Vec<f64>>()
-        };
-        let shifts = part(&found.shift_m, &truth.shift_m, &found.shift_sd_m);
-        let turns = part(&found.turn_deg, &truth.turn_deg, &found.turn_sd_deg);
-        Some(shifts.into_iter().chain(turns).collect())
+        Some(self.true_error.as_ref()?.deviations(self.error.as_ref()?))
     }
 }
 

@@ -12,7 +12,7 @@ use crate::sim::finger::noise::normal;
 use file::Seen;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_explore::robot::Robot;
-use palpate_explore::view::{LookOffer, PixelNoise, View, corrected_pose};
+use palpate_explore::view::{LookOffer, PixelNoise, RigidError, View, corrected_pose};
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::primitives::nearest_of_segments;
 use palpate_geometry::sweep::Capsule;
@@ -30,8 +30,7 @@ const FARTHEST_M: f64 = 5.0;
 // heuristic: a surface at 75° to the ray has a step of a hundredth at 640 pixels.
 const EDGE: f64 = 0.02;
 
-/// Error of a simulated camera's stated pose, in the terms of
-/// [`RigidError`](palpate_explore::view::RigidError).
+/// Error of a simulated camera's stated pose, in the terms of [`RigidError`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrueError {
     /// Shift of the seen points at the middle of the region along x, y and z of the camera, m.
@@ -40,6 +39,20 @@ pub struct TrueError {
     pub turn_deg: [f64; 3],
     /// Relative error of the depths.
     pub scale: f64,
+}
+
+impl TrueError {
+    /// Returns the differences of the six components of a found pose from the true ones, over their
+    /// stated deviations; those without a deviation are left out.
+    pub fn deviations(&self, found: &RigidError) -> Vec<f64> {
+        let part = |found: &[f64; 3], truth: &[f64; 3], sds: &[f64; 3]| {
+            let known = (0..3).filter(|i| sds[*i] > 0.0);
+            known.map(|i| (found[i] - truth[i]) / sds[i]).collect::<Vec<f64>>()
+        };
+        let shifts = part(&found.shift_m, &self.shift_m, &found.shift_sd_m);
+        let turns = part(&found.turn_deg, &self.turn_deg, &found.turn_sd_deg);
+        shifts.into_iter().chain(turns).collect()
+    }
 }
 
 /// Scene before a camera.

@@ -19,4 +19,5 @@ pub mod shipped;
 pub mod six;
 pub mod solids;
 pub mod tap;
+pub mod touched;
 pub mod viewer;
