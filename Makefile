@@ -14,7 +14,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test test-code test-arms check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection camera growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test test-code test-arms check-planners check-cost hard-cases test-ros2 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection camera growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
 FEATURES := ros2,franka
@@ -130,20 +130,6 @@ $(DEPS)/franka/bin/python: tests/franka/box.txt
 	python3 -m venv $(DEPS)/franka
 	$(DEPS)/franka/bin/python -m pip install --quiet --only-binary=:all: -r tests/franka/box.txt
 	touch $@
-
-# The same tests over ROS 1, with Debian's master and rospy; `make install-ros1` installs them.
-ROS1 := libssl-dev pkg-config python3-rosmaster python3-rospy python3-std-srvs \
-	$(foreach part,std sensor geometry trajectory diagnostic,python3-$(part)-msgs)
-
-test-ros1: setup
-	@if ! command -v rosmaster >/dev/null; then echo "test-ros1 is skipped: no rosmaster; make install-ros1"; \
-	elif $(NAMESPACE) true 2>/dev/null; then \
-		PALPATE_ROS=ros1 PALPATE_PEER=/usr/bin/python3 PALPATE_TOUCHES=$(TOUCHES) $(NAMESPACE) \
-			$(call LAB_TESTS,ros1); \
-	else echo "test-ros1 is skipped: $(NO_NAMESPACE)"; fi
-
-install-ros1:
-	apt-get install --yes --no-install-recommends $(ROS1)
 
 # Tests the report page in a browser, and the accessibility of report and built site with axe-core; fails without
 # Chromium. Accessibility is skipped if axe-core cannot be fetched.

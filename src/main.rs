@@ -10,8 +10,6 @@ use std::process::ExitCode;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
-    #[cfg(feature = "ros1")]
-    palpate_ros::disable_tls_certificates();
     let is_here =
         ["experiments/toy.toml", "scenes/toy.toml"].iter().all(|it| Path::new(it).is_file());
     if std::env::var_os(HOME).is_none()

@@ -1,12 +1,11 @@
-"""Independent peer for ROS 1 and ROS 2, written from the table of topics alone.
+"""Independent peer for ROS 2, written from the table of topics alone.
 
     peer.py touch ADDRESS [hand|fingers]   moves a stage along -y until the finger detects contact, and back
     peer.py listen ADDRESS SECONDS         counts and checks the messages of an explorer
-    peer.py arm ADDRESS SECONDS            simulates an arm at rest that answers services (ROS 2 only)
+    peer.py arm ADDRESS SECONDS            simulates an arm at rest that answers services
     peer.py echo ADDRESS SECONDS           answers every command with a joint state of the same stamp
 
-Prints one JSON object; exits with 1 if a message differs from the table. The address is a ROS 2 domain or a ROS 1
-master. A `link` opens topics and sends messages: `inbox(name)` returns the messages since its last use, `drive(names,
+Prints one JSON object; exits with 1 if a message differs from the table. The address is a ROS 2 domain. A `link` opens topics and sends messages: `inbox(name)` returns the messages since its last use, `drive(names,
 velocities)` sends a command, `engage()` enables the arm, `seconds(stamp)` and `validity_ns(point)` read times,
 `echo(span)` answers and counts commands, `arm(span)` simulates an arm.
 """

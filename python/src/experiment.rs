@@ -46,21 +46,20 @@ impl Experiment {
 
     /// Returns the experiment after more assignments.
     fn with_settings(&self, sets: Vec<String>) -> PyResult<Self> {
-        parsed(resolved(&self.0), &sets, self.former_names()).map(Self)
+        parsed(resolved(&self.0), &sets).map(Self)
     }
 
     #[staticmethod]
-    fn _restore(version: Version, toml: String, former: FormerNames) -> PyResult<Self> {
+    fn _restore(version: Version, toml: String) -> PyResult<Self> {
         pickle::check(&version, "Experiment")?;
-        parsed(toml, &[], former).map(Self)
+        parsed(toml, &[]).map(Self)
     }
 
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
-    ) -> PyResult<Reduced<'py, (Version, String, FormerNames)>> {
+    ) -> PyResult<Reduced<'py, (Version, String)>> {
         let Self(experiment) = slf.get();
-        let former = slf.get().former_names();
-        pickle::reduced(slf, (pickle::version(), resolved(experiment), former))
+        pickle::reduced(slf, (pickle::version(), resolved(experiment)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -197,9 +196,6 @@ impl Experiment {
     }
 }
 
-/// Former names of settings and legacy keys of a scene, of which its notices warn.
-pub(crate) type FormerNames = (Vec<String>, Vec<String>);
-
 /// Reads an experiment from the text of all its settings, after assignments.
 ///
 /// # Errors
@@ -207,21 +203,13 @@ pub(crate) type FormerNames = (Vec<String>, Vec<String>);
 pub(crate) fn parsed(
     toml: String,
     sets: &[String],
-    former: FormerNames,
 ) -> PyResult<experiment::Experiment> {
     let text = Loader::from_text(errors::SETTINGS.as_ref(), toml);
     let read = text.and_then(|loader| experiment::Experiment::from_loader(loader, sets));
-    let mut experiment = read.map_err(errors::config)?;
-    (experiment.scene.former_names, experiment.scene.effects.legacy_keys) = former;
-    Ok(experiment)
+    read.map_err(errors::config)
 }
 
 impl Experiment {
-    fn former_names(&self) -> FormerNames {
-        let scene = &self.0.scene;
-        (scene.former_names.clone(), scene.effects.legacy_keys.clone())
-    }
-
     /// Builds the simulation, with the Python planners `own`.
     pub(crate) fn simulation(
         &self,

@@ -4,7 +4,7 @@ use crate::ball::Ball;
 use crate::belief::Belief;
 use crate::columns;
 use crate::errors;
-use crate::experiment::{FormerNames, parsed};
+use crate::experiment::parsed;
 use crate::fork;
 use crate::pickle::{self, Reduced, Version};
 use crate::places::rows;
@@ -152,13 +152,12 @@ impl Run {
     fn _restore(
         version: Version,
         toml: String,
-        former: FormerNames,
         truth: &str,
         rows: &[u8],
         unlisted: usize,
     ) -> PyResult<Self> {
         pickle::check(&version, "Run")?;
-        let experiment = parsed(toml, &[], former)?;
+        let experiment = parsed(toml, &[])?;
         let truth: TruthState = serde_json::from_str(truth).map_err(errors::other)?;
         let (places, heights_m, is_edge, is_reachable, is_complete, mesh) = truth;
         let mesh = mesh.map(|(vertices, triangles)| {
@@ -175,8 +174,6 @@ impl Run {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, RunState<'py>>> {
         let store::Run { experiment, truth, unlisted, .. } = &slf.get().0;
-        let scene = &experiment.scene;
-        let former = (scene.former_names.clone(), scene.effects.legacy_keys.clone());
         let mesh = truth.mesh.as_ref().map(|mesh| {
             let vertices = mesh.vertices().iter().map(|p_w| <[f64; 3]>::from(*p_w));
             (vertices.collect::<Vec<_>>(), mesh.triangles())
@@ -185,7 +182,7 @@ impl Run {
         let truth = (places, heights_m, is_edge, is_reachable, is_complete, mesh);
         let truth = serde_json::to_string(&truth).map_err(errors::other)?;
         let rows = slf.get().rows(slf.py())?;
-        let state = (pickle::version(), resolved(experiment), former, truth, rows, *unlisted);
+        let state = (pickle::version(), resolved(experiment), truth, rows, *unlisted);
         pickle::reduced(slf, state)
     }
 

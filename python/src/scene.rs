@@ -2,7 +2,6 @@
 
 use crate::ball::Ball;
 use crate::errors;
-use crate::experiment::FormerNames;
 use crate::mesh::{Arrays, arrays, mesh_of};
 use crate::pickle::{self, Reduced, Version};
 use crate::places::Places;
@@ -42,8 +41,8 @@ pub(crate) struct Scene {
 /// Vertices (n, 3), metres, and triangles (m, 3).
 type MeshArrays = (Py<PyArray2<f64>>, Py<PyArray2<i64>>);
 
-/// Settings as TOML, former names in them, mesh and seed of a scene.
-type SceneState = (Version, String, FormerNames, Option<MeshArrays>, u64);
+/// Settings as TOML, mesh and seed of a scene.
+type SceneState = (Version, String, Option<MeshArrays>, u64);
 
 impl Scene {
     /// Builds a scene, with the mesh, if there is one, in place of its object.
@@ -243,26 +242,22 @@ impl Scene {
         py: Python<'_>,
         version: Version,
         toml: String,
-        former: FormerNames,
         mesh: Option<MeshArrays>,
         seed: u64,
     ) -> PyResult<Self> {
         pickle::check(&version, "Scene")?;
         let text = Loader::from_text(errors::SETTINGS.as_ref(), toml);
         let read = text.and_then(|loader| sim::Scene::from_loader(loader, &[]));
-        let mut settings = read.map_err(errors::config)?;
-        (settings.former_names, settings.effects.legacy_keys) = former;
-        Self::build(py, settings, mesh, seed)
+        Self::build(py, read.map_err(errors::config)?, mesh, seed)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, SceneState>> {
         let Self { settings, mesh, seed, .. } = slf.get();
-        let former = (settings.former_names.clone(), settings.effects.legacy_keys.clone());
         let clone = |(vertices, triangles): &MeshArrays| {
             (vertices.clone_ref(slf.py()), triangles.clone_ref(slf.py()))
         };
         let mesh = mesh.as_ref().map(clone);
-        pickle::reduced(slf, (pickle::version(), settings.to_toml(false), former, mesh, *seed))
+        pickle::reduced(slf, (pickle::version(), settings.to_toml(false), mesh, *seed))
     }
 
     /// Settings on one line, for an experiment on this scene.

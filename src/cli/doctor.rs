@@ -8,9 +8,7 @@ use crate::experiment::Experiment;
 use palpate_ros::network::{discovery_note, network};
 use palpate_ros::settings::RosSettings;
 use std::fs;
-use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -67,7 +65,6 @@ fn parts(host: &Host) -> Vec<Line> {
         display(&variable),
         egl(),
         ros2(&variable),
-        ros1(&variable),
         clock(),
     ]
 }
@@ -161,22 +158,6 @@ fn ros2(variable: &impl Fn(&str) -> Option<String>) -> Line {
             ("ROS 2", State::Ok, format!("domain {domain}, this machine only{note}"))
         }
         Err(error) => ("ROS 2", State::Wrong, error),
-    }
-}
-
-fn ros1(variable: &impl Fn(&str) -> Option<String>) -> Line {
-    if !cfg!(feature = "ros1") {
-        return ("ROS 1", State::Absent, "build with the feature ros1".into());
-    }
-    let master =
-        variable("ROS_MASTER_URI").unwrap_or_else(|| RosSettings::default().master.clone());
-    let host = master.trim_start_matches("http://").trim_end_matches('/');
-    let mut addresses = host.to_socket_addrs().into_iter().flatten();
-    let is_open = addresses
-        .any(|address| TcpStream::connect_timeout(&address, Duration::from_millis(300)).is_ok());
-    match is_open {
-        true => ("ROS 1", State::Ok, format!("master at {master}")),
-        false => ("ROS 1", State::Absent, format!("no master at {master}; start roscore")),
     }
 }
 

@@ -23,7 +23,7 @@ pub(super) fn lines(experiment: &Experiment, save: Option<&Path>) -> anyhow::Res
     let settings = backend.ros().with_context(|| {
         let found =
             backend.arm().map_or("a simulation".into(), |(name, _)| format!("[backend.{name}]"));
-        format!("--arm: {found} has no topics; allowed are [backend.ros2], [backend.ros1]")
+        format!("--arm: {found} has no topics; allowed is [backend.ros2]")
     })?;
     let arm = experiment.scene.arm.as_ref().context("--arm: the scene has no [arm]")?;
     let chain = arm.chain_of(&Environment::arm_model(arm)?.0)?;

@@ -1,14 +1,13 @@
 //! Command `palpate look`.
 
 use super::output::Overwrite;
-use super::serve::kind;
 use super::terminal::{Completion, print};
 use crate::experiment::store::write_whole;
 use crate::report::points::binary_ply;
 use anyhow::ensure;
 use palpate_ros::camera::CameraTopics;
 use palpate_ros::look;
-use palpate_ros::settings::{RosSettings, RosVersion};
+use palpate_ros::settings::RosSettings;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -34,9 +33,6 @@ pub(super) struct Args {
     /// Topic of the intrinsics of an image [default: `camera_info` beside TOPIC].
     #[arg(long, value_name = "TOPIC")]
     info: Option<String>,
-    /// Transport.
-    #[arg(long, value_name = "ros2|ros1", value_parser = kind, default_value = "ros2")]
-    kind: RosVersion,
     /// ROS 2 domain [default: ROS_DOMAIN_ID, or 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
@@ -51,10 +47,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
     let is_ply = args.out.extension().is_some_and(|extension| extension == "ply");
     ensure!(is_ply, "--out {}: allowed is a file ending in .ply", args.out.display());
     args.force.check_file(&args.out)?;
-    let usual = RosSettings::default();
-    let master = std::env::var("ROS_MASTER_URI").unwrap_or(usual.master.clone());
-    let version = Some(args.kind);
-    let settings = RosSettings { version, domain: args.domain, master, ..usual };
+    let settings =
+        RosSettings { is_networked: true, domain: args.domain, ..RosSettings::default() };
     let timeout = Duration::from_secs(args.timeout.into());
     let topics = CameraTopics { view: &args.topic, info: args.info.as_deref(), timeout };
     let cloud = look(&settings, &topics)?;

@@ -10,7 +10,6 @@ mod choices;
 mod columns;
 mod compare;
 mod completions;
-mod deprecated_commands;
 mod doctor;
 mod doctor_arm;
 mod export;
@@ -172,19 +171,12 @@ pub fn main(commit: &str) -> ExitCode {
 /// Runs the program for a host on `arguments`, the first of which is the program's name; returns
 /// the exit code.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
-    let outcome = deprecated_commands::translate(arguments.into_iter().collect()).and_then(
-        |(arguments, note)| {
-            let parser = command();
-            let cli = (parser.clone().try_get_matches_from(&arguments))
-                .and_then(|found| Cli::from_arg_matches(&found))
-                .unwrap_or_else(|error| with_setting_tip(error, &parser, &arguments).exit());
-            if let Some(note) = note {
-                cli.talk.note(note);
-            }
-            run_command(cli, host)
-        },
-    );
-    match outcome {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let parser = command();
+    let cli = (parser.clone().try_get_matches_from(&arguments))
+        .and_then(|found| Cli::from_arg_matches(&found))
+        .unwrap_or_else(|error| with_setting_tip(error, &parser, &arguments).exit());
+    match run_command(cli, host) {
         Ok(Completion::Done) => 0,
         Ok(Completion::Failed) => 1,
         Ok(Completion::Undecided) => 3,

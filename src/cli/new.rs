@@ -62,7 +62,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t)]
     finger: FingerKind,
     /// Let a glTF mesh read buffers outside its own folder.
-    #[arg(long, alias = "outside-buffers")]
+    #[arg(long)]
     allow_external_buffers: bool,
     /// Folder for the files.
     #[arg(long, value_name = "FOLDER", default_value = ".")]

@@ -16,7 +16,7 @@ use palpate_ros::connect;
 use palpate_ros::network::discovery_note;
 use palpate_ros::server::failure::{FAILURES, Failure, by_name};
 use palpate_ros::server::serve::{Injection, SimulatedRobotServer, services};
-use palpate_ros::settings::{RosSettings, RosVersion};
+use palpate_ros::settings::RosSettings;
 use palpate_ros::topics::{Endpoint, TactileMessage, Topic};
 use serde_json::json;
 use std::path::PathBuf;
@@ -51,9 +51,6 @@ pub(super) struct Args {
     /// Body for `palpate register`, in place of the scene's object.
     #[command(flatten)]
     body: KnownBodyArgs,
-    /// Transport [default: the experiment's, or ros2].
-    #[arg(long, value_name = "ros2|ros1", value_parser = kind)]
-    kind: Option<RosVersion>,
     /// ROS 2 domain [default: the experiment's, ROS_DOMAIN_ID, or 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
@@ -71,11 +68,6 @@ pub(super) struct Args {
     /// Change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-}
-
-pub(super) fn kind(text: &str) -> Result<RosVersion, String> {
-    let kinds = [RosVersion::Ros2, RosVersion::Ros1];
-    kinds.into_iter().find(|kind| kind.name() == text).ok_or("allowed are ros2, ros1".into())
 }
 
 fn injection(text: &str) -> Result<Injection, String> {
@@ -135,9 +127,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         bail!("{path}: {key} = \"{name}\" needs {needed} in the scene");
     }
     let stop = stop_on_interrupt("ticks")?;
-    if settings.version == Some(RosVersion::Ros2) {
-        discovery_note(|name| std::env::var(name).ok()).iter().for_each(|note| talk.note(note));
-    }
+    discovery_note(|name| std::env::var(name).ok()).iter().for_each(|note| talk.note(note));
     let open = connect(&settings, Endpoint::Arm, services(settings.profile))?;
     let injections = args.inject.clone();
     let mut twin =
@@ -178,11 +168,11 @@ fn settings(args: &Args, experiment: &Experiment) -> anyhow::Result<RosSettings>
     let backend = &experiment.backend;
     let mut settings = match (backend.ros(), backend.arm()) {
         (None, Some((name, _))) => {
-            bail!("[backend.{name}] has no topics; allowed are [backend.ros2], [backend.ros1]")
+            bail!("[backend.{name}] has no topics; allowed is [backend.ros2]")
         }
         (given, _) => given.cloned().unwrap_or_default(),
     };
-    settings.version = args.kind.or(settings.version).or(Some(RosVersion::Ros2));
+    settings.is_networked = true;
     settings.domain = args.domain.or(settings.domain);
     settings.complete(experiment.scene.arm.as_ref());
     Ok(settings)

@@ -53,7 +53,7 @@ pub(super) struct Args {
     unit: Option<Unit>,
     /// Let a .gltf mesh read buffers outside its folder; in a scene use
     /// object.allow_external_buffers.
-    #[arg(long, alias = "outside-buffers")]
+    #[arg(long)]
     allow_external_buffers: bool,
     /// Change one setting of a scene or experiment; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]

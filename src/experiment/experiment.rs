@@ -98,9 +98,6 @@ const INCLUDED: [(&str, Option<&str>); 4] =
 /// Default reference planners, those of the paper.
 const BASELINES: [&str; 2] = ["random", "active"];
 
-/// Planners of version 0.1 that were removed; they sought the highest point.
-const REMOVED: [&str; 2] = ["pi", "ei"];
-
 /// Maximum touches for an exact fit, whose cost is cubic in their number.
 const EXACT_TOUCHES_MAX: u32 = 2000;
 
@@ -111,18 +108,6 @@ const VIEWS_MAX: f64 = 8.0;
 /// Default number of test points along each side of the zone.
 // heuristic: balances resolution and cost.
 const GRID: u32 = 31;
-
-/// Keys of version 0.1, and their present names.
-const FORMER_KEYS: [[&str; 2]; 8] = [
-    ["gp.free_places", "gp.free_space_samples"],
-    ["gp.widening", "gp.sd_inflation"],
-    ["gp.compared_every", "gp.evaluate_every"],
-    ["planning.lbfgs_evaluations", "planning.bfgs_evaluations"],
-    ["planning.silhouette.touch_way_m", "planning.silhouette.travel_cost_m"],
-    ["planning.ucb.sds", "planning.ucb.kappa"],
-    ["truth.within_m", "truth.search_radius_m"],
-    ["truth.neighbours", "truth.contacts_min"],
-];
 
 impl Experiment {
     /// Returns an experiment of `trials` trials of `touches` touches with each planner on `scene`,
@@ -194,23 +179,12 @@ impl Experiment {
         files.iter().try_for_each(|set| loader.set(set))?;
         INCLUDED.iter().try_for_each(|(key, folder)| loader.include(key, *folder))?;
         others.iter().try_for_each(|set| loader.set(set))?;
-        loader.read_former_keys("", &FORMER_KEYS)?;
-        let legacy_keys = Scene::resolve(&mut loader, "scene.")?;
+        Scene::resolve(&mut loader, "scene.")?;
         if loader.has_value("scene.whole_object") {
-            // Version 0.1 also wrote the settings of a zone's belief here, all of them.
-            let is_of_zone = ["gp.mean", "gp.signal", "gp.free_space"];
-            match is_of_zone.iter().all(|key| loader.has_value(key)) {
-                true => drop(loader.take("gp")),
-                false => loader.read_as("gp", "space")?,
-            }
+            loader.read_as("gp", "space")?;
         }
-        // Version 0.1 wrote settings of planners that were removed.
-        REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
-        BackendSettings::prepare(&mut loader)?;
-        let former_names = loader.take_former_names();
+        BackendSettings::prepare(&mut loader);
         let mut experiment: Self = loader.finish()?;
-        experiment.scene.former_names = former_names;
-        experiment.scene.effects.legacy_keys = legacy_keys;
         experiment.backend.complete(experiment.scene.arm.as_ref());
         experiment.scene.arm.iter_mut().for_each(ArmSettings::complete);
         Ok(experiment)

@@ -33,10 +33,8 @@ pub struct ReportSettings {
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// Figure or section of the publication.
-    #[serde(alias = "place")]
     pub source: String,
     /// Text of the claim.
-    #[serde(alias = "says")]
     pub text: String,
     /// Number of touches after which it applies.
     pub touches: u32,

@@ -35,9 +35,6 @@ pub fn is_setting(key: &str) -> bool {
 /// Field of the experiment for the table `[gp]` of a whole object.
 const AROUND: &str = "space";
 
-/// Tables with the same settings; the second refers to the first.
-const SAME: [&str; 2] = ["backend.ros2", "backend.ros1"];
-
 fn allowed() -> BTreeMap<String, String> {
     let Ok(complete) = tables::read::<Experiment>(COMPLETE.parse().unwrap_or_default()) else {
         return BTreeMap::new();
@@ -101,10 +98,6 @@ fn add_table(
         *text += &format!("\n### {title}\n\n{}", table.markdown());
     }
     for (key, within) in tables {
-        if key == SAME[1] {
-            *text += &format!("\n### `{}`\n\nAs `{}`.\n", SAME[1], SAME[0]);
-            continue;
-        }
         add_table(text, root, allowed, &key, within);
     }
 }

@@ -160,12 +160,6 @@ impl Environment {
             scene.effects = effects;
             notices.push(notice::DEFAULT_FINGER.into());
         }
-        if !scene.former_names.is_empty() {
-            notices.push(notice::former_names(&scene.former_names));
-        }
-        if !scene.effects.legacy_keys.is_empty() {
-            notices.push(notice::legacy_keys(&scene.effects.legacy_keys));
-        }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
         if scene.simulator.moves_finger() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(notice::scaled_finger(scene.finger.radius_m));

@@ -17,26 +17,11 @@ use palpate_geometry::mesh::Mesh;
 pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger gets the default \
     [effects.skin], [effects.fluid] and [effects.electrodes]";
 
-/// Notice that a file uses names of version 0.1.
-pub(super) fn former_names(names: &[String]) -> String {
-    format!("rename these settings, which the next version will not read: {}", names.join(", "))
-}
-
 /// Notice that the file of an arm lacks something.
 pub(super) fn arm_lacks(file: &str, lacks: &[String]) -> String {
     format!(
         "{file} lacks the following, with what is assumed: {}; give them in an arm model (.toml)",
         lacks.join("; ")
-    )
-}
-
-/// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
-pub(super) fn legacy_keys(keys: &[String]) -> String {
-    format!(
-        "{}: constants of the sensor, which will no longer be read here in the next version; move them \
-         to the table [effects.sensor], or to a file (written by `palpate calibrate`) and set \
-         effects.sensor to its name",
-        keys.join(", ")
     )
 }
 

@@ -72,28 +72,7 @@ pub struct Scene {
     /// Motion of the finger during a touch.
     #[serde(default, skip_serializing_if = "is_default")]
     pub touch: TouchSettings,
-    /// Former names of settings in the file that was read, each with the present one.
-    #[serde(skip)]
-    pub former_names: Vec<String>,
 }
-
-/// Keys of version 0.1, and their present names.
-const FORMER_KEYS: [[&str; 2]; 11] = [
-    ["body", "simulator"],
-    ["around", "whole_object"],
-    ["object.outside_buffers", "object.allow_external_buffers"],
-    ["effects.skin.along", "effects.skin.cells_along"],
-    ["effects.skin.around", "effects.skin.cells_around"],
-    ["effects.registration.finger_position_m", "effects.registration.true_tool_position_m"],
-    ["effects.registration.finger_rotation_deg", "effects.registration.true_tool_rotation_deg"],
-    ["effects.registration.finger_m", "effects.registration.finger_position_sd_m"],
-    ["effects.registration.finger_deg", "effects.registration.finger_attitude_sd_deg"],
-    ["effects.registration.object_m", "effects.registration.object_position_sd_m"],
-    ["effects.registration.object_deg", "effects.registration.object_attitude_sd_deg"],
-];
-
-/// Simulators of version 0.1, and their present names.
-const FORMER_SIMULATORS: [[&str; 2]; 2] = [["function", "analytic"], ["cast", "swept"]];
 
 // heuristic: contact is a force above this many standard deviations of its noise, because an
 // approach takes about a thousand readings.
@@ -562,12 +541,8 @@ impl Scene {
             ));
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
-        let legacy_keys = Self::resolve(&mut loader, "")?;
-        let former_names = loader.take_former_names();
-        let mut scene: Self = loader.finish()?;
-        scene.former_names = former_names;
-        scene.effects.legacy_keys = legacy_keys;
-        Ok(scene)
+        Self::resolve(&mut loader, "")?;
+        loader.finish()
     }
 
     /// Returns the scene with all defaults as TOML, on one line if it is the value of a key.
@@ -580,14 +555,11 @@ impl Scene {
     }
 
     /// Copies the constants of the camera's model and of the sensor into the scene under `prefix`.
-    /// Returns the keys of sensor constants that are set in the effects themselves.
     ///
     /// # Errors
     /// If the sensor file cannot be read, or holds a value that is not allowed.
-    pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
-        loader.read_former_keys(prefix, &FORMER_KEYS)?;
-        loader.read_former_values(&format!("{prefix}simulator"), &FORMER_SIMULATORS);
-        SensorSettings::prepare(loader, &format!("{prefix}sensor"))?;
+    pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<(), ConfigError> {
+        SensorSettings::prepare(loader, &format!("{prefix}sensor"));
         CameraSettings::resolve(loader, &format!("{prefix}camera"))?;
         sensor::load(loader, &format!("{prefix}effects"))
     }

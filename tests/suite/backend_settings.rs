@@ -1,6 +1,6 @@
-//! Tests of the table `[backend]`: the arm that its tables select, and keys of earlier versions.
+//! Tests of the table `[backend]`: the arm that its tables select.
 
-use crate::common::program::{EXPERIMENT, fails, folder};
+use crate::common::program::{EXPERIMENT, folder};
 use palpate::experiment::Experiment;
 use palpate::experiment::backend_settings::ARMS;
 use palpate::ros::driver::Profile;
@@ -26,7 +26,6 @@ fn the_table_of_an_arm_selects_it() {
     let read = |more: &str, sets: &[&str]| load(folder.path(), more, sets).unwrap();
     assert_eq!(arm(&read("", &[])), None);
     assert_eq!(arm(&read("[backend.interlocks]\nlowest_m = 0.0", &[])), None);
-    assert_eq!(arm(&read("[backend.ros1]", &[])), Some("ros1"));
     let franka = "[backend.franka]\naddress = \"172.16.0.2\"";
     assert_eq!(arm(&read(franka, &[])), Some("franka"));
     // An assignment makes the table, and the driver's settings are filled in.
@@ -48,12 +47,12 @@ fn the_table_of_an_arm_selects_it() {
 #[test]
 fn two_arms_are_refused_with_both_names() {
     let folder = folder();
-    let tables = "[backend.ros2]\n[backend.ros1]";
+    let tables = "[backend.ros2]\n[backend.franka]\naddress = \"172.16.0.2\"";
     let error = load(folder.path(), tables, &[]).unwrap_err();
-    assert!(error.contains("`backend.ros1`") && error.contains("`backend.ros2`"), "{error}");
+    assert!(error.contains("`backend.franka`") && error.contains("`backend.ros2`"), "{error}");
     assert_eq!(
         load(folder.path(), tables, &["backend.ros2=false"]).map(|it| arm(&it)),
-        Ok(Some("ros1"))
+        Ok(Some("franka"))
     );
 }
 
@@ -67,53 +66,8 @@ fn an_arm_without_its_address_is_refused_with_the_key() {
 }
 
 #[test]
-fn former_keys_are_refused_with_the_table_of_their_arm() {
+fn an_unknown_arm_is_refused_with_all_names() {
     let folder = folder();
-    for (text, key, place) in [
-        ("kind = \"ros2\"\nprofile = \"ur\"", "`backend.kind`", "[backend.ros2]"),
-        ("kind = \"franka\"", "`backend.kind`", "[backend.franka]"),
-        ("kind = \"simulated\"", "`backend.kind`", "simulated"),
-        ("kind = \"ros3\"", "`backend.kind`", "[backend.ros1]"),
-        ("profile = \"ur\"", "`backend.profile`", "`backend.ros2.profile`"),
-        ("patience_s = 7.0", "`backend.patience_s`", "`backend.ros2.patience_s`"),
-        ("address = \"a\"", "`backend.address`", "`backend.franka.address`"),
-        ("rate_hz = 100.0\n[backend.ros1]", "`backend.rate_hz`", "`backend.ros1.rate_hz`"),
-        ("[backend.topics.tactile]\ntype = \"none\"", "`backend.topics`", "`backend.ros2.topics`"),
-    ] {
-        let error = load(folder.path(), &format!("[backend]\n{text}"), &[]).unwrap_err();
-        assert!(error.contains("small.toml:") && error.contains(key), "{error}");
-        assert!(error.contains(place), "{error}");
-    }
-    let set = "backend.kind=\"ros2\"";
-    fails(folder.path(), &["run", "small.toml", "--set", set], &[set, "[backend.ros2]"]);
     let unknown = load(folder.path(), "[backend.ros3]", &[]).unwrap_err();
     assert!(ARMS.iter().all(|name| unknown.contains(name)), "{unknown}");
-}
-
-/// Interlocks and start checks as written by version 0.1, with every default.
-const FORMER_LIMITS: &str = "
-[backend.gates]
-hold_s = 2
-still = 0.002
-near = 0.5
-drift_n = 0.25
-[backend.interlocks]
-force_rate_n_s = 2000.0
-tracking_error_s = 0.2
-retract_m_s = 0.02
-retract_rise_n = 2.0
-";
-
-/// A limit of an arm does not change without notice.
-#[test]
-fn another_value_than_the_constant_is_an_error_with_its_line() {
-    let folder = folder();
-    let read = |text: &str| load(folder.path(), text, &[]);
-    assert_eq!(read(FORMER_LIMITS).unwrap().backend.start_checks.drift_n, 0.25);
-    for (now, other) in [("hold_s = 2", "hold_s = 3"), ("retract_m_s = 0.02", "retract_m_s = 0.01")]
-    {
-        assert!(FORMER_LIMITS.contains(now));
-        let error = read(&FORMER_LIMITS.replace(now, other)).unwrap_err();
-        assert!(error.contains("small.toml:") && error.contains("remove the key"), "{error}");
-    }
 }

@@ -138,34 +138,9 @@ fn an_experiment_finds_a_shipped_scene_by_name() {
     assert_eq!(beside.scene.object.unwrap().mesh, folder.path().join("mesh.obj").into());
 }
 
-/// Deprecated command names still work, with a note of the new name.
 #[test]
-fn commands_answer_to_their_old_names() {
+fn the_help_lists_each_command_once_in_its_group() {
     let folder = folder();
-    let renamed: [(&[&str], &[&str]); 8] = [
-        (&["plan", "small.toml", "--shards", "2"], &["run EXPERIMENT --plan", "2/2"]),
-        (&["-q", "run", "small.toml", "--shard=1/2", "--out", "1"], &["rows in 1"]),
-        (&["-q", "run", "small.toml", "--shard=2/2", "--out", "2"], &["rows in 2"]),
-        (&["merge", "whole", "1", "2"], &["report FOLDER --merge", "1 trial in whole"]),
-        (&["scan", "scene.toml", "--grid=4x4", "--out=scan"], &["export SCENE", "of contact"]),
-        (
-            &["align", "scan/cloud.ply", "mesh.obj", "--position=0,0,0"],
-            &["register MESH --cloud CLOUD"],
-        ),
-        (&["watch", "scene.toml"], &["show SCENE --watch", "does not move"]),
-        (&["fidelity", "scene.toml", "--touches", "x"], &["invalid value 'x'"]),
-    ];
-    for (old, says) in renamed {
-        let output = palpate(folder.path(), old);
-        let output = stderr(&output) + &String::from_utf8_lossy(&output.stdout);
-        assert!(says.iter().all(|words| output.contains(words)), "{old:?}: {output}");
-    }
-    for gone in ["stress", "bench", "cost"] {
-        fails(folder.path(), &[gone], &["was removed", "make "]);
-    }
-    fails(folder.path(), &["merge"], &["palpate report FOLDER --merge SHARDS"]);
-    fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);
-    // The help lists each command once, in its group.
     let help = succeeds(folder.path(), &["--help"]);
     for (group, name) in [("Explore:", "  export "), ("Robot:", "  serve "), ("More:", "  list ")] {
         assert!(help.find(group) < help.find(name), "{help}");

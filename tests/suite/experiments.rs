@@ -196,13 +196,3 @@ fn toy_slope_with_generic_priors_is_never_behind_random_and_found_by_touch_22() 
         }
     }
 }
-
-/// Settings as in `resolved.toml` of version 0.1.
-#[test]
-fn settings_of_removed_planners_are_read_and_ignored() {
-    let load = |sets: &[String]| Experiment::load("experiments/toy.toml".as_ref(), sets).unwrap();
-    assert_eq!(
-        load(&["planning.pi.margin=0.01".into(), "planning.ei.margin=0.5".into()]),
-        load(&[])
-    );
-}

@@ -1,5 +1,5 @@
-//! Tests of an arm over topics, run in a network namespace by `make test-ros2` and `make
-//! test-ros1`. They are ignored otherwise, because DDS multicasts to the local network.
+//! Tests of an arm over topics, run in a network namespace by `make test-ros2`. They are ignored
+//! otherwise, because DDS multicasts to the local network.
 
 use crate::common::lab::{
     CELL, EXPERIMENT, Network, TwinProcess, contacts_off_m, count, row, touch_sets,
@@ -13,7 +13,7 @@ use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
 use palpate::ros::link::Link;
 use palpate::ros::service::Service;
-use palpate::ros::settings::{MappingKind, RosSettings, RosVersion};
+use palpate::ros::settings::{MappingKind, RosSettings};
 use palpate::ros::topics::{CommandTopic, Endpoint};
 use palpate::ros::transport::{Delivery, Packet};
 use serde_json::Value;
@@ -244,9 +244,6 @@ fn a_run_that_was_halted_goes_on() {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn an_arm_of_another_implementation_is_heard_and_answers() {
     let network = Network::new(16);
-    if network.settings.version != Some(RosVersion::Ros2) {
-        return;
-    }
     let arm = network.peer("arm", &["14"]).stdout(Stdio::piped()).spawn().unwrap();
     // The status was published before any subscriber existed.
     sleep(Duration::from_millis(1500));
@@ -299,9 +296,6 @@ fn multicast_members(device: &str) -> u32 {
 #[ignore = "needs a network namespace: make test-ros2"]
 fn only_the_named_interfaces_are_used() {
     let network = Network::new(17);
-    if network.settings.version != Some(RosVersion::Ros2) {
-        return;
-    }
     let set = ["--set", "backend.ros2.interfaces=[\"lo\"]"];
     let counts = || ["lo", "dds0"].map(multicast_members);
     let before = counts();

@@ -30,9 +30,6 @@ fn points(ply: &[u8]) -> Vec<[f32; 3]> {
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn a_view_is_saved_from_cloud_and_depths() {
-    if std::env::var("PALPATE_ROS").is_ok_and(|kind| kind == "ros1") {
-        return;
-    }
     let folder = folder();
     let look = |topic, wait_s| {
         ["look", topic, "--out", "view.ply", "--domain", DOMAIN, "--timeout", wait_s]

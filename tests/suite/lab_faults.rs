@@ -203,7 +203,6 @@ fn a_second_publisher_of_commands_stops_the_arm() {
         sleep(Duration::from_millis(20));
     }
     let (said, halted_s) = scene.halted();
-    // Over ROS 1 the arm's side cannot distinguish publishers; the explorer queries the master.
     let is_told_by_arm = said.contains("alarm");
     let at_s = if is_told_by_arm { scene.twin.alarmed_s(before_s) } else { before_s };
     values("two publishers", Some(halted_s - at_s), Some(scene.rest_s(at_s)), &said);

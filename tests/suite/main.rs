@@ -46,7 +46,6 @@ mod finger_signals;
 mod fit;
 mod folders;
 mod formats;
-mod former_names;
 #[cfg(all(feature = "franka", feature = "mujoco"))]
 mod franka;
 mod fuzz;

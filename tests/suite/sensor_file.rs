@@ -1,5 +1,4 @@
-//! Tests of the file with a sensor's constants, and of scenes of version 0.1 with these constants
-//! in their effects.
+//! Tests of the file with a sensor's constants.
 
 use palpate::experiment::Experiment;
 use palpate::experiment::store::resolved;
@@ -37,7 +36,7 @@ fn a_file_gives_the_constants_of_a_scene() {
     assert_eq!(is.skin.as_ref().unwrap().flatten_pa_m, 1.8e6);
     assert_eq!(is.electrodes.as_ref().unwrap().noise, 0.0);
     assert_eq!(is.skin.as_ref().unwrap().core_pa_m, was.skin.as_ref().unwrap().core_pa_m);
-    assert!(is.friction.is_none() && is.legacy_keys.is_empty());
+    assert!(is.friction.is_none());
     assert_eq!(scene(&["effects.sensor=biotac"]).unwrap(), shipped);
     assert_eq!(scene(&["effects.sensor=models/biotac.toml"]).unwrap(), shipped);
     let inline = scene(&["effects.sensor={skin={flatten_pa_m=1.8e6}, electrodes={noise=0.0}}"]);
@@ -64,32 +63,21 @@ fn what_is_wrong_with_a_file_is_said_with_its_place() {
     for (set, said) in [
         ("effects.sensor=none.toml", "allowed is a readable file"),
         ("effects.sensor=takktile", "\"takktile\": allowed is \"biotac\", \"ati_gamma\""),
-        ("effects.flex={}", "removed: use model = \"columns\" or model = \"shell\""),
     ] {
         let error = scene(&[set]).unwrap_err();
         assert!(error.contains(said), "{error}");
     }
 }
 
-/// Constants in the effects override the file, with one note; unchanged constants need no note.
+/// Constants in the effects override the file.
 #[test]
-fn constants_in_effects_are_still_read() {
+fn constants_in_effects_override_the_file() {
     let (_folder, set) = sensor("[skin]\nflatten_pa_m = 1.8e6");
-    let old = "effects.skin.flatten_pa_m=2e6";
-    let given = scene(&[&set, old, "effects.skin.core_pa_m=1.4e9"]).unwrap();
+    let given = scene(&[&set, "effects.skin.flatten_pa_m=2e6"]).unwrap();
     assert_eq!(given.effects.skin.as_ref().unwrap().flatten_pa_m, 2e6);
-    assert_eq!(given.effects.legacy_keys, ["effects.skin.flatten_pa_m"]);
-    let environment = Environment::build(given).unwrap();
-    let notices = environment.notices();
-    assert!(
-        notices.iter().any(|notice| notice.contains("effects.skin.flatten_pa_m")),
-        "{notices:?}"
-    );
-    assert!(scene(&["effects.skin.flatten_pa_m=3.5e6"]).unwrap().effects.legacy_keys.is_empty());
 }
 
-/// `resolved.toml` contains the constants that differ and can be run without the sensor's file;
-/// that of version 0.1, with all constants in the effects, is the same experiment.
+/// `resolved.toml` contains the constants that differ and can be run without the sensor's file.
 #[test]
 fn resolved_experiments_hold_what_differs() {
     let read = |text: &str| {
@@ -99,12 +87,6 @@ fn resolved_experiments_hold_what_differs() {
     let written = resolved(&plain);
     assert!(!written.contains("modulus_pa") && written.contains("samples"), "{written}");
     assert_eq!(read(&written), plain);
-    let old = written.replace(
-        "[scene.effects.skin]\n",
-        "[scene.effects.skin]\nmodulus_pa = 1552000.0\nflatten_pa_m = 3500000.0\n",
-    );
-    assert_ne!(old, written);
-    assert_eq!(read(&old), plain);
     let (folder, set) = sensor("[skin]\nflatten_pa_m = 1.8e6");
     let experiment = path("experiments/container_finger.toml");
     let other = Experiment::load(&experiment, &[format!("scene.{set}")]).unwrap();

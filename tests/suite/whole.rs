@@ -304,12 +304,10 @@ fn what_cannot_be_asked_for_is_refused() {
     );
     refused(&format!("{active}\ngp = {{ cells = 4 }}"), "whole_object = {}", "gp.cells");
     refused(&format!("{active}\ngp = {{ mean = \"zero\" }}"), "whole_object = {}", "gp.mean");
-    // As in version 0.1.
     refused(&format!("{active}\nspace = {{ cells = 4 }}"), "whole_object = {}", "space.cells");
 }
 
-/// One table `[gp]` configures the belief in either region; it is written and read back unchanged,
-/// as is the output of version 0.1.
+/// One table `[gp]` configures the belief in either region; it is written and read back unchanged.
 #[test]
 fn one_table_says_how_a_belief_is_fitted() {
     let path = "experiments/around.toml".as_ref();
@@ -320,12 +318,6 @@ fn one_table_says_how_a_belief_is_fitted() {
     let written = resolved(&given);
     assert!(written.contains("\n[gp]\n") && !written.contains("[space]"), "{written}");
     assert_eq!(read(&written), given);
-    let before = toml::to_string(&given).unwrap();
-    assert!(before.contains("[gp]") && before.contains("[space]"));
-    assert_eq!(read(&before), given);
-    // With default values, `[space]` was not written.
-    let plain = Experiment::load(path, &[]).unwrap();
-    assert_eq!(read(&toml::to_string(&plain).unwrap()), plain);
 }
 
 /// A ball that does not contain the object is rejected by name before any touch.

@@ -7,7 +7,7 @@ use super::network::discovery_note;
 use super::planning_scene::CollisionObject;
 use super::receiver::{LatestMessages, TopicReceiver, TopicState, refused};
 use super::service::{Answer, Service};
-use super::settings::{RosSettings, RosVersion};
+use super::settings::RosSettings;
 use super::topics::{Endpoint, Topic};
 use super::transport::{Connect, Packet, cannot_open};
 use super::view::{MarkerArray, TFMessage};
@@ -115,9 +115,7 @@ impl RosArm {
     /// Publishes a message for viewers, if this transport has its topic.
     pub fn show(&self, packet: impl Into<Packet>) {
         let packet = packet.into();
-        if self.settings().version == Some(RosVersion::Ros2)
-            && Topic::VIEWED.contains(&packet.topic())
-        {
+        if self.settings().is_networked && Topic::VIEWED.contains(&packet.topic()) {
             self.link.send(packet);
         }
     }
@@ -139,8 +137,7 @@ impl RosArm {
     /// replace those of the same names, and stay after the end: so does the object.
     pub fn show_solids(&self, solids: &dyn Fn() -> Vec<KeepOutSolid>) {
         let settings = self.settings();
-        if settings.version != Some(RosVersion::Ros2) || settings.topics.collision_object.is_none()
-        {
+        if !settings.is_networked || settings.topics.collision_object.is_none() {
             return;
         }
         let (frame, x_wb) = (settings.base_frame(), self.chain.base);
@@ -266,7 +263,7 @@ impl RosArm {
                 {
                     more += &format!(" {words}");
                 }
-                if self.settings().version == Some(RosVersion::Ros2)
+                if self.settings().is_networked
                     && let Some(note) = discovery_note(|name| std::env::var(name).ok())
                 {
                     more += &format!(" {note}");

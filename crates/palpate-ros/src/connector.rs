@@ -2,59 +2,21 @@
 
 use super::arm::RosArm;
 use super::driver::Profile;
-use super::settings::{CLOCK_AHEAD_S, RosSettings};
-use super::topics::{TactileMessage, Topic, Topics};
+use super::settings::RosSettings;
+use super::topics::{TactileMessage, Topic};
 use nalgebra::Isometry3;
 use palpate_explore::backend::arm::{Arm, Connector, KeepOutSolid};
 use palpate_explore::backend::interlock::StartCheckSettings;
 use palpate_explore::backend::{Backend, Fault, LinkFault};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
 use palpate_explore::robot::sensor::{SensorSettings, Signal};
-use palpate_input::config::{ConfigError, Loader};
+use palpate_input::config::Loader;
 use palpate_input::error::InputError;
 use std::sync::Arc;
-use toml::Value;
-
-/// Keys of version 0.1 without an effect on a run.
-const UNUSED_KEYS: [&str; 5] = [
-    "topics.joints.rate_hz",
-    "topics.wrench.rate_hz",
-    "topics.tactile.rate_hz",
-    "topics.status.rate_hz",
-    "topics.command.rate_hz",
-];
-
-/// Keys of version 0.1, and their present names.
-const RENAMED_KEYS: [[&str; 2]; 6] = [
-    ["patience_s", "connect_timeout_s"],
-    ["topics.joints.age_s", "topics.joints.max_age_s"],
-    ["topics.wrench.age_s", "topics.wrench.max_age_s"],
-    ["topics.tactile.age_s", "topics.tactile.max_age_s"],
-    ["topics.status.age_s", "topics.status.max_age_s"],
-    ["topics.command.age_s", "topics.command.max_age_s"],
-];
-
-/// Renames or removes the keys that version 0.1 read in the table with the dotted key `table`, and
-/// wrote with their defaults.
-///
-/// # Errors
-/// If one has a value other than the present constant.
-fn take_former_keys(loader: &mut Loader, table: &str) -> Result<(), ConfigError> {
-    loader.read_former_keys(&format!("{table}."), &RENAMED_KEYS)?;
-    UNUSED_KEYS.iter().for_each(|key| drop(loader.take(&format!("{table}.{key}"))));
-    loader.take_constant(&format!("{table}.clock_ahead_s"), &Value::Float(CLOCK_AHEAD_S))?;
-    for topic in [Topic::Joints, Topic::Wrench, Topic::Status] {
-        let type_name = Value::String(Topics::default().type_name(topic).into());
-        loader.take_constant(&format!("{table}.topics.{}.type", topic.key()), &type_name)?;
-    }
-    Ok(())
-}
 
 impl Connector for RosSettings {
-    fn prepare(loader: &mut Loader, table: &str) -> Result<(), ConfigError> {
-        take_former_keys(loader, table)?;
+    fn prepare(loader: &mut Loader, table: &str) {
         Profile::fill_in(loader, table);
-        Ok(())
     }
 
     /// Sets the namespace of the model of `arm`, or of the default arm for a stage; an unreadable

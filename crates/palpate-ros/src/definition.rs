@@ -20,19 +20,6 @@ pub trait HasDefinition {
 /// Replacements that turn the macro's text into a ROS 2 definition.
 const ROS2: &[(&str, &str)] = &[("r#", "")];
 
-/// Replacements that turn a ROS 2 definition into one of ROS 1, in which times are primitive, a
-/// header has a sequence number, and the matrices of a camera are in capitals.
-#[cfg(feature = "ros1")]
-const ROS1: &[(&str, &str)] = &[
-    ("builtin_interfaces/Time stamp", "uint32 seq\ntime stamp"),
-    ("builtin_interfaces/Time", "time"),
-    ("builtin_interfaces/Duration", "duration"),
-    ("float64[] d\n", "float64[] D\n"),
-    ("float64[9] k\n", "float64[9] K\n"),
-    ("float64[9] r\n", "float64[9] R\n"),
-    ("float64[12] p\n", "float64[12] P\n"),
-];
-
 /// Separator before the definition of each part.
 const RULE: &str =
     "================================================================================\nMSG: ";
@@ -51,12 +38,6 @@ impl Definition {
     /// Returns the full definition with those of all parts: a schema of encoding `ros2msg`.
     pub fn text(&self) -> String {
         Text::of(self, ROS2).as_str().into()
-    }
-
-    /// Returns the full definition for ROS 1.
-    #[cfg(feature = "ros1")]
-    pub(super) const fn ros1(&self) -> Text {
-        Text::of(self, ROS1)
     }
 }
 

@@ -5,7 +5,6 @@ use super::arm::{POLL_INTERVAL, RosArm};
 use super::controllers::{Controller, Switch, switch_to};
 use super::receiver::LatestMessages;
 use super::service::Service;
-use super::settings::RosVersion;
 use super::status::ArmStatus;
 use super::topics::Topic;
 use nalgebra::{Isometry3, Point3};
@@ -34,7 +33,7 @@ impl RosArm {
     /// If another program commands the arm, nothing receives commands, or a service is refused.
     pub(super) fn engage(&self) -> Result<(), LinkFault> {
         let is_first = !self.mailbox.latest().is_engaged;
-        if is_first && self.settings().version == Some(RosVersion::Ros2) {
+        if is_first && self.settings().is_networked {
             sleep(DISCOVERY.saturating_sub(self.opened.elapsed()));
         }
         self.check_sole(&self.mailbox.latest())?;
@@ -65,7 +64,7 @@ impl RosArm {
     fn open_commands(&self) {
         let is_new = self.link.publisher_count(Topic::Command) == 0;
         self.link.open_commands();
-        if is_new && self.settings().version.is_some() {
+        if is_new && self.settings().is_networked {
             sleep(MATCHING);
         }
     }

@@ -1,4 +1,4 @@
-//! Robot arm behind ROS 1 or ROS 2 topics, a simulated robot, and recordings of touches.
+//! Robot arm behind ROS 2 topics, a simulated robot, and recordings of touches.
 //!
 //! | module | content |
 //! |---|---|
@@ -45,8 +45,6 @@ pub mod network;
 pub mod planning_scene;
 pub mod receiver;
 pub mod recording;
-#[cfg(feature = "ros1")]
-mod ros1;
 #[cfg(feature = "ros2")]
 mod ros2;
 pub mod server;
@@ -61,10 +59,8 @@ pub mod view;
 
 use camera::{CameraMessage, CameraTopics, Cloud, FirstMessages};
 use palpate_input::error::InputError;
-#[cfg(feature = "ros1")]
-pub use ros1::disable_tls_certificates;
 use service::Service;
-use settings::{RosSettings, RosVersion};
+use settings::RosSettings;
 use topics::Endpoint;
 use transport::Connect;
 
@@ -73,26 +69,25 @@ use transport::Connect;
 ///
 /// # Errors
 /// If this build lacks the transport.
+#[cfg(feature = "ros2")]
 pub fn connect(
     settings: &RosSettings,
     side: Endpoint,
     services: Vec<Service>,
 ) -> Result<Connect, InputError> {
     let owned = settings.clone();
-    match settings.version {
-        #[cfg(feature = "ros2")]
-        Some(RosVersion::Ros2) => Ok(Box::new(move || {
-            Ok(Box::new(ros2::Ros2::open(&owned, side, services)?) as Box<dyn transport::Transport>)
-        })),
-        #[cfg(feature = "ros1")]
-        Some(RosVersion::Ros1) => Ok(Box::new(move || {
-            Ok(Box::new(ros1::Ros1::open(&owned, side, services)?) as Box<dyn transport::Transport>)
-        })),
-        version => {
-            drop((owned, side, services));
-            Err(no_transport(version))
-        }
-    }
+    Ok(Box::new(move || {
+        Ok(Box::new(ros2::Ros2::open(&owned, side, services)?) as Box<dyn transport::Transport>)
+    }))
+}
+
+/// Returns a function that opens the transport of `settings`.
+///
+/// # Errors
+/// Always: this build lacks the transport.
+#[cfg(not(feature = "ros2"))]
+pub fn connect(_: &RosSettings, _: Endpoint, _: Vec<Service>) -> Result<Connect, InputError> {
+    Err(no_transport())
 }
 
 /// Receives one view of a depth camera.
@@ -102,31 +97,24 @@ pub fn connect(
 pub fn look(settings: &RosSettings, topics: &CameraTopics) -> Result<Cloud, InputError> {
     let mut first = FirstMessages::default();
     let mut take = |message| first.take(message);
-    let listened = match settings.version {
-        #[cfg(feature = "ros2")]
-        Some(RosVersion::Ros2) => ros2::camera::listen(settings, topics, &mut take),
-        #[cfg(feature = "ros1")]
-        Some(RosVersion::Ros1) => ros1::camera::listen(settings, topics, &mut take),
-        version => {
-            // Without a transport nothing else names its type.
-            let _: &mut dyn FnMut(CameraMessage) -> bool = &mut take;
-            Err(no_transport(version))
-        }
+    #[cfg(feature = "ros2")]
+    let listened = ros2::camera::listen(settings, topics, &mut take);
+    #[cfg(not(feature = "ros2"))]
+    let listened = {
+        // Without a transport nothing else names its type.
+        let _: (&RosSettings, &mut dyn FnMut(CameraMessage) -> bool) = (settings, &mut take);
+        Err(no_transport())
     };
     let published: Vec<String> = listened?;
-    let variable = |name: &str| std::env::var(name).ok();
-    let is_ros2 = settings.version == Some(RosVersion::Ros2);
-    let note = is_ros2.then(|| network::discovery_note(variable)).flatten();
+    let note = network::discovery_note(|name| std::env::var(name).ok());
     first.cloud(topics, &published, note)
 }
 
-/// Returns the error of settings without a version of ROS, or whose transport this build lacks.
-fn no_transport(version: Option<RosVersion>) -> InputError {
-    InputError::new(match version.map(RosVersion::name) {
-        None => "no version of ROS; allowed are \"ros2\", \"ros1\"".into(),
-        Some(name) => format!(
-            "[backend.{name}] needs a build with the feature `{name}`: \
-             cargo build --release --features {name}"
-        ),
-    })
+/// Returns the error of a build that lacks the transport.
+#[cfg(not(feature = "ros2"))]
+fn no_transport() -> InputError {
+    InputError::new(
+        "[backend.ros2] needs a build with the feature `ros2`: \
+         cargo build --release --features ros2",
+    )
 }

@@ -1,4 +1,4 @@
-//! Settings of an arm behind ROS topics: tables `[backend.ros2]` and `[backend.ros1]`.
+//! Settings of an arm behind ROS topics: table `[backend.ros2]`.
 
 use super::controllers::Switch;
 use super::driver::{Driver, Profile, Release};
@@ -10,25 +10,6 @@ use palpate_explore::robot::arm::Chain;
 use palpate_input::config::{Rules, Validate, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
-
-/// Version of ROS.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RosVersion {
-    /// ROS 2, by DDS.
-    Ros2,
-    /// ROS 1, with a master.
-    Ros1,
-}
-
-impl RosVersion {
-    /// Returns the name of this version in settings files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ros2 => "ros2",
-            Self::Ros1 => "ros1",
-        }
-    }
-}
 
 /// Mapping of ROS 2 services to DDS.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -45,13 +26,13 @@ pub enum MappingKind {
     Basic,
 }
 
-/// Table `[backend.ros2]` or `[backend.ros1]` of an experiment.
+/// Table `[backend.ros2]` of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RosSettings {
-    /// Version of ROS, by the name of the table; `None` for another transport.
+    /// Whether the messages travel over DDS; false for a channel in this process.
     #[serde(skip)]
-    pub version: Option<RosVersion>,
+    pub is_networked: bool,
     /// Driver of the arm: one for Palpate, `ur_robot_driver` or `franka_ros2`.
     pub profile: Profile,
     /// ROS 2 release on the driver's computer, which decides its controllers and the layout of its
@@ -82,8 +63,6 @@ pub struct RosSettings {
     pub interfaces: Vec<String>,
     /// Mapping of ROS 2 services to DDS; `auto` follows the vendor of the other side.
     pub service_mapping: MappingKind,
-    /// Address of the ROS 1 master.
-    pub master: String,
     /// Frame of the robot's base, in which the pose of `W` is published; default: the driver's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base_frame: Option<String>,
@@ -123,7 +102,7 @@ impl Default for RosSettings {
     /// states.
     fn default() -> Self {
         Self {
-            version: None,
+            is_networked: false,
             profile: Profile::Palpate,
             release: Release::Jazzy,
             prefix: String::new(),
@@ -134,7 +113,6 @@ impl Default for RosSettings {
             domain: None,
             interfaces: Vec::new(),
             service_mapping: MappingKind::Auto,
-            master: "http://127.0.0.1:11311".into(),
             base_frame: None,
             joints: Vec::new(),
             finger: 0,
@@ -158,22 +136,13 @@ pub const CLOCK_AHEAD_S: f64 = 0.005;
 /// If it cannot be read.
 pub fn ros2<'de, D: Deserializer<'de>>(table: D) -> Result<Option<RosSettings>, D::Error> {
     let read = RosSettings::deserialize(table)?;
-    Ok(Some(RosSettings { version: Some(RosVersion::Ros2), ..read }))
-}
-
-/// Reads the table `[backend.ros1]`.
-///
-/// # Errors
-/// If it cannot be read.
-pub fn ros1<'de, D: Deserializer<'de>>(table: D) -> Result<Option<RosSettings>, D::Error> {
-    let read = RosSettings::deserialize(table)?;
-    Ok(Some(RosSettings { version: Some(RosVersion::Ros1), ..read }))
+    Ok(Some(RosSettings { is_networked: true, ..read }))
 }
 
 impl RosSettings {
     /// Returns the dotted key of a setting of this table.
     pub fn key(&self, name: &str) -> String {
-        format!("backend.{}.{name}", self.version.unwrap_or(RosVersion::Ros2).name())
+        format!("backend.ros2.{name}")
     }
 
     /// Returns the description of the arm's driver.
@@ -271,11 +240,6 @@ impl Validate for RosSettings {
         if let Some(domain) = self.domain {
             rules.number("domain", domain.into(), 0.0..=DOMAIN_MAX.into());
         }
-        self.check_version(rules);
-        let is_address = self.master.starts_with("http://") && self.master.len() > 7;
-        rules.require("master", format!("\"{}\"", self.master), is_address, || {
-            "an address, e.g. \"http://127.0.0.1:11311\"".into()
-        });
         let is_plain = self.prefix.chars().all(|c| c.is_ascii_alphanumeric() || "_/".contains(c));
         rules.require("prefix", format!("\"{}\"", self.prefix), is_plain, || {
             "letters, digits, _ and slashes".into()
@@ -304,30 +268,5 @@ impl Validate for RosSettings {
             rules.table("net_ft", net_ft);
         }
         rules.table("topics", &self.topics);
-    }
-}
-
-impl RosSettings {
-    /// Checks that the settings of the other version of ROS are not given.
-    fn check_version(&self, rules: &mut Rules) {
-        let usual = Self::default();
-        let is_ros2_only = [
-            ("profile", self.profile == usual.profile),
-            ("release", self.release == usual.release),
-            ("domain", self.domain.is_none()),
-            ("interfaces", self.interfaces.is_empty()),
-            ("service_mapping", self.service_mapping == usual.service_mapping),
-        ];
-        let is_ros1_only = [("master", self.master == usual.master)];
-        let (others, other) = match self.version {
-            Some(RosVersion::Ros1) => (&is_ros2_only[..], RosVersion::Ros2),
-            Some(RosVersion::Ros2) => (&is_ros1_only[..], RosVersion::Ros1),
-            None => return,
-        };
-        for (key, is_usual) in others {
-            rules.require(key, "(given)", *is_usual, || {
-                format!("its default: it belongs to [backend.{}]", other.name())
-            });
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! Packets, and the transports that carry them: ROS 2, ROS 1, or a channel for tests.
+//! Packets, and the transports that carry them: ROS 2, or a channel for tests.
 
 use super::control_message::{Clock, GoalStatusArray, RobotDescription};
 use super::franka_message::FrankaRobotState;
@@ -169,7 +169,7 @@ pub(super) fn cannot_open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> Inp
 }
 
 /// Returns the error of a message that cannot be sent to `what`.
-#[cfg(any(feature = "ros1", feature = "ros2"))]
+#[cfg(feature = "ros2")]
 pub(super) fn cannot_send(what: &str, error: impl std::fmt::Display) -> InputError {
     InputError::new(format!("cannot send to {what}: {error}"))
 }

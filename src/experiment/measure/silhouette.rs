@@ -16,7 +16,6 @@ pub struct SilhouetteMetrics {
     /// Intersection over union of the estimated (probability > ½) and the true surface area.
     pub iou: f64,
     /// Share of the zone's test points that are classified wrongly at probability ½.
-    #[serde(alias = "wrong_share")]
     pub misclassified_share: f64,
     /// Test points in each tenth of the probability, and those of them with a surface; written
     /// after the last touch.

@@ -88,7 +88,7 @@ pub struct TouchRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub planned_sd_m: Option<f64>,
     /// Reason why the planner used its fallback.
-    #[serde(default, alias = "stall", skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallback: Option<Fallback>,
     /// Fit after this touch; none before the last initial touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,7 +100,7 @@ pub struct TouchRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metrics: Option<Metrics>,
     /// Errors of the estimated silhouette; omitted where the object fills its zone.
-    #[serde(default, alias = "outline", skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub silhouette: Option<SilhouetteMetrics>,
     /// Errors of the estimated closed surface; omitted for a zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -116,7 +116,7 @@ pub struct VerificationRow {
     /// Target of the touch, as in the trial's touches.
     pub target: Target,
     /// Number of the repeated touch, from 1; none for a touch at a new place.
-    #[serde(default, alias = "again", skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub repeats: Option<u32>,
     /// Predicted height at the target; around an object, predicted distance of contact before the
     /// aimed point, 0 without a prediction.

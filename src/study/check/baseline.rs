@@ -7,7 +7,6 @@ use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
 use palpate_input::format::hex;
 use palpate_input::{files, paths};
-use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -40,9 +39,6 @@ pub struct Header {
     pub trials: u32,
     /// Names of the planners.
     pub planners: Vec<String>,
-    /// Instruction counts that version 0.1 wrote; ignored.
-    #[serde(default, skip_serializing)]
-    cost: IgnoredAny,
 }
 
 /// Results of a trial.
@@ -131,7 +127,6 @@ impl StoredBaseline {
             grid: experiment.grid,
             trials: experiment.trials,
             planners: experiment.planners.clone(),
-            cost: IgnoredAny,
         };
         let lines = rows.iter().map(|row| TrialLine::of(row, experiment)).collect();
         Self { header, lines }

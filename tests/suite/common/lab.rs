@@ -1,12 +1,11 @@
-//! An explorer and a simulated robot in separate processes, over ROS 2 or ROS 1, selected by
-//! `PALPATE_ROS`.
+//! An explorer and a simulated robot in separate processes, over ROS 2.
 
 use palpate::backend::pace;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::backend::arm::Connector;
 use palpate::robot::arm::ArmSettings;
-use palpate::ros::settings::{RosSettings, RosVersion};
+use palpate::ros::settings::RosSettings;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -33,13 +32,12 @@ pub const CELL: [&str; 3] = [
     "backend.interlocks.workspace_m=[[-1.0, 1.0], [-1.2, 0.6], [0.0, 1.8]]",
 ];
 
-/// An isolated network: a ROS 2 domain, or a ROS 1 master.
+/// An isolated network: a ROS 2 domain.
 pub struct Network {
     /// Settings of the arm for this network.
     pub settings: RosSettings,
     /// Experiment that is run.
     pub experiment: &'static str,
-    master: Option<Child>,
 }
 
 impl Network {
@@ -48,44 +46,22 @@ impl Network {
         let domain = format!("backend.ros2.domain={number}");
         let backend = Experiment::load(Path::new(experiment), &[domain]).unwrap().backend;
         let settings = backend.ros2.unwrap();
-        Self { settings, experiment, master: None }
+        Self { settings, experiment }
     }
 
     /// Creates the network with this number.
     pub fn new(number: u16) -> Self {
         let mut settings = RosSettings::default();
         settings.complete(Some(&ArmSettings::default()));
-        let is_first = std::env::var("PALPATE_ROS").is_ok_and(|name| name == "ros1");
-        if !is_first {
-            settings.version = Some(RosVersion::Ros2);
-            settings.domain = Some(number);
-            return Self { settings, experiment: EXPERIMENT, master: None };
-        }
-        let port = 11311 + number;
-        settings.version = Some(RosVersion::Ros1);
-        settings.master = format!("http://127.0.0.1:{port}");
-        let master = Command::new("rosmaster")
-            .args(["--core", "-p", &port.to_string()])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("rosmaster, of Debian's python3-rosmaster");
-        let begun = Instant::now();
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            assert!(begun.elapsed().as_secs() < 20, "no master at {}", settings.master);
-            sleep(Duration::from_millis(50));
-        }
-        Self { settings, experiment: EXPERIMENT, master: Some(master) }
+        settings.is_networked = true;
+        settings.domain = Some(number);
+        Self { settings, experiment: EXPERIMENT }
     }
 
     /// Settings as `--set` options.
     fn sets(&self) -> [String; 2] {
-        let RosSettings { version, domain, master, .. } = &self.settings;
-        let set = match version {
-            Some(RosVersion::Ros1) => format!("backend.ros1.master=\"{master}\""),
-            _ => format!("backend.ros2.domain={}", domain.unwrap_or_default()),
-        };
-        ["--set".into(), set]
+        let domain = self.settings.domain.unwrap_or_default();
+        ["--set".into(), format!("backend.ros2.domain={domain}")]
     }
 
     /// Command `palpate` on this network.
@@ -108,27 +84,9 @@ impl Network {
     /// An independent peer.
     pub fn peer(&self, what: &str, more: &[&str]) -> Command {
         let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
-        match self.settings.version {
-            Some(RosVersion::Ros1) => {
-                command.args(["tests/ros1/peer.py", what, &self.settings.master])
-            }
-            _ => command.args([
-                "tests/ros2/peer.py",
-                what,
-                &self.settings.domain.unwrap_or_default().to_string(),
-            ]),
-        };
-        command.args(more);
+        let domain = self.settings.domain.unwrap_or_default().to_string();
+        command.args(["tests/ros2/peer.py", what, &domain]).args(more);
         command
-    }
-}
-
-impl Drop for Network {
-    fn drop(&mut self) {
-        if let Some(master) = &mut self.master {
-            let _ = master.kill();
-            let _ = master.wait();
-        }
     }
 }
 

@@ -145,7 +145,6 @@ pub fn scene(period_s: f64) -> Scene {
         effects,
         touch: TouchSettings { period_s: Some(period_s), ..TouchSettings::default() },
         solver: Default::default(),
-        former_names: Vec::new(),
     }
 }
 

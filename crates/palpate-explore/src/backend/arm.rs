@@ -5,23 +5,19 @@ use super::{Backend, Fault, LinkFault};
 use crate::robot::arm::{ArmSettings, Chain};
 use crate::robot::sensor::SensorSettings;
 use nalgebra::{Isometry3, Point3};
-use palpate_input::config::{ConfigError, Loader, Validate};
+use palpate_input::config::{Loader, Validate};
 use palpate_input::error::InputError;
 use std::any::Any;
 use std::sync::Arc;
 
 /// Settings of a kind of arm: a table of `[backend]`, whose presence selects the arm.
 pub trait Connector: Validate {
-    /// Changes the settings in `loader` before they are read: renames former keys of the table with
-    /// the dotted key `table`, and fills in the defaults of the arm's driver.
-    ///
-    /// # Errors
-    /// If a former key has a value that is not allowed any more.
-    fn prepare(_loader: &mut Loader, _table: &str) -> Result<(), ConfigError>
+    /// Changes the settings in `loader` before they are read: fills in the defaults of the arm's
+    /// driver in the table with the dotted key `table`.
+    fn prepare(_loader: &mut Loader, _table: &str)
     where
         Self: Sized,
     {
-        Ok(())
     }
 
     /// Sets omitted values from the model of the arm.

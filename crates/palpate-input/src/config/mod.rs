@@ -41,8 +41,6 @@ pub struct Loader {
     sets: Vec<(String, String)>,
     /// Keys as given, and as read.
     read_as: Vec<[String; 2]>,
-    /// Former names that were read, each with the present one.
-    former_names: Vec<String>,
     /// Folder of the shipped files; `None` for that of the environment.
     home: Option<PathBuf>,
 }
@@ -69,7 +67,6 @@ impl Loader {
             sources: vec![source],
             sets: Vec::new(),
             read_as: Vec::new(),
-            former_names: Vec::new(),
             home: None,
         })
     }
@@ -108,62 +105,11 @@ impl Loader {
         Ok(())
     }
 
-    /// Reads keys of an earlier version, pairs of a former and the present name under `prefix`.
-    ///
-    /// # Errors
-    /// If a key is given by both names.
-    pub fn read_former_keys(
-        &mut self,
-        prefix: &str,
-        keys: &[[&str; 2]],
-    ) -> Result<(), ConfigError> {
-        for names in keys {
-            let [former, present] = names.map(|name| format!("{prefix}{name}"));
-            if self.has_value(&former) {
-                self.read_as(&former, &present)?;
-                self.former_names.push(format!("`{former}` is now `{present}`"));
-            }
-        }
-        Ok(())
-    }
-
-    /// Reads values of an earlier version, pairs of a former and the present name, of the key
-    /// `key`.
-    pub fn read_former_values(&mut self, key: &str, values: &[[&str; 2]]) {
-        let value = self.value(key).and_then(Value::as_str);
-        if let Some([former, present]) = values.iter().find(|[former, _]| value == Some(former)) {
-            self.insert(key, Value::String((*present).into()));
-            self.former_names.push(format!("\"{former}\" is now \"{present}\""));
-        }
-    }
-
-    /// Removes the dotted key of a setting that is now a constant.
-    ///
-    /// # Errors
-    /// If it has another value than `constant`.
-    pub fn take_constant(&mut self, key: &str, constant: &Value) -> Result<(), ConfigError> {
-        let Some(value) = self.take(key) else { return Ok(()) };
-        let is_same = match value.as_integer() {
-            Some(whole) => Some(whole as f64) == constant.as_float(),
-            None => value == *constant,
-        };
-        if is_same {
-            return Ok(());
-        }
-        let allowed = format!("{constant}, which is now a constant; remove the key");
-        Err(self.not_allowed(key, &value.to_string(), &allowed))
-    }
-
     /// Removes the dotted key of an optional table that is `false`.
     pub fn take_false(&mut self, key: &str) {
         if self.value(key) == Some(&Value::Boolean(false)) {
             self.take(key);
         }
-    }
-
-    /// Takes the list of former names that were read, each with the present one.
-    pub fn take_former_names(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.former_names)
     }
 
     /// Returns the key under which `key` was given.
@@ -360,11 +306,6 @@ impl Loader {
             let key = self.given(&join(path, &missing));
             let error = ConfigError::new(self.origin(&key), format!("`{key}` is missing"));
             return ConfigError { key: Some(key), ..error };
-        }
-        if let (true, Some(twice)) = (message.starts_with("duplicate field"), names.next()) {
-            let key = join(path, &twice);
-            let message = "given by its current and by a former name; keep one".into();
-            return ConfigError::invalid(self.origin(&key), key, None, message);
         }
         let key = String::from(path);
         let value = self.value(&key).map(|value| value.to_string());

@@ -2,7 +2,6 @@
 
 mod arm_pc;
 mod driver_tables;
-mod former_keys;
 mod franka;
 mod net_ft;
 mod ros_messages;

@@ -10,19 +10,12 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// Copies the constants of the scene's sensor into the effects under `effects`, unless the scene
-/// sets them itself. Returns the keys of constants that the scene sets in its effects, where
-/// version 0.1 had them.
+/// sets them itself.
 ///
 /// # Errors
 /// If the sensor file cannot be read, or has a key that is not a constant or a value that is not
 /// allowed.
-pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigError> {
-    let flex = format!("{effects}.flex");
-    if loader.has_value(&flex) {
-        let allowed = "no flex, which was removed: use model = \"columns\" or \
-                       model = \"shell\" in [effects.skin]";
-        return Err(loader.not_allowed(&flex, "(given)", allowed));
-    }
+pub fn load(loader: &mut Loader, effects: &str) -> Result<(), ConfigError> {
     let key = format!("{effects}.sensor");
     loader.resolve_path_ending(&key, ".toml");
     let sensor = match loader.value(&key).cloned() {
@@ -30,7 +23,7 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
         Some(Value::String(name)) => read(loader, &key, &name)?,
         _ => Table::new(),
     };
-    let Some(table) = loader.table_mut(effects) else { return Ok(Vec::new()) };
+    let Some(table) = loader.table_mut(effects) else { return Ok(()) };
     let is_used = |name: &String| table.contains_key(name);
     let differs = |(name, is): (String, &Value)| value(&DEFAULTS, &name) != Some(is);
     if !sensor.keys().any(is_used) && values(&sensor, "").into_iter().any(differs) {
@@ -40,14 +33,8 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
         return Err(loader.not_allowed(&key, &shown, &allowed));
     }
     table.remove("sensor");
-    let is_moved = |(name, is): &(String, &Value)| {
-        let known = value(&DEFAULTS, name);
-        known.is_some_and(|known| value(&sensor, name).unwrap_or(known) != *is)
-    };
-    let moved = values(table, "").into_iter().filter(is_moved);
-    let moved = moved.map(|(name, _)| format!("effects.{name}")).collect();
     model_file::overlay(table, &sensor);
-    Ok(moved)
+    Ok(())
 }
 
 /// Returns the constants in the file `name`, or those of an included sensor.

@@ -19,9 +19,6 @@ macro_rules! effects {
                 $(#[$doc])*
                 pub $name: Option<$Effect>,
             )*
-            /// Keys of constants that the scene sets in its effects, as in version 0.1.
-            #[serde(skip)]
-            pub legacy_keys: Vec<String>,
         }
 
         impl serde::Serialize for Effects {

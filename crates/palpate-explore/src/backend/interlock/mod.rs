@@ -37,13 +37,3 @@ pub const INTERLOCKS: &[InterlockEntry] = &[
     tracking::POSITION,
 ];
 
-/// Keys of `[backend]` in files of version 0.1 that are now constants, with their values.
-pub const FORMER_KEYS: [(&str, f64); 7] = [
-    ("interlocks.force_rate_n_s", force::RISE_N_S),
-    ("interlocks.tracking_error_s", tracking::VELOCITY_S),
-    ("interlocks.follow_s", tracking::VELOCITY_S),
-    ("interlocks.retract_m_s", force::RETRACT_M_S),
-    ("interlocks.retract_rise_n", force::RETRACT_RISE_N),
-    ("start_checks.hold_s", start_checks::HOLD_S),
-    ("start_checks.still", start_checks::START_TOLERANCE),
-];

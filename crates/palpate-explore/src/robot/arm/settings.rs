@@ -21,7 +21,6 @@ use std::path::Path;
 pub struct ArmSettings {
     /// Arm model: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), `"ur5e"`, `"fr3"`, `"iiwa14"`,
     /// or a file: an arm model (`.toml`), a URDF or an MJCF (`.xml`).
-    #[serde(alias = "links", deserialize_with = "model")]
     #[schemars(extend("format" = PATH_OR_NAME))]
     pub model: String,
     /// Link (URDF), body or site (MJCF) that carries the tool along its +z; default: the only end.
@@ -245,16 +244,6 @@ const ROUNDING: f64 = 1e-9;
 
 /// Last digit of a limit in a message, deg or m; limits are rounded inwards.
 const LAST_DIGIT: f64 = 1e-4;
-
-/// Reads `model`; version 0.1 had `links = "C"` or `"A"` instead.
-fn model<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-    let model = String::deserialize(deserializer)?;
-    Ok(match model.as_str() {
-        "C" => MODELS[0].0.into(),
-        "A" => MODELS[1].0.into(),
-        _ => model,
-    })
-}
 
 fn is_zero(numbers: &[f64; 3]) -> bool {
     *numbers == [0.0; 3]

@@ -4,7 +4,7 @@ use super::contact_switch::ContactSettings;
 use super::depth_patch::DepthPatchSettings;
 use super::force_torque::ForceTorqueTipSettings;
 use super::kind::{SensorKind, Signal};
-use palpate_input::config::{ConfigError, Loader, Rules, Validate};
+use palpate_input::config::{Loader, Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -60,25 +60,10 @@ impl SensorSettings {
 
     /// Changes the settings of the table with the dotted key `table` in `loader` before they are
     /// read: a sensor's table that is `false` is removed.
-    ///
-    /// # Errors
-    /// If the former key `kind` is given, with the table that replaces it.
-    pub fn prepare(loader: &mut Loader, table: &str) -> Result<(), ConfigError> {
-        let key = format!("{table}.kind");
-        if let Some(kind) = loader.value(&key).cloned() {
-            let allowed = match kind.as_str() {
-                Some("automatic") => "no kind; without a table in [sensor] it is automatic".into(),
-                Some(name) if TABLES.contains(&name) => {
-                    format!("no kind, and a table [{table}.{name}]")
-                }
-                _ => format!("no kind, and a table of {}", TABLES.join(", ")),
-            };
-            return Err(loader.not_allowed(&key, &kind.to_string(), &allowed));
-        }
+    pub fn prepare(loader: &mut Loader, table: &str) {
         for name in TABLES {
             loader.take_false(&format!("{table}.{name}"));
         }
-        Ok(())
     }
 }
 
