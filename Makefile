@@ -17,7 +17,7 @@ DIST := palpate-$(VERSION)-x86_64-linux
 .PHONY: test-franka test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test test-code test-arms check-planners check-cost hard-cases test-ros2 page-test test-live test-mcap fuzz reference messages lint lint-features bench contacts strokes detection camera growth speed bench-peers growth-around growth-hypotheses wheel release test-wheel-systems install-python test-python docs notebooks dist setup tools clean
 
 # Features of all tests; one set, so that nothing is built twice.
-FEATURES := ros2,franka
+FEATURES := ros2,franka,pictures
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
 

@@ -3,7 +3,7 @@
 
 use palpate::report::axes::{Axis, Panel};
 use palpate::report::canvas::{Area, Canvas};
-use palpate::report::files::png;
+use palpate::report::files::write_as;
 use palpate::report::legend::{Legend, Swatch};
 use palpate::report::style;
 use std::path::Path;
@@ -102,8 +102,7 @@ pub fn draw(name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
 pub fn draw_over(of: &str, name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
     if let Some(svg) = drawn(of, panels) {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-        std::fs::write(docs.join(name).with_extension("png"), png(&svg)?)?;
-        std::fs::write(docs.join(name).with_extension("svg"), svg)?;
+        ["svg", "png"].iter().try_for_each(|format| write_as(&docs.join(name).with_extension(format), &svg))?;
     }
     Ok(())
 }

@@ -1,8 +1,7 @@
 //! Option `--camera` of `palpate show`: what the scene's depth camera sees.
 
-use crate::experiment::store::write_whole;
 use crate::report::camera_view::{DepthImage, camera_views};
-use crate::report::files::png;
+use crate::report::files;
 use crate::sim::Environment;
 use anyhow::{Context, ensure};
 use palpate_explore::view::SeenSurface;
@@ -41,6 +40,6 @@ pub(super) fn draw(environment: &Environment, path: &Path) -> anyhow::Result<Str
         images.iter().any(|image| !image.depths_m.is_empty()),
         "--camera: the camera sees nothing; check camera.position_m and rotation_deg"
     );
-    write_whole(path, png(&camera_views(&images))?)?;
+    files::write_as(path, &camera_views(&images))?;
     Ok(text + &format!("picture: {}\n", path.display()))
 }

@@ -11,7 +11,9 @@ use crate::experiment::store::{Run, write_whole};
 use crate::experiment::trial::row::planner_rows;
 use crate::report::points::PointCloud;
 use crate::report::replay::{self, BeliefReplay};
-use crate::report::{animation, figures, files, film, style, whole_object};
+#[cfg(feature = "pictures")]
+use crate::report::animation;
+use crate::report::{figures, files, film, style, whole_object};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
@@ -30,7 +32,7 @@ Examples:
   palpate export scenes/container.toml --grid 41x51 --out runs/container-scan
 
 From a run: writes the belief after some touches as FILE.ply or FILE.obj, and the belief beside the true surface as \
-FILE.svg, FILE.png and FILE.pdf. The standard deviation is the property `sigma_m` of a PLY file and a comment below each \
+FILE.svg. The standard deviation is the property `sigma_m` of a PLY file and a comment below each \
 vertex of an OBJ file. Colours show it on the viridis map, from 0 to the largest. Vertices where a surface is \
 less likely than none are omitted. A run around a whole object gives the closed mean surface; sigma_m is the standard \
 deviation along its normal, and error_m is the signed distance to the true surface, negative inside.
@@ -41,7 +43,7 @@ planner's median trial by final error, or its first trial if there is no ground 
 and its rank.
 
 From a scene: touches a grid of targets. FOLDER holds cloud.ply (contact points with normals), cloud.csv (also the \
-misses), scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops it without writing anything; the \
+misses), scan.svg (the object beside the cloud). Ctrl-C stops it without writing anything; the \
 files do not depend on the number of threads.")]
 pub(super) struct Args {
     /// A run's folder, a scene (.toml) with an object, or the name of a scene in scenes/.
@@ -136,7 +138,7 @@ fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let out = out.with_context(|| format!("--out FILE: allowed is a file ending in {ENDINGS}"))?;
     let format = format(out)?;
     match format {
-        Format::Mesh(_) => args.force.check_files(out, &files::FORMATS)?,
+        Format::Mesh(_) => args.force.check_files(out, files::FORMATS)?,
         Format::Gif | Format::Mp4 => args.force.check_file(out)?,
     }
     let mut run = Run::read(&args.path)?;
@@ -154,7 +156,21 @@ fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     }
 }
 
+/// Returns the error that a film cannot be written.
+#[cfg(not(feature = "pictures"))]
+fn film_file(
+    _: &Run,
+    _: &Args,
+    _: u32,
+    _: &Format,
+    out: &Path,
+    _: Verbosity,
+) -> anyhow::Result<Completion> {
+    bail!("--out {}{}", out.display(), files::NEEDS_PICTURES)
+}
+
 /// Writes the film of a trial up to some touches.
+#[cfg(feature = "pictures")]
 fn film_file(
     run: &Run,
     args: &Args,
@@ -224,7 +240,7 @@ fn mesh_file(
         mesh.triangles.len(),
         1e3 * largest_m,
         film::rank_words(&run, args.planner(), run.experiment.report.trial),
-        out.with_extension("png").display()
+        out.with_extension("svg").display()
     ))?;
     Ok(Completion::Done)
 }

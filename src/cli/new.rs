@@ -8,7 +8,6 @@ use super::prepare::prepare_environment;
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::experiment::is_name_character;
 use crate::experiment::store::write_whole;
-use crate::report::files::png;
 use crate::sim::Scene;
 use crate::sim::placement::{self, ObjectAxes, ObjectSide, UpAxis, ZoneProposal};
 use crate::sim::scene::Unit;
@@ -30,7 +29,7 @@ Examples:
   palpate new mug.glb --around
   palpate new scan.ply --unit inch --up z --out my-experiments
 
-Reads the mesh and writes an experiment, NAME.toml, its scene, NAME-scene.toml, and a picture of both, NAME.png and NAME.svg. \
+Reads the mesh and writes an experiment, NAME.toml, its scene, NAME-scene.toml, and a picture of both, NAME.svg. \
 The experiment runs unchanged. Each choice is printed with its evidence and is a setting of the scene that you can change. A second \
 call replaces the files unless you edited them.
 
@@ -219,8 +218,8 @@ pub(super) fn write(args: &Args, talk: Verbosity) -> anyhow::Result<Written> {
     let [experiment, scene] = ["", "-scene"].map(|what| args.beside(format!("{name}{what}.toml")));
     args.force.check_editable_file(&experiment)?;
     args.force.check_editable_file(&scene)?;
-    let pictures = ["png", "svg"].map(|extension| args.beside(format!("{name}.{extension}")));
-    pictures.iter().try_for_each(|path| args.force.check_file(path))?;
+    let drawn = args.beside(format!("{name}.svg"));
+    args.force.check_file(&drawn)?;
     let placed = MeshPlacement::new(args, Asker::new(args.yes, talk))?;
     make_folder(&args.out)?;
     let finger = args.finger.template(args.around);
@@ -236,13 +235,11 @@ pub(super) fn write(args: &Args, talk: Verbosity) -> anyhow::Result<Written> {
     environment.notices().iter().for_each(|notice| talk.note(notice));
     placed.narrow_zone(args).iter().for_each(|notice| talk.note(notice));
     if let Some(svg) = picture(&environment, None) {
-        write_whole(&pictures[0], png(&svg)?)?;
-        write_whole(&pictures[1], &svg)?;
-        written.extend(pictures.iter().map(|path| path.display().to_string()));
+        write_whole(&drawn, &svg)?;
+        written.push(drawn.display().to_string());
     }
-    let [picture, _] = pictures;
     let (words, takes) = (placed.words(args), finger.takes);
-    Ok(Written { words, files: written, experiment, picture, takes })
+    Ok(Written { words, files: written, experiment, picture: drawn, takes })
 }
 
 /// Refuses a scene or an experiment, with the command that takes it.

@@ -15,7 +15,7 @@ use crate::experiment::store;
 use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
 use crate::report;
-use crate::report::files::png;
+use crate::report::files;
 use crate::sim::environment::ObjectShape;
 use crate::sim::home::home_deg;
 use crate::sim::scene::Unit;
@@ -32,10 +32,10 @@ Examples:
   palpate show models/bird.glb
   palpate show my-part.obj --unit mm
   palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's viewer
-  palpate show scenes/container.toml --png container.png     a picture of the zone on the object
-  palpate show scenes/bird_around_pa10.toml --png bird.png   reachable surface of a whole object
+  palpate show scenes/container.toml --picture zone.svg      a picture of the zone on the object
+  palpate show scenes/bird_around_pa10.toml --picture bird.svg reachable surface of a whole object
   palpate show scenes/bird_pa10.toml --render bird.png       the whole scene with its robot
-  palpate show scenes/container_camera.toml --camera view.png    what the depth camera sees
+  palpate show scenes/container_camera.toml --camera view.svg    what the depth camera sees
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy
   palpate show scenes/bird_pa10.toml --watch                 a trial of active in a window
@@ -63,7 +63,7 @@ pub(super) struct Args {
     mjcf: Option<PathBuf>,
     /// Draw a scene's object with its zone, or the reachable surface of a whole object.
     #[arg(long, value_name = "FILE")]
-    png: Option<PathBuf>,
+    picture: Option<PathBuf>,
     /// Find a home posture of a scene's arm.
     #[arg(long)]
     home: bool,
@@ -95,7 +95,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let is_mesh = !is_toml && !is_folder;
     let options = [
         ("--mjcf", args.mjcf.is_some(), is_scene, "a scene (.toml)"),
-        ("--png", args.png.is_some(), is_scene, "a scene (.toml)"),
+        ("--picture", args.picture.is_some(), is_scene, "a scene (.toml)"),
         ("--render", args.render.is_some(), is_scene, "a scene (.toml)"),
         ("--home", args.home, is_scene, "a scene (.toml)"),
         ("--camera", args.camera.is_some(), is_scene, "a scene (.toml)"),
@@ -111,7 +111,10 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         ("--unit", args.unit.is_some(), is_mesh, "a mesh; in a scene use object.unit"),
     ];
     check_applicable(&path, &options)?;
-    for file in [&args.mjcf, &args.png, &args.render, &args.camera].into_iter().flatten() {
+    for picture in [&args.picture, &args.camera].into_iter().flatten() {
+        files::extension(picture)?;
+    }
+    for file in [&args.mjcf, &args.picture, &args.render, &args.camera].into_iter().flatten() {
         args.force.check_file(file)?;
     }
     if args.watch.watch {
@@ -168,11 +171,11 @@ fn scene(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<String> {
     if let ObjectShape::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }
-    if let Some(path) = &args.png {
+    if let Some(path) = &args.picture {
         let shape = whole_object.as_ref().and_then(|(_, shape)| shape.as_ref());
         let svg =
-            picture(&environment, shape).context("--png: this scene has no object to draw")?;
-        store::write_whole(path, png(&svg)?)?;
+            picture(&environment, shape).context("--picture: this scene has no object to draw")?;
+        files::write_as(path, &svg)?;
         text += &format!("picture: {}\n", path.display());
     }
     if let Some(path) = &args.camera {

@@ -2,7 +2,7 @@
 //!
 //! Frames have equal sizes. A GIF has the same bytes on every machine of one kind.
 
-use super::files::pixels;
+use super::raster::pixels;
 use anyhow::{Context, anyhow};
 use color_quant::NeuQuant;
 use gif::{DisposalMethod, Encoder, Extension, Frame, Repeat};

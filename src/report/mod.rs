@@ -1,6 +1,7 @@
 //! Report of a run: tables, figures and a page, drawn from its recorded rows.
 
 pub mod accuracy;
+#[cfg(feature = "pictures")]
 pub mod animation;
 pub mod axes;
 pub mod benchmark;
@@ -22,6 +23,8 @@ pub mod page;
 pub mod points;
 pub mod reference;
 pub mod reliability;
+#[cfg(feature = "pictures")]
+pub mod raster;
 pub mod relief;
 pub mod replay;
 pub mod scan;
@@ -69,8 +72,8 @@ pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Re
     files.iter().try_for_each(|(name, table)| table.write_csv(&folder.join(name)))
 }
 
-/// Writes figures and page into the run's folder: `figures/*.svg`, with `.png` and `.pdf`, and
-/// `report.html`.
+/// Writes figures and page into the run's folder: `figures/*.svg`, in each format of this build,
+/// and `report.html`.
 ///
 /// # Errors
 /// If the rows do not belong to the experiment, or a file cannot be written.

@@ -58,9 +58,13 @@ pub fn html(
         fold("All settings, including defaults", &preformatted(settings)),
         fold("Software and machine", &preformatted(manifest)),
         fold("Files in this folder", &raw_files(drawings)),
+        format!("<script>{SAVE}</script>\n"),
     ];
     html::page("Palpate run", &run.experiment.name, &run.experiment.question, &parts.concat())
 }
+
+/// Saves a figure as PNG.
+const SAVE: &str = include_str!("save.js");
 
 /// Name of the figure that stays open: errors against touches.
 const CURVES: &str = "convergence";
@@ -98,8 +102,13 @@ fn events(run: &Run) -> String {
 
 fn figure(run: &Run, figure: &ReportFigure, svg: &str) -> String {
     let name = figure.name;
-    let links = FORMATS
-        .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
+    let link = |format: &&str| {
+        format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase())
+    };
+    let mut links: Vec<String> = FORMATS.iter().map(link).collect();
+    if !FORMATS.contains(&"png") {
+        links.push(format!("<button type=\"button\" data-png=\"{name}\">PNG</button>"));
+    }
     let caption = explained(&(figure.caption)(run));
     let caption = format!("{caption} <span class=\"files\">{}</span>", links.join(" "));
     html::figure(name, svg, caption)
@@ -115,7 +124,7 @@ fn raw_files(drawings: &[(&ReportFigure, String)]) -> String {
         .map(|(file, what)| format!("<li><a href=\"{file}\">{file}</a>: {what}</li>\n"))
         .collect();
     if !drawings.is_empty() {
-        items += "<li><a href=\"figures/\">figures</a>: each figure as SVG, PNG and PDF</li>\n";
+        items += "<li><a href=\"figures/\">figures</a>: each figure; print this page for a PDF</li>\n";
     }
     format!("<ul>\n{items}</ul>\n")
 }

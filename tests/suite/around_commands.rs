@@ -90,8 +90,8 @@ fn what_goes_over_a_zone_refuses_a_whole_object() {
     assert!(!shown.contains("zone") && !shown.contains("refuses"), "{shown}");
     let mjcf = ["show", "scene.toml", "--mjcf", "it.xml"];
     fails(folder.path(), &mjcf, &["no MuJoCo model", "[arm]"]);
-    succeeds(folder.path(), &["show", "scene.toml", "--png", "reach.png"]);
-    assert!(folder.path().join("reach.png").is_file());
+    succeeds(folder.path(), &["show", "scene.toml", "--picture", "reach.svg"]);
+    assert!(folder.path().join("reach.svg").is_file());
     fails(folder.path(), &["show", "scene.toml", "--watch"], &["does not move"]);
 }
 

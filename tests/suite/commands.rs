@@ -200,7 +200,7 @@ fn files_of_others_are_replaced_by_force_only() {
     let scene = read("scene.toml");
     for (option, file) in [
         ("--mjcf", "scene.toml"),
-        ("--png", "scene.toml"),
+        ("--picture", "scene.toml"),
         ("--mjcf", "mesh.obj"),
         ("--render", "small.toml"),
     ] {

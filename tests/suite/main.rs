@@ -37,8 +37,10 @@ mod dynamic;
 mod effects;
 mod examples;
 mod experiments;
+#[cfg(feature = "pictures")]
 mod figures;
 mod files;
+#[cfg(feature = "pictures")]
 mod film;
 mod finger;
 mod finger_parts;
@@ -101,6 +103,7 @@ mod reference;
 mod registration;
 mod release;
 mod relevance;
+#[cfg(feature = "pictures")]
 mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]

@@ -170,9 +170,8 @@ fn a_mesh_and_a_scene_are_shown_with_the_way_on() {
     let folder = folder();
     assert!(succeeds(folder.path(), &["show", "egg.ply"]).contains("palpate new egg.ply"));
     succeeds(folder.path(), &["new", "egg.ply"]);
-    succeeds(folder.path(), &["show", "egg-scene.toml", "--png", "egg.png"]);
-    let png = fs::read(folder.path().join("egg.png")).unwrap();
-    assert_eq!(&png[1..4], b"PNG");
+    succeeds(folder.path(), &["show", "egg-scene.toml", "--picture", "egg.svg"]);
+    assert!(fs::read(folder.path().join("egg.svg")).unwrap().starts_with(b"<svg"));
     // The program's own picture is replaced, a scene is not.
-    succeeds(folder.path(), &["show", "egg-scene.toml", "--png", "egg.png"]);
+    succeeds(folder.path(), &["show", "egg-scene.toml", "--picture", "egg.svg"]);
 }
