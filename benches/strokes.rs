@@ -52,9 +52,9 @@ fn slide(environment: &Arc<Environment>, target: &Target) -> Option<Slide> {
 
 fn main() {
     println!(
-        "| object | speed mm/s | strokes | length | RMS error mm | mean force | peak force | lost |"
+        "| object | speed mm/s | strokes | length | RMS error mm | mean force | peak force: median, 95 %, largest | up to 2 | lost |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     for object in ["container", "bird"] {
         for speed_m_s in [0.005, 0.01, 0.02, 0.04] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{object}.toml"));
@@ -89,15 +89,22 @@ fn main() {
                 errors_m.extend(found.errors_m);
             }
             let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+            peaks_n.sort_by(f64::total_cmp);
+            let last = peaks_n.len() as f64 - 1.0;
+            let peak = |part: f64| peaks_n[(part * last).round() as usize] / FORCE_N;
+            let few = peaks_n.iter().filter(|peak_n| **peak_n <= 2.0 * FORCE_N).count();
             let squares: Vec<f64> = errors_m.iter().map(|error_m| error_m * error_m).collect();
             println!(
-                "| {object} | {:.0} | {} | {:.0} % | {:.3} | {:.2} | {:.2} | {:.1} % |",
+                "| {object} | {:.0} | {} | {:.0} % | {:.3} | {:.2} | {:.1}, {:.1}, {:.1} | {:.0} % | {:.1} % |",
                 1e3 * speed_m_s,
                 peaks_n.len(),
                 100.0 * errors_m.len() as f64 / (peaks_n.len() as f64 * LENGTH_M * 1e3),
                 1e3 * mean(&squares).sqrt(),
                 mean(&means_n) / FORCE_N,
-                peaks_n.iter().copied().fold(0.0, f64::max) / FORCE_N,
+                peak(0.5),
+                peak(0.95),
+                peak(1.0),
+                100.0 * few as f64 / peaks_n.len() as f64,
                 100.0 * lost as f64 / count as f64,
             );
         }

@@ -30,14 +30,20 @@ const MEASURED_M: f64 = 5e-5;
 const LOST: f64 = 0.3;
 const LASTS_S: f64 = 0.1;
 
-/// Multiple of the set load, or of that at the start if it is larger, that shows a wall ahead.
-// heuristic: a stiff finger still brakes well below a usual limit of force.
-const WALL: f64 = 3.0;
+/// Multiple of the set load, or of that at the start if it is larger, that shows a wall ahead, and
+/// of the set load above which the finger slows down.
+// heuristic: below 1.7 a rigid tip stops at each step, above 3 a soft one presses six times as hard.
+const WALL: f64 = 2.0;
+const EASED: f64 = 1.3;
+
+/// Time until a command changes the load, s.
+// heuristic: an arm's lag; a load that rises goes on rising as long.
+const REACTION_S: f64 = 0.03;
 
 /// Fraction of the load of a wall above which a contact is that of two surfaces, which is not
 /// measured, and which is a wall if it lasts.
-// heuristic: twice the set load at the start.
-const HARD: f64 = 0.67;
+// heuristic: a finger that climbs slowly stays below.
+const HARD: f64 = 0.9;
 
 /// Distance of the tip behind its set point at which it counts as stuck, m.
 // heuristic: what a servo lags at the largest speed of a stroke.
@@ -94,6 +100,8 @@ struct Slide {
     hold: Hold,
     /// Whether the sensor states a load; it may state none without contact.
     has_load: bool,
+    /// Load, averaged over the reaction time.
+    slow_load: f64,
     trail: Trail,
     /// Length at the last place of the trail, and at the last contact.
     left_m: f64,
@@ -133,17 +141,25 @@ impl Slide {
         self.has_load.then(|| monitor.load().unwrap_or(0.0))
     }
 
+    /// Returns the load to be expected when the arm has reacted.
+    fn expected(&self, load: f64) -> f64 {
+        load + (load - self.slow_load).max(0.0)
+    }
+
     /// Returns the velocity along the estimated surface that corrects `load`.
     fn velocity_w(&self, load: Option<f64>) -> Vector3<f64> {
         let (hold, wall, steep) = (&self.hold, self.trail.wall, self.slope());
         let most_m_s = STEEPEST * self.speed_m_s;
         // A surface that rises ahead presses the finger: it goes on as the load falls again.
-        let eased = load.map_or(1.0, |load| (wall - load) / (wall - hold.load).max(1e-9));
+        let eases = EASED * hold.load;
+        let expected = load.map(|load| self.expected(load));
+        let eased = expected.map_or(1.0, |load| (wall - load) / (wall - eases).max(1e-9));
         let across_m_s = eased.clamp(0.0, 1.0) * self.speed_m_s / (1.0 + steep * steep).sqrt();
         let push_m_s = load.map_or(0.0, |load| {
             (RATE_PER_S * (hold.load - load) / hold.per_m).clamp(-most_m_s, most_m_s)
         });
-        self.across_w.scale(across_m_s) + self.ahead_w.scale(across_m_s * steep + push_m_s)
+        let along_w = self.across_w.scale(across_m_s) + self.ahead_w.scale(across_m_s * steep);
+        along_w - self.normal_w * push_m_s
     }
 
     /// Counts the time without contact and that at the load of a wall. Returns whether the contact
@@ -199,8 +215,11 @@ impl Servo {
                 break;
             }
             let load = slide.load(&self.monitor);
-            if load.is_some_and(|load| load > slide.trail.wall) {
+            if load.is_some_and(|load| slide.expected(load) > slide.trail.wall) {
                 break;
+            }
+            if let Some(load) = load {
+                slide.slow_load += (load - slide.slow_load) * (passed_s / REACTION_S).min(1.0);
             }
             let is_clear = slide.count_time(load, passed_s);
             slide.pass(&here.translation.vector, done_m);
@@ -251,6 +270,7 @@ impl Servo {
             deepest_w: turning_point(&self.robot, approach).translation.vector,
             hold,
             has_load: load.is_some(),
+            slow_load: load.unwrap_or(0.0),
             trail: Trail { places_w: vec![start_w], wall },
             left_m: 0.0,
             sampled_m: 0.0,
