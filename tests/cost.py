@@ -30,7 +30,7 @@ BUILD = ["cargo", "build", "--quiet", "--locked", "--features", "ros2"]
 WHOLE = {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_CODEGEN_UNITS": "2"}
 SKIPPED = "cost: skipped, no valgrind (Debian: apt-get install valgrind)"
 HEAD = """\
-# Instructions of one trial of each planner, set-up subtracted. `make check-cost` compares the program
+# Instructions of one trial of each planner, set-up subtracted. `make test PART=cost` compares the program
 # with this table; `tests/cost.py --write` updates it.
 """
 

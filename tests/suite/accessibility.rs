@@ -1,7 +1,7 @@
 //! Checks by axe-core of the report pages and, if it is built, of the site: narrow and wide, light
 //! and dark.
 //!
-//! They run under `make page-test`, which fetches axe-core; otherwise they are skipped with a note.
+//! They run under `make test PART=page`, which fetches axe-core; otherwise they are skipped with a note.
 
 use crate::common::program::palpate;
 use crate::common::runs::SURFACE;
@@ -54,7 +54,7 @@ fn axe() -> Option<PathBuf> {
         // A macro's output would be captured by the test harness.
         let _ = writeln!(
             io::stderr(),
-            "tests/suite/accessibility.rs: SKIPPED, no axe-core; use `make page-test`"
+            "tests/suite/accessibility.rs: SKIPPED, no axe-core; use `make test PART=page`"
         );
     }
     path

@@ -1,7 +1,7 @@
 //! Fuzz tests with randomly altered files and settings: the program neither panics nor hangs, and
 //! rejects invalid input with clear messages.
 //!
-//! The alterations are deterministic. `PALPATE_FUZZ` is the number of cases per target: `make fuzz`
+//! The alterations are deterministic. `PALPATE_FUZZ` is the number of cases per target: `make test PART=fuzz`
 //! uses 100000, a thousandth of them through the program itself.
 
 use std::fs;

@@ -1,7 +1,7 @@
 //! Tests of a run's page in a browser: controls change the picture, and the page fits and is
 //! readable at every width, on light and dark backgrounds.
 //!
-//! They are skipped with a note if there is no Chromium; `make page-test` requires one.
+//! They are skipped with a note if there is no Chromium; `make test PART=page` requires one.
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::statistics::analysis::Analysis;
