@@ -78,10 +78,13 @@ $(AXE): tests/axe.txt
 	cd $(DEPS)/axe && python3 -m zipfile -e axe_playwright_python-*.whl .
 	touch $@
 
+# Notes that part $(1) of the tests is skipped, and why; an error with PALPATE_REQUIRE=1.
+skip = { echo "$(1) is skipped: $(2)" >&2; test "$$PALPATE_REQUIRE" != 1; }
+
 # Runs the command $(2) of part $(1) in a network namespace of its own, isolated from the network.
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 NO_NAMESPACE := no permission for a network namespace (unshare --map-root-user --net)
-isolated = if $(NAMESPACE) true 2>/dev/null; then $(2); else echo "$(1) is skipped: $(NO_NAMESPACE)"; fi
+isolated = if $(NAMESPACE) true 2>/dev/null; then $(2); else $(call skip,$(1),$(NO_NAMESPACE)); fi
 
 # Shards with GNU parallel and with Slurm on one node.
 define part-clusters
@@ -110,10 +113,13 @@ define part-franka
 	PALPATE_FRANKA_ENDS=20 $(NAMESPACE) $(SUITE) --ignored --test-threads 1 $(FRANKA_TESTS))
 endef
 
-# Randomly altered files and settings cause errors, but no panic and no hang. Takes about an hour.
+# Randomly altered files and settings cause errors, but no panic and no hang. Takes about an hour. Each run draws other
+# ones; PROPTEST_RNG_SEED repeats a run.
 FUZZ := 100000
 define part-fuzz
-for tests in fuzz:: folders::kills recording::; do PALPATE_FUZZ=$(FUZZ) $(SUITE) $$tests || exit; done
+@export PALPATE_FUZZ=$(FUZZ) PROPTEST_RNG_SEED=$${PROPTEST_RNG_SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')}; \
+	echo "PROPTEST_RNG_SEED=$$PROPTEST_RNG_SEED"; \
+	for tests in fuzz:: folders::kills recording::; do $(SUITE) $$tests || exit; done
 endef
 
 # All hard cases at all severities, periods and time steps, ten minutes of processor time: writes
@@ -141,7 +147,7 @@ endef
 # The report page in Chromium, and the accessibility of report and built site by axe-core.
 needs-page := $(AXE)
 define part-page
-PALPATE_PAGE_TEST=1 PALPATE_AXE=$(abspath $(AXE)) $(SUITE) page:: solid:: accessibility::
+PALPATE_REQUIRE=1 PALPATE_AXE=$(abspath $(AXE)) $(SUITE) --include-ignored page:: solid:: accessibility::
 endef
 
 # Regression test of planners against experiments/baselines; palpate check --accept REASON accepts a change.
@@ -280,7 +286,8 @@ SUDO = $(if $(filter-out 0,$(shell id -u)),sudo)
 tools: ## Debian packages that tests can use: browser, valgrind, schedulers
 	@missing=$$(PATH=$$PATH:/usr/sbin:/sbin; for tool in $(TOOLS); do \
 		command -v $${tool%:*} >/dev/null || echo $${tool#*:}; done | sort -u); \
-	test -z "$$missing" || { $(SUDO) apt-get update && $(SUDO) apt-get install --yes --no-install-recommends $$missing; }
+	test -z "$$missing" || { $(SUDO) apt-get update && \
+		$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends $$missing; }
 
 # Wheel without a Rust dependency: program, extension and shipped files, in target/wheels.
 PYTHON_HOME := python/palpate/home
