@@ -1,4 +1,4 @@
-//! Cost of the exploration of a whole object as touches grow: `make growth-around`.
+//! Cost of the exploration of a whole object as touches grow: `make bench BENCH=around`.
 //!
 //! `active` chooses the first 300 touches on a mug, a Sobol sequence the others. The update with
 //! and without a search of the hyperparameters, the choice of the next touch, and the mesh of the

@@ -1,4 +1,4 @@
-//! Errors of registered views, and how often a wrong view is named: `make camera`.
+//! Errors of registered views, and how often a wrong view is named: `make bench BENCH=camera`.
 //!
 //! Touches random places of the suite's zones, which a D405 beside them has seen, and prints the
 //! share of the six components of its pose within 1.96 stated deviations, and the share of views in

@@ -1,5 +1,5 @@
 //! Distance of the electrodes' point of contact from the exact one, over shapes and attitudes:
-//! `make contacts`. Prints the table of `docs/finger.md`.
+//! `make bench BENCH=contacts`. Prints the table of `docs/finger.md`.
 
 #[path = "../tests/suite/common/shapes.rs"]
 #[allow(dead_code)]

@@ -1,5 +1,5 @@
-//! Force at which contact with a plane is detected, and rate of false alarms: `make detection`.
-//! Prints the tables of `docs/finger.md`.
+//! Force at which contact with a plane is detected, and rate of false alarms:
+//! `make bench BENCH=detection`. Prints the tables of `docs/finger.md`.
 
 #[path = "../tests/suite/common/shapes.rs"]
 #[allow(dead_code)]

@@ -1,4 +1,4 @@
-//! Growth of the Gaussian process's cost with the number of touches: `make growth`.
+//! Growth of the Gaussian process's cost with the number of touches: `make bench BENCH=growth`.
 //!
 //! Compares the exact process with one of at most 500 inducing touches. Prints tables of seconds
 //! and of memory with measured exponents, the error of the approximation, and the fraction of this

@@ -1,4 +1,4 @@
-//! Cost of recognition as hypotheses grow: `make growth-hypotheses`.
+//! Cost of recognition as hypotheses grow: `make bench BENCH=hypotheses`.
 //!
 //! Objects of the suite at unknown places: taking in the first, third and sixth touch, and choosing
 //! the next one by information, on all cores. Prints a table with measured exponents and draws

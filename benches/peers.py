@@ -1,8 +1,8 @@
 """Algorithm 1 on the toy and on the bird's face with scikit-learn, egobox, BoTorch and Palpate: the same initial
 touches, one thread.
 
-Run by `make bench-peers`, which makes the environment. Prints processor seconds per trial, ratios to Palpate, and of
-the toy the touches after which the mean R (Eq. 5) first reaches 0.99. The others get the bird's heights from a grid
+Run by `make bench BENCH=peers`, which makes the environment. Prints processor seconds per trial, ratios to Palpate, and
+of the toy the touches after which the mean R (Eq. 5) first reaches 0.99. The others get the bird's heights from a grid
 that Palpate writes; Palpate touches the mesh.
 """
 

@@ -4,7 +4,7 @@
     benches/profile.py PROGRAM [--pieces FILE]
 
 PROGRAM has symbols; FILE has the table that `cargo bench --bench limits` printed. Needs perf (Debian: linux-perf).
-Run by `make speed`.
+Run by `make bench BENCH=speed`.
 """
 
 import argparse
@@ -173,7 +173,7 @@ def page(rows: list[str], pieces: str) -> str:
     return f"""# Speed
 
 After this page you know where the time of a touch goes, and how far each piece is from what the machine can do.
-`make speed` writes it. One thread of {processor}; planner `active`.
+`make bench BENCH=speed` writes it. One thread of {processor}; planner `active`.
 
 ## Works
 

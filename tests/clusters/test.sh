@@ -1,12 +1,17 @@
 #!/usr/bin/env bash
 # Runs the toy in eight shards by GNU parallel and by Slurm, and compares the rows with those of one process, byte
-# by byte. One Slurm task is killed and submitted again. Usage: test.sh PALPATE, from the project's folder.
+# by byte. One Slurm task is killed and submitted again. What is not installed is skipped, and an error if
+# PALPATE_REQUIRE is 1. Usage: test.sh PALPATE, from the project's folder.
 set -eu
 export PALPATE=$1
 has_parallel() { command -v parallel >/dev/null; }
-has_slurm() { command -v sbatch slurmd munged >/dev/null && unshare --net true 2>/dev/null; }
-has_parallel || echo "GNU parallel: skipped, not installed (Debian: apt-get install parallel)"
-has_slurm || echo "Slurm: skipped, not installed (Debian: apt-get install slurm-wlm munge) or not root"
+has_slurm() { [ "$(command -v sbatch slurmd munged | wc -l)" = 3 ] && unshare --net true 2>/dev/null; }
+skip() {
+    echo "$1: skipped, $2" >&2
+    [ "${PALPATE_REQUIRE:-}" != 1 ]
+}
+has_parallel || skip "GNU parallel" "not installed; use make tools"
+has_slurm || skip Slurm "not installed, or not root; use make tools"
 has_parallel || has_slurm || exit 0
 
 scratch=$(mktemp -d)

@@ -1,15 +1,15 @@
 //! Checks by axe-core of the report pages and, if it is built, of the site: narrow and wide, light
 //! and dark.
 //!
-//! They run under `make page-test`, which fetches axe-core; otherwise they are skipped with a note.
+//! They are ignored but for `make test PART=page`, which fetches axe-core.
 
 use crate::common::program::palpate;
 use crate::common::runs::SURFACE;
+use crate::common::skip::skip;
 use crate::page::{browser_or_note, log};
 use palpate::experiment::statistics::analysis::Analysis;
 use palpate::report;
 use std::fs;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Window widths, pixels: a phone, a large screen.
@@ -51,11 +51,7 @@ const pause = (time_ms) => new Promise((done) => setTimeout(done, time_ms));
 fn axe() -> Option<PathBuf> {
     let path = std::env::var_os("PALPATE_AXE").map(PathBuf::from).filter(|path| path.is_file());
     if path.is_none() {
-        // A macro's output would be captured by the test harness.
-        let _ = writeln!(
-            io::stderr(),
-            "tests/suite/accessibility.rs: SKIPPED, no axe-core; use `make page-test`"
-        );
+        skip("tests/suite/accessibility.rs", "no axe-core; use `make test PART=page`");
     }
     path
 }
@@ -92,6 +88,7 @@ fn assert_accessible(pages: &[PathBuf]) {
 
 /// The browser and axe-core find what is wrong: no language, a button without a name, grey text.
 #[test]
+#[ignore = "needs axe-core: make test PART=page"]
 fn a_bad_page_is_found() {
     let Some(browser) = browser_or_note() else { return };
     let Some(axe) = axe() else { return };
@@ -115,6 +112,7 @@ fn a_bad_page_is_found() {
 /// Pages of a curve, a surface, a whole object, a run in which each trial of a planner fails, and a
 /// comparison.
 #[test]
+#[ignore = "needs axe-core: make test PART=page"]
 fn report_pages_are_accessible() {
     if browser_or_note().is_none() || axe().is_none() {
         return;
@@ -153,13 +151,11 @@ fn report_pages_are_accessible() {
 
 /// Pages of the site, without those of rustdoc.
 #[test]
+#[ignore = "needs axe-core: make test PART=page"]
 fn the_site_is_accessible() {
     let site = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/docs-site");
     if !site.join("index.html").is_file() {
-        let _ = writeln!(
-            io::stderr(),
-            "tests/suite/accessibility.rs: SKIPPED, no site; use `make docs`"
-        );
+        skip("tests/suite/accessibility.rs", "no site; use `make docs`");
         return;
     }
     let mut pages = Vec::new();

@@ -20,14 +20,17 @@ impl Script {
         self.folder.path().join("cost.toml")
     }
 
-    /// Runs the script on the unchanged table; returns exit code and output.
-    fn run(&self, more: &[&str]) -> (Option<i32>, String) {
+    /// Returns the command of the script on the unchanged table.
+    fn command(&self, more: &[&str]) -> Command {
         let mut command = Command::new("python3");
         command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("tests/cost.py").arg(self.table());
         command.args(["--program", env!("CARGO_BIN_EXE_palpate")]).args(more);
-        let output = run_to_end(&mut command, "cost.py");
-        let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
-        (output.status.code(), said)
+        command
+    }
+
+    /// Runs the script on the unchanged table; returns exit code and output.
+    fn run(&self, more: &[&str]) -> (Option<i32>, String) {
+        ended(&mut self.command(more))
     }
 
     /// Runs the script on `text`.
@@ -37,15 +40,26 @@ impl Script {
     }
 }
 
+/// Runs a command; returns exit code and output.
+fn ended(command: &mut Command) -> (Option<i32>, String) {
+    let output = run_to_end(command, "cost.py");
+    let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
+    (output.status.code(), said)
+}
+
 const WORK: &str = "[[work]]\nexperiment = \"toy\"\n";
 
-/// A table is compared only with a program of comparable counts.
+/// A table is compared only with a program of comparable counts; that is an error if the comparison
+/// is required.
 #[test]
 fn counts_of_another_program_are_skipped() {
     let script = Script::new();
-    let (code, said) =
-        script.check(&format!("tolerance = 0.05\nby = \"another compiler\"\n{WORK}"));
-    assert!(code == Some(0) && said.contains("cost: skipped, "), "{said}");
+    let text = format!("tolerance = 0.05\nby = \"another compiler\"\n{WORK}");
+    fs::write(script.table(), text).unwrap();
+    for (is_required, expected) in [("0", 0), ("1", 1)] {
+        let (code, said) = ended(script.command(&[]).env("PALPATE_REQUIRE", is_required));
+        assert!(code == Some(expected) && said.contains("cost: skipped, "), "{said}");
+    }
 }
 
 #[test]
@@ -63,7 +77,7 @@ fn a_bad_table_is_an_error() {
 }
 
 /// The same program gives equal counts within 0.1 % under any load, and 10 % more is worse. Skipped
-/// without valgrind.
+/// without valgrind, unless `PALPATE_REQUIRE` is 1.
 #[test]
 fn a_trial_is_counted_by_valgrind() {
     let script = Script::new();

@@ -123,7 +123,7 @@ const ALONG_M: f64 = 1e-3;
 
 /// The contacts lie on the cylinder, and beside those of the same scene in this process.
 #[test]
-#[ignore = "needs a simulated control box: make test-franka"]
+#[ignore = "needs a simulated control box: make test PART=franka"]
 fn a_cylinder_is_touched_by_an_fr3_as_in_the_simulator() {
     let touches = count("PALPATE_FRANKA_TOUCHES", 3);
     let rig = Rig::new();
@@ -147,7 +147,7 @@ fn a_cylinder_is_touched_by_an_fr3_as_in_the_simulator() {
 /// An arm whose planner is killed, stopped or cut off comes to rest by itself, no touch is lost,
 /// and the same command continues.
 #[test]
-#[ignore = "needs a simulated control box: make test-franka"]
+#[ignore = "needs a simulated control box: make test PART=franka"]
 fn an_fr3_without_its_planner_comes_to_rest() {
     for end in [End::Kill, End::Stop, End::Cut] {
         let rig = Rig::new();
@@ -162,7 +162,7 @@ fn an_fr3_without_its_planner_comes_to_rest() {
 
 /// A reflex ends the run with its name, and lasts until an operator recovers from it.
 #[test]
-#[ignore = "needs a simulated control box: make test-franka"]
+#[ignore = "needs a simulated control box: make test PART=franka"]
 fn a_reflex_ends_the_run_until_the_operator_recovers() {
     let rig = Rig::new();
     let explorer = rig.run(3).stderr(Stdio::piped()).spawn().unwrap();

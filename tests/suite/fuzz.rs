@@ -1,8 +1,9 @@
 //! Fuzz tests with randomly altered files and settings: the program neither panics nor hangs, and
 //! rejects invalid input with clear messages.
 //!
-//! The alterations are deterministic. `PALPATE_FUZZ` is the number of cases per target: `make fuzz`
-//! uses 100000, a thousandth of them through the program itself.
+//! `PROPTEST_RNG_SEED` selects the alterations, the same in each `make test` and others in each
+//! `make test PART=fuzz`. `PALPATE_FUZZ` is the number of cases per target: the latter uses 100000,
+//! a thousandth of them through the program itself.
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,7 +20,7 @@ use palpate::report::replay::BeliefReplay;
 use palpate::report::{FIGURES, tables};
 use palpate::sim::Scene;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use proptest::test_runner::{Config, TestRunner};
 use tempfile::TempDir;
 
 use crate::common::program::{EXPERIMENT, SCENE, command, folder, run_to_end, stderr, succeeds};
@@ -158,9 +159,8 @@ fn fuzz<S: Strategy>(strategy: S, count: u32, try_out: impl Fn(&S::Value) -> Res
         max_shrink_iters: 200,
         ..Config::default()
     };
-    let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-    let mut runner = TestRunner::new_with_rng(config, random);
-    let outcome = runner.run(&strategy, |value| try_out(&value).map_err(TestCaseError::fail));
+    let outcome = TestRunner::new(config)
+        .run(&strategy, |value| try_out(&value).map_err(TestCaseError::fail));
     outcome.unwrap_or_else(|error| panic!("{error}"));
 }
 

@@ -15,10 +15,10 @@ const ELSEWHERE: [(&str, &str); 19] = [
     ("git clone", "continuous integration, in a clean checkout"),
     ("make ", "targets of the Makefile, tested below"),
     ("cargo ", "continuous integration; examples in `make test`"),
-    ("pip install", "make test-python"),
-    ("pytest ", "make test-python"),
-    ("python ", "make test-python"),
-    ("cd python", "make test-python"),
+    ("pip install", "make test PART=python"),
+    ("pytest ", "make test PART=python"),
+    ("python ", "make test PART=python"),
+    ("cd python", "make test PART=python"),
     ("cp .deps", "only after cargo install"),
     ("tar ", "make dist"),
     ("./palpate", "make dist"),
@@ -27,7 +27,7 @@ const ELSEWHERE: [(&str, &str); 19] = [
     ("export ROS_LOCALHOST_ONLY", "tests/ros2/namespace.sh"),
     ("palpate accuracy", "accuracy:: and relevance::, on small scenes"),
     ("palpate serve", "lab::the_loop, over ROS 2"),
-    ("palpate live", "live::, and make test-live in a browser"),
+    ("palpate live", "live::, and make test PART=live in a browser"),
     ("palpate run real_arm", "lab::the_loop, over ROS 2"),
     ("palpate run real_ur5e", "lab_ur::, over ROS 2"),
     ("palpate register real_arm", "needs a robot, or the simulated one in real time"),
@@ -35,8 +35,8 @@ const ELSEWHERE: [(&str, &str); 19] = [
 
 /// Parts of command lines that run elsewhere, and where.
 const ELSEWHERE_PARTS: [(&str, &str); 4] = [
-    ("--planner my_", "make test-python"),
-    ("--planner policy:", "make test-python"),
+    ("--planner my_", "make test PART=python"),
+    ("--planner policy:", "make test PART=python"),
     ("--watch", "needs a display"),
     ("register experiments/real_arm.toml", "needs a robot, or the simulated one in real time"),
 ];

@@ -1,5 +1,5 @@
-//! Tests of an arm over topics, run in a network namespace by `make test-ros2`. They are ignored
-//! otherwise, because DDS multicasts to the local network.
+//! Tests of an arm over topics, run in a network namespace by `make test PART=ros2`. They are
+//! ignored otherwise, because DDS multicasts to the local network.
 
 use crate::common::lab::{
     CELL, EXPERIMENT, Network, TwinProcess, contacts_off_m, count, row, touch_sets,
@@ -55,7 +55,7 @@ fn run_to_its_end(network: &Network, planner: &str, out: &Path) {
 /// Runs an exploration with each planner in turn, so that each side has a processor; meanwhile an
 /// independent peer reads the first explorer's messages.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_container_is_explored_over_topics_as_in_the_simulator() {
     let folder = tempfile::tempdir().unwrap();
     let jobs = [(Network::new(11), "active"), (Network::new(12), "random")];
@@ -105,7 +105,7 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
 /// An independent peer, written from the table of topics alone, makes a touch with the messages of
 /// either driver.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
     let folder = tempfile::tempdir().unwrap();
     let scene = fs::canonicalize("scenes/container_finger.toml").unwrap();
@@ -136,7 +136,7 @@ fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
 
 /// Sends commands at 250 Hz to an independent peer, which answers each.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_loop_loses_nothing_at_250_hz() {
     let span_s: f64 =
         std::env::var("PALPATE_LOOP_S").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
@@ -197,7 +197,7 @@ fn the_loop_loses_nothing_at_250_hz() {
 
 /// After a fault in the middle of a trial the touches are kept, and the same command continues.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_run_that_was_halted_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
@@ -241,7 +241,7 @@ fn a_run_that_was_halted_goes_on() {
 /// Tests a status that is published once and latched, and services in another participant than the
 /// topics, discovered two seconds later, with the request identity in the payload.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn an_arm_of_another_implementation_is_heard_and_answers() {
     let network = Network::new(16);
     let arm = network.peer("arm", &["14"]).stdout(Stdio::piped()).spawn().unwrap();
@@ -293,7 +293,7 @@ fn multicast_members(device: &str) -> u32 {
 
 /// Only the interfaces named in the settings are used.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn only_the_named_interfaces_are_used() {
     let network = Network::new(17);
     let set = ["--set", "backend.ros2.interfaces=[\"lo\"]"];

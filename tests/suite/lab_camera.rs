@@ -28,7 +28,7 @@ fn points(ply: &[u8]) -> Vec<[f32; 3]> {
 /// Cloud and depth image of one plane give the same points, with and without confirmations; a
 /// camera whose topic is misspelt is named.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_view_is_saved_from_cloud_and_depths() {
     let folder = folder();
     let look = |topic, wait_s| {

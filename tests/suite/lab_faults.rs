@@ -69,7 +69,7 @@ fn values(what: &str, seen_s: Option<f64>, rest_s: Option<f64>, said: &str) {
 
 /// Tests failures on the arm's side and the explorer's message for each.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn what_fails_on_the_arms_side_stops_the_exploration() {
     let mut other = Vec::new();
     for (i, (name, words)) in [
@@ -105,7 +105,7 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
 
 /// Tests network disturbances that do not lose the arm: the exploration continues.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn loss_latency_and_noise_are_lived_with() {
     for (i, name) in ["loss", "latency", "noise"].into_iter().enumerate() {
         let network = Network::new(45 + i as u16);
@@ -119,7 +119,7 @@ fn loss_latency_and_noise_are_lived_with() {
 
 /// Either side is stopped or killed.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_death_of_either_side_stops_the_other() {
     for (number, name) in [(50, "STOP"), (51, "KILL")] {
         let mut scene = FaultScenario::new(number, &[], &[]);
@@ -162,7 +162,7 @@ fn the_death_of_either_side_stops_the_other() {
 
 /// A network cable is disconnected and reconnected.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
     let mut scene = FaultScenario::new(54, &[], &[]);
     scene.twin.wait_until_it_moves();
@@ -187,7 +187,7 @@ fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
 
 /// A second publisher also commands the arm.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_second_publisher_of_commands_stops_the_arm() {
     let mut scene = FaultScenario::new(55, &[], &[]);
     scene.twin.wait_until_it_moves();
@@ -211,7 +211,7 @@ fn a_second_publisher_of_commands_stops_the_arm() {
 
 /// Tests states in which an explorer does not start.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn an_arm_that_speaks_otherwise_is_not_moved() {
     let network = Network::new(56);
     let key = network.settings.key("topics.tactile.type");
@@ -228,7 +228,7 @@ fn an_arm_that_speaks_otherwise_is_not_moved() {
 
 /// A path that moves a link below the table is not started.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_way_into_the_table_is_refused_before_it_is_begun() {
     let network = Network::new(57);
     let twin = TwinProcess::new(&network, EXPERIMENT, &[]);

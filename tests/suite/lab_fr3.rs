@@ -1,6 +1,6 @@
 //! Tests of a Franka Research 3 behind `franka_ros2` as its sources describe it:
 //! `tests/ros2/franka_driver.py`, on another implementation of DDS, run in a network namespace by
-//! `make test-ros2`.
+//! `make test PART=ros2`.
 
 use crate::common::driver::{driver, off_mm, passes_its_own_tests, refused, said, touch};
 use crate::common::lab::{Network, count};
@@ -18,7 +18,7 @@ fn network(number: u16) -> Network {
 }
 
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_peer_of_an_fr3_passes_its_own_tests() {
     passes_its_own_tests(PEER);
 }
@@ -26,7 +26,7 @@ fn the_peer_of_an_fr3_passes_its_own_tests() {
 /// The contacts lie on the surface whatever the release, end effector, prefix and namespace, and
 /// the controllers are as before.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn an_fr3_touches_where_the_surface_is() {
     let touches = count("PALPATE_UR_TOUCHES", 6);
     for (number, options, sets) in [
@@ -58,7 +58,7 @@ fn an_fr3_touches_where_the_surface_is() {
 
 /// A stop of the arm ends the run with its words, and an operator can go on.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
     let topic = "/franka_robot_state_broadcaster";
     let mut problems = Vec::new();
@@ -103,7 +103,7 @@ fn stops_of_an_fr3_end_the_run_and_say_what_to_do() {
 
 /// A robot that is not ready is refused before anything is switched.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn an_fr3_that_is_not_ready_is_refused() {
     for (i, (event, words)) in [
         ("reflex", "robot mode REFLEX (cartesian_reflex)"),
@@ -132,7 +132,7 @@ fn an_fr3_that_is_not_ready_is_refused() {
 
 /// Another controller that moved the arm before is active again afterwards; a Cartesian one is left.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn controllers_of_an_fr3_are_left_as_they_were() {
     for (number, before, is_refused) in [
         (157, "joint_impedance_example_controller", false),

@@ -35,13 +35,13 @@ impl Drop for Killed {
 }
 
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_person_explores_by_a_pa10() {
     a_person_explores(&Network::new(15));
 }
 
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_person_explores_by_a_ur() {
     a_person_explores(&Network::of(16, UR_EXPERIMENT));
 }

@@ -20,7 +20,7 @@ const TOPIC: [&str; 2] = ["--set", "backend.ros2.topics.collision_object=\"/coll
 /// Another program gets object and table at the start and after each touch, closed and in the
 /// frame of the base; the object contains the contacts and the true surface.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_planning_scene_has_the_object_and_the_table() {
     let network = Network::of(24, UR_EXPERIMENT);
     let [folder, received] = [(); 2].map(|()| tempfile::tempdir().unwrap());

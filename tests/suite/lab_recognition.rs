@@ -9,7 +9,7 @@ const BOX: &str = "v -60 -40 -60\nv 60 -40 -60\nv 60 40 -60\nv -60 40 -60\nv -60
 
 /// A simulated robot over topics tells a container from a box of its size, and where it is.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn an_object_is_identified_over_topics() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("box.obj"), BOX).unwrap();

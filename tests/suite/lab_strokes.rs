@@ -21,7 +21,7 @@ fn lines(row: &TrialRow) -> impl Iterator<Item = Vec<Point3<f64>>> {
 
 /// The strokes of a simulated robot over topics are where those in the simulator are.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn strokes_over_topics_are_those_of_the_simulator() {
     let folder = tempfile::tempdir().unwrap();
     let network = Network::new(13);

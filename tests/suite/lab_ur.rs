@@ -1,4 +1,5 @@
-//! Tests of a UR5e behind its driver over ROS 2, run in a network namespace by `make test-ros2`.
+//! Tests of a UR5e behind its driver over ROS 2, run in a network namespace by
+//! `make test PART=ros2`.
 
 use crate::common::lab::{
     BALL_EXPERIMENT, End, Network, TwinProcess, UR_EXPERIMENT, contacts_off_m, count, end_planners,
@@ -15,7 +16,7 @@ use std::time::Duration;
 
 /// The contacts are those of the same scene in this process.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_container_is_touched_by_a_ur_as_in_the_simulator() {
     touched_as_in_the_simulator(&Network::of(60, UR_EXPERIMENT), &[]);
 }
@@ -23,7 +24,7 @@ fn the_container_is_touched_by_a_ur_as_in_the_simulator() {
 /// The same without a tactile sensor, with forces at a tool centre point far from the flange, and
 /// at one that is turned, too.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_container_is_touched_by_force_as_in_the_simulator() {
     for (number, tcp) in [(74, "0,0,0.12,0,0,0"), (75, "0.01,-0.03,0.15,0.4,-0.5,0.8")] {
         touched_as_in_the_simulator(&Network::of(number, BALL_EXPERIMENT), &["--tcp", tcp]);
@@ -62,7 +63,7 @@ fn touched_as_in_the_simulator(network: &Network, options: &[&str]) {
 /// An arm whose planner is killed, stopped or cut off comes to rest by itself, no touch is lost,
 /// and the same command continues.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_ur_without_its_planner_comes_to_rest() {
     for (number, end) in [(61, End::Kill), (62, End::Stop), (63, End::Cut)] {
         let network = Network::of(number, UR_EXPERIMENT);
@@ -78,7 +79,7 @@ fn a_ur_without_its_planner_comes_to_rest() {
 
 /// A stop that the robot reports ends the run, and the message says how to go on.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn stops_of_a_ur_end_the_run_and_say_what_to_do() {
     for (i, (name, words)) in [
         ("protective_stop", "enable the robot on the pendant"),
@@ -110,7 +111,7 @@ fn stops_of_a_ur_end_the_run_and_say_what_to_do() {
 
 /// At half speed the run takes longer, and ends as it should.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_ur_at_half_speed_is_followed() {
     let network = Network::of(70, UR_EXPERIMENT);
     let twin = TwinProcess::new(&network, UR_EXPERIMENT, &["--inject", "slow@0"]);
@@ -130,7 +131,7 @@ fn peer(arguments: &[&str]) -> Command {
 }
 
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_peer_of_another_implementation_drives_the_twin_of_a_ur() {
     let network = Network::of(71, UR_EXPERIMENT);
     let twin = TwinProcess::new(&network, UR_EXPERIMENT, &[]);
@@ -143,7 +144,7 @@ fn a_peer_of_another_implementation_drives_the_twin_of_a_ur() {
 
 /// An operator confirms, skips and moves touches; the same command continues with the same ones.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn an_operator_is_asked_before_each_touch() {
     let network = Network::of(73, UR_EXPERIMENT);
     let twin = TwinProcess::new(&network, UR_EXPERIMENT, &[]);

@@ -1,5 +1,5 @@
 //! Tests of a UR5e behind `ur_robot_driver` as its sources describe it: `tests/ros2/ur_driver.py`,
-//! on another implementation of DDS, run in a network namespace by `make test-ros2`.
+//! on another implementation of DDS, run in a network namespace by `make test PART=ros2`.
 
 use crate::common::driver::{driver, off_mm, passes_its_own_tests, refused, said, touch};
 use crate::common::lab::{
@@ -24,14 +24,14 @@ fn network(number: u16) -> Network {
 }
 
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_peer_passes_its_own_tests() {
     passes_its_own_tests(PEER);
 }
 
 /// The contacts lie on the surface whatever the release, tool centre point, prefix and namespace.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_ur_touches_where_the_surface_is() {
     let touches = count("PALPATE_UR_TOUCHES", 6);
     let turned = "0.01,-0.03,0.15,0.4,-0.5,0.8";
@@ -68,7 +68,7 @@ fn a_ur_touches_where_the_surface_is() {
 /// A robot whose lengths and angles differ from the nominal ones is refused; with the URDF that its
 /// driver publishes it touches where the surface is.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_calibrated_ur_touches_where_the_surface_is() {
     let network = network(103);
     let twin = driver(PEER, &network, &["--dh-error"]);
@@ -128,7 +128,7 @@ fn rest(twin: &TwinProcess, name: &str) -> (f64, f64) {
 /// Every stop ends the run with words, within 0.15 s and 10 mm of the failure, and the same command
 /// goes on.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn failures_of_a_ur_bring_it_to_rest() {
     let mut problems = Vec::new();
     for (i, (name, words)) in STOPS.iter().enumerate() {
@@ -154,7 +154,7 @@ fn failures_of_a_ur_bring_it_to_rest() {
 /// An arm whose explorer is killed, stopped or cut off comes to rest by itself, and no touch is
 /// lost.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_ur_without_its_explorer_comes_to_rest() {
     for (number, end) in [(122, End::Kill), (123, End::Stop), (124, End::Cut)] {
         let network = network(number);
@@ -180,7 +180,7 @@ fn a_ur_without_its_explorer_comes_to_rest() {
 
 /// A pause on the pendant, and half the speed, are waited for.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_paused_ur_is_waited_for() {
     for (number, event) in [(125, "pause@0.5+2"), (126, "slow@0.2")] {
         let network = network(number);
@@ -194,7 +194,7 @@ fn a_paused_ur_is_waited_for() {
 
 /// A second explorer with another folder is refused before it changes anything; the first goes on.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_second_explorer_is_refused_and_the_first_goes_on() {
     let network = network(127);
     let twin = driver(PEER, &network, &[]);
@@ -220,7 +220,7 @@ fn a_second_explorer_is_refused_and_the_first_goes_on() {
 /// Mock hardware has no forces and no status: a run names the rehearsal, which follows approaches
 /// above the surface.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_rehearsal_needs_no_forces() {
     let network = network(128);
     let twin = driver(PEER, &network, &["--mock"]);
@@ -239,7 +239,7 @@ fn a_rehearsal_needs_no_forces() {
 /// A driver with another setup is refused by the name of what differs: nothing moves, and its
 /// controllers stay as they are.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
     let passthrough = "passthrough_trajectory_controller";
     for (number, options, words) in [
@@ -266,7 +266,7 @@ fn a_driver_set_up_otherwise_is_named_and_left_as_it_was() {
 
 /// Another controller that moved the arm before is active again afterwards.
 #[test]
-#[ignore = "needs a network namespace: make test-ros2"]
+#[ignore = "needs a network namespace: make test PART=ros2"]
 fn the_controller_that_was_active_is_active_again() {
     let network = network(135);
     let before = "forward_velocity_controller";

@@ -151,10 +151,7 @@ fn messages_are_listed() {
     }
     let kept = fs::read_to_string(&path).unwrap_or_default();
     for (ours, kept) in list.lines().zip(kept.lines().chain(std::iter::repeat(""))) {
-        assert_eq!(
-            ours, kept,
-            "tests/messages.txt differs: run `make messages` and read the change"
-        );
+        assert_eq!(ours, kept, "tests/messages.txt differs: run `make texts` and read the change");
     }
     assert_eq!(list.len(), kept.len());
 }

@@ -8,15 +8,15 @@ fn the_reference_is_what_the_code_says() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference.md");
     let text = palpate::cli::reference();
     let text = text.trim_end().to_owned() + "\n";
-    // Set by `make reference`.
+    // Set by `make texts`.
     if std::env::var_os("PALPATE_WRITE_REFERENCE").is_some() {
         fs::write(&path, &text).unwrap();
     }
     let written = fs::read_to_string(&path).unwrap_or_default();
     for (i, (ours, theirs)) in text.lines().zip(written.lines()).enumerate() {
-        assert_eq!(ours, theirs, "docs/reference.md:{}: run `make reference`", i + 1);
+        assert_eq!(ours, theirs, "docs/reference.md:{}: run `make texts`", i + 1);
     }
-    assert_eq!(text.lines().count(), written.lines().count(), "run `make reference`");
+    assert_eq!(text.lines().count(), written.lines().count(), "run `make texts`");
 }
 
 /// The reference contains every setting of a resolved experiment, with its range or allowed names.

@@ -1,8 +1,8 @@
 //! Tests of failures on either side of the topics: the explorer's message, and the distance that
 //! the tip moves.
 //!
-//! The tests of times and paths need an idle machine and are ignored by default: `make test-faults`
-//! runs them and prints the table of `docs/safety.md`.
+//! The tests of times and paths need an idle machine and are ignored by default: `make test
+//! PART=faults` runs them and prints the table of `docs/safety.md`.
 
 #[cfg(feature = "mujoco")]
 use crate::common::rig::{ARM, Rest};
@@ -244,7 +244,7 @@ fn rig(speed_m_s: f64, failures: &[(&str, f64, Option<f64>)]) -> Rig {
 /// Injects one failure after another while the dynamic arm moves.
 #[cfg(feature = "mujoco")]
 #[test]
-#[ignore = "needs the machine for itself: make test-faults"]
+#[ignore = "needs the machine for itself: make test PART=faults"]
 fn after_every_failure_the_tip_moves_ten_millimetres_at_most() {
     const TRAVEL_M_S: f64 = 0.1;
     let mut far = Vec::new();
@@ -295,7 +295,7 @@ const YIELDS: f64 = 0.1;
 /// stops, and the force falls.
 #[cfg(feature = "mujoco")]
 #[test]
-#[ignore = "needs the machine for itself: make test-faults"]
+#[ignore = "needs the machine for itself: make test PART=faults"]
 fn a_stroke_without_commands_stops_soon_and_its_force_falls() {
     let target = Target::Stroke { place: [-0.045, 0.5], to: [0.045, 0.5] };
     for speed in [0.02, 0.04] {

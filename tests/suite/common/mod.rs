@@ -17,6 +17,7 @@ pub mod runs;
 pub mod shapes;
 pub mod shipped;
 pub mod six;
+pub mod skip;
 pub mod solids;
 pub mod tap;
 pub mod touched;

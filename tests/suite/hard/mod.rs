@@ -1,8 +1,9 @@
 //! Hard cases: conditions under which the simulation breaks, and whether it reports so. Each case
 //! runs at increasing severity and has a law that it must obey.
 //!
-//! The tests run every case at the largest severity that must be stable. `make hard-cases` runs all
-//! severities at all control periods or time steps and writes `docs/hard-cases.md`.
+//! The tests run every case at the largest severity that must be stable. `make test
+//! PART=hard-cases` runs all severities at all control periods or time steps and writes
+//! `docs/hard-cases.md`.
 //!
 //! `case` defines a case and the evaluation of its outcome. The groups of cases are: `force_law`
 //! presses a finger pose by pose; `shapes`, `wall`, `arm` and `sensor` make touches as in a scene;
@@ -55,7 +56,7 @@ fn cases() -> impl Iterator<Item = &'static Case> {
     GROUPS.iter().flat_map(|(_, cases)| *cases)
 }
 
-/// Runs every case at the nominal period or step; `make hard-cases` runs the others.
+/// Runs every case at the nominal period or step; `make test PART=hard-cases` runs the others.
 #[test]
 fn every_case_holds_where_it_must() {
     let cases: Vec<&Case> = cases().collect();
@@ -129,11 +130,11 @@ fn all_outcomes_are_explained() {
 fn the_page_lists_every_case() {
     let text = std::fs::read_to_string(page::path()).unwrap();
     let listed = text.lines().filter(|line| line.starts_with("|**")).count();
-    assert_eq!(listed, cases().count(), "run `make hard-cases`");
+    assert_eq!(listed, cases().count(), "run `make test PART=hard-cases`");
     for case in cases() {
         let start = format!("|**{}**: {}|", case.name, case.why);
         let line = text.lines().find(|line| line.starts_with(&start));
-        let line = line.unwrap_or_else(|| panic!("{}: run `make hard-cases`", case.name));
+        let line = line.unwrap_or_else(|| panic!("{}: run `make test PART=hard-cases`", case.name));
         let [first, last] = [0, case.severities.len() - 1].map(|i| page::short(case.severities[i]));
         assert!(line.contains(&format!("|{first}–{last}|")), "{}", case.name);
     }

@@ -12,9 +12,9 @@ pub fn path() -> PathBuf {
 
 const HEAD: &str = "# Hard cases
 
-Written by `make hard-cases`, which runs every case of `tests/suite/hard` at every severity and, where time matters, at
-every control period or time step. [physics.md](physics.md#where-the-simulation-breaks) says what helps. `make test` runs
-each case at the hardest severity that must hold.
+Written by `make test PART=hard-cases`, which runs every case of `tests/suite/hard` at every severity and, where time
+matters, at every control period or time step. [physics.md](physics.md#where-the-simulation-breaks) says what helps.
+`make test` runs each case at the hardest severity that must hold.
 
 The column *tested* gives the easiest and the hardest severity. The column *outcomes* lists the severities that did not hold everywhere. Behind each stands one letter for each period or step:
 

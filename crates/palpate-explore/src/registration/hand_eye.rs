@@ -54,7 +54,7 @@ const FINGER_RAD: f64 = 0.2;
 const GIVE_M: f64 = 0.5e-3;
 const GAIN: f64 = 0.5;
 /// Plausible lateral offset of a central contact for an electrode finger, whose halves are never
-/// identical. A heuristic: three times the value of `make contacts` on a sphere.
+/// identical. A heuristic: three times the value of `make bench BENCH=contacts` on a sphere.
 const ASIDE_M: f64 = 3e-4;
 /// Plausible indentation and lateral offset for a finger with exact contacts.
 const EXACT_M: f64 = 1e-6;
