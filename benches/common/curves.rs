@@ -102,7 +102,9 @@ pub fn draw(name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
 pub fn draw_over(of: &str, name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
     if let Some(svg) = drawn(of, panels) {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-        ["svg", "png"].iter().try_for_each(|format| write_as(&docs.join(name).with_extension(format), &svg))?;
+        ["svg", "png"]
+            .iter()
+            .try_for_each(|format| write_as(&docs.join(name).with_extension(format), &svg))?;
     }
     Ok(())
 }

@@ -55,9 +55,7 @@ impl Experiment {
         parsed(toml, &[]).map(Self)
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<Reduced<'py, (Version, String)>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, (Version, String)>> {
         let Self(experiment) = slf.get();
         pickle::reduced(slf, (pickle::version(), resolved(experiment)))
     }
@@ -200,10 +198,7 @@ impl Experiment {
 ///
 /// # Errors
 /// `ConfigError`.
-pub(crate) fn parsed(
-    toml: String,
-    sets: &[String],
-) -> PyResult<experiment::Experiment> {
+pub(crate) fn parsed(toml: String, sets: &[String]) -> PyResult<experiment::Experiment> {
     let text = Loader::from_text(errors::SETTINGS.as_ref(), toml);
     let read = text.and_then(|loader| experiment::Experiment::from_loader(loader, sets));
     read.map_err(errors::config)

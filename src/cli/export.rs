@@ -4,15 +4,16 @@ use super::find::{SCENES, find};
 use super::output::Overwrite;
 use super::prepare::check_applicable;
 use super::scan::{Grid, ScanArgs, grid, scan};
+#[cfg(feature = "pictures")]
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::experiment::trial::row::planner_rows;
-use crate::report::points::PointCloud;
-use crate::report::replay::{self, BeliefReplay};
 #[cfg(feature = "pictures")]
 use crate::report::animation;
+use crate::report::points::PointCloud;
+use crate::report::replay::{self, BeliefReplay};
 use crate::report::{figures, files, film, style, whole_object};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;

@@ -384,11 +384,6 @@ impl Validate for Experiment {
             planner_names::allowed_names("").join(", ")
         });
         for (i, name) in self.planners.iter().enumerate() {
-            let is_removed = REMOVED.contains(&name.as_str());
-            rules.require(&format!("planners[{i}]"), format!("\"{name}\""), !is_removed, || {
-                let names = planner_names::allowed_names(name).join(", ");
-                format!("one of {names}; pi and ei were removed")
-            });
             rules.one_of(&format!("planners[{i}]"), name, &planner_names::allowed_names(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());

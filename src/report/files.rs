@@ -23,7 +23,7 @@ pub fn write(path: &Path, svg: &str) -> anyhow::Result<()> {
 /// # Errors
 /// If this build has no such format, it is not an SVG, or the file cannot be written.
 pub fn write_as(path: &Path, svg: &str) -> anyhow::Result<()> {
-    let bytes = match extension(path)? {
+    let bytes: anyhow::Result<Vec<u8>> = match extension(path)? {
         #[cfg(feature = "pictures")]
         "png" => super::raster::png(svg),
         #[cfg(feature = "pictures")]

@@ -21,10 +21,10 @@ pub mod legend;
 pub mod orientation;
 pub mod page;
 pub mod points;
-pub mod reference;
-pub mod reliability;
 #[cfg(feature = "pictures")]
 pub mod raster;
+pub mod reference;
+pub mod reliability;
 pub mod relief;
 pub mod replay;
 pub mod scan;

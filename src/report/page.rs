@@ -124,7 +124,8 @@ fn raw_files(drawings: &[(&ReportFigure, String)]) -> String {
         .map(|(file, what)| format!("<li><a href=\"{file}\">{file}</a>: {what}</li>\n"))
         .collect();
     if !drawings.is_empty() {
-        items += "<li><a href=\"figures/\">figures</a>: each figure; print this page for a PDF</li>\n";
+        items +=
+            "<li><a href=\"figures/\">figures</a>: each figure; print this page for a PDF</li>\n";
     }
     format!("<ul>\n{items}</ul>\n")
 }

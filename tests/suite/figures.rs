@@ -4,8 +4,8 @@
 use crate::common::runs::{CURVE, SURFACE, miss, run};
 use palpate::experiment::store::Run;
 use palpate::report::FIGURES;
-use palpate::report::raster::{pdf, tree};
 use palpate::report::legend::{Legend, Swatch};
+use palpate::report::raster::{pdf, tree};
 use palpate::report::replay::BeliefReplay;
 use palpate::report::style::{self, ON_DARK};
 use resvg::usvg::{Group, Node, Rect};

@@ -3,8 +3,8 @@
 use crate::common::program::{EXPERIMENT, command, fails, folder, palpate, run_to_end, succeeds};
 use gif::{ColorOutput, DecodeOptions};
 use palpate::experiment::store::Run;
-use palpate::report::raster::pixels;
 use palpate::report::film;
+use palpate::report::raster::pixels;
 use palpate::report::table::digits;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

@@ -228,9 +228,7 @@ fn files_are_replaced_until_they_are_edited() {
     new(&folder, &["egg.obj"]);
     let path = folder.path().join("egg.toml");
     let first = fs::read_to_string(&path).unwrap();
-    assert!(
-        new(&folder, &["egg.obj"]).contains("wrote egg.toml, egg-scene.toml, egg.svg")
-    );
+    assert!(new(&folder, &["egg.obj"]).contains("wrote egg.toml, egg-scene.toml, egg.svg"));
     assert_eq!(fs::read_to_string(&path).unwrap(), first);
     new(&folder, &["egg.obj", "--around"]);
     assert_ne!(fs::read_to_string(&path).unwrap(), first);

@@ -13,7 +13,7 @@ use palpate::experiment::store::Run;
 use palpate::explore::evidence::End;
 use palpate::report;
 use palpate::report::axes::Axis;
-use palpate::report::files::PNG_SCALE;
+use palpate::report::raster::PNG_SCALE;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
 use std::collections::{BTreeMap, BTreeSet};

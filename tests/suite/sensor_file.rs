@@ -2,8 +2,8 @@
 
 use palpate::experiment::Experiment;
 use palpate::experiment::store::resolved;
+use palpate::sim::Scene;
 use palpate::sim::finger::Effects;
-use palpate::sim::{Environment, Scene};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 

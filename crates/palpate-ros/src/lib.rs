@@ -57,7 +57,9 @@ pub mod trajectory_stream;
 pub mod transport;
 pub mod view;
 
-use camera::{CameraMessage, CameraTopics, Cloud, FirstMessages};
+#[cfg(not(feature = "ros2"))]
+use camera::CameraMessage;
+use camera::{CameraTopics, Cloud, FirstMessages};
 use palpate_input::error::InputError;
 use service::Service;
 use settings::RosSettings;

@@ -62,13 +62,7 @@ impl Loader {
     pub fn from_text(path: &Path, text: String) -> Result<Self, ConfigError> {
         let (table, document) = parse(path, text)?;
         let source = Source { path: path.into(), prefix: String::new(), document };
-        Ok(Self {
-            table,
-            sources: vec![source],
-            sets: Vec::new(),
-            read_as: Vec::new(),
-            home: None,
-        })
+        Ok(Self { table, sources: vec![source], sets: Vec::new(), read_as: Vec::new(), home: None })
     }
 
     /// Sets the folder of the files that [`include`](Self::include) finds by name; default: that of

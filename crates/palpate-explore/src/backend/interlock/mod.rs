@@ -36,4 +36,3 @@ pub const INTERLOCKS: &[InterlockEntry] = &[
     tracking::VELOCITY,
     tracking::POSITION,
 ];
-

@@ -11,7 +11,7 @@ use palpate_input::config::{Rules, Validate};
 use palpate_input::error::InputError;
 use palpate_input::paths::{InputPath, PATH_OR_NAME};
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 

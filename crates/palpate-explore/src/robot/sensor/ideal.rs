@@ -47,8 +47,7 @@ mod tests {
     /// The force keeps its unit when the contact ends: another sensor's signal must not replace it.
     #[test]
     fn the_force_is_zero_after_a_contact() {
-        let contact =
-            IdealContact { p_tc: Point3::origin(), normal_t: Vector3::y_axis(), force_n: 0.5 };
+        let contact = IdealContact { p_tc: Point3::origin(), normal_t: Vector3::y(), force_n: 0.5 };
         let mut sensor = IdealSensor::default();
         assert_eq!(sensor.force_n(), None);
         sensor.push(0.0, &[Sample::Ideal(contact)], None);
