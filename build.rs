@@ -10,7 +10,8 @@ fn main() {
         return;
     }
     // An installed program has the library beside it, or in the lib beside its bin.
-    for beside in ["", "/../lib"] {
+    let has_program = env::var_os("CARGO_PKG_NAME").is_some_and(|name| name == "palpate");
+    for beside in ["", "/../lib"].iter().filter(|_| has_program) {
         println!("cargo::rustc-link-arg-bin=palpate=-Wl,-rpath,$ORIGIN{beside}");
     }
     // Relative first, so that a folder that was moved whole still runs: binaries lie in

@@ -3,8 +3,8 @@
 //! A robot finger explores an object without vision; a Gaussian process estimates its
 //! surface; a planner selects the next target.
 //!
-//! This package contains simulator, experiments and reports. Its modules are layers: a module
-//! imports only from those below it in this table.
+//! This package contains commands and reports. Its modules are layers: a module imports only from
+//! those below it in this table.
 //!
 //! | module | content |
 //! |---|---|
@@ -12,14 +12,14 @@
 //! | [`live`] | page in a browser to watch and to steer trials |
 //! | [`report`] | tables, figures and the page, drawn from rows and studies |
 //! | [`study`] | accuracy, regression checks of planners, comparisons of runs |
-//! | [`experiment`] | experiment, trial, runner, store, measures, statistics, ground truth |
-//! | [`sim`] | scene, object, effects, physics of the finger, simulated robots |
 //!
 //! A robot program does not need it. It uses the packages below, which do not depend on this
 //! one, so that the robot program has no access to the ground truth:
 //!
 //! | package | here | content |
 //! |---|---|---|
+//! | `palpate-experiment` | [`experiment`] | experiment, trial, runner, store, measures, statistics |
+//! | `palpate-sim` | [`sim`] | scene, object, effects, physics of the finger, simulated robots |
 //! | `palpate-explore` | [`explore`], [`task`], [`robot`], [`backend`] | belief, planners, servo |
 //! | `palpate-ros` | [`ros`] | an arm over topics, a simulated robot, recordings |
 //! | `palpate-gp` | [`gp`], [`math`] | Gaussian-process regression |
@@ -38,12 +38,11 @@
 //! `R_WT` its attitude; in code they are written `p_wc`, `x_wt`, `r_wt`.
 
 pub mod cli;
-pub mod experiment;
 pub mod live;
 pub mod report;
-pub mod sim;
 pub mod study;
 
+pub use palpate_experiment as experiment;
 pub use palpate_explore as explore;
 pub use palpate_explore::{backend, robot, task};
 pub use palpate_franka as franka;
@@ -52,3 +51,4 @@ pub use palpate_gp as gp;
 pub use palpate_gp::math;
 pub use palpate_input::{config, error, files, format};
 pub use palpate_ros as ros;
+pub use palpate_sim as sim;

@@ -158,7 +158,7 @@ fn print_results(
         write_whole(path, &text).with_context(|| path.display().to_string())
     };
     if let Some(path) = &args.junit {
-        write(path, junit(name, held, rules, args.max_trials)?)?;
+        write(path, junit(name, held, rules, args.max_trials))?;
     }
     if let Some(path) = &args.markdown {
         write(path, markdown(name, held, rules, args.max_trials))?;

@@ -1,12 +1,11 @@
 //! Report of a check: tables and sentences, Markdown, JUnit XML for continuous integration, and a
 //! drawing.
 
-use super::canvas::{Anchor, Area, Canvas};
+use super::canvas::{Anchor, Area, Canvas, escape};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use super::table::{Cell, Column, Table};
 use crate::study::check::{CheckOptions, CheckResult, PlannerResult, Verdict};
 use palpate_input::format::counted;
-use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 /// Returns the name of a verdict.
 pub fn word(verdict: Verdict) -> &'static str {
@@ -86,40 +85,39 @@ pub fn markdown(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32)
     text + "\n"
 }
 
-/// Formats the check as JUnit XML, a test case for each planner. Worse and missing are failures;
-/// undecided is an error, because it must not pass.
-///
-/// # Errors
-/// If a name contains a character that XML does not allow.
-pub fn junit(
-    name: &str,
-    held: &CheckResult,
-    rules: &CheckOptions,
-    most: u32,
-) -> Result<String, SerializeError> {
-    let mut report = Report::new("palpate check");
-    let mut suite = TestSuite::new(name);
-    for planner in &held.planners {
-        let mut case = TestCase::new(planner.name.clone(), status(planner));
-        case.set_classname(format!("palpate.{name}"));
+/// Returns the report in the format of JUnit, which CI systems read: a test case for each planner.
+pub fn junit(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) -> String {
+    let count = |tag| held.planners.iter().filter(|it| problem(it) == Some(tag)).count();
+    let (tests, failures, errors) = (held.planners.len(), count("failure"), count("error"));
+    let counts = format!("tests=\"{tests}\" failures=\"{failures}\" errors=\"{errors}\"");
+    let name = escape(name);
+    let output = |text: String| format!("<system-out>{}</system-out>", escape(&text));
+    let case = |planner: &PlannerResult| {
+        let problem = problem(planner).map_or(String::new(), |tag| {
+            format!("<{tag} message=\"{}\"/>", word(planner.verdict))
+        });
         let lines: Vec<String> = rows(planner).iter().map(|row| row[1..].join("  ")).collect();
-        case.set_system_out(lines.join("\n"));
-        suite.add_test_case(case);
-    }
-    suite.set_system_out(remarks(held, rules, most).join("\n"));
-    report.add_test_suite(suite);
-    report.to_string()
+        format!(
+            "    <testcase name=\"{}\" classname=\"palpate.{name}\">{problem}{}</testcase>\n",
+            escape(&planner.name),
+            output(lines.join("\n"))
+        )
+    };
+    let cases: String = held.planners.iter().map(case).collect();
+    let remarks = output(remarks(held, rules, most).join("\n"));
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"palpate check\" {counts}>\n  \
+         <testsuite name=\"{name}\" {counts}>\n{cases}    {remarks}\n  </testsuite>\n</testsuites>\n"
+    )
 }
 
-fn status(planner: &PlannerResult) -> TestCaseStatus {
-    let kind = match planner.verdict {
-        Verdict::Identical | Verdict::Better | Verdict::Ok => return TestCaseStatus::success(),
-        Verdict::Worse | Verdict::Missing => NonSuccessKind::Failure,
-        Verdict::Undecided => NonSuccessKind::Error,
-    };
-    let mut status = TestCaseStatus::non_success(kind);
-    status.set_message(word(planner.verdict));
-    status
+/// Returns the tag of a planner that does not pass.
+fn problem(planner: &PlannerResult) -> Option<&'static str> {
+    match planner.verdict {
+        Verdict::Identical | Verdict::Better | Verdict::Ok => None,
+        Verdict::Worse | Verdict::Missing => Some("failure"),
+        Verdict::Undecided => Some("error"),
+    }
 }
 
 const LEFT_PX: f64 = 300.0;

@@ -1,0 +1,39 @@
+//! Experiments, their trials, and the folder of their results.
+//!
+//! An [`Experiment`] is a set of settings, read from a file or built in code. A [`Simulation`] runs
+//! its trials. Each trial is a row, and all results are computed from the rows.
+//!
+//! ```
+//! use palpate_experiment::{Experiment, Simulation, measure};
+//! use palpate_explore::planner;
+//!
+//! # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+//! # std::env::set_current_dir(folder)?;
+//! let sets = ["touches=8".into()];
+//! let experiment = Experiment::load("experiments/toy.toml".as_ref(), &sets)?;
+//! let simulation = Simulation::new(experiment)?;
+//! let active = planner::by_name("active").expect("it is there");
+//! let row = simulation.trial(active, 0);
+//! assert_eq!((row.touches.len(), row.failure.clone()), (8, None));
+//! let rmse = measure::RMSE.value(&row, 8).expect("it was measured");
+//! assert!(rmse > 0.0 && rmse < 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod backend_settings;
+#[allow(clippy::module_inception)]
+pub mod experiment;
+pub mod measure;
+pub mod notice;
+pub mod real_robot;
+pub mod report_settings;
+pub mod runner;
+pub mod simulation;
+pub mod statistics;
+pub mod store;
+pub mod sweep;
+pub mod trial;
+pub mod truth;
+
+pub use experiment::Experiment;
+pub use simulation::Simulation;
