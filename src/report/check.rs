@@ -93,9 +93,8 @@ pub fn junit(name: &str, held: &CheckResult, rules: &CheckOptions, most: u32) ->
     let name = escape(name);
     let output = |text: String| format!("<system-out>{}</system-out>", escape(&text));
     let case = |planner: &PlannerResult| {
-        let problem = problem(planner).map_or(String::new(), |tag| {
-            format!("<{tag} message=\"{}\"/>", word(planner.verdict))
-        });
+        let problem = problem(planner)
+            .map_or(String::new(), |tag| format!("<{tag} message=\"{}\"/>", word(planner.verdict)));
         let lines: Vec<String> = rows(planner).iter().map(|row| row[1..].join("  ")).collect();
         format!(
             "    <testcase name=\"{}\" classname=\"palpate.{name}\">{problem}{}</testcase>\n",

@@ -9,7 +9,6 @@ use crate::report::table::{Cell, Column, Table};
 use palpate_explore::evidence::{Contact, FreeVolume, Outcome};
 use palpate_gp::fit::Fit;
 use palpate_input::config::Rules;
-use palpate_input::tables;
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -36,7 +35,7 @@ pub fn is_setting(key: &str) -> bool {
 const AROUND: &str = "space";
 
 fn allowed() -> BTreeMap<String, String> {
-    let Ok(complete) = tables::read::<Experiment>(COMPLETE.parse().unwrap_or_default()) else {
+    let Ok(complete) = Experiment::from_table(COMPLETE.parse().unwrap_or_default()) else {
         return BTreeMap::new();
     };
     let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };

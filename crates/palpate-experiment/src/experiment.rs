@@ -10,7 +10,6 @@ use crate::report_settings::{ReportSettings, TOUCHES_MAX};
 use crate::trial::planner_names::{self, ORACLE};
 use crate::trial::row::TrialId;
 use crate::truth::scan_truth::ScanTruth;
-use palpate_sim::Scene;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
@@ -19,10 +18,14 @@ use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::arm::model::JointModel;
 use palpate_explore::whole_object::SpatialGpSettings;
 use palpate_input::config::{ConfigError, Loader, Rules, Validate, is_default};
+use palpate_input::paths;
+use palpate_input::tables::{self, Mismatch};
+use palpate_sim::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use toml::Table;
 
 /// An experiment: all settings that determine its results and its report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -89,7 +92,7 @@ pub struct Experiment {
 pub(super) const SWEEP: &str = "sweep";
 
 /// Folder of the shipped scenes.
-pub(crate) const SCENES: &str = "scenes";
+pub const SCENES: &str = "scenes";
 
 /// Tables that may be in a separate file, and the folder in which it is found by name.
 const INCLUDED: [(&str, Option<&str>); 4] =
@@ -143,6 +146,24 @@ impl Experiment {
     /// The first invalid setting, with its place.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         Self::from_loader(Loader::read(path)?, sets)
+    }
+
+    /// Reads an experiment from the table of all its settings.
+    ///
+    /// # Errors
+    /// The first key whose value does not fit.
+    pub fn from_table(table: Table) -> Result<Self, Mismatch> {
+        tables::read(table)
+    }
+
+    /// Returns the experiment with each path among its settings replaced.
+    pub fn with_paths(&self, replace: &mut dyn FnMut(&str) -> String) -> Option<Self> {
+        paths::map(self, replace)
+    }
+
+    /// Returns the paths among the settings with their dotted keys.
+    pub fn paths(&self) -> Vec<(String, PathBuf)> {
+        paths::list(self)
     }
 
     /// Reads an experiment from `text`, the contents of the file `path`, as [`load`](Self::load)

@@ -5,8 +5,8 @@ use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
+use palpate_input::files;
 use palpate_input::format::hex;
-use palpate_input::{files, paths};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -97,10 +97,10 @@ fn hash(row: &TrialRow) -> String {
 /// count; the contents of the files do, and those of the meshes in a folder.
 pub fn settings_hash(experiment: &Experiment) -> String {
     let settings = experiment.row_settings();
-    let without_paths = paths::map(&settings, |_| String::new());
+    let without_paths = settings.with_paths(&mut |_| String::new());
     let text = serde_json::to_vec(without_paths.as_ref().unwrap_or(&settings)).unwrap_or_default();
     let mut hash = Sha256::new().chain_update(text);
-    for (_, path) in paths::list(&settings) {
+    for (_, path) in settings.paths() {
         let entries = std::fs::read_dir(&path).into_iter().flatten().flatten();
         let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
         files.retain(|file| is_mesh_file(file));

@@ -63,9 +63,7 @@ pub(crate) fn nlpd(errors: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> 
 }
 
 /// Returns the share of values within their band [low, high]; `None` if there are none.
-pub(crate) fn coverage(
-    banded: impl IntoIterator<Item = (f64, [f64; 2])>,
-) -> Option<f64> {
+pub(crate) fn coverage(banded: impl IntoIterator<Item = (f64, [f64; 2])>) -> Option<f64> {
     let is_inside = |(value, [low, high]): (f64, [f64; 2])| low <= value && value <= high;
     mean(banded.into_iter().map(|it| f64::from(u8::from(is_inside(it))))).map(round)
 }
@@ -75,9 +73,7 @@ const OUTSIDE: f64 = 0.05;
 
 /// Returns the mean [interval score](Metrics::interval_score_m) of values with their band [low,
 /// high]; `None` if there are none.
-pub(crate) fn interval_score(
-    banded: impl IntoIterator<Item = (f64, [f64; 2])>,
-) -> Option<f64> {
+pub(crate) fn interval_score(banded: impl IntoIterator<Item = (f64, [f64; 2])>) -> Option<f64> {
     mean(banded.into_iter().map(|(value, [low, high])| {
         let outside = (low - value).max(0.0) + (value - high).max(0.0);
         high - low + 2.0 / OUTSIDE * outside
@@ -100,9 +96,7 @@ impl Metrics {
     /// Compares true heights f with predicted heights g; leaves out calibration and the errors on
     /// parts of the zone. Welford's rule updates the centred sums, so that a large common offset
     /// does not cancel small variations of the heights.
-    pub(crate) fn from_heights(
-        heights: impl IntoIterator<Item = (f64, f64)>,
-    ) -> Self {
+    pub(crate) fn from_heights(heights: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let (mut count, mut squares, mut max_error_m) = (0.0, 0.0, 0.0_f64);
         let [mut ff, mut gg, mut fg] = [0.0; 3];
         let [mut mean_f, mut mean_g] = [0.0; 2];

@@ -1,8 +1,8 @@
 //! Comparison of the hypotheses about the object with the object of the trial.
 
-use palpate_sim::library::TrueObject;
 use palpate_explore::recognition::ObjectHypotheses;
 use palpate_gp::math::pose::parts;
+use palpate_sim::library::TrueObject;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -3,9 +3,9 @@
 
 use super::io::{RunError, io_error, write_changed, write_whole};
 use crate::simulation::Simulation;
-use palpate_sim::environment::ObjectShape;
+use palpate_input::files;
 use palpate_input::format::hex;
-use palpate_input::{files, paths};
+use palpate_sim::environment::ObjectShape;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -42,7 +42,7 @@ impl InputHashes {
         let mut content = Self::default();
         let experiment = simulation.experiment();
         let contents = parsed_contents(simulation)?;
-        for (key, path) in paths::list(experiment) {
+        for (key, path) in experiment.paths() {
             let hash = match contents.iter().find(|(read, _)| *read == path) {
                 Some((_, content)) => content.clone(),
                 None => sha256(&files::bytes(&path, FILE_MAX).map_err(io_error(&path))?),

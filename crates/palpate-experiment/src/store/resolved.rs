@@ -3,7 +3,7 @@
 use super::io::{RunError, check_equal, write_changed};
 use crate::experiment::Experiment;
 use palpate_input::error::InputError;
-use palpate_input::{files, paths, tables};
+use palpate_input::{files, tables};
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
 
@@ -80,7 +80,7 @@ fn relative_resolved(experiment: &Experiment, folder: &Path) -> String {
         let path = Path::new(path);
         relative(&path.canonicalize().unwrap_or_else(|_| path.into()), &folder)
     };
-    let moved = paths::map(experiment, |path| moved(path).to_string_lossy().into_owned());
+    let moved = experiment.with_paths(&mut |path| moved(path).to_string_lossy().into_owned());
     moved.as_ref().map_or_else(|| resolved(experiment), resolved)
 }
 

@@ -1,19 +1,16 @@
 //! Check of the views that an experiment reads from files.
 
 use crate::experiment::Experiment;
-use palpate_sim::Environment;
-use palpate_sim::camera::probe::seen;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
+use palpate_sim::Environment;
+use palpate_sim::camera::probe::seen;
 
 /// Checks the views that an experiment reads from files.
 ///
 /// # Errors
 /// If a file cannot be read, or shows nothing of the region.
-pub(crate) fn check(
-    experiment: &Experiment,
-    environment: &Environment,
-) -> Result<(), InputError> {
+pub(crate) fn check(experiment: &Experiment, environment: &Environment) -> Result<(), InputError> {
     let scene = environment.scene();
     let Some(camera) = &scene.camera else { return Ok(()) };
     let places = match experiment.further_views {

@@ -20,8 +20,6 @@ use self::verification::verify;
 use crate::experiment::Experiment;
 use crate::measure::recognition::RecognitionMetrics;
 use crate::measure::silhouette::SilhouetteMetrics;
-use palpate_sim::Environment;
-use palpate_sim::camera::{self, probe::CameraProbe};
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::episode::Episode;
@@ -31,6 +29,8 @@ use palpate_explore::recognition::{Library, ObjectHypotheses, RecognitionSetting
 use palpate_explore::task::{Action, Approach, Target};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
+use palpate_sim::Environment;
+use palpate_sim::camera::{self, probe::CameraProbe};
 use rand_chacha::ChaCha8Rng;
 use std::cell::OnceCell;
 use std::fmt::Display;

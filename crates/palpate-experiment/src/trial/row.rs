@@ -4,7 +4,6 @@ use crate::measure::metrics::Metrics;
 use crate::measure::recognition::RecognitionMetrics;
 use crate::measure::shape::ShapeMetrics;
 use crate::measure::silhouette::SilhouetteMetrics;
-use palpate_sim::camera::TrueError;
 use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};
@@ -12,6 +11,7 @@ use palpate_explore::planner::{Fallback, Plan};
 use palpate_explore::task::Target;
 use palpate_explore::view::RigidError;
 use palpate_gp::fit::Fit;
+use palpate_sim::camera::TrueError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -43,12 +43,12 @@ pub mod scan;
 pub mod scan_truth;
 
 use crate::measure::metrics::{Metrics, coverage, interval_score, nlpd, rmse};
-use palpate_sim::Environment;
-use palpate_sim::reach;
 use palpate_explore::belief::{BAND, HeightPredictions, RandomField, SurfaceBelief};
 use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;
 use palpate_geometry::mesh::Mesh;
+use palpate_sim::Environment;
+use palpate_sim::reach;
 use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.

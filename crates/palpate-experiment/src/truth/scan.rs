@@ -1,11 +1,11 @@
 //! Scan of an object: touches on a grid of targets, without a belief.
 
 use crate::runner::thread_pool;
-use palpate_sim::simulator::Simulator;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::Outcome;
 use palpate_explore::task::Zone;
 use palpate_input::error::InputError;
+use palpate_sim::simulator::Simulator;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicBool, Ordering};
 

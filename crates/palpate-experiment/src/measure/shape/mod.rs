@@ -4,8 +4,6 @@ mod reach;
 
 pub use reach::FingerReach;
 
-use palpate_sim::Environment;
-use palpate_sim::environment::ObjectShape;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::task::approach::attitude;
 use palpate_explore::whole_object::Surface;
@@ -13,6 +11,8 @@ use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::low_discrepancy::{SurfacePoint, in_square, over_surface};
 use palpate_geometry::mesh::Mesh;
 use palpate_geometry::point_in_mesh::{Crossing, spans_inside};
+use palpate_sim::Environment;
+use palpate_sim::environment::ObjectShape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
