@@ -65,7 +65,7 @@ fn main() -> anyhow::Result<()> {
     let mut first_us = None;
     for (name, sets) in bodies {
         let dynamic = |arm: &[&str]| environment(&[sets, arm, &["simulator=\"dynamic\""]].concat());
-        let on_arm = dynamic(&["arm={links=\"C\"}"])?;
+        let on_arm = dynamic(&["arm={model=\"pa10\"}"])?;
         let (rests, depth_m, words) = match on_arm.fingertip() {
             Some(_) => (None, DEEP_M, "as cast | | | | |".into()),
             None => {

@@ -13,13 +13,13 @@
 //! | [`report`] | tables, figures and the page, drawn from rows and studies |
 //! | [`study`] | accuracy, regression checks of planners, comparisons of runs |
 //!
-//! A robot program does not need it. It uses the packages below, which do not depend on this
-//! one, so that the robot program has no access to the ground truth:
+//! A robot program needs neither it nor the first two packages below. It uses the others, which do
+//! not depend on them, so that the robot program has no access to the ground truth:
 //!
 //! | package | here | content |
 //! |---|---|---|
-//! | `palpate-experiment` | [`experiment`] | experiment, trial, runner, store, measures, statistics |
-//! | `palpate-sim` | [`sim`] | scene, object, effects, physics of the finger, simulated robots |
+//! | `palpate-experiment` | [`experiment`] | trial, runner, store, measures, statistics |
+//! | `palpate-sim` | [`sim`] | scene, effects, physics of the finger, simulated robots |
 //! | `palpate-explore` | [`explore`], [`task`], [`robot`], [`backend`] | belief, planners, servo |
 //! | `palpate-ros` | [`ros`] | an arm over topics, a simulated robot, recordings |
 //! | `palpate-gp` | [`gp`], [`math`] | Gaussian-process regression |

@@ -58,7 +58,7 @@ pub fn html(
         fold("All settings, including defaults", &preformatted(settings)),
         fold("Software and machine", &preformatted(manifest)),
         fold("Files in this folder", &raw_files(drawings)),
-        format!("<script>{SAVE}</script>\n"),
+        if FORMATS.contains(&"png") { String::new() } else { format!("<script>{SAVE}</script>\n") },
     ];
     html::page("Palpate run", &run.experiment.name, &run.experiment.question, &parts.concat())
 }

@@ -65,7 +65,7 @@ fn interlocked(body: Box<dyn Backend>, chain: &Chain) -> InterlockedBackend {
 /// Runs `check` on every body in every wrapper.
 fn each(check: impl Fn(&str, &mut dyn Backend, &Chain)) {
     for kind in KINDS {
-        for arm in [None, Some("arm={links=\"C\"}")] {
+        for arm in [None, Some("arm={model=\"pa10\"}")] {
             for effects in [Some(EVERYTHING), (kind == "dynamic").then_some("effects={}")] {
                 let Some(effects) = effects else { continue };
                 let body = format!("simulator=\"{kind}\"");
@@ -190,7 +190,7 @@ fn capabilities_are_those_of_the_chain() {
 
 #[test]
 fn limits_hold_acceleration_and_braking_and_leave_a_good_command_alone() {
-    for sets in [&["arm={links=\"C\"}"][..], &[]] {
+    for sets in [&["arm={model=\"pa10\"}"][..], &[]] {
         let simulator = Simulator::new(environment(sets)).unwrap();
         let chain = simulator.environment().chain().unwrap();
         let body = || simulator.body().unwrap().unwrap();

@@ -69,7 +69,7 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
         ("name = \"small\"", "nmae = \"small\"", &["nmae", "did you mean `name`"]),
         ("[\"random\"]", "[]", &["small.toml:3", "planners", "active, random, sobol"]),
         ("[\"random\"]", "[\"randon\"]", &["small.toml:3", "randon", "active, random, sobol"]),
-        ("[\"random\"]", "[\"ei\"]", &["small.toml:3", "active, random, sobol", "ei were removed"]),
+        ("[\"random\"]", "[\"ei\"]", &["small.toml:3", "active, random, sobol", "silhouette"]),
         ("[\"random\"]", "[\"random\", \"random\"]", &["small.toml:3", "each name once"]),
         ("[\"random\"]", "\"random\"", &["small.toml:3", "planners"]),
         ("[\"random\"]", "[1]", &["small.toml:3", "planners[0]"]),

@@ -198,9 +198,10 @@ fn files_of_others_are_replaced_by_force_only() {
     let folder = folder();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let scene = read("scene.toml");
+    fs::write(folder.path().join("zone.svg"), "a drawing").unwrap();
     for (option, file) in [
         ("--mjcf", "scene.toml"),
-        ("--picture", "scene.toml"),
+        ("--picture", "zone.svg"),
         ("--mjcf", "mesh.obj"),
         ("--render", "small.toml"),
     ] {

@@ -16,7 +16,7 @@ use palpate::sim::{Environment, Scene};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-const ARM: &str = "arm={links=\"C\"}";
+const ARM: &str = "arm={model=\"pa10\"}";
 const DYNAMIC: &str = "simulator=\"dynamic\"";
 const DRY: &str = "effects={skin={}}";
 const WET: &str = "effects={skin={}, fluid={}}";

@@ -193,7 +193,7 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
 /// both are stable in every posture, at 2 ms neither is.
 #[test]
 fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
-    for links in ["arm={links=\"C\"}", "arm={links=\"A\"}"] {
+    for links in ["arm={model=\"pa10\"}", "arm={model=\"pa10_a\"}"] {
         // With Euler steps the mass matrix is the arm's.
         let euler = ["solver={integrator=\"euler\", step_s=1e-3}", links];
         let environment = Environment::build(scene("container_pa10.toml", &euler)).unwrap();

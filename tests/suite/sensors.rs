@@ -226,14 +226,6 @@ fn the_table_of_a_sensor_selects_it() {
     assert_eq!(name(&["sensor={contact={}}"]), Some("contact"));
     let two = load(&["sensor.contact={}"]).unwrap_err();
     assert!(two.contains("`sensor.contact`") && two.contains("`force_torque_tip`"), "{two}");
-    for (kind, place) in [
-        ("contact", "[sensor.contact]"),
-        ("automatic", "without a table"),
-        ("finger", "depth_patch"),
-    ] {
-        let error = load(&[&format!("sensor.kind={kind}")]).unwrap_err();
-        assert!(error.contains("`sensor.kind`") && error.contains(place), "{error}");
-    }
     let blind = load(&["sensor={depth_patch={}}"]).unwrap_err();
     assert!(blind.contains("`sensor.depth_patch`") && blind.contains("[effects.gel]"), "{blind}");
 }

@@ -145,7 +145,11 @@ impl<'de> SeqAccess<'de> for Inner<'_, std::vec::IntoIter<Value>> {
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Reason> {
-        let Some(value) = self.rest.next() else { return Ok(None) };
+        let Some(value) = self.rest.next() else {
+            // What is missing is missing in the list.
+            self.place.0.borrow_mut().truncate(self.depth);
+            return Ok(None);
+        };
         let step = format!("[{}]", self.count);
         self.count += 1;
         self.read(step, value, seed).map(Some)

@@ -32,7 +32,7 @@ const LASTS_S: f64 = 0.1;
 
 /// Multiple of the set load, or of that at the start if it is larger, that shows a wall ahead, and
 /// of the set load above which the finger slows down.
-// heuristic: below 1.7 a rigid tip stops at each step, above 3 a soft one presses six times as hard.
+// heuristic: below 1.7 a rigid tip stops at each step, above 3 a soft one presses too hard.
 const WALL: f64 = 2.0;
 const EASED: f64 = 1.3;
 
