@@ -9,10 +9,10 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::backend::Fault;
 use palpate::experiment::measure::RMSE;
-use palpate::experiment::measure::metrics::Metrics;
+use palpate::experiment::metrics::Metrics;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::statistics::equal_error::{IntervalEstimate, equal_error};
 use palpate::experiment::statistics::{PairedDifference, median};
-use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::evidence::{Contact, Evidence, Outcome};
 use palpate::explore::planner;

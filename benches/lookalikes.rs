@@ -9,9 +9,9 @@
 
 use anyhow::{Context, Result, ensure};
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::measure::recognition::{NONE, RecognitionMetrics};
+use palpate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::statistics::median;
-use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner::{self, PlannerEntry};
 use palpate::geometry::import::import;

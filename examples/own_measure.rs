@@ -3,8 +3,8 @@
 //! `cargo run --release --example own_measure`
 
 use palpate::experiment::measure::{Aggregate, Direction, METRES, Measure, PanelAxis, Source};
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::statistics::summary::representative_value;
-use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 
 /// Mean RMSE over all touches so far: the area under the error curve, which rewards planners with

@@ -5,8 +5,8 @@
 //! `cargo run --release --example proximity_ray`
 
 use palpate::backend::Fault;
-use palpate::experiment::measure::metrics::Metrics;
-use palpate::experiment::truth::Truth;
+use palpate::experiment::metrics::Metrics;
+use palpate::experiment::metrics::truth::Truth;
 use palpate::explore::belief::{Belief, HeightField};
 use palpate::explore::episode::Episode;
 use palpate::explore::evidence::{Contact, End, Evidence, FreeVolume, Outcome};

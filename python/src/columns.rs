@@ -3,12 +3,12 @@
 use crate::fork;
 use numpy::PyArray1;
 use palpate::experiment::measure::{Measure, PanelAxis, measures_with_columns};
+use palpate::experiment::row::{TouchRow, TrialRow};
 use palpate::experiment::statistics::comparison::PairedComparison;
 use palpate::experiment::statistics::curve_table::{columns, curve_table, uncertainty};
 use palpate::experiment::statistics::equal_error::{EqualError, IntervalEstimate};
 use palpate::experiment::statistics::summary::{self, CurvePoint};
 use palpate::experiment::store::Run;
-use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::explore::planner::Fallback;
 use palpate::report::findings;
 use pyo3::exceptions::PyValueError;

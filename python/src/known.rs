@@ -1,8 +1,8 @@
 //! Beliefs over a zone or around an object, and their ground truth.
 
-use palpate::experiment::measure::metrics::Metrics;
-use palpate::experiment::measure::shape::{ShapeMetrics, TrueShape};
-use palpate::experiment::truth::Truth;
+use palpate::experiment::metrics::Metrics;
+use palpate::experiment::metrics::shape::{ShapeMetrics, TrueShape};
+use palpate::experiment::metrics::truth::Truth;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::whole_object::SpatialGpSettings;
 use palpate::sim::Environment;

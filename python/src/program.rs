@@ -3,7 +3,7 @@
 use crate::fork;
 use crate::planner::PythonFactory;
 use palpate::cli::Host;
-use palpate::experiment::trial::planner_names;
+use palpate::experiment::planner_names;
 use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
 

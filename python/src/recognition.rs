@@ -3,7 +3,7 @@
 use crate::errors;
 use crate::exploration::{EpisodeOptions, ExplorationEnv, ExplorationScene, Reward};
 use crate::fork;
-use palpate::experiment::measure::recognition::NONE;
+use palpate::experiment::metrics::recognition::NONE;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::recognition::ObjectHypotheses;
 use palpate::math::pose::parts;

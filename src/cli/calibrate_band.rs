@@ -7,9 +7,9 @@ use super::prepare::{needs_zone, set_thread_count};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
+use crate::experiment::planner_names::ORACLE;
 use crate::experiment::store::write_whole;
 use crate::experiment::sweep::sweep_cases;
-use crate::experiment::trial::planner_names::ORACLE;
 use crate::experiment::{Experiment, Simulation};
 use crate::report::{files, reliability};
 use crate::study::band::{

@@ -8,8 +8,8 @@ use super::scan::{Grid, ScanArgs, grid, scan};
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::report_settings::ReportSettings;
+use crate::experiment::row::planner_rows;
 use crate::experiment::store::{Run, write_whole};
-use crate::experiment::trial::row::planner_rows;
 #[cfg(feature = "pictures")]
 use crate::report::animation;
 use crate::report::points::PointCloud;

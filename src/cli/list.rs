@@ -4,7 +4,7 @@ use super::find::{EXPERIMENTS, SCENES, file_stems, find};
 use super::terminal::{Completion, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::MEASURES;
-use crate::experiment::trial::planner_names;
+use crate::experiment::planner_names;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
 use schemars::schema_for;

@@ -1,6 +1,6 @@
 //! Picture of a scene's object, with its zone or its ball.
 
-use crate::experiment::measure::shape::TrueShape;
+use crate::experiment::metrics::shape::TrueShape;
 use crate::report::scan::zone_picture;
 use crate::report::solid;
 use crate::sim::Environment;

@@ -3,8 +3,8 @@
 use super::known_body::numbers;
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
+use crate::experiment::metrics::truth::scan_truth::read_cloud;
 use crate::experiment::store::write_whole;
-use crate::experiment::truth::scan_truth::read_cloud;
 use crate::sim::scene::Unit;
 use palpate_explore::registration::icp;
 use palpate_geometry::bvh::MeshBvh;

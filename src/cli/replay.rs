@@ -2,8 +2,8 @@
 
 use super::prepare::prepare_simulation;
 use super::terminal::{Completion, Verbosity, print};
-use crate::experiment::trial::recorded_trial::parts;
-use crate::experiment::trial::replay::{self, Difference, ReplayResult};
+use crate::experiment::recording::recorded_trial::parts;
+use crate::experiment::recording::replay::{self, Difference, ReplayResult};
 use anyhow::Context;
 use palpate_input::format::counted;
 use palpate_input::format::shorten;

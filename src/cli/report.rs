@@ -2,7 +2,7 @@
 
 use super::host::Host;
 use super::terminal::{Completion, print, print_fitted};
-use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;
 use palpate_input::format::counted;

@@ -4,7 +4,7 @@ use super::prepare::{load_experiment, prepare_simulation};
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
-use crate::experiment::trial::row::TrialRow;
+use crate::experiment::row::TrialRow;
 use anyhow::{Context, bail};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::{LiveView, ViewedBackend};

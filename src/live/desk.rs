@@ -2,8 +2,8 @@
 
 use super::order::{Order, OrderError};
 use crate::experiment::experiment::Experiment;
-use crate::experiment::trial::planner_names::HUMAN;
-use crate::experiment::trial::row::TrialRow;
+use crate::experiment::planner_names::HUMAN;
+use crate::experiment::row::TrialRow;
 use crate::experiment::trial::{NextTouch, TrialEvent};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::LiveView;

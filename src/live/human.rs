@@ -1,7 +1,7 @@
 //! Planner `human`: a person who chooses each target on the page.
 
 use super::desk::Desk;
-use crate::experiment::trial::planner_names::HUMAN;
+use crate::experiment::planner_names::HUMAN;
 use palpate_explore::belief::Belief;
 use palpate_explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use rand_chacha::ChaCha8Rng;

@@ -1,10 +1,10 @@
 //! Data for viewers: the desk's state, and beliefs replayed from the touches so far.
 
 use super::desk::{Desk, Phase, Status, Track};
+use crate::experiment::metrics::truth::Truth;
+use crate::experiment::planner_names::HUMAN;
+use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
-use crate::experiment::trial::planner_names::HUMAN;
-use crate::experiment::trial::row::TouchRow;
-use crate::experiment::truth::Truth;
 use crate::report::{explorer, solid, style, whole_object};
 use palpate_explore::evidence::End;
 use palpate_explore::task::Target;

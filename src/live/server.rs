@@ -7,7 +7,7 @@ use super::desk::Desk;
 use super::guard::{Access, Passage};
 use super::order::Order;
 use super::picture::{self, BeliefView, Picture, Shown};
-use crate::experiment::truth::Truth;
+use crate::experiment::metrics::truth::Truth;
 use crate::report::canvas::escape;
 use crate::report::explorer::choice;
 use crate::report::html;

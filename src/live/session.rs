@@ -3,10 +3,10 @@
 use super::desk::Desk;
 use super::human::HumanFactory;
 use crate::experiment::Simulation;
+use crate::experiment::row::{TrialId, TrialRow};
 use crate::experiment::runner::{self, Job, RealRun};
 use crate::experiment::store::{Run, RunError, RunFolder};
 use crate::experiment::trial::TrialEvent;
-use crate::experiment::trial::row::{TrialId, TrialRow};
 use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::task::Task;
 use std::sync::Arc;

@@ -10,10 +10,10 @@ use super::legend::{FigureLayout, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
 use crate::experiment::measure::Direction;
-use crate::experiment::measure::silhouette::TENTHS;
+use crate::experiment::metrics::silhouette::TENTHS;
+use crate::experiment::planner_names::ORACLE;
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::mean;
-use crate::experiment::trial::planner_names::ORACLE;
 use crate::study::compare::{
     BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric_mean,
     interquartile_mean_interval, profile, win_probability,

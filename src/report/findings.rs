@@ -1,12 +1,12 @@
 //! Findings of a run as sentences, and its verdict.
 
 use super::table::{digits, shown, verdict};
-use crate::experiment::measure::metrics::constant_r;
+use crate::experiment::analysis::Analysis;
 use crate::experiment::measure::{
     self, CENTRED_R, CHAMFER, COVERAGE, Direction, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
     VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
-use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::metrics::constant_r;
 use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;

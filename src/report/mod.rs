@@ -42,7 +42,7 @@ pub mod whole_object;
 
 pub use figures::ReportFigure;
 
-use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::path::Path;

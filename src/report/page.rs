@@ -7,7 +7,7 @@ use super::findings;
 use super::glossary::explained;
 use super::html::{self, fold, list, section, tables};
 use super::tables::{comparison, summary};
-use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::analysis::Analysis;
 use crate::experiment::store::Run;
 
 /// Files of a run folder that the page links to.

@@ -1,10 +1,10 @@
 //! Generator of the reference of settings and files, from the types that read and write them.
 
 use crate::experiment::Experiment;
-use crate::experiment::measure::metrics::Metrics;
-use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::measure::{Direction, MEASURES};
-use crate::experiment::trial::row::{TouchRow, TrialRow};
+use crate::experiment::metrics::Metrics;
+use crate::experiment::metrics::shape::ShapeMetrics;
+use crate::experiment::row::{TouchRow, TrialRow};
 use crate::report::table::{Cell, Column, Table};
 use palpate_explore::evidence::{Contact, FreeVolume, Outcome};
 use palpate_gp::fit::Fit;

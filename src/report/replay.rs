@@ -1,9 +1,9 @@
 //! Replay of beliefs: a recorded trial's touches and hyperparameters, conditioned again.
 
 use crate::experiment::Experiment;
-use crate::experiment::measure::metrics::Metrics;
+use crate::experiment::metrics::Metrics;
+use crate::experiment::row::{TouchRow, TrialRow};
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::report::canvas::{Canvas, PointPx};
 use crate::report::style;
 use crate::report::table::digits;

@@ -5,10 +5,10 @@
 
 use super::compare::{Entrant, SuiteComparison, gap_closed, geometric_mean};
 use crate::experiment::Experiment;
+use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::median;
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::{TrialRow, planner_rows};
 use palpate_input::error::InputError;
 use palpate_input::files;
 use palpate_input::format::hex;

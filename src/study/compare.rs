@@ -6,12 +6,12 @@
 //! different sizes count equally. Smaller is better; the reference has score 1.
 
 use super::check::measures::CHECK_MEASURES;
-use crate::experiment::measure::silhouette::TENTHS;
+use crate::experiment::metrics::silhouette::TENTHS;
+use crate::experiment::planner_names::ORACLE;
+use crate::experiment::row::{TouchRow, TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::{RESAMPLES, central_95, mean};
 use crate::experiment::store::Run;
-use crate::experiment::trial::planner_names::ORACLE;
-use crate::experiment::trial::row::{TouchRow, TrialRow, planner_rows};
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
 use rand::RngExt;

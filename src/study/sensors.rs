@@ -4,11 +4,11 @@
 //! so that trials of the same number are paired.
 
 use crate::experiment::measure::Measure;
+use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::runner::{Progress, missing_jobs, run_in_memory};
 use crate::experiment::statistics::equal_error::{EqualError, equal_error};
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts};
 use crate::experiment::sweep::SweepCase;
-use crate::experiment::trial::row::{TrialRow, planner_rows};
 use crate::experiment::{Experiment, Simulation};
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::error::InputError;

@@ -7,7 +7,7 @@ use crate::common::program::palpate;
 use crate::common::runs::SURFACE;
 use crate::common::skip::skip;
 use crate::page::{browser_or_note, log};
-use palpate::experiment::statistics::analysis::Analysis;
+use palpate::experiment::analysis::Analysis;
 use palpate::report;
 use std::fs;
 use std::path::{Path, PathBuf};

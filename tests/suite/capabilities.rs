@@ -3,12 +3,12 @@
 //! The table is `tests/capabilities.md`; `PALPATE_WRITE_REFERENCE=1` writes it anew. The columns of
 //! Python are tested by `python/tests/test_capabilities.py`.
 
+use palpate::experiment::recording::recorded_trial;
+use palpate::experiment::recording::replay;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::store::RunFolder;
 use palpate::experiment::trial::TrialEvent;
-use palpate::experiment::trial::recorded_trial;
-use palpate::experiment::trial::replay;
-use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, real_robot};
 use palpate::explore::belief::Belief;
 use palpate::live::session::Session;

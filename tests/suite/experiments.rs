@@ -1,10 +1,10 @@
 //! Tests of the shipped experiments' results, with all or some of the trials.
 
 use palpate::experiment::measure::{EDGE_RMSE, R, RMSE};
+use palpate::experiment::row::{TrialRow, planner_rows};
 use palpate::experiment::statistics::equal_error::equal_error;
 use palpate::experiment::statistics::summary;
 use palpate::experiment::statistics::summary::CurvePoint;
-use palpate::experiment::trial::row::{TrialRow, planner_rows};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use rayon::prelude::*;

@@ -12,8 +12,8 @@ use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
 
 use crate::common::program::{command, fails, folder, stderr, succeeds};
+use palpate::experiment::row::TouchRow;
 use palpate::experiment::store::{Journal, JournalEntry};
-use palpate::experiment::trial::row::TouchRow;
 
 /// Number of kills; `PALPATE_FUZZ` sets more.
 const KILLS: u64 = 100;

@@ -13,7 +13,7 @@ use std::thread;
 use std::time::Duration;
 
 use palpate::experiment::Experiment;
-use palpate::experiment::statistics::analysis::Analysis;
+use palpate::experiment::analysis::Analysis;
 use palpate::experiment::store::{Run, resolved};
 use palpate::geometry::import::import;
 use palpate::report::replay::BeliefReplay;

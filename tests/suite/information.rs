@@ -2,8 +2,8 @@
 
 use crate::common::outcomes::free_volume;
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::trial::row::TrialRow;
-use palpate::experiment::truth::Truth;
+use palpate::experiment::metrics::truth::Truth;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::{Contact, End, Evidence};

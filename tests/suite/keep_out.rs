@@ -2,8 +2,8 @@
 
 use nalgebra::Point3;
 use palpate::backend::arm::KeepOutSolid;
+use palpate::experiment::recording::keep_out::{TABLE, object, table};
 use palpate::experiment::trial::TrialEvent;
-use palpate::experiment::trial::keep_out::{TABLE, object, table};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::backend::interlock::InterlockSettings;
 use palpate::geometry::bvh::MeshBvh;

@@ -2,7 +2,7 @@
 
 use crate::common::lab::{Network, TwinProcess, UR_EXPERIMENT, row};
 use nalgebra::Point3;
-use palpate::experiment::trial::row::TouchRow;
+use palpate::experiment::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;

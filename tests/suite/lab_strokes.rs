@@ -2,7 +2,7 @@
 
 use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row, touch_sets};
 use nalgebra::Point3;
-use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate_geometry::primitives::nearest_on_segment;
 use std::path::Path;

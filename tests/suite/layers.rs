@@ -14,7 +14,22 @@ const LAYERS: [(&str, &[&[&str]]); 8] = [
     ("palpate_explore", &[&["robot"], &["task", "backend"]]),
     ("palpate_ros", &[]),
     ("palpate_sim", &[]),
-    ("palpate_experiment", &[]),
+    (
+        "palpate_experiment",
+        &[
+            &["metrics", "planner_names", "backend_settings"],
+            &["row"],
+            &["measure"],
+            &["report_settings"],
+            &["experiment"],
+            &["statistics", "trial", "real_robot", "sweep"],
+            &["notice"],
+            &["simulation"],
+            &["store"],
+            &["recording", "analysis"],
+            &["runner"],
+        ],
+    ),
     ("palpate", &[&["study"], &["report"], &["live"], &["cli"]]),
 ];
 

@@ -363,7 +363,7 @@ fn holes_of_a_whole_object_have_no_samples() {
     let said = new(&folder, &["scan.obj", "--around"]);
     assert!(said.contains("of the object has no surface: the mesh has 4 holes"), "{said}");
     let environment = Environment::build(scene(&folder, "scan")).unwrap();
-    let shape = palpate::experiment::measure::shape::TrueShape::from_environment(&environment);
+    let shape = palpate::experiment::metrics::shape::TrueShape::from_environment(&environment);
     let (shape, mesh) = (shape.unwrap(), environment.mesh().unwrap());
     assert!(mesh.has_patches());
     assert!(shape.samples().iter().all(|spot| !mesh.is_patch(spot.triangle)));

@@ -1,12 +1,12 @@
 //! Tests of runs without ground truth: verification touches, repeated touches, and scans as ground
 //! truth.
 
+use palpate::experiment::analysis::Analysis;
 use palpate::experiment::measure;
-use palpate::experiment::statistics::analysis::Analysis;
+use palpate::experiment::metrics::truth::Truth;
+use palpate::experiment::metrics::truth::scan_truth::ScanTruth;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::store::Run;
-use palpate::experiment::trial::row::TrialRow;
-use palpate::experiment::truth::Truth;
-use palpate::experiment::truth::scan_truth::ScanTruth;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::report;

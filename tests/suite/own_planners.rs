@@ -1,8 +1,8 @@
 //! Tests of external planners, which a program adds to its simulation.
 
+use palpate::experiment::row::TrialId;
 use palpate::experiment::runner;
 use palpate::experiment::store::{Run, RunError, RunFolder};
-use palpate::experiment::trial::row::TrialId;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{

@@ -5,7 +5,7 @@
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use crate::common::skip::skip;
-use palpate::experiment::statistics::analysis::Analysis;
+use palpate::experiment::analysis::Analysis;
 use palpate::experiment::store::Run;
 use palpate::report;
 use std::fs;

@@ -2,8 +2,8 @@
 
 use crate::common::outcomes::outcome;
 use nalgebra::Vector3;
+use palpate::experiment::recording::recorded_trial::ResumedProbe;
 use palpate::experiment::sweep::sweep_cases;
-use palpate::experiment::trial::recorded_trial::ResumedProbe;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::Contact;

@@ -3,8 +3,8 @@
 use crate::common::program::{fails, palpate, run_to_end, stderr, succeeds};
 use palpate::experiment::Simulation;
 use palpate::experiment::experiment::Experiment;
-use palpate::experiment::measure::recognition::{NONE, RecognitionMetrics};
-use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
+use palpate::experiment::row::TrialRow;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;

@@ -9,10 +9,10 @@ use mcap::records::{MessageHeader, Record};
 use palpate::backend::{
     Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample, Wrench,
 };
+use palpate::experiment::recording::recorded_trial::{self, next_part, parts, recording_path};
+use palpate::experiment::recording::replay::{self, Difference};
+use palpate::experiment::row::TouchRow;
 use palpate::experiment::trial::TrialEvent;
-use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
-use palpate::experiment::trial::replay::{self, Difference};
-use palpate::experiment::trial::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::robot::finger::Frame;

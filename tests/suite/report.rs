@@ -1,14 +1,14 @@
 //! Tests of figures and pages of synthetic runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
-use palpate::experiment::measure::recognition::{
+use palpate::experiment::analysis::Analysis;
+use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
+use palpate::experiment::metrics::recognition::{
     NONE, PoseRow, RecognitionError, RecognitionMetrics,
 };
-use palpate::experiment::measure::shape::ShapeMetrics;
-use palpate::experiment::measure::silhouette::SilhouetteMetrics;
-use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
+use palpate::experiment::metrics::shape::ShapeMetrics;
+use palpate::experiment::metrics::silhouette::SilhouetteMetrics;
 use palpate::experiment::report_settings::Claim;
-use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
 use palpate::explore::evidence::End;
 use palpate::report;

@@ -4,7 +4,7 @@
 use crate::common::shapes::{box_mesh, point};
 use crate::common::shipped::{contact, environment, scene};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
-use palpate::experiment::trial::row::TouchRow;
+use palpate::experiment::row::TouchRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::probe::Probe;
 use palpate::explore::probe::servo::Servo;

@@ -3,7 +3,7 @@
 
 use crate::common::around::{belief, belief_with, meet, simulation, trial};
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::trial::row::TouchRow;
+use palpate::experiment::row::TouchRow;
 use palpate::explore::whole_object::{ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::low_discrepancy::directions;
 use palpate::task::Aim;

@@ -2,7 +2,7 @@
 
 use crate::common::shapes::{box_mesh, point, sphere_mesh, square};
 use nalgebra::{Isometry3, Vector3};
-use palpate::experiment::measure::shape::{ShapeMetrics, TrueShape};
+use palpate::experiment::metrics::shape::{ShapeMetrics, TrueShape};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;

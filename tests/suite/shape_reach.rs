@@ -2,7 +2,7 @@
 
 use crate::common::shapes::{box_corners, box_mesh, point, sphere_mesh};
 use nalgebra::{UnitVector3, Vector3};
-use palpate::experiment::measure::shape::{FingerReach, TrueShape};
+use palpate::experiment::metrics::shape::{FingerReach, TrueShape};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::import::import;
 use palpate::geometry::low_discrepancy::{SurfacePoint, over_surface};

@@ -2,13 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
-use palpate::experiment::measure::shape::TrueShape;
+use palpate::experiment::metrics::shape::TrueShape;
+use palpate::experiment::metrics::truth::Truth;
+use palpate::experiment::row::{TouchRow, TrialRow};
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::statistics::equal_error::equal_errors;
 use palpate::experiment::store::Run;
 use palpate::experiment::store::resolved;
-use palpate::experiment::trial::row::{TouchRow, TrialRow};
-use palpate::experiment::truth::Truth;
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::Planner;
 use palpate::explore::planner::{self, Offer};

@@ -6,10 +6,10 @@
 
 use crate::backend_settings::BackendSettings;
 use crate::measure::{CHAMFER, Measure, RMSE};
+use crate::metrics::truth::scan_truth::ScanTruth;
+use crate::planner_names::{self, ORACLE};
 use crate::report_settings::{ReportSettings, TOUCHES_MAX};
-use crate::trial::planner_names::{self, ORACLE};
-use crate::trial::row::TrialId;
-use crate::truth::scan_truth::ScanTruth;
+use crate::row::TrialId;
 use palpate_explore::gp_settings::GpSettings;
 use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;

@@ -20,20 +20,25 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod analysis;
 pub mod backend_settings;
 #[allow(clippy::module_inception)]
 pub mod experiment;
 pub mod measure;
+pub mod metrics;
 pub mod notice;
+pub mod planner_names;
 pub mod real_robot;
+pub mod recording;
 pub mod report_settings;
+pub mod row;
 pub mod runner;
+pub mod scan;
 pub mod simulation;
 pub mod statistics;
 pub mod store;
 pub mod sweep;
 pub mod trial;
-pub mod truth;
 
 pub use experiment::Experiment;
 pub use simulation::Simulation;

@@ -1,11 +1,11 @@
 //! Notices about an experiment's results: each explains what limits their meaning, and what to do.
 
 use crate::experiment::Experiment;
-use crate::measure::shape::TrueShape;
 use crate::measure::{CENTRED_R, Measure, R};
+use crate::metrics::shape::TrueShape;
+use crate::metrics::truth::Truth;
+use crate::row::{TrialRow, planner_rows};
 use crate::statistics::summary;
-use crate::trial::row::{TrialRow, planner_rows};
-use crate::truth::Truth;
 use palpate_explore::task::Zone;
 use palpate_input::format::counted;
 

@@ -1,7 +1,7 @@
 //! Settings of a run's report. They do not affect rows, so they may change on a finished run.
 
 use crate::measure::MEASURES;
-use crate::trial::planner_names;
+use crate::planner_names;
 use palpate_input::config::{Rules, Validate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,12 @@
 //! Execution of trials × planners: simulated trials in parallel, those of a real arm in sequence.
 
+use crate::planner_names::HUMAN;
+use crate::recording::recorded_trial::{self, next_part, recording_path};
+use crate::recording::view;
+use crate::row::{TouchRow, TrialId, TrialRow};
 use crate::simulation::Simulation;
 use crate::store::{JOURNAL, Journal, JournalEntry, RunError, RunFolder};
-use crate::trial::planner_names::HUMAN;
-use crate::trial::recorded_trial::{self, next_part, recording_path};
-use crate::trial::row::{TouchRow, TrialId, TrialRow};
-use crate::trial::{self, FinishedTouch, TrialEvent, TrialObserver};
+use crate::trial::{FinishedTouch, TrialEvent, TrialObserver};
 use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::backend::{Fault, pace};
 use palpate_explore::planner::{Fallback, PlannerFactory};
@@ -305,7 +306,7 @@ impl StoredTrial<'_, '_> {
         let is_shown = event.count() as usize >= self.made.len();
         let simulation = self.run.simulation;
         if let Some(arm) = simulation.arm().filter(|_| is_shown) {
-            trial::view::show(arm, simulation, event);
+            view::show(arm, simulation, event);
         }
         let made = self.made.get(event.count() as usize - 1);
         match (event, made) {

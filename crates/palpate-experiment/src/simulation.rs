@@ -1,13 +1,13 @@
 //! Simulation of an experiment's trials.
 
 use crate::experiment::Experiment;
-use crate::measure::shape::TrueShape;
+use crate::metrics::shape::TrueShape;
+use crate::metrics::truth::Truth;
 use crate::notice;
 use crate::real_robot;
+use crate::row::TrialRow;
 use crate::trial::looks;
-use crate::trial::row::TrialRow;
 use crate::trial::{self, GroundTruth, OracleFactory, TrialObserver};
-use crate::truth::Truth;
 use palpate_explore::backend::arm::Arm;
 use palpate_explore::backend::live_view::{LiveView, ViewedBackend};
 use palpate_explore::backend::{Backend, Fault, LinkFault};

@@ -1,8 +1,8 @@
 //! Interactive view of beliefs over a zone: values on a grid after many touch counts, in few bytes.
 
 use super::{Counts, InteractiveView, LEAST_SHARE, PARTS, counts, encode, encode_log, short};
+use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{self, Axis, Length};
 use crate::report::relief::Space;
 use crate::report::replay::{self, BeliefReplay, Grid, drawn_caption};

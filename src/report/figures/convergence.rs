@@ -1,7 +1,8 @@
 //! Figure of errors against touches, Fig. 4 of Yi et al. 2016.
 
 use super::ReportFigure;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, PanelAxis, R, ROBOT_TIME, metrics};
+use crate::experiment::measure::{Aggregate, MEASURES, Measure, PanelAxis, R, ROBOT_TIME};
+use crate::experiment::metrics;
 use crate::experiment::statistics::curve_table;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;

@@ -2,9 +2,9 @@
 //! taken for which in all trials.
 
 use super::ReportFigure;
-use crate::experiment::measure::recognition::{NONE, RecognitionMetrics};
+use crate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
+use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::{TrialRow, planner_rows};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::replay;
 use crate::report::style::{

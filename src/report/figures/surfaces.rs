@@ -1,8 +1,8 @@
 //! Figure of the beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
 
 use super::ReportFigure;
+use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, miss_entry, seen_entry, touch_entries};

@@ -1,9 +1,9 @@
 //! Figure of targets and contacts, seen along the approach.
 
 use super::ReportFigure;
+use crate::experiment::row::TouchRow;
 use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::TouchRow;
 use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::Area;
 use crate::report::legend::{FigureLayout, Swatch, miss_entry, stroke_entry};

@@ -2,12 +2,12 @@
 //! next to the results.
 
 use crate::experiment::measure::{self, MEASURES, Measure, RECOGNISED, VERIFICATION_RMSE};
+use crate::experiment::row::{ViewRow, planner_rows};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts, representative_value};
 use crate::experiment::statistics::{mean, mean_interval};
 use crate::experiment::store::Run;
-use crate::experiment::trial::row::{ViewRow, planner_rows};
 use crate::report::table::{Cell, Column, Table, shown, title_with_unit};
 use palpate_explore::view::ViewDoubt;
 use palpate_gp::math::normal::BAND_95;

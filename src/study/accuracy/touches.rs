@@ -1,6 +1,6 @@
 //! Touches of a scene without sensor noise: contacts, loads and times, to compare models.
 
-use crate::experiment::truth::Truth;
+use crate::experiment::metrics::truth::Truth;
 use crate::sim::environment::ObjectShape;
 use crate::sim::finger::FingertipState;
 use crate::sim::simulator::Simulator;

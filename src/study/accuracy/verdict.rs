@@ -1,7 +1,7 @@
 //! Comparison of two planners in a scene, and the relevance of a change in it.
 
+use crate::experiment::metrics::truth::Truth;
 use crate::experiment::statistics::PairedDifference;
-use crate::experiment::truth::Truth;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::{Environment, Scene};
 use palpate_explore::planner;

@@ -1,7 +1,7 @@
 //! Stored baseline of a regression test: a file of JSON lines, a header and a line per trial.
 
 use super::measures::CHECK_MEASURES;
-use crate::experiment::trial::row::TrialRow;
+use crate::experiment::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;

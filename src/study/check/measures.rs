@@ -2,7 +2,7 @@
 
 use crate::experiment::Experiment;
 use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE, ROBOT_TIME};
-use crate::experiment::trial::row::{TouchRow, TrialRow};
+use crate::experiment::row::{TouchRow, TrialRow};
 use serde::Serialize;
 
 /// Measure of a trial; smaller is better.

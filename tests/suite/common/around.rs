@@ -3,8 +3,8 @@
 use super::solids::nets_within;
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::simulation::Simulation;
-use palpate::experiment::trial::row::TrialRow;
 use palpate::explore::evidence::{Contact, End, Evidence, FreeVolume, Outcome};
 use palpate::explore::whole_object::{ExplorationSetup, ImplicitSurface, SpatialGpSettings};
 use palpate::geometry::bvh::MeshBvh;

@@ -3,7 +3,7 @@
 
 use super::lab::{Network, TwinProcess, row};
 use palpate::experiment::Experiment;
-use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::row::TrialRow;
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -1,7 +1,7 @@
 //! An explorer and a simulated robot in separate processes, over ROS 2.
 
 use palpate::backend::pace;
-use palpate::experiment::trial::row::TrialRow;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::backend::arm::Connector;
 use palpate::robot::arm::ArmSettings;

@@ -2,10 +2,10 @@
 
 use super::outcomes::outcome;
 use palpate::experiment::experiment::Experiment;
-use palpate::experiment::measure::metrics::Metrics;
+use palpate::experiment::metrics::Metrics;
+use palpate::experiment::metrics::truth::Truth;
+use palpate::experiment::row::{TouchRow, TrialRow};
 use palpate::experiment::store::Run;
-use palpate::experiment::trial::row::{TouchRow, TrialRow};
-use palpate::experiment::truth::Truth;
 use palpate::explore::evidence::{Contact, Outcome};
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::Hyperparameters;

@@ -3,8 +3,8 @@
 
 use crate::experiment::Experiment;
 use crate::measure::{Direction, MEASURES, Measure};
+use crate::row::{TrialRow, planner_rows};
 use crate::statistics::PairedDifference;
-use crate::trial::row::{TrialRow, planner_rows};
 use std::collections::HashMap;
 
 /// One measure of one planner relative to one baseline after the last touch.

@@ -2,11 +2,11 @@
 
 use crate::experiment::Experiment;
 use crate::measure::{Measure, measures_with_columns};
+use crate::row::TrialRow;
 use crate::statistics::BootstrapSamples;
 use crate::statistics::comparison::paired;
 use crate::statistics::summary;
 use crate::statistics::summary::CurvePoint;
-use crate::trial::row::TrialRow;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 /// Returns the columns of a run's records. A measure has its mean with the standard error, or its

@@ -9,9 +9,9 @@
 
 use crate::experiment::Experiment;
 use crate::measure::{MEASURES, Measure, ROBOT_TIME};
+use crate::row::{TrialRow, planner_rows};
 use crate::statistics::comparison::pairs;
 use crate::statistics::{BootstrapSamples, RankedValues, central_95};
-use crate::trial::row::{TrialRow, planner_rows};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 

@@ -1,6 +1,5 @@
 //! Statistics over trials.
 
-pub mod analysis;
 pub mod comparison;
 pub mod curve_table;
 pub mod equal_error;

@@ -2,8 +2,8 @@
 
 use crate::experiment::Experiment;
 use crate::measure::{MEASURES, Measure};
+use crate::row::{TouchRow, TrialRow, planner_rows};
 use crate::statistics::{mean, mean_and_error, median};
-use crate::trial::row::{TouchRow, TrialRow, planner_rows};
 use palpate_explore::evidence::End;
 use palpate_explore::planner::Fallback;
 use palpate_explore::robot::sensor::Doubt;

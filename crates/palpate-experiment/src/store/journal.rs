@@ -2,7 +2,7 @@
 //! loses none.
 
 use super::io::{RunError, io_error};
-use crate::trial::row::TouchRow;
+use crate::row::TouchRow;
 use palpate_input::files;
 use serde::{Deserialize, Serialize};
 use std::fs::File;

@@ -3,7 +3,7 @@
 use super::io::{RunError, io_error};
 use crate::experiment::Experiment;
 use crate::measure::{FAR_M, MEASURES};
-use crate::trial::row::{TouchRow, TrialId, TrialRow};
+use crate::row::{TouchRow, TrialId, TrialRow};
 use palpate_input::format::counted;
 use palpate_input::{files, format};
 use std::cmp::Ordering;

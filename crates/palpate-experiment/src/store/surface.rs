@@ -2,7 +2,7 @@
 
 use super::io::{RunError, check_equal, io_error, write_whole};
 use crate::experiment::Experiment;
-use crate::truth::Truth;
+use crate::metrics::truth::Truth;
 use palpate_geometry::import::import;
 use palpate_geometry::mesh::Mesh;
 use palpate_input::files;

@@ -21,7 +21,7 @@ const UNSURE: ColorRGBA = ColorRGBA { r: 0.94, g: 0.54, b: 0.38, a: 0.8 };
 const CONTACT: ColorRGBA = ColorRGBA { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 
 /// The belief as viewers draw it, in `W`.
-pub(super) struct BelievedShape {
+pub struct BelievedShape {
     /// Mean surface, coloured by standard deviation, and the contacts as the belief has them.
     pub markers: [Marker; 2],
     /// Points of the surface with their standard deviation, m.

@@ -1,25 +1,19 @@
 //! A trial, Algorithm 1 of Yi et al. 2016: touch, fit and plan in a loop; and its row.
 
 mod belief_shape;
-pub mod keep_out;
 pub(super) mod looks;
 mod oracle;
-pub mod planner_names;
-pub mod recorded_trial;
-pub mod replay;
-pub mod row;
 mod row_belief;
 mod verification;
-pub mod view;
 
 pub(super) use oracle::{GroundTruth, OracleFactory};
 
 use self::belief_shape::{BelievedShape, shape};
-use self::row::{TouchRow, TrialRow, ViewRow};
 use self::verification::verify;
 use crate::experiment::Experiment;
-use crate::measure::recognition::RecognitionMetrics;
-use crate::measure::silhouette::SilhouetteMetrics;
+use crate::metrics::recognition::RecognitionMetrics;
+use crate::metrics::silhouette::SilhouetteMetrics;
+use crate::row::{TouchRow, TrialRow, ViewRow};
 use palpate_explore::backend::Fault;
 use palpate_explore::belief::Belief;
 use palpate_explore::episode::Episode;
@@ -52,7 +46,7 @@ pub struct FinishedTouch<'a> {
 
 impl FinishedTouch<'_> {
     /// Returns the belief as viewers draw it.
-    fn shape(&self) -> &BelievedShape {
+    pub(crate) fn shape(&self) -> &BelievedShape {
         self.shape.get_or_init(|| shape(self.belief))
     }
 }

@@ -2,10 +2,9 @@
 //!
 //! Only a simulation's ground truth can create it. Other planners get only the belief.
 
-use crate::measure::shape::TrueShape;
-use crate::statistics::mean;
-use crate::trial::planner_names::ORACLE;
-use crate::truth::Truth;
+use crate::metrics::shape::TrueShape;
+use crate::metrics::truth::Truth;
+use crate::planner_names::ORACLE;
 use palpate_explore::belief::Belief;
 use palpate_explore::planner::candidates::{Candidates, free_aim};
 use palpate_explore::planner::sample::random_target;
@@ -65,7 +64,8 @@ impl GroundTruth {
                     let field = surface.field(&spot.point);
                     field.value.abs() / steepness(&field.gradient)
                 };
-                Some(mean(&spots.map(offset_m).collect::<Vec<f64>>()))
+                let offsets_m: Vec<f64> = spots.map(offset_m).collect();
+                Some(offsets_m.iter().sum::<f64>() / offsets_m.len() as f64)
             }
         }
     }

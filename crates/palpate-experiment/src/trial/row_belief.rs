@@ -1,7 +1,7 @@
 //! Belief of a recorded trial: a fold over the actions of its row.
 
-use super::row::TrialRow;
 use crate::experiment::Experiment;
+use crate::row::TrialRow;
 use palpate_explore::belief::{Belief, HeightField};
 use palpate_explore::task::Task;
 use palpate_explore::whole_object::{ExplorationSetup, ImplicitSurface};

@@ -2,7 +2,7 @@
 //! further touches.
 
 use crate::experiment::Experiment;
-use crate::trial::row::{TouchRow, TrialRow, VerificationRow};
+use crate::row::{TouchRow, TrialRow, VerificationRow};
 use nalgebra::Point3;
 use palpate_explore::belief::{Belief, HeightField, SurfaceBelief};
 use palpate_explore::episode::Episode;

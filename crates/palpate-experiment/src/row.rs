@@ -1,9 +1,9 @@
 //! Row of a trial: one line of `trials.jsonl`.
 
-use crate::measure::metrics::Metrics;
-use crate::measure::recognition::RecognitionMetrics;
-use crate::measure::shape::ShapeMetrics;
-use crate::measure::silhouette::SilhouetteMetrics;
+use crate::metrics::Metrics;
+use crate::metrics::recognition::RecognitionMetrics;
+use crate::metrics::shape::ShapeMetrics;
+use crate::metrics::silhouette::SilhouetteMetrics;
 use nalgebra::Point3;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};

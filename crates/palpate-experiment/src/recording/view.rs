@@ -1,7 +1,7 @@
 //! Shapes of a running trial for viewers: belief, contacts, next approach, limits of the cell.
 
+use crate::recording::keep_out::{keep_out, table_sides_m};
 use crate::simulation::Simulation;
-use crate::trial::keep_out::{keep_out, table_sides_m};
 use crate::trial::{NextTouch, TrialEvent};
 use nalgebra::Point3;
 use palpate_explore::backend::arm::Arm;

@@ -1,10 +1,10 @@
 //! Replay of a recorded trial: the current code runs on the recorded readings.
 
 use crate::experiment::Experiment;
+use crate::recording::recorded_trial::ResumedProbe;
+use crate::row::TouchRow;
 use crate::simulation::Simulation;
 use crate::trial::TrialEvent;
-use crate::trial::recorded_trial::ResumedProbe;
-use crate::trial::row::TouchRow;
 use palpate_explore::backend::Fault;
 use palpate_explore::planner::Fallback;
 use palpate_explore::task::Target;

@@ -3,7 +3,7 @@
 //! A planner cannot access it. This planner, which uses its belief, compiles:
 //!
 //! ```
-//! use palpate_experiment::truth::Truth;
+//! use palpate_experiment::metrics::truth::Truth;
 //! use palpate_explore::belief::Belief;
 //! use palpate_explore::planner::{Offer, Plan, PlanError, Planner};
 //! use palpate_gp::posterior::Scratch;
@@ -22,7 +22,7 @@
 //! oracle's data cannot be named outside of `experiment` (E0603, private).
 //!
 //! ```compile_fail,E0050
-//! use palpate_experiment::truth::Truth;
+//! use palpate_experiment::metrics::truth::Truth;
 //! use palpate_explore::belief::Belief;
 //! use palpate_explore::planner::{Offer, Plan, PlanError, Planner};
 //!
@@ -39,10 +39,9 @@
 //! use palpate_experiment::trial::oracle::GroundTruth;
 //! ```
 
-pub mod scan;
 pub mod scan_truth;
 
-use crate::measure::metrics::{Metrics, coverage, interval_score, nlpd, rmse};
+use crate::metrics::{Metrics, coverage, interval_score, nlpd, rmse};
 use palpate_explore::belief::{BAND, HeightPredictions, RandomField, SurfaceBelief};
 use palpate_explore::task::Zone;
 use palpate_geometry::decimate::decimate;

@@ -1,9 +1,10 @@
 //! Recording of running trials, and continuation of interrupted ones.
 
+use super::view;
+use crate::row::{TouchRow, TrialRow};
 use crate::simulation::Simulation;
 use crate::store::{RECORDINGS, resolved_beside};
-use crate::trial::row::{TouchRow, TrialRow};
-use crate::trial::{TrialEvent, TrialObserver, view};
+use crate::trial::{TrialEvent, TrialObserver};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::live_view::LiveView;
 use palpate_explore::evidence::{Contact, Outcome};

@@ -1,7 +1,7 @@
 //! Ground truth of an object without a mesh: heights from a scan.
 
-use crate::measure::metrics::rmse;
-use crate::truth::Truth;
+use crate::metrics::rmse;
+use crate::metrics::truth::Truth;
 use nalgebra::{Matrix3, Point3, Vector3};
 use palpate_explore::task::Zone;
 use palpate_geometry::import::ply::points;

@@ -4,17 +4,12 @@
 //! their intervals, the lines of `comparison.csv`, the panels of the convergence figure, the tables
 //! of the page, and the names that a claim may use.
 
-pub mod metrics;
-pub mod recognition;
-pub mod shape;
-pub mod silhouette;
-
 use self::Direction::{Maximise, Minimise, Undirected};
-use self::metrics::{Metrics, coverage, nlpd, rmse};
-use self::recognition::RecognitionMetrics;
-use self::shape::ShapeMetrics;
-use self::silhouette::SilhouetteMetrics;
-use crate::trial::row::{TouchRow, TrialRow, VerificationRow};
+use crate::metrics::recognition::RecognitionMetrics;
+use crate::metrics::shape::ShapeMetrics;
+use crate::metrics::silhouette::SilhouetteMetrics;
+use crate::metrics::{Metrics, coverage, nlpd, rmse};
+use crate::row::{TouchRow, TrialRow, VerificationRow};
 use palpate_gp::math::normal::BAND_95;
 use std::fmt;
 

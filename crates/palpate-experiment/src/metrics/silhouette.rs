@@ -1,6 +1,6 @@
 //! Errors of the estimated silhouette of an object.
 
-use crate::truth::Truth;
+use crate::metrics::truth::Truth;
 use palpate_explore::surface_evidence::Silhouette;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,10 @@
 //! Errors of a belief relative to the true surface.
 
+pub mod recognition;
+pub mod shape;
+pub mod silhouette;
+pub mod truth;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
