@@ -205,6 +205,6 @@ type Triangles = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 /// Places, heights, flags and mesh of a ground truth.
 type TruthState = (Vec<Vec<f64>>, Vec<Option<f64>>, Vec<bool>, Vec<bool>, bool, Option<Triangles>);
 
-/// Settings as TOML, former names in them, ground truth as JSON, rows as bytes, and the number of
-/// rows that are not listed.
-type RunState<'py> = (Version, String, FormerNames, String, Bound<'py, PyBytes>, usize);
+/// Settings as TOML, ground truth as JSON, rows as bytes, and the number of rows that are not
+/// listed.
+type RunState<'py> = (Version, String, String, Bound<'py, PyBytes>, usize);
