@@ -198,7 +198,7 @@ def test_the_touch_is_where_the_action_says():
     assert row[3:6] == pytest.approx(offset, abs=1e-6) and row[12] == 1
     assert row[6:9] == pytest.approx((touch.p_wc - ball.centre_m) / ball.radius_m, abs=1e-5)
     assert row[9:12] == pytest.approx(touch.normal_w, abs=1e-5)
-    low = palpate.gym.TouchEnv(MUG, touches=7, grid=0, around__lowest_m=float(ball.centre_m[2]))
+    low = palpate.gym.TouchEnv(MUG, touches=7, grid=0, whole_object__lowest_m=float(ball.centre_m[2]))
     low.reset(seed=0)
     seen, _, over, _, info = low.step(np.array([0, 0, -1, 0, 0, 0], dtype=np.float32))
     assert seen["count"] == 6 and (seen["touches"][5][6:] == 0).all() and info["failure"] is None
