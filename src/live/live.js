@@ -333,7 +333,7 @@ find("mesh").addEventListener("submit", async (event) => {
   say("Reading the mesh …");
   const found = await post("/mesh", mesh, { "x-mesh": JSON.stringify(wish) });
   if (!found) return;
-  find("picture").src = `data:image/png;base64,${found.picture}`;
+  find("picture").src = `data:image/svg+xml;base64,${found.picture}`;
   find("words").textContent = found.words;
   find("brought").hidden = false;
 });
