@@ -107,8 +107,8 @@ struct Inner<'a, I> {
 }
 
 impl<'a, I: ExactSizeIterator> Inner<'a, I> {
-    fn new(rest: I, reader: &Reader<'a>) -> Self {
-        Self { rest, value: None, count: 0, place: reader.place, depth: reader.depth }
+    fn new(rest: I, place: &'a Place, depth: usize) -> Self {
+        Self { rest, value: None, count: 0, place, depth }
     }
 
     /// Reads `value` at `step`.
@@ -228,13 +228,23 @@ impl<'de> Deserializer<'de> for Reader<'_> {
     type Error = Reason;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Reason> {
-        match self.value {
+        let Reader { value, place, depth } = self;
+        match value {
             Value::String(text) => visitor.visit_string(text),
             Value::Integer(number) => visitor.visit_i64(number),
             Value::Float(number) => visitor.visit_f64(number),
             Value::Boolean(is_true) => visitor.visit_bool(is_true),
             Value::Datetime(time) => visitor.visit_string(time.to_string()),
-            Value::Array(_) | Value::Table(_) => self.deserialize_inner(visitor),
+            Value::Array(items) => {
+                let mut items = Inner::new(items.into_iter(), place, depth);
+                let read = visitor.visit_seq(&mut items)?;
+                items.ended(read, "fewer elements in array")
+            }
+            Value::Table(table) => {
+                let mut entries = Inner::new(table.into_iter(), place, depth);
+                let read = visitor.visit_map(&mut entries)?;
+                entries.ended(read, "fewer elements in map")
+            }
         }
     }
 
@@ -281,24 +291,5 @@ impl<'de> Deserializer<'de> for Reader<'_> {
     serde::forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit
         unit_struct seq tuple tuple_struct map struct identifier ignored_any
-    }
-}
-
-impl Reader<'_> {
-    /// Reads a list or a table.
-    fn deserialize_inner<'de, V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Reason> {
-        match std::mem::replace(&mut self.value, Value::Boolean(false)) {
-            Value::Array(items) => {
-                let mut items = Inner::new(items.into_iter(), &self);
-                let read = visitor.visit_seq(&mut items)?;
-                items.ended(read, "fewer elements in array")
-            }
-            Value::Table(table) => {
-                let mut entries = Inner::new(table.into_iter(), &self);
-                let read = visitor.visit_map(&mut entries)?;
-                entries.ended(read, "fewer elements in map")
-            }
-            value => Reader { value, ..self }.deserialize_any(visitor),
-        }
     }
 }
