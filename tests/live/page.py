@@ -169,7 +169,7 @@ def main() -> None:
         other.goto(live.url)
         wait(other, "your turn")
         other.click("[data-order=hold]")
-        page.wait_for_function("told.is_held", timeout=LONGEST_MS)
+        page.wait_for_function("told?.is_held", timeout=LONGEST_MS)
         other.close()
         print("two tabs")
 
@@ -205,25 +205,25 @@ def main() -> None:
         print("phone and dark")
 
         page.click("[data-order=stop]")
-        page.wait_for_function("told.phase === 'ended'", timeout=LONGEST_MS)
+        page.wait_for_function("told?.phase === 'ended'", timeout=LONGEST_MS)
         assert not errors, errors
 
         # All around, planners alone: held, stepped, gone on.
         bring(page, mesh, ["active", "random"], around=True)
-        page.wait_for_function("told.is_around && told.planners.length === 2", timeout=LONGEST_MS)
+        page.wait_for_function("told?.is_around && told.planners.length === 2", timeout=LONGEST_MS)
         page.click("[data-order=hold]")
-        page.wait_for_function("told.planners.every(it => it.status === 'held')", timeout=LONGEST_MS)
+        page.wait_for_function("told?.planners.every(it => it.status === 'held')", timeout=LONGEST_MS)
         made = touches(page, "active")
         page.click("[data-order=step]")
         when(lambda: touches(page, "active") == made + 1, "one touch is not one touch")
-        page.wait_for_function("told.planners.every(it => it.status === 'held')", timeout=LONGEST_MS)
+        page.wait_for_function("told?.planners.every(it => it.status === 'held')", timeout=LONGEST_MS)
         assert touches(page, "active") == made + 1
         picture(page, "5-around")
         choose(page, 0)
         page.click("#target button[type=submit]")
         when(lambda: touches(page, "active") == made + 2, "a target in place of the planner's is not touched")
         page.click("[data-order=stop]")
-        page.wait_for_function("told.phase === 'ended'", timeout=LONGEST_MS)
+        page.wait_for_function("told?.phase === 'ended'", timeout=LONGEST_MS)
         assert not errors, errors
         print("all around")
 
@@ -240,7 +240,7 @@ def main() -> None:
                 contacts = page.evaluate("JSON.stringify(data.planners[0].contacts)")
                 page.fill("#trial", str(other + 1))
                 page.keyboard.press("Enter")
-                page.wait_for_function("other => told.trial === other", arg=other, timeout=LONGEST_MS)
+                page.wait_for_function("other => told?.trial === other", arg=other, timeout=LONGEST_MS)
                 when(lambda: page.evaluate("JSON.stringify(data.planners[0].contacts)") != contacts, "the same belief is drawn")
                 axe(page, args.axe, "replay")
                 picture(page, "6-replay")
