@@ -1,6 +1,7 @@
 //! Efficiency of each piece of a trial relative to the machine, on one thread: its operations and
-//! bytes in a second, as fractions of a matrix product's and of a triad's over long arrays. Pieces
-//! are timed in turns, so that other load affects all alike; numbers are medians over rounds.
+//! bytes in a second, as fractions of those of multiply-adds in registers and of a triad over long
+//! arrays. Pieces are timed in turns, so that other load affects all alike; numbers are medians
+//! over rounds.
 //!
 //! `cargo bench --bench limits -- PART` times the pieces whose name contains PART.
 
@@ -23,7 +24,7 @@ fn main() {
         .collect();
     println!(
         "{:<52} {:>10} {:>9} {:>12} {:>8} {:>10}",
-        "piece", "time us", "GFLOP/s", "% of product", "GB/s", "% of triad"
+        "piece", "time us", "GFLOP/s", "% of peak", "GB/s", "% of triad"
     );
     let cell =
         |value: Option<f64>, digits: usize| value.map_or("-".into(), |v| format!("{v:.digits$}"));
@@ -33,7 +34,7 @@ fn main() {
             it.name,
             1e6 * it.time_s,
             cell(it.gflops, 2),
-            cell(it.of_product.map(|share| 100.0 * share), 0),
+            cell(it.of_peak.map(|share| 100.0 * share), 0),
             cell(it.gbytes, 1),
             cell(it.of_stream.map(|share| 100.0 * share), 0)
         );

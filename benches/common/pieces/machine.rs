@@ -1,25 +1,57 @@
 //! Reference speeds of this machine on one thread.
 
 use super::Piece;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par};
+use pulp::{Arch, Simd, WithSimd};
+use std::hint::black_box;
 
-/// Order of the product: three matrices of 2 MB, as those of a large belief.
-const ORDER: usize = 512;
+/// Sums that do not wait for each other: two units with a latency of four to five cycles each, in
+/// the sixteen registers that most processors have.
+const SUMS: usize = 12;
+
+/// Fused multiply-adds of each sum.
+const STEPS: usize = 1 << 16;
 
 /// Length of each array: together larger than any cache.
 const LONG: usize = 1 << 23;
 
-/// Times a product of two matrices: 2 n³ operations.
-pub fn product() -> Piece {
-    let number = |i: usize, j: usize| ((7 * i + 3 * j) % 11) as f64;
-    let (a, b) = (Mat::from_fn(ORDER, ORDER, number), Mat::from_fn(ORDER, ORDER, number));
-    let mut c = Mat::zeros(ORDER, ORDER);
+/// Times multiply-adds in registers: the most operations that a thread does.
+pub fn multiply_adds() -> Piece {
+    let lanes = Arch::new().dispatch(Lanes);
     Piece {
-        name: format!("product of matrices, {ORDER}"),
-        flops: 2.0 * (ORDER as f64).powi(3),
+        name: "multiply-adds in registers".into(),
+        flops: (2 * SUMS * STEPS * lanes) as f64,
         bytes: 0.0,
-        run: Box::new(move || matmul(&mut c, Accum::Replace, &a, &b, 1.0, Par::Seq)),
+        run: Box::new(|| Arch::new().dispatch(MultiplyAdds)),
+    }
+}
+
+/// Returns the number of lanes of the widest vector.
+struct Lanes;
+
+impl WithSimd for Lanes {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        S::F64_LANES
+    }
+}
+
+struct MultiplyAdds;
+
+impl WithSimd for MultiplyAdds {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (factor, term) = (simd.splat_f64s(black_box(0.5)), simd.splat_f64s(black_box(1.0)));
+        let mut sums = [term; SUMS];
+        for _ in 0..STEPS {
+            for sum in &mut sums {
+                *sum = simd.mul_add_e_f64s(*sum, factor, term);
+            }
+        }
+        black_box(sums);
     }
 }
 

@@ -16,7 +16,7 @@ pub struct Timed {
     /// Operations in a second, 1e9; `None` if they are not counted.
     pub gflops: Option<f64>,
     /// Fraction of the first piece's operations in a second, median over rounds.
-    pub of_product: Option<f64>,
+    pub of_peak: Option<f64>,
     /// Bytes in a second, 1e9; `None` if they are not counted.
     pub gbytes: Option<f64>,
     /// Fraction of the second piece's bytes in a second, median over rounds.
@@ -48,7 +48,7 @@ pub fn time(pieces: &mut [Piece], rounds: usize) -> Vec<Timed> {
                 name: piece.name.clone(),
                 time_s: median(samples_s[i].clone()),
                 gflops: counts(piece.flops).then(|| 1e-9 * median(rates(flops, i))),
-                of_product: counts(piece.flops).then(|| share(flops, i, 0)),
+                of_peak: counts(piece.flops).then(|| share(flops, i, 0)),
                 gbytes: counts(piece.bytes).then(|| 1e-9 * median(rates(bytes, i))),
                 of_stream: counts(piece.bytes).then(|| share(bytes, i, 1)),
             }

@@ -1,43 +1,37 @@
-//! Cholesky factorisation and inversion of a whole covariance matrix: in tiles if it fits into the
-//! cache, otherwise by faer's blocked algorithms.
+//! Cholesky factorisation and inversion of a whole covariance matrix.
 
-use super::tiles;
+use super::tiles::{self, Columns, ColumnsMut};
 pub use super::tiles::NotPositiveDefinite;
 use crate::math::simd::{widest, widest_dot};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_inverse::invert_lower_triangular;
-use faer::{Accum, Mat, Par};
-
-/// Largest order factored in tiles.
-const TILED_MAX: usize = 320;
 
 /// A symmetric matrix that is factored in place; only its lower triangle is read and written.
 ///
-/// In tiles the order is rounded up, and the padding is the identity.
+/// The order is rounded up to whole tiles, and the padding is the identity.
 pub struct DenseMatrix {
     order: usize,
-    matrix: Mat<f64>,
-    inverse: Mat<f64>,
-    scratch: MemBuffer,
+    padded: usize,
+    stride: usize,
+    entries: Vec<f64>,
+    inverse: Vec<f64>,
     log_determinant: f64,
 }
 
 impl DenseMatrix {
     /// Creates a zero matrix of order `n`.
     pub fn new(n: usize) -> Self {
-        let padded = if n <= TILED_MAX { n.next_multiple_of(tiles::WIDE) } else { n };
-        let mut matrix = Mat::zeros(padded, padded);
-        (n..padded).for_each(|i| matrix[(i, i)] = 1.0);
-        let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
-        Self {
-            order: n,
-            matrix,
-            inverse: Mat::zeros(0, 0),
-            scratch: MemBuffer::new(need),
-            log_determinant: 0.0,
+        let (padded, stride) = (n.next_multiple_of(tiles::WIDE), tiles::stride(n));
+        let mut entries = vec![0.0; stride * padded];
+        (n..padded).for_each(|i| entries[i * stride + i] = 1.0);
+        Self { order: n, padded, stride, entries, inverse: Vec::new(), log_determinant: 0.0 }
+    }
+
+    /// Creates a matrix from the entries of its lower triangle.
+    pub(super) fn from_fn(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        let mut matrix = Self::new(n);
+        for j in 0..n {
+            (j..).zip(matrix.column_mut(j)).for_each(|(i, to)| *to = entry(i, j));
         }
+        matrix
     }
 
     /// Returns the order of the matrix.
@@ -48,12 +42,12 @@ impl DenseMatrix {
     /// Returns column `j` from its diagonal down.
     #[inline(always)]
     pub fn column(&self, j: usize) -> &[f64] {
-        &self.matrix.col_as_slice(j)[j..self.order]
+        &self.entries[j * self.stride..][j..self.order]
     }
 
     /// Returns column `j` from its diagonal down.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
-        &mut self.matrix.col_as_slice_mut(j)[j..self.order]
+        &mut self.entries[j * self.stride..][j..self.order]
     }
 
     /// Replaces A by L with A = L·Lᵀ: n³/3 operations.
@@ -62,31 +56,17 @@ impl DenseMatrix {
     /// If A is not positive definite to within rounding: a pivot that is lost to cancellation
     /// counts as not positive, since its sign is noise. `largest` is A's largest diagonal entry.
     pub fn factor(&mut self, largest: f64) -> Result<(), NotPositiveDefinite> {
-        match self.order <= TILED_MAX {
-            true => tiles::factor(self.matrix.as_mut())?,
-            false => self.factor_blocked()?,
-        }
+        tiles::factor(ColumnsMut { entries: &mut self.entries, stride: self.stride }, self.padded)?;
         let is_lost = |i: &usize| {
-            let pivot = self.matrix[(*i, *i)];
+            let pivot = self.column(*i)[0];
             let is_kept = pivot * pivot > f64::EPSILON * largest && pivot.is_finite();
             !is_kept
         };
         if let Some(index) = (0..self.order()).find(is_lost) {
             return Err(NotPositiveDefinite { index });
         }
-        self.log_determinant = (0..self.order()).map(|i| 2.0 * self.matrix[(i, i)].ln()).sum();
+        self.log_determinant = (0..self.order()).map(|i| 2.0 * self.column(i)[0].ln()).sum();
         Ok(())
-    }
-
-    fn factor_blocked(&mut self) -> Result<(), NotPositiveDefinite> {
-        let stack = MemStack::new(&mut self.scratch);
-        let matrix = self.matrix.as_mut();
-        let options = Default::default();
-        llt::factor::cholesky_in_place(matrix, options, Par::Seq, stack, Default::default())
-            .map(|_| ())
-            .map_err(|llt::factor::LltError::NonPositivePivot { index }| NotPositiveDefinite {
-                index,
-            })
     }
 
     /// Returns ln |A| of the last factored matrix.
@@ -120,32 +100,41 @@ impl DenseMatrix {
     /// Computes A⁻¹ = XᵀX with X = L⁻¹ of the factored matrix: 2n³/3 operations. It overwrites the
     /// factor.
     pub fn invert(&mut self) {
-        let n = self.matrix.nrows();
-        if self.inverse.nrows() != n {
-            self.inverse = Mat::zeros(n, n);
-        }
-        if self.order <= TILED_MAX {
-            let (factor, upper) = (self.matrix.as_mut(), self.inverse.as_mut());
-            tiles::invert(factor, upper);
-            return std::mem::swap(&mut self.matrix, &mut self.inverse);
-        }
-        invert_lower_triangular(self.inverse.as_mut(), self.matrix.as_ref(), Par::Seq);
-        triangular::matmul(
-            self.matrix.as_mut(),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            self.inverse.transpose(),
-            BlockStructure::TriangularUpper,
-            self.inverse.as_ref(),
-            BlockStructure::TriangularLower,
-            1.0,
-            Par::Seq,
-        );
-        std::mem::swap(&mut self.matrix, &mut self.inverse);
+        self.inverse.resize(self.entries.len(), 0.0);
+        let stride = self.stride;
+        let factor = ColumnsMut { entries: &mut self.entries, stride };
+        tiles::invert(factor, ColumnsMut { entries: &mut self.inverse, stride }, self.padded);
+        std::mem::swap(&mut self.entries, &mut self.inverse);
+    }
+
+    /// Returns the distance of columns.
+    pub(super) fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Returns the number of columns, in whole tiles.
+    pub(super) fn padded(&self) -> usize {
+        self.padded
+    }
+
+    /// Replaces the rows B of a matrix by B·L⁻ᵀ with this matrix's triangle L. It has
+    /// [`padded`](Self::padded) columns of `stride` rows, a multiple of [`tiles::WIDE`].
+    pub(super) fn solve_rows(&self, entries: &mut [f64], stride: usize) {
+        let factor = Columns { entries: &self.entries, stride: self.stride };
+        tiles::solve_rows(ColumnsMut { entries, stride }, factor, self.padded);
+    }
+
+    /// Subtracts P·Pᵀ. Columns of P are as far apart as those of this matrix, and its rows beyond
+    /// the order are zero.
+    pub(super) fn subtract_square(&mut self, p: &[f64]) {
+        let stride = self.stride;
+        let count = p.len() / stride.max(1);
+        let matrix = ColumnsMut { entries: &mut self.entries, stride };
+        tiles::subtract_square(matrix, Columns { entries: p, stride }, self.padded, count);
     }
 
     /// Returns column `j` of A⁻¹ from its diagonal down, after [`invert`](Self::invert).
     pub fn inverse_column(&self, j: usize) -> &[f64] {
-        &self.inverse.col_as_slice(j)[j..self.order]
+        &self.inverse[j * self.stride..][j..self.order]
     }
 }

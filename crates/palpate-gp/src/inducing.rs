@@ -13,10 +13,7 @@ use super::dense::{DenseMatrix, NotPositiveDefinite};
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::posterior::Posterior;
-use crate::math::simd::{dot, widest};
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place as solve_lower;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use crate::math::simd::widest;
 
 /// Residual variance, as a fraction of the noise variance, below which no inducing touch is added.
 /// It applies to the largest residual variance of all other touches;
@@ -58,33 +55,16 @@ impl Posterior {
         let (indices, factor) = choose(most, kernel, &hyperparameters, observations);
         let count = indices.len();
         let kept = observations.places(&indices);
-        let (covariance, residuals, left_variance) =
-            condition(kernel, &hyperparameters, observations, &kept, factor.as_ref())?;
-        let mut dense = dense(covariance.as_ref());
+        let (mut covariance, residuals, left_variance) =
+            condition(kernel, &hyperparameters, observations, &kept, &factor)?;
         let largest = 1.0 + hyperparameters.noise_ratio().height.powi(2);
-        dense.factor(largest).map_err(|cause| indefinite(count, cause))?;
+        covariance.factor(largest).map_err(|cause| indefinite(count, cause))?;
         let heights = residuals.iter().map(|height| hyperparameters.mean + height);
         let kept = kept.with_heights(heights.collect());
         let left_sd = hyperparameters.signal_sd * left_variance.sqrt();
-        let posterior = Self::factored(kernel, hyperparameters, kept, &dense, 0.0);
+        let posterior = Self::factored(kernel, hyperparameters, kept, &covariance, 0.0);
         Ok(InducingPosterior { posterior, nystrom_residual_sd: left_sd })
     }
-}
-
-/// Copies the lower triangle into a dense matrix.
-fn dense(matrix: MatRef<f64>) -> DenseMatrix {
-    let mut dense = DenseMatrix::new(matrix.nrows());
-    for (j, column) in matrix.col_iter().enumerate() {
-        let below = column.iter().skip(j);
-        dense.column_mut(j).iter_mut().zip(below).for_each(|(to, entry)| *to = *entry);
-    }
-    dense
-}
-
-/// Adds the lower triangle of a·b.
-fn add_product(sum: &mut Mat<f64>, a: MatRef<f64>, b: MatRef<f64>) {
-    let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    triangular::matmul(sum.as_mut(), lower, Accum::Add, a, whole, b, whole, 1.0, Par::Seq);
 }
 
 fn indefinite(count: usize, cause: NotPositiveDefinite) -> CovarianceError {
@@ -99,7 +79,7 @@ fn choose(
     kernel: &dyn Kernel,
     hyperparameters: &Hyperparameters,
     observations: &Observations,
-) -> (Vec<usize>, Mat<f64>) {
+) -> (Vec<usize>, DenseMatrix) {
     let lengths = &hyperparameters.length_scales;
     let candidates = spread(CANDIDATES * most, lengths, observations);
     let places = observations.places(&candidates);
@@ -130,8 +110,7 @@ fn choose(
         chosen.push(next);
         rows.push(row);
     }
-    let entry = |i: usize, j: usize| if j <= i { rows[j][chosen[i]] } else { 0.0 };
-    let factor = Mat::from_fn(chosen.len(), chosen.len(), entry);
+    let factor = DenseMatrix::from_fn(chosen.len(), |i, j| rows[j][chosen[i]]);
     (chosen.iter().map(|&i| candidates[i]).collect(), factor)
 }
 
@@ -163,65 +142,65 @@ fn condition(
     hyperparameters: &Hyperparameters,
     observations: &Observations,
     kept: &Observations,
-    factor: MatRef<f64>,
-) -> Result<(Mat<f64>, Vec<f64>, f64), CovarianceError> {
-    let count = kept.len();
-    let mut precision = Mat::<f64>::zeros(count, count);
-    let mut sums = Mat::<f64>::zeros(count, 1);
+    factor: &DenseMatrix,
+) -> Result<(DenseMatrix, Vec<f64>, f64), CovarianceError> {
+    let lengths = &hyperparameters.length_scales;
+    let (count, stride) = (kept.len(), factor.stride());
+    let mut precision = DenseMatrix::new(count);
+    let mut sums = vec![0.0; count];
     let mut left_variance: f64 = 0.0;
-    let mut block = Mat::<f64>::zeros(count, BLOCK);
+    // Vᵀ and V·D^(-1/2) of a block of touches.
+    let mut solved = vec![0.0; BLOCK * factor.padded()];
+    let mut weighted = vec![0.0; stride * BLOCK];
+    let mut left = [0.0; BLOCK];
     for begin in (0..observations.len()).step_by(BLOCK) {
         let length = BLOCK.min(observations.len() - begin);
-        let mut solved = block.as_mut().subcols_mut(0, length);
-        correlate(kernel, hyperparameters, observations, begin, kept, solved.as_mut());
-        solve_lower(factor, solved.as_mut(), Par::Seq);
-        for (at, mut column) in solved.as_mut().col_iter_mut().enumerate() {
+        for (j, column) in solved.chunks_exact_mut(BLOCK).take(count).enumerate() {
+            let column = &mut column[..length];
+            observations.distances2(kept.place(j), lengths, begin, column);
+            kernel.correlate(column);
+        }
+        factor.solve_rows(&mut solved, BLOCK);
+        left.fill(1.0);
+        for column in solved.chunks_exact(BLOCK) {
+            left.iter_mut().zip(column).for_each(|(left, entry)| *left -= entry * entry);
+        }
+        weighted.fill(0.0);
+        for (at, column) in weighted.chunks_exact_mut(stride).take(length).enumerate() {
             let i = begin + at;
             let residual = observations.heights()[i] - hyperparameters.mean;
-            let Some(column) = column.as_mut().try_as_col_major_mut() else { continue };
-            let column = column.as_slice_mut();
-            let left = (1.0 - widest(|| dot(column, column))).max(0.0);
+            let left = left[at].max(0.0);
             left_variance = left_variance.max(left);
             let noise2 = observations.height_noise2(i, hyperparameters.noise_ratio()) + left;
             let weight = noise2.sqrt().recip();
-            for (entry, sum) in column.iter_mut().zip(sums.col_as_slice_mut(0)) {
-                *entry *= weight;
+            for (j, (entry, sum)) in column.iter_mut().zip(&mut sums).enumerate() {
+                *entry = weight * solved[j * BLOCK + at];
                 *sum += *entry * (weight * residual);
             }
         }
-        let solved = solved.as_ref();
-        add_product(&mut precision, solved, solved.transpose());
+        precision.subtract_square(&weighted);
     }
-    let trace: f64 = (0..count).map(|i| precision[(i, i)]).sum();
-    (0..count).for_each(|i| precision[(i, i)] += JITTER * trace);
-    let mut root = dense(precision.as_ref());
+    let trace: f64 = (0..count).map(|i| -precision.column(i)[0]).sum();
+    let regular = |i: usize, j: usize| {
+        let jitter = if i == j { JITTER * trace } else { 0.0 };
+        jitter - precision.column(j)[i - j]
+    };
+    let mut root = DenseMatrix::from_fn(count, regular);
     root.factor(0.0).map_err(|cause| indefinite(count, cause))?;
-    let root = Mat::from_fn(count, count, |i, j| if j <= i { root.column(j)[i - j] } else { 0.0 });
-    let mut transposed = factor.transpose().to_owned();
-    solve_lower(root.as_ref(), transposed.as_mut(), Par::Seq);
-    solve_lower(root.as_ref(), sums.as_mut(), Par::Seq);
-    let residuals = transposed.transpose() * &sums;
-    let mut covariance = Mat::<f64>::zeros(count, count);
-    add_product(&mut covariance, transposed.transpose(), transposed.as_ref());
-    add_product(&mut covariance, factor, factor.transpose());
-    Ok((covariance, residuals.col_as_slice(0).to_vec(), left_variance))
-}
-
-/// Writes the correlations of the inducing touches with those from `begin` on, one column per
-/// touch.
-fn correlate(
-    kernel: &dyn Kernel,
-    hyperparameters: &Hyperparameters,
-    observations: &Observations,
-    begin: usize,
-    kept: &Observations,
-    mut out: MatMut<f64>,
-) {
-    let lengths = &hyperparameters.length_scales;
-    for at in 0..out.ncols() {
-        let Some(column) = out.as_mut().col_mut(at).try_as_col_major_mut() else { continue };
-        let column = column.as_slice_mut();
-        kept.distances2(observations.place(begin + at), lengths, 0, column);
-        kernel.correlate(column);
+    // L, and W = L·R⁻ᵀ.
+    let mut product = vec![0.0; stride * factor.padded()];
+    for (j, column) in product.chunks_exact_mut(stride).take(count).enumerate() {
+        column[j..count].copy_from_slice(factor.column(j));
     }
+    let mut negative = DenseMatrix::new(count);
+    negative.subtract_square(&product);
+    root.solve_rows(&mut product, stride);
+    negative.subtract_square(&product);
+    root.solve_lower(&mut sums);
+    let mut residuals = vec![0.0; count];
+    for (column, sum) in product.chunks_exact(stride).zip(&sums) {
+        residuals.iter_mut().zip(column).for_each(|(residual, entry)| *residual += entry * sum);
+    }
+    let covariance = DenseMatrix::from_fn(count, |i, j| -negative.column(j)[i - j]);
+    Ok((covariance, residuals, left_variance))
 }

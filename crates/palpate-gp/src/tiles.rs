@@ -1,12 +1,10 @@
-//! Cholesky factorisation and inversion of matrices that fit into the cache, tile by tile.
+//! Cholesky factorisation and inversion of matrices by columns, in tiles and blocks.
 //!
 //! The work is dominated by one loop: products of rows of two matrices, for a tile of the result
 //! that stays in the processor's registers (Goto & van de Geijn 2008). A search factors thousands
-//! of such matrices, and the overhead of a blocked algorithm would exceed that.
+//! of matrices that are one block each; a larger one is worked on block by block.
 
 use crate::math::vector::{Vector, vectorised_fn};
-use faer::reborrow::{Reborrow, ReborrowMut};
-use faer::{MatMut, MatRef};
 use std::ops::Range;
 use thiserror::Error;
 
@@ -18,22 +16,95 @@ pub struct NotPositiveDefinite {
     pub index: usize,
 }
 
-/// Number of columns processed together; orders are multiples of it.
+/// Number of columns processed together; orders and numbers of rows are multiples of it.
 pub(super) const WIDE: usize = 8;
+
+/// Largest order that is one block, which fits into a second-level cache of 1 MB.
+const WHOLE: usize = 320;
+/// Number of rows and of columns of a block of a larger matrix; the fastest of 128, 192, 256 and 320
+/// from order 1000 on.
+const BLOCK: usize = 128;
+
+/// Returns the distance of columns of `rows` numbers: a multiple of [`WIDE`], and not of a page,
+/// whose addresses share places in the cache.
+pub(super) fn stride(rows: usize) -> usize {
+    let padded = rows.next_multiple_of(WIDE);
+    if padded.is_multiple_of(512) { padded + WIDE } else { padded }
+}
+
+/// A matrix by columns.
+#[derive(Clone, Copy)]
+pub(super) struct Columns<'a> {
+    /// Entries, column after column.
+    pub(super) entries: &'a [f64],
+    /// Distance of the columns' first entries.
+    pub(super) stride: usize,
+}
+
+/// A matrix by columns that is written.
+pub(super) struct ColumnsMut<'a> {
+    /// Entries, column after column.
+    pub(super) entries: &'a mut [f64],
+    /// Distance of the columns' first entries.
+    pub(super) stride: usize,
+}
+
+impl<'a> Columns<'a> {
+    #[inline(always)]
+    fn column(self, j: usize) -> &'a [f64] {
+        &self.entries[j * self.stride..][..self.stride]
+    }
+}
+
+impl ColumnsMut<'_> {
+    #[inline(always)]
+    fn column(&mut self, j: usize) -> &mut [f64] {
+        &mut self.entries[j * self.stride..][..self.stride]
+    }
+
+    #[inline(always)]
+    fn read(&self) -> Columns<'_> {
+        Columns { entries: self.entries, stride: self.stride }
+    }
+
+    /// Returns the columns before `j`, and those from it on.
+    #[inline(always)]
+    fn split(&mut self, j: usize) -> (Columns<'_>, ColumnsMut<'_>) {
+        let (before, from) = self.entries.split_at_mut(j * self.stride);
+        let stride = self.stride;
+        (Columns { entries: before, stride }, ColumnsMut { entries: from, stride })
+    }
+}
 
 vectorised_fn! {
     /// Replaces the lower triangle of A by L with A = L·Lᵀ.
-    pub(super) fn factor<'a, V: Vector>(matrix: MatMut<'a, f64>) -> Result<(), NotPositiveDefinite> {
-        let mut matrix = matrix;
-        let order = matrix.ncols();
-        for j in (0..order).step_by(WIDE) {
-            let (done, mut block) = matrix.rb_mut().split_at_col_mut(j);
-            let done = done.rb();
-            for rows in tiles::<V>(j..order) {
-                subtract::<V>(block.rb_mut(), done, done, rows, j, 0..j);
+    pub(super) fn factor<'a, V: Vector>(
+        matrix: ColumnsMut<'a>,
+        order: usize,
+    ) -> Result<(), NotPositiveDefinite> {
+        let (mut matrix, block) = (matrix, block(order));
+        for columns in blocks(0..order, block) {
+            for rows in blocks(columns.start..order, block) {
+                for sum in blocks(0..columns.start, block) {
+                    for j in columns.clone().step_by(WIDE) {
+                        let (done, mut part) = matrix.split(j);
+                        for rows in tiles::<V>(rows.start.max(j)..rows.end) {
+                            subtract::<V>(&mut part, done, done, rows, j, sum.clone());
+                        }
+                    }
+                }
+                for j in columns.clone().step_by(WIDE) {
+                    let (done, mut part) = matrix.split(j);
+                    for rows in tiles::<V>(rows.start.max(j)..rows.end) {
+                        subtract::<V>(&mut part, done, done, rows, j, columns.start..j);
+                    }
+                    let corner = match rows.contains(&j) {
+                        true => corner(&mut part, j)?,
+                        false => triangle(part.read(), 0, j),
+                    };
+                    solve::<V>(&mut part, rows.start.max(j + WIDE)..rows.end, &corner);
+                }
             }
-            let corner = corner(block.rb_mut(), j)?;
-            solve::<V>(block, j + WIDE..order, &corner);
         }
         Ok(())
     }
@@ -45,39 +116,126 @@ vectorised_fn! {
     ///
     /// Y is initialised with the identity below A: the operations that turn A into L turn it into
     /// Y.
-    pub(super) fn invert<'a, V: Vector>(factor: MatMut<'a, f64>, upper: MatMut<'a, f64>) -> () {
-        let (mut factor, mut upper) = (factor, upper);
-        let order = factor.ncols();
-        for j in (0..order).step_by(WIDE) {
-            let (done, mut block) = upper.rb_mut().split_at_col_mut(j);
-            for c in 0..WIDE {
-                let column = slice_mut(block.rb_mut(), c);
+    pub(super) fn invert<'a, V: Vector>(
+        factor: ColumnsMut<'a>,
+        upper: ColumnsMut<'a>,
+        order: usize,
+    ) -> () {
+        let (mut factor, mut upper, block) = (factor, upper, block(order));
+        for columns in blocks(0..order, block) {
+            for j in columns.clone() {
                 // Tiles read zeros as far as one of them extends below the diagonal.
-                column[..order.min(j + 2 * WIDE)].fill(0.0);
-                column[j + c] = 1.0;
+                upper.column(j)[..order.min(j + 2 * WIDE)].fill(0.0);
+                upper.column(j)[j] = 1.0;
             }
-            for rows in tiles::<V>(0..j) {
-                let from = rows.start;
-                subtract::<V>(block.rb_mut(), done.rb(), factor.rb(), rows, j, from..j);
-            }
-            let corner = triangle(factor.rb(), j);
-            solve::<V>(block, 0..j + WIDE, &corner);
-        }
-        let upper = upper.rb();
-        for j in (0..order).step_by(WIDE) {
-            let mut block = factor.rb_mut().split_at_col_mut(j).1;
-            for rows in tiles::<V>(j..order) {
-                let from = rows.start;
-                for c in 0..WIDE {
-                    slice_mut(block.rb_mut(), c)[rows.clone()].fill(0.0);
+            for rows in blocks(0..columns.end, block) {
+                for sum in blocks(rows.start..columns.start, block) {
+                    for j in columns.clone().step_by(WIDE) {
+                        let (done, mut part) = upper.split(j);
+                        for rows in tiles::<V>(rows.clone()) {
+                            let sum = sum.start.max(rows.start)..sum.end;
+                            subtract::<V>(&mut part, done, factor.read(), rows, j, sum);
+                        }
+                    }
                 }
-                subtract::<V>(block.rb_mut(), upper, upper, rows, j, from..order);
+                for j in columns.clone().step_by(WIDE) {
+                    let (done, mut part) = upper.split(j);
+                    for rows in tiles::<V>(rows.start..rows.end.min(j)) {
+                        let sum = columns.start.max(rows.start)..j;
+                        subtract::<V>(&mut part, done, factor.read(), rows, j, sum);
+                    }
+                    let corner = triangle(factor.read(), j, j);
+                    solve::<V>(&mut part, rows.start..rows.end.min(j + WIDE), &corner);
+                }
             }
-            for c in 0..WIDE {
-                slice_mut(block.rb_mut(), c)[j..].iter_mut().for_each(|entry| *entry = -*entry);
+        }
+        let upper = upper.read();
+        for columns in blocks(0..order, block) {
+            for j in columns.clone() {
+                factor.column(j)[columns.start..order].fill(0.0);
+            }
+            for rows in blocks(columns.start..order, block) {
+                for sum in blocks(rows.start..order, block) {
+                    for j in columns.clone().step_by(WIDE) {
+                        let mut part = factor.split(j).1;
+                        for rows in tiles::<V>(rows.start.max(j)..rows.end) {
+                            let sum = sum.start.max(rows.start)..sum.end;
+                            subtract::<V>(&mut part, upper, upper, rows, j, sum);
+                        }
+                    }
+                }
+            }
+            for j in columns {
+                factor.column(j)[j..order].iter_mut().for_each(|entry| *entry = -*entry);
             }
         }
     }
+}
+
+vectorised_fn! {
+    /// Replaces the rows B of `matrix` by B·L⁻ᵀ with the lower triangle L of `factor`.
+    pub(super) fn solve_rows<'a, V: Vector>(
+        matrix: ColumnsMut<'a>,
+        factor: Columns<'a>,
+        order: usize,
+    ) -> () {
+        let (mut matrix, block) = (matrix, block(order));
+        for rows in blocks(0..matrix.stride, block) {
+            for columns in blocks(0..order, block) {
+                for sum in blocks(0..columns.start, block) {
+                    for j in columns.clone().step_by(WIDE) {
+                        let (done, mut part) = matrix.split(j);
+                        for rows in tiles::<V>(rows.clone()) {
+                            subtract::<V>(&mut part, done, factor, rows, j, sum.clone());
+                        }
+                    }
+                }
+                for j in columns.clone().step_by(WIDE) {
+                    let (done, mut part) = matrix.split(j);
+                    for rows in tiles::<V>(rows.clone()) {
+                        subtract::<V>(&mut part, done, factor, rows, j, columns.start..j);
+                    }
+                    solve::<V>(&mut part, rows.clone(), &triangle(factor, j, j));
+                }
+            }
+        }
+    }
+}
+
+vectorised_fn! {
+    /// Subtracts P·Pᵀ from the lower triangle of `matrix`; P has `count` columns.
+    pub(super) fn subtract_square<'a, V: Vector>(
+        matrix: ColumnsMut<'a>,
+        p: Columns<'a>,
+        order: usize,
+        count: usize,
+    ) -> () {
+        let (mut matrix, block) = (matrix, block(order));
+        for columns in blocks(0..order, block) {
+            for rows in blocks(columns.start..order, block) {
+                for sum in blocks(0..count, block) {
+                    for j in columns.clone().step_by(WIDE) {
+                        let mut part = matrix.split(j).1;
+                        for rows in tiles::<V>(rows.start.max(j)..rows.end) {
+                            subtract::<V>(&mut part, p, p, rows, j, sum.clone());
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns the number of rows of a block of a matrix.
+#[inline(always)]
+fn block(order: usize) -> usize {
+    if order <= WHOLE { WHOLE } else { BLOCK }
+}
+
+/// Returns ranges of rows or columns of `block` each.
+#[inline(always)]
+fn blocks(range: Range<usize>, block: usize) -> impl Iterator<Item = Range<usize>> {
+    range.clone().step_by(block).map(move |i| i..range.end.min(i + block))
 }
 
 /// Returns ranges of rows, two vectors at a time, or one if no more are left.
@@ -87,42 +245,42 @@ fn tiles<V: Vector>(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     rows.clone().step_by(high).map(move |i| i..rows.end.min(i + high))
 }
 
-/// Subtracts Σ_k P[i, k]·Q[j + c, k] from entry i of each of the first columns c of `block`.
+/// Subtracts Σ_k P[i, k]·Q[j + c, k] from entry i of each of the first columns c of `part`.
 #[inline(always)]
 fn subtract<V: Vector>(
-    mut block: MatMut<'_, f64>,
-    p: MatRef<'_, f64>,
-    q: MatRef<'_, f64>,
+    part: &mut ColumnsMut<'_>,
+    p: Columns<'_>,
+    q: Columns<'_>,
     rows: Range<usize>,
     j: usize,
     sum: Range<usize>,
 ) {
     if rows.len() < 2 * V::LANES {
-        return subtract_tile::<V, 1, 8>(block, p, q, rows, j, sum);
+        return subtract_tile::<V, 1, 8>(part, p, q, rows, j, sum);
     }
     if V::LANES == 8 {
-        return subtract_tile::<V, 2, 8>(block, p, q, rows, j, sum);
+        return subtract_tile::<V, 2, 8>(part, p, q, rows, j, sum);
     }
     // With fewer registers, half of the columns at a time.
     for half in [0, 4] {
-        let block = block.rb_mut().split_at_col_mut(half).1;
-        subtract_tile::<V, 2, 4>(block, p, q, rows.clone(), j + half, sum.clone());
+        let mut half_part = part.split(half).1;
+        subtract_tile::<V, 2, 4>(&mut half_part, p, q, rows.clone(), j + half, sum.clone());
     }
 }
 
 #[inline(always)]
 fn subtract_tile<V: Vector, const HIGH: usize, const COLUMNS: usize>(
-    mut block: MatMut<'_, f64>,
-    p: MatRef<'_, f64>,
-    q: MatRef<'_, f64>,
+    part: &mut ColumnsMut<'_>,
+    p: Columns<'_>,
+    q: Columns<'_>,
     rows: Range<usize>,
     j: usize,
     sum: Range<usize>,
 ) {
     let mut sums = [[V::splat(0.0); HIGH]; COLUMNS];
     for k in sum {
-        let p = &slice(p, k)[rows.clone()];
-        let Some(q) = slice(q, k)[j..].first_chunk::<COLUMNS>() else { return };
+        let p = &p.column(k)[rows.clone()];
+        let Some(q) = q.column(k)[j..].first_chunk::<COLUMNS>() else { return };
         let p: [V; HIGH] = std::array::from_fn(|h| V::load(&p[h * V::LANES..]));
         for c in 0..COLUMNS {
             let q = V::splat(q[c]);
@@ -132,7 +290,7 @@ fn subtract_tile<V: Vector, const HIGH: usize, const COLUMNS: usize>(
         }
     }
     for (c, sums) in sums.into_iter().enumerate() {
-        let column = &mut slice_mut(block.rb_mut(), c)[rows.clone()];
+        let column = &mut part.column(c)[rows.clone()];
         for (h, sum) in sums.into_iter().enumerate() {
             let entries = &mut column[h * V::LANES..];
             V::load(entries).sub(sum).store(entries);
@@ -143,10 +301,10 @@ fn subtract_tile<V: Vector, const HIGH: usize, const COLUMNS: usize>(
 /// Rows of a triangle of [`WIDE`] columns, each with the reciprocal of its pivot on the diagonal.
 type Corner = [[f64; WIDE]; WIDE];
 
-/// Factors the diagonal block of the first columns, at row `j`.
+/// Factors the diagonal corner of the first columns, at row `j`.
 #[inline(always)]
-fn corner(mut block: MatMut<'_, f64>, j: usize) -> Result<Corner, NotPositiveDefinite> {
-    let columns: [&[f64]; WIDE] = std::array::from_fn(|c| &slice(block.rb(), c)[j..]);
+fn corner(part: &mut ColumnsMut<'_>, j: usize) -> Result<Corner, NotPositiveDefinite> {
+    let columns: [&[f64]; WIDE] = std::array::from_fn(|c| &part.read().column(c)[j..]);
     let mut rows: Corner =
         std::array::from_fn(|r| std::array::from_fn(|c| if c <= r { columns[c][r] } else { 0.0 }));
     for (c, index) in (j..j + WIDE).enumerate() {
@@ -165,32 +323,33 @@ fn corner(mut block: MatMut<'_, f64>, j: usize) -> Result<Corner, NotPositiveDef
                 rows[r][k] -= column[r] * column[k];
             }
         }
-        let written = &mut slice_mut(block.rb_mut(), c)[j..];
+        let written = &mut part.column(c)[j..];
         written[c] = root;
         (c + 1..WIDE).for_each(|r| written[r] = rows[r][c]);
     }
     Ok(rows)
 }
 
-/// Returns the triangle of an already factored matrix.
+/// Returns the triangle of already factored columns, of which the first has the index `first`, at
+/// row `j`.
 #[inline(always)]
-fn triangle(factor: MatRef<'_, f64>, j: usize) -> Corner {
+fn triangle(factor: Columns<'_>, first: usize, j: usize) -> Corner {
     let mut rows = [[0.0; WIDE]; WIDE];
     for c in 0..WIDE {
-        let column = &slice(factor, j + c)[j..];
+        let column = &factor.column(first + c)[j..];
         rows[c][c] = 1.0 / column[c];
         (c + 1..WIDE).for_each(|r| rows[r][c] = column[r]);
     }
     rows
 }
 
-/// Replaces rows B of a block's first columns by B·C⁻ᵀ with a corner C.
+/// Replaces rows B of the first columns by B·C⁻ᵀ with a corner C.
 #[inline(always)]
-fn solve<V: Vector>(mut block: MatMut<'_, f64>, rows: Range<usize>, corner: &Corner) {
+fn solve<V: Vector>(part: &mut ColumnsMut<'_>, rows: Range<usize>, corner: &Corner) {
     for i in rows.step_by(V::LANES) {
         let mut solved = [V::splat(0.0); WIDE];
         for c in 0..WIDE {
-            let entries = &mut slice_mut(block.rb_mut(), c)[i..];
+            let entries = &mut part.column(c)[i..];
             let mut sum = V::load(entries);
             for k in 0..c {
                 sum = V::splat(-corner[c][k]).mul_add(solved[k], sum);
@@ -199,16 +358,4 @@ fn solve<V: Vector>(mut block: MatMut<'_, f64>, rows: Range<usize>, corner: &Cor
             solved[c].store(entries);
         }
     }
-}
-
-/// Returns column `j` of a matrix whose columns are contiguous.
-#[inline(always)]
-fn slice(matrix: MatRef<'_, f64>, j: usize) -> &[f64] {
-    matrix.col(j).try_as_col_major().map_or(&[], |column| column.as_slice())
-}
-
-/// Returns column `j` of a matrix whose columns are contiguous.
-#[inline(always)]
-fn slice_mut(matrix: MatMut<'_, f64>, j: usize) -> &mut [f64] {
-    matrix.col_mut(j).try_as_col_major_mut().map_or(&mut [], |column| column.as_slice_mut())
 }
