@@ -275,9 +275,6 @@ class Scene:
             SimulationError: if the mesh is unusable, or has no surface in the zone.
         """
     @staticmethod
-    def of_mesh(*arguments: Any, **settings: Any) -> Scene:
-        """Former name of `from_mesh`, with `body` in place of `simulator`."""
-    @staticmethod
     def _load(
         path: str | None,
         sets: Sequence[str],

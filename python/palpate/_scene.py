@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from typing import Any
 
 import numpy as np
@@ -19,16 +18,6 @@ __all__ = ["read_mesh", "write_mesh"]
 def load(path: str | os.PathLike[str], seed: int, /, **settings: Any) -> _palpate.Scene:
     """Implements `Scene.load`."""
     return _palpate.Scene._load(os.fspath(find_file(path, "scenes")), assignments(settings), seed)
-
-
-def of_mesh(*arguments: Any, **settings: Any) -> _palpate.Scene:
-    """Implements `Scene.of_mesh`, the name of `Scene.from_mesh` in version 0.1."""
-    warnings.warn("use Scene.from_mesh(…, simulator=…)", DeprecationWarning, stacklevel=2)
-    former = {"cast": "swept", "function": "analytic"}
-    if "body" in settings:
-        body = settings.pop("body")
-        settings["simulator"] = former.get(body, body)
-    return _palpate.Scene.from_mesh(*arguments, **settings)
 
 
 def from_mesh(

@@ -20,7 +20,7 @@ use palpate::sim::simulator::Simulator;
 use palpate::task;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -210,17 +210,6 @@ impl Scene {
         let py = vertices_m.py();
         let arguments = (vertices_m, triangles, x_m, z_m, simulator, seed);
         py.import("palpate._scene")?.call_method("from_mesh", arguments, settings.as_ref())
-    }
-
-    /// Former name of `from_mesh`.
-    #[staticmethod]
-    #[pyo3(signature = (*arguments, **settings))]
-    fn of_mesh<'py>(
-        arguments: &Bound<'py, PyTuple>,
-        settings: Option<&Bound<'py, PyDict>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let scene = arguments.py().import("palpate._scene")?;
-        scene.call_method("of_mesh", arguments, settings)
     }
 
     /// Loads a scene's file, or assignments alone, with the mesh, if there is one, in place of its

@@ -45,12 +45,6 @@ def test_a_sphere_is_touched_where_it_is(simulator):
     assert "Touch" in repr(touch) and "Scene" in repr(scene)
 
 
-def test_the_former_names_are_read():
-    with pytest.warns(DeprecationWarning, match="from_mesh"):
-        scene = palpate.Scene.of_mesh(*sphere(), x_m=(-0.02, 0.02), z_m=(0.49, 0.51), body="cast")
-    assert scene.touch([0.01, 0.5]).time_s is None
-
-
 def test_meshes_go_out_and_come_in_again(tmp_path):
     scene = palpate.Scene.load("bird")
     vertices_m, triangles = scene.mesh()
