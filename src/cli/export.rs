@@ -7,20 +7,16 @@ use super::scan::{Grid, ScanArgs, grid, scan};
 #[cfg(feature = "pictures")]
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
+use super::topic::{TopicArgs, write_view};
 use crate::experiment::report_settings::ReportSettings;
-use crate::experiment::row::planner_rows;
 use crate::experiment::store::{Run, write_whole};
-#[cfg(feature = "pictures")]
-use crate::report::animation;
 use crate::report::points::PointCloud;
-use crate::report::replay::{self, BeliefReplay};
-use crate::report::{figures, files, film, style, whole_object};
+#[cfg(feature = "pictures")]
+use crate::report::{animation, replay};
+use crate::report::{export, figures, files, film};
+use crate::study::export::{ExportSpec, select};
 use anyhow::{Context, bail, ensure};
-use nalgebra::Vector3;
-use palpate_explore::task::zone::grid_triangles;
 use palpate_geometry::import::is_mesh_file;
-use palpate_gp::posterior::Scratch;
-use palpate_input::format::counted;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -31,6 +27,7 @@ Examples:
   palpate export runs/mug --planner active --grid 128 --out mug.ply
   palpate export runs/bird --planner active --out bird.gif
   palpate export scenes/container.toml --grid 41x51 --out runs/container-scan
+  palpate export --topic /camera/camera/depth/color/points --out view.ply
 
 From a run: writes the belief after some touches as FILE.ply or FILE.obj, and the belief beside the true surface as \
 FILE.svg. The standard deviation is the property `sigma_m` of a PLY file and a comment below each \
@@ -45,10 +42,19 @@ and its rank.
 
 From a scene: touches a grid of targets. FOLDER holds cloud.ply (contact points with normals), cloud.csv (also the \
 misses), scan.svg (the object beside the cloud). Ctrl-C stops it without writing anything; the \
-files do not depend on the number of threads.")]
+files do not depend on the number of threads.
+
+From a TOPIC with a sensor_msgs/PointCloud2, or a sensor_msgs/Image of depths with the sensor_msgs/CameraInfo in \
+`camera_info` beside it: the first message is written as a cloud, in metres, in its own frame. Name the file in the scene:
+
+  [camera]
+  file = \"view.ply\"
+  position_m = [0.15, -0.4, 0.6]       # of the cloud's frame
+  rotation_deg = [-120, 0, 0]")]
 pub(super) struct Args {
     /// A run's folder, a scene (.toml) with an object, or the name of a scene in scenes/.
-    path: PathBuf,
+    #[arg(required_unless_present = "topic")]
+    path: Option<PathBuf>,
     /// Run only: planner whose belief is written.
     #[arg(long)]
     planner: Option<String>,
@@ -60,7 +66,7 @@ pub(super) struct Args {
     #[arg(long)]
     touches: Option<u32>,
     /// Output: for a run a mesh (.ply, .obj) or a film (.gif, .mp4), for a scene a folder
-    /// [default: runs/SCENE-scan].
+    /// [default: runs/SCENE-scan], for a topic a cloud (.ply).
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
     /// For a mesh of a run, vertices along each side of the zone, or cells along the longest side
@@ -70,6 +76,8 @@ pub(super) struct Args {
     grid: Option<Grid>,
     #[command(flatten)]
     scan: ScanArgs,
+    #[command(flatten)]
+    view: TopicArgs,
     #[command(flatten)]
     force: Overwrite,
 }
@@ -90,13 +98,17 @@ impl Args {
 
 /// Exports a run's belief as a mesh, or the contacts of a grid of touches on a scene.
 pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
-    let is_run = args.path.is_dir();
+    if let (Some(topic), Some(out)) = (&args.view.topic, &args.out) {
+        return write_view(topic, &args.view, out, args.force);
+    }
+    let path = args.path.as_deref().context("allowed is a run's folder or a scene (.toml)")?;
+    let is_run = path.is_dir();
     ensure!(
-        !is_mesh_file(&args.path),
+        !is_mesh_file(path),
         "{0} is a mesh, and export takes a run's folder or a scene (.toml): palpate new {0} writes a scene",
-        args.path.display()
+        path.display()
     );
-    let path = if is_run { args.path.clone() } else { find(&args.path, SCENES)? };
+    let path = if is_run { path.to_owned() } else { find(path, SCENES)? };
     let options = [
         ("--planner", args.planner.is_some(), is_run, "a run's folder"),
         ("--trial", args.trial.is_some(), is_run, "a run's folder"),
@@ -106,13 +118,10 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     ];
     check_applicable(&path, &options)?;
     if is_run {
-        return belief(args, talk);
+        return belief(&path, args, talk);
     }
     scan(&path, &args.scan, args.out.as_deref(), args.grid, args.force, talk)
 }
-
-/// Allowed cells of a belief around an object, as for `gp.cells`.
-const CELLS: std::ops::RangeInclusive<usize> = 8..=256;
 
 /// File format of a run's export.
 enum Format {
@@ -134,7 +143,7 @@ fn format(out: &Path) -> anyhow::Result<Format> {
 
 const ENDINGS: &str = ".ply or .obj (mesh), .gif or .mp4 (film)";
 
-fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
+fn belief(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let out = args.out.as_ref();
     let out = out.with_context(|| format!("--out FILE: allowed is a file ending in {ENDINGS}"))?;
     let format = format(out)?;
@@ -142,8 +151,9 @@ fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         Format::Mesh(_) => args.force.check_files(out, files::FORMATS)?,
         Format::Gif | Format::Mp4 => args.force.check_file(out)?,
     }
-    let mut run = Run::read(&args.path)?;
-    let (trial, touches) = checked_trial(&run, args)?;
+    let mut run = Run::read(path)?;
+    let spec = ExportSpec { planner: args.planner(), trial: args.trial, touches: args.touches };
+    let (trial, touches) = select(&run, &spec)?;
     // Draws the run's figure of beliefs for this planner, trial and touch count only.
     run.experiment.report = ReportSettings {
         touch_counts: vec![touches],
@@ -152,7 +162,7 @@ fn belief(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         ..ReportSettings::default()
     };
     match format {
-        Format::Mesh(write) => mesh_file(run, args, touches, write, out),
+        Format::Mesh(write) => mesh_file(path, run, args, touches, write, out),
         Format::Gif | Format::Mp4 => film_file(&run, args, touches, &format, out, talk),
     }
 }
@@ -210,6 +220,7 @@ fn film_file(
 
 /// Writes the belief after some touches as a mesh, with a picture.
 fn mesh_file(
+    path: &Path,
     mut run: Run,
     args: &Args,
     touches: u32,
@@ -220,13 +231,9 @@ fn mesh_file(
     ensure!(
         !run.experiment.scene.is_curve(),
         "{} explored a curve, which has no mesh; use a file ending in .gif, or the figures of the run",
-        args.path.display()
+        path.display()
     );
-    let (mesh, score) = if is_around {
-        closed_surface(&mut run, args, touches)?
-    } else {
-        zone_surface(&run, args, touches)?
-    };
+    let (mesh, score) = export::surface(&mut run, args.planner(), touches, args.side()?)?;
     write_whole(out, write(&mesh))?;
     let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
     if let Some(svg) = (figure.draw)(&run)? {
@@ -244,141 +251,4 @@ fn mesh_file(
         out.with_extension("svg").display()
     ))?;
     Ok(Completion::Done)
-}
-
-/// Closed mean surface of an object, and its error.
-fn closed_surface(
-    run: &mut Run,
-    args: &Args,
-    touches: u32,
-) -> anyhow::Result<(PointCloud, String)> {
-    if let Some(cells) = args.side()? {
-        ensure!(
-            CELLS.contains(&cells),
-            "--grid {cells}: allowed are {} to {} cells around an object",
-            CELLS.start(),
-            CELLS.end()
-        );
-        run.experiment.space.cells = u32::try_from(cells)?;
-    }
-    let planner = args.planner();
-    let of = || format!("{planner} has no fit after {}", counted(touches, "touch"));
-    let row = replay::row(run, planner).with_context(of)?;
-    let truth = whole_object::truth(run);
-    let frame = whole_object::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
-    let frame = frame.with_context(of)?;
-    ensure!(
-        !frame.mesh.1.is_empty(),
-        "the belief of {planner} contains no surface after {}",
-        counted(touches, "touch")
-    );
-    let mut comments = vec![
-        title(run, args, touches),
-        "sigma_m: standard deviation of the surface along its normal".into(),
-    ];
-    if !frame.error_m.is_empty() {
-        comments.push("error_m: signed distance to the true surface, negative inside".into());
-    }
-    Ok((frame.points(comments), frame.score))
-}
-
-/// Belief over a zone as a mesh, and its error.
-fn zone_surface(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(PointCloud, String)> {
-    let planner = args.planner();
-    let replay = BeliefReplay::new(run, planner, touches)?
-        .with_context(|| format!("{planner} has no fit after {}", counted(touches, "touch")))?;
-    let grid = args.side()?.unwrap_or(run.experiment.grid as usize);
-    Ok((mesh(run, args, &replay, grid), replay.score()))
-}
-
-/// First comment line of an exported file.
-fn title(run: &Run, args: &Args, touches: u32) -> String {
-    format!(
-        "Palpate {}: belief of {} in trial {} of {} after {}",
-        env!("CARGO_PKG_VERSION"),
-        args.planner(),
-        run.experiment.report.trial,
-        run.experiment.name,
-        counted(touches, "touch"),
-    )
-}
-
-/// Returns the trial that is exported, and the number of its touches.
-///
-/// # Errors
-/// If the run lacks the planner, the trial or the touch count.
-fn checked_trial(run: &Run, args: &Args) -> anyhow::Result<(u32, u32)> {
-    let planner = args.planner();
-    let planners = &run.experiment.planners;
-    ensure!(
-        planners.iter().any(|known| known == planner),
-        "--planner {planner}: this run has {}",
-        planners.join(", ")
-    );
-    let mut rows = planner_rows(&run.rows, planner);
-    let ranked = film::ranked(run, planner);
-    let median = ranked.get(film::median_index(ranked.len())).map(|(row, _)| *row);
-    let row = match args.trial {
-        None => median.or_else(|| rows.next()),
-        Some(trial) => rows.find(|row| row.trial == trial),
-    };
-    let Some(row) = row else {
-        let asked = args.trial.map_or("--trial".into(), |trial| format!("--trial {trial}"));
-        // Rows are ordered by trial.
-        let mut trials = planner_rows(&run.rows, planner).map(|row| row.trial);
-        match (trials.next(), trials.last()) {
-            (Some(first), last) => {
-                let last = last.unwrap_or(first);
-                bail!("{asked}: {planner} has finished trials {first} to {last}")
-            }
-            _ => bail!("{asked}: {planner} has finished no trial"),
-        }
-    };
-    let (first, last) = (run.experiment.first_fit(), row.touches.len() as u32);
-    let touches = args.touches.unwrap_or(last);
-    ensure!(
-        (first..=last).contains(&touches),
-        "--touches {touches}: trial {} of {planner} has beliefs after {first} to {last} touches",
-        row.trial
-    );
-    Ok((row.trial, touches))
-}
-
-/// Posterior mean as a surface in `W`, where a surface is more likely than none.
-fn mesh(run: &Run, args: &Args, replay: &BeliefReplay, grid: usize) -> PointCloud {
-    let zone = replay.belief.zone();
-    let places = zone.grid(grid);
-    let known = replay.is_drawn(places.iter().map(Vec::as_slice));
-    // Index of the vertex at each place that has one.
-    let mut count = 0..;
-    let vertices: Vec<Option<usize>> =
-        known.iter().map(|known| known.then(|| count.next()).flatten()).collect();
-    let places: Vec<Vec<f64>> =
-        places.into_iter().zip(known).filter(|(_, known)| *known).map(|(place, _)| place).collect();
-    let predictions = replay.surface.predict(places.iter().map(Vec::as_slice));
-    let mut scratch = Scratch::default();
-    let mut slope = [0.0; 2];
-    let r_wz = zone.x_wz().rotation;
-    let points = places.iter().zip(&predictions).map(|(place, prediction)| {
-        replay.surface.mean_gradient(place, &mut slope, &mut scratch);
-        let normal_z = Vector3::new(-slope[0], 1.0, -slope[1]).normalize();
-        (zone.point(place, prediction.mean), r_wz * normal_z)
-    });
-    let points = points.collect();
-    let deviations_m: Vec<f64> = predictions.iter().map(|p| p.variance.sqrt()).collect();
-    let largest_m = deviations_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let colour = |deviation_m: f64| style::deviation_rgb(deviation_m / largest_m);
-    let joined = grid_triangles(grid, grid)
-        .filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
-    PointCloud {
-        comments: vec![
-            title(run, args, replay.touches.len() as u32),
-            zone.frame_description(),
-            "sigma_m: standard deviation of the height along the approach".into(),
-        ],
-        points,
-        deviations: deviations_m.iter().map(|&sd_m| (sd_m, colour(sd_m))).collect(),
-        triangles: joined.collect(),
-        ..PointCloud::default()
-    }
 }
