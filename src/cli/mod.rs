@@ -6,7 +6,6 @@ mod calibrate;
 mod calibrate_band;
 mod camera;
 mod check;
-mod choices;
 mod compare;
 mod doctor;
 mod doctor_arm;

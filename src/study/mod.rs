@@ -9,6 +9,7 @@
 //! * [`export`]: choice of the belief that is exported.
 //! * [`identify`]: an object of a library, identified by touch.
 //! * [`sensors`]: the same experiment with every kind of fingertip.
+//! * [`setup`]: scene and experiment for a mesh.
 
 pub mod accuracy;
 pub mod band;
@@ -18,6 +19,7 @@ pub mod compare;
 pub mod export;
 pub mod identify;
 pub mod sensors;
+pub mod setup;
 
 use crate::sim::Scene;
 use anyhow::ensure;
