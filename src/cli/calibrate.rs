@@ -1,10 +1,10 @@
 //! Command `palpate calibrate`.
 
 use super::calibrate_band::{self, BandArgs};
+use super::calibration_text as text;
 use super::find::find_input;
 use super::output::Overwrite;
 use super::terminal::{Completion, Verbosity, print};
-use crate::report::tables::calibration as text;
 use crate::sim::finger::calibration::constants::FingerConstants;
 use crate::sim::finger::calibration::fit::{FreeParameters, fit};
 use crate::sim::finger::calibration::score::leave_one_out;

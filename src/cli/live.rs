@@ -3,9 +3,8 @@
 use super::find::{EXPERIMENTS, SCENES, find, find_input, is_experiment};
 use super::host::Host as Program;
 use super::new::{self, Written};
-use super::prepare::{connect_arm, load_experiment, planners_setting, prepare_simulation};
+use super::prepare::{connect_arm, load_experiment, prepare_simulation};
 use super::progress::stop_on_interrupt;
-use super::run::with_planners;
 use super::terminal::{Completion, Verbosity, command_line, error, print};
 use crate::experiment::Experiment;
 use crate::experiment::analysis::Analysis;
@@ -15,6 +14,7 @@ use crate::live::files::{file_name, open_browser};
 use crate::live::session::{Session, replay};
 use crate::live::{Brought, Host, MeshWish, Server};
 use crate::report;
+use crate::study::planners::{planners_setting, with_planners};
 use anyhow::Context;
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;

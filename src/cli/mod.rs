@@ -4,6 +4,7 @@ mod accuracy;
 mod benchmark;
 mod calibrate;
 mod calibrate_band;
+mod calibration_text;
 mod camera;
 mod check;
 mod compare;

@@ -15,12 +15,6 @@ use palpate_input::format::counted;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Returns the `--set` assignment of an experiment's planners.
-pub(super) fn planners_setting<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let names: Vec<String> = names.map(|name| format!("{name:?}")).collect();
-    format!("planners=[{}]", names.join(","))
-}
-
 /// Limits the number of threads of the process; 0 means all cores.
 pub(super) fn set_thread_count(threads: u16) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());

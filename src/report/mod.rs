@@ -39,7 +39,6 @@ pub mod tables {
     //! Tables of runs and studies.
 
     pub mod accuracy;
-    pub mod calibration;
     pub mod comparison;
     pub mod summary;
 }

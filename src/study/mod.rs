@@ -8,6 +8,7 @@
 //! * [`compare`](mod@compare): comparison of planners over several runs.
 //! * [`export`]: choice of the belief that is exported.
 //! * [`identify`]: an object of a library, identified by touch.
+//! * [`planners`]: planners that are added to those of an experiment.
 //! * [`sensors`]: the same experiment with every kind of fingertip.
 //! * [`setup`]: scene and experiment for a mesh.
 
@@ -18,6 +19,7 @@ pub mod check;
 pub mod compare;
 pub mod export;
 pub mod identify;
+pub mod planners;
 pub mod sensors;
 pub mod setup;
 

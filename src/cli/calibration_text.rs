@@ -7,7 +7,7 @@ use crate::sim::finger::calibration::session::Session;
 use crate::sim::finger::calibration::shear::ShearComparison;
 
 /// Table of the electrodes' responses to tangential force, measured and modelled.
-pub fn shear(found: &ShearComparison, stiffness_n_m: f64) -> String {
+pub(super) fn shear(found: &ShearComparison, stiffness_n_m: f64) -> String {
     let ShearComparison { sensor, lateral, axial } = found;
     let mut rows = vec![["  counts per N", "lateral", "model", "axial", "model"].map(String::from)];
     rows.extend((0..lateral.measured.len()).map(|i| {
@@ -29,7 +29,7 @@ pub fn shear(found: &ShearComparison, stiffness_n_m: f64) -> String {
 }
 
 /// Returns the fit without a sensor and its scores on that sensor.
-pub fn held_out(held: &HeldOutResult) -> String {
+pub(super) fn held_out(held: &HeldOutResult) -> String {
     let from = match held.others.is_empty() {
         true => "the default constants".into(),
         false => format!("constants fitted to {}", names(held.others.iter())),
@@ -48,7 +48,7 @@ pub fn held_out(held: &HeldOutResult) -> String {
 }
 
 /// Lists the constants of a fit; `held_out` are fits without one sensor each.
-pub fn estimates(fit: &Fit, held_out: &[HeldOutResult]) -> String {
+pub(super) fn estimates(fit: &Fit, held_out: &[HeldOutResult]) -> String {
     let mut text = String::new();
     for found in &fit.estimates {
         text += &format!("  {:22} {:.2e} */÷ {:.2}", found.key, found.value, found.factor);
@@ -67,7 +67,7 @@ pub fn estimates(fit: &Fit, held_out: &[HeldOutResult]) -> String {
 }
 
 /// Describes the constants of a session.
-pub fn session(session: &Session) -> String {
+pub(super) fn session(session: &Session) -> String {
     let rolls: Vec<String> =
         session.roll_rad.iter().map(|roll| format!("{:.0}", roll.to_degrees())).collect();
     format!(
@@ -80,7 +80,7 @@ pub fn session(session: &Session) -> String {
 }
 
 /// Joins the names of sensors.
-pub fn names<'a>(sensors: impl Iterator<Item = &'a String>) -> String {
+pub(super) fn names<'a>(sensors: impl Iterator<Item = &'a String>) -> String {
     sensors.map(String::as_str).collect::<Vec<_>>().join(", ")
 }
 
@@ -102,7 +102,7 @@ fn table(rows: Vec<[String; 6]>) -> String {
 }
 
 /// Returns the scores of all sensors together.
-pub fn overall(held_out: &[HeldOutResult]) -> String {
+pub(super) fn overall(held_out: &[HeldOutResult]) -> String {
     let whole: Vec<Score> = held_out.iter().map(HeldOutResult::overall).collect();
     table(vec![row("all sensors", &Score::of(whole.iter()))])
 }
