@@ -4,18 +4,15 @@ use super::find::{SCENES, find};
 use super::output::Overwrite;
 use super::prepare::check_applicable;
 use super::scan::{Grid, ScanArgs, grid, scan};
-#[cfg(feature = "pictures")]
 use super::slow_steps::report_slow_steps;
 use super::terminal::{Completion, Verbosity, print};
 use super::topic::{TopicArgs, write_view};
 use crate::experiment::report_settings::ReportSettings;
-use crate::experiment::store::{Run, write_whole};
-use crate::report::points::PointCloud;
-#[cfg(feature = "pictures")]
-use crate::report::{animation, replay};
-use crate::report::{export, figures, files, film};
+use crate::experiment::store::Run;
+use crate::report::export::{self, ENDINGS, Format};
+use crate::report::files;
 use crate::study::export::{ExportSpec, select};
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use palpate_geometry::import::is_mesh_file;
 use std::path::{Path, PathBuf};
 
@@ -83,11 +80,6 @@ pub(super) struct Args {
 }
 
 impl Args {
-    /// Name of the requested planner; empty if none is given.
-    fn planner(&self) -> &str {
-        self.planner.as_deref().unwrap_or_default()
-    }
-
     /// Returns the vertices or cells along each side of a belief.
     fn side(&self) -> anyhow::Result<Option<usize>> {
         let Some(Grid([columns, rows])) = self.grid else { return Ok(None) };
@@ -123,36 +115,18 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     scan(&path, &args.scan, args.out.as_deref(), args.grid, args.force, talk)
 }
 
-/// File format of a run's export.
-enum Format {
-    Mesh(fn(&PointCloud) -> String),
-    Gif,
-    Mp4,
-}
-
-/// Returns the format of a file by its extension.
-fn format(out: &Path) -> anyhow::Result<Format> {
-    Ok(match out.extension().and_then(|extension| extension.to_str()) {
-        Some("ply") => Format::Mesh(PointCloud::ply),
-        Some("obj") => Format::Mesh(PointCloud::obj),
-        Some("gif") => Format::Gif,
-        Some("mp4") => Format::Mp4,
-        _ => bail!("--out {}: allowed is a file ending in {ENDINGS}", out.display()),
-    })
-}
-
-const ENDINGS: &str = ".ply or .obj (mesh), .gif or .mp4 (film)";
-
+/// Writes the belief of a run's folder as a mesh or a film.
 fn belief(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let out = args.out.as_ref();
     let out = out.with_context(|| format!("--out FILE: allowed is a file ending in {ENDINGS}"))?;
-    let format = format(out)?;
+    let format = Format::of(out)?;
     match format {
         Format::Mesh(_) => args.force.check_files(out, files::FORMATS)?,
-        Format::Gif | Format::Mp4 => args.force.check_file(out)?,
+        Format::Film(_) => args.force.check_file(out)?,
     }
     let mut run = Run::read(path)?;
-    let spec = ExportSpec { planner: args.planner(), trial: args.trial, touches: args.touches };
+    let planner = args.planner.as_deref().unwrap_or_default();
+    let spec = ExportSpec { planner, trial: args.trial, touches: args.touches };
     let (trial, touches) = select(&run, &spec)?;
     // Draws the run's figure of beliefs for this planner, trial and touch count only.
     run.experiment.report = ReportSettings {
@@ -161,94 +135,20 @@ fn belief(path: &Path, args: &Args, talk: Verbosity) -> anyhow::Result<Completio
         planners: args.planner.clone().into_iter().collect(),
         ..ReportSettings::default()
     };
-    match format {
-        Format::Mesh(write) => mesh_file(path, run, args, touches, write, out),
-        Format::Gif | Format::Mp4 => film_file(&run, args, touches, &format, out, talk),
-    }
-}
-
-/// Returns the error that a film cannot be written.
-#[cfg(not(feature = "pictures"))]
-fn film_file(
-    _: &Run,
-    _: &Args,
-    _: u32,
-    _: &Format,
-    out: &Path,
-    _: Verbosity,
-) -> anyhow::Result<Completion> {
-    bail!("--out {}{}", out.display(), files::NEEDS_PICTURES)
-}
-
-/// Writes the film of a trial up to some touches.
-#[cfg(feature = "pictures")]
-fn film_file(
-    run: &Run,
-    args: &Args,
-    touches: u32,
-    format: &Format,
-    out: &Path,
-    talk: Verbosity,
-) -> anyhow::Result<Completion> {
-    ensure!(args.grid.is_none(), "--grid applies only to a mesh (.ply, .obj)");
-    let planner = args.planner();
-    let row = replay::row(run, planner).context("the trial is missing")?;
-    let counts = film::counts(run, row, touches);
-    let (Some(first), Some(last)) = (counts.first(), counts.last()) else {
-        bail!("{planner} has no fit in trial {} up to {touches} touches", row.trial);
-    };
-    if matches!(format, Format::Mp4) {
-        animation::check_ffmpeg()?;
-    }
-    report_slow_steps(talk, |tell| -> anyhow::Result<()> {
-        tell(&format!("drawing {} frames", counts.len()));
-        let drawings = film::drawings(run, planner, &counts)?;
-        match format {
-            Format::Mp4 => animation::mp4(&drawings, out),
-            _ => Ok(write_whole(out, animation::gif(&drawings)?)?),
+    let text = match format {
+        Format::Mesh(write) => {
+            ensure!(
+                !run.experiment.scene.is_curve(),
+                "{} explored a curve, which has no mesh; use a file ending in .gif, or the figures of the run",
+                path.display()
+            );
+            export::mesh(run, planner, touches, args.side()?, write, out)?
         }
-    })?;
-    let megabytes = std::fs::metadata(out).map_or(0.0, |file| file.len() as f64 / 1e6);
-    print(&format!(
-        "{}: {} frames, {first} to {last} touches of {planner}, {megabytes:.1} MB\n{}",
-        out.display(),
-        counts.len(),
-        film::rank_words(run, planner, row.trial),
-    ))?;
-    Ok(Completion::Done)
-}
-
-/// Writes the belief after some touches as a mesh, with a picture.
-fn mesh_file(
-    path: &Path,
-    mut run: Run,
-    args: &Args,
-    touches: u32,
-    write: fn(&PointCloud) -> String,
-    out: &Path,
-) -> anyhow::Result<Completion> {
-    let is_around = run.experiment.scene.whole_object.is_some();
-    ensure!(
-        !run.experiment.scene.is_curve(),
-        "{} explored a curve, which has no mesh; use a file ending in .gif, or the figures of the run",
-        path.display()
-    );
-    let (mesh, score) = export::surface(&mut run, args.planner(), touches, args.side()?)?;
-    write_whole(out, write(&mesh))?;
-    let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
-    if let Some(svg) = (figure.draw)(&run)? {
-        files::write(out, &svg)?;
-    }
-    let score = if score.is_empty() { score } else { format!("; {score}") };
-    let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
-    print(&format!(
-        "{}: {} vertices, {} triangles, sigma up to {:.3} mm{score}\n{}\npicture: {}",
-        out.display(),
-        mesh.points.len(),
-        mesh.triangles.len(),
-        1e3 * largest_m,
-        film::rank_words(&run, args.planner(), run.experiment.report.trial),
-        out.with_extension("svg").display()
-    ))?;
+        Format::Film(film) => {
+            ensure!(args.grid.is_none(), "--grid applies only to a mesh (.ply, .obj)");
+            report_slow_steps(talk, |tell| export::film(&run, planner, touches, film, out, tell))?
+        }
+    };
+    print(&text)?;
     Ok(Completion::Done)
 }

@@ -1,34 +1,146 @@
-//! Beliefs of a run as meshes.
+//! Beliefs of a run as meshes and films.
 
+#[cfg(feature = "pictures")]
+use super::animation;
 use super::points::PointCloud;
 use super::replay::{self, BeliefReplay};
-use super::{style, whole_object};
-use crate::experiment::store::Run;
-use anyhow::{Context, ensure};
+use super::{figures, files, film, style, whole_object};
+use crate::experiment::store::{Run, write_whole};
+use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
 use palpate_gp::posterior::Scratch;
 use palpate_input::format::counted;
+use std::path::Path;
 
 /// Allowed cells of a belief around an object, as for `gp.cells`.
 const CELLS: std::ops::RangeInclusive<usize> = 8..=256;
 
-/// Returns the belief of `planner` in the drawn trial after some touches as a mesh, with its score:
-/// around an object the closed mean surface, otherwise the mean over the zone. `side` is the number
-/// of cells or vertices along each side, by default that of the experiment.
+/// File format of a belief.
+pub enum Format {
+    /// Mesh, with the function that formats it.
+    Mesh(fn(&PointCloud) -> String),
+    /// Film.
+    Film(FilmFormat),
+}
+
+/// File format of a film.
+#[derive(Clone, Copy, PartialEq)]
+pub enum FilmFormat {
+    /// GIF.
+    Gif,
+    /// MP4, which needs ffmpeg.
+    Mp4,
+}
+
+/// Endings of the files.
+pub const ENDINGS: &str = ".ply or .obj (mesh), .gif or .mp4 (film)";
+
+impl Format {
+    /// Returns the format of a file by its ending.
+    ///
+    /// # Errors
+    /// If the ending is not allowed.
+    pub fn of(out: &Path) -> anyhow::Result<Self> {
+        Ok(match out.extension().and_then(|extension| extension.to_str()) {
+            Some("ply") => Self::Mesh(PointCloud::ply),
+            Some("obj") => Self::Mesh(PointCloud::obj),
+            Some("gif") => Self::Film(FilmFormat::Gif),
+            Some("mp4") => Self::Film(FilmFormat::Mp4),
+            _ => bail!("--out {}: allowed is a file ending in {ENDINGS}", out.display()),
+        })
+    }
+}
+
+/// Returns the error that a film cannot be written.
 ///
 /// # Errors
-/// If there is no fit, no surface, or the number of cells is not allowed.
-pub fn surface(
-    run: &mut Run,
+/// Always, in this build.
+#[cfg(not(feature = "pictures"))]
+pub fn film(
+    _: &Run,
+    _: &str,
+    _: u32,
+    _: FilmFormat,
+    out: &Path,
+    _: &dyn Fn(&str),
+) -> anyhow::Result<String> {
+    bail!("--out {}{}", out.display(), files::NEEDS_PICTURES)
+}
+
+/// Writes the film of the drawn trial of `planner` up to some touches, and describes it. `tell` is
+/// called before a slow step.
+///
+/// # Errors
+/// If there is no fit, or the file cannot be written.
+#[cfg(feature = "pictures")]
+pub fn film(
+    run: &Run,
+    planner: &str,
+    touches: u32,
+    format: FilmFormat,
+    out: &Path,
+    tell: &dyn Fn(&str),
+) -> anyhow::Result<String> {
+    let row = replay::row(run, planner).context("the trial is missing")?;
+    let counts = film::counts(run, row, touches);
+    let (Some(first), Some(last)) = (counts.first(), counts.last()) else {
+        bail!("{planner} has no fit in trial {} up to {touches} touches", row.trial);
+    };
+    if format == FilmFormat::Mp4 {
+        animation::check_ffmpeg()?;
+    }
+    tell(&format!("drawing {} frames", counts.len()));
+    let drawings = film::drawings(run, planner, &counts)?;
+    match format {
+        FilmFormat::Mp4 => animation::mp4(&drawings, out)?,
+        FilmFormat::Gif => write_whole(out, animation::gif(&drawings)?)?,
+    }
+    let megabytes = std::fs::metadata(out).map_or(0.0, |file| file.len() as f64 / 1e6);
+    Ok(format!(
+        "{}: {} frames, {first} to {last} touches of {planner}, {megabytes:.1} MB\n{}",
+        out.display(),
+        counts.len(),
+        film::rank_words(run, planner, row.trial),
+    ))
+}
+
+/// Writes the belief of `planner` in the drawn trial after some touches as a mesh, with a picture,
+/// and describes it. `side` is the number of cells or vertices along each side, by default that of
+/// the experiment.
+///
+/// # Errors
+/// If there is no fit or no surface, the number of cells is not allowed, or a file cannot be
+/// written.
+pub fn mesh(
+    mut run: Run,
     planner: &str,
     touches: u32,
     side: Option<usize>,
-) -> anyhow::Result<(PointCloud, String)> {
-    match run.experiment.scene.whole_object.is_some() {
-        true => closed_surface(run, planner, touches, side),
-        false => zone_surface(run, planner, touches, side),
+    write: fn(&PointCloud) -> String,
+    out: &Path,
+) -> anyhow::Result<String> {
+    let is_around = run.experiment.scene.whole_object.is_some();
+    let (mesh, score) = match is_around {
+        true => closed_surface(&mut run, planner, touches, side)?,
+        false => zone_surface(&run, planner, touches, side)?,
+    };
+    write_whole(out, write(&mesh))?;
+    let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
+    if let Some(svg) = (figure.draw)(&run)? {
+        files::write(out, &svg)?;
     }
+    let score = if score.is_empty() { score } else { format!("; {score}") };
+    let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
+    Ok(format!(
+        "{}: {} vertices, {} triangles, sigma up to {:.3} mm{score}\n{}\npicture: {}",
+        out.display(),
+        mesh.points.len(),
+        mesh.triangles.len(),
+        1e3 * largest_m,
+        film::rank_words(&run, planner, run.experiment.report.trial),
+        out.with_extension("svg").display()
+    ))
 }
 
 /// Closed mean surface of an object, and its error.
@@ -77,7 +189,7 @@ fn zone_surface(
     let replay = BeliefReplay::new(run, planner, touches)?
         .with_context(|| format!("{planner} has no fit after {}", counted(touches, "touch")))?;
     let grid = side.unwrap_or(run.experiment.grid as usize);
-    Ok((mesh(run, planner, &replay, grid), replay.score()))
+    Ok((surface(run, planner, &replay, grid), replay.score()))
 }
 
 /// First comment line of an exported file.
@@ -93,7 +205,7 @@ fn title(run: &Run, planner: &str, touches: u32) -> String {
 }
 
 /// Posterior mean as a surface in `W`, where a surface is more likely than none.
-fn mesh(run: &Run, planner: &str, replay: &BeliefReplay, grid: usize) -> PointCloud {
+fn surface(run: &Run, planner: &str, replay: &BeliefReplay, grid: usize) -> PointCloud {
     let zone = replay.belief.zone();
     let places = zone.grid(grid);
     let known = replay.is_drawn(places.iter().map(Vec::as_slice));
