@@ -4,10 +4,10 @@ use super::output::{Overwrite, make_folder};
 use super::sensors::{self, SensorArgs};
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::store::{Run, write_whole};
-use crate::report::compare::{file, html, interquartiles, overall, per_object_table, profiles};
-use crate::study::compare::{SuiteComparison, compare};
+use crate::report::compare::{PAGE, interquartiles, profiles, text, write};
+use crate::study::compare::compare;
 use anyhow::Context;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let read = |path: &PathBuf| anyhow::Ok((path.display().to_string(), Run::read(path)?));
     let runs: Vec<(String, Run)> = args.paths.iter().map(read).collect::<Result<_, _>>()?;
     let compared = compare(&runs, &args.against)?;
-    let mut text = format!("{}\n{}", interquartiles(&compared).text(), text(&compared));
+    let mut words = format!("{}\n{}", interquartiles(&compared).text(), text(&compared));
     if let Some(path) = &args.svg {
         args.force.check_file(path)?;
         let svg = profiles(&compared).context("nothing to draw")?;
@@ -63,28 +63,8 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         args.force.check_file(&folder.join(PAGE))?;
         make_folder(folder)?;
         let name = compared.objects.join(", ");
-        text += &format!("\npage: {}\n", write(folder, &name, "", &compared)?.display());
+        words += &format!("\npage: {}\n", write(folder, &name, "", &compared)?.display());
     }
-    print(text.trim_end())?;
+    print(words.trim_end())?;
     Ok(Completion::Done)
-}
-
-const PAGE: &str = "suite.html";
-
-/// Formats the tables of a comparison for a terminal, per object and overall.
-pub(super) fn text(compared: &SuiteComparison) -> String {
-    format!("{}\n{}", per_object_table(compared).text(), overall(compared).text())
-}
-
-/// Writes a comparison to a folder as a page and a CSV table; returns the page's path.
-pub(super) fn write(
-    folder: &Path,
-    name: &str,
-    question: &str,
-    compared: &SuiteComparison,
-) -> anyhow::Result<PathBuf> {
-    let page = folder.join(PAGE);
-    write_whole(&page, html(name, question, compared))?;
-    file(compared).write_csv(&folder.join("suite.csv"))?;
-    Ok(page)
 }

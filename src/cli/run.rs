@@ -1,6 +1,5 @@
 //! Command `palpate run`.
 
-use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::plan::plan;
@@ -19,6 +18,7 @@ use crate::experiment::store::{RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::TrialEvent;
 use crate::report;
+use crate::report::compare as comparison;
 use crate::study::compare::{compare, name_objects};
 use crate::study::planners::with_planners;
 use anyhow::{Context, bail, ensure};
@@ -233,9 +233,9 @@ fn compare_cells(
     // Cells with different planners, or without ground truth, cannot be compared.
     let Ok(mut compared) = compare(&runs, against) else { return Ok(()) };
     name_objects(&mut compared, name);
-    let mut text = compare::text(&compared);
+    let mut text = comparison::text(&compared);
     if !args.no_report {
-        let page = compare::write(folder, name, &first.question, &compared)?;
+        let page = comparison::write(folder, name, &first.question, &compared)?;
         text += &format!("\npage: {}", page.display());
     }
     if !args.json {
