@@ -68,24 +68,24 @@ const WEIGHT_EXPONENTS: [f64; 2] = [0.75, 0.25];
 
 /// A test place of a belief, with the true height there.
 #[derive(Clone, Debug)]
-pub struct BandSample {
+struct BandSample {
     /// Number of touches.
-    pub count: u32,
+    count: u32,
     /// Whether the finger can touch the surface there.
-    pub is_reachable: bool,
+    is_reachable: bool,
     /// True height above the datum, m.
-    pub height_m: f64,
+    height_m: f64,
     /// Features of the belief.
-    pub features: BandFeatures,
+    features: BandFeatures,
 }
 
 /// Samples of all trials of an object.
 #[derive(Clone, Debug)]
-pub struct ObjectSamples {
+struct ObjectSamples {
     /// Name of the object.
-    pub object: String,
+    object: String,
     /// Samples of its beliefs.
-    pub samples: Vec<BandSample>,
+    samples: Vec<BandSample>,
 }
 
 /// Experiments and extent of the study.
@@ -246,7 +246,7 @@ pub fn file_text(band: &LearnedBand) -> anyhow::Result<String> {
 ///
 /// # Errors
 /// If the planner is not available, or the trial ended early.
-pub fn sample_trial(
+fn sample_trial(
     simulation: &Simulation,
     planner: &str,
     trial: u32,
@@ -284,7 +284,7 @@ pub fn sample_trial(
 }
 
 /// Learns the band from objects.
-pub fn learn(objects: &[&ObjectSamples], learned_from: String) -> LearnedBand {
+fn learn(objects: &[&ObjectSamples], learned_from: String) -> LearnedBand {
     let [mut below, above] = [0, 1].map(|side| half_width(objects, side));
     below[0] += UNSEEN.ln();
     let mut band = LearnedBand { learned_from: Cow::Owned(learned_from), below, above, tail: 1.0 };
@@ -404,7 +404,7 @@ pub struct BandCoverage {
 }
 
 /// Returns the coverage of each object by `band` after each count.
-pub fn coverage(object: &ObjectSamples, band: &LearnedBand) -> Vec<BandCoverage> {
+fn coverage(object: &ObjectSamples, band: &LearnedBand) -> Vec<BandCoverage> {
     let of_count = |&touches: &u32| {
         let samples = object.samples.iter().filter(|sample| sample.count == touches);
         let (mut all, mut inside, mut reached, mut reached_inside, mut score_m) = (0, 0, 0, 0, 0.0);
@@ -432,7 +432,7 @@ pub fn coverage(object: &ObjectSamples, band: &LearnedBand) -> Vec<BandCoverage>
 
 /// Returns the band learned without each object's fold, one per object; `None` with fewer than two
 /// objects.
-pub fn left_out_bands(objects: &[ObjectSamples]) -> Option<Vec<LearnedBand>> {
+fn left_out_bands(objects: &[ObjectSamples]) -> Option<Vec<LearnedBand>> {
     let folds = FOLDS.min(objects.len());
     let without = |fold: usize| {
         let kept = objects.iter().enumerate().filter(|(i, _)| i % folds != fold);
@@ -450,7 +450,7 @@ pub const LEVELS: [f64; 11] = [0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.9
 
 /// Returns, for each count of touches, the share of the truth below the quantile at each of
 /// [`LEVELS`], every object the same. `bands` has one band for each object.
-pub fn reliability(
+fn reliability(
     objects: &[ObjectSamples],
     bands: &[LearnedBand],
 ) -> Vec<(u32, [f64; LEVELS.len()])> {

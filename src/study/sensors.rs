@@ -121,10 +121,7 @@ pub struct SensorResults {
 
 impl SensorKit {
     /// Reads the experiment at `path`, or a case of its sweep, with this kit on a kinematic stage.
-    ///
-    /// # Errors
-    /// See [`Experiment::load`].
-    pub fn load(
+    fn load(
         &self,
         path: &Path,
         case: Option<&SweepCase>,
