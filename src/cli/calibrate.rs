@@ -39,7 +39,7 @@ regression. Writes band.toml, the table [gp.band] of an experiment, and reliabil
 of objects left out of the learning.")]
 pub struct Args {
     /// Recordings; the format is that of models/biotac/flat_plate.json.
-    #[arg(value_parser = find_input, required_unless_present = "band")]
+    #[arg(value_parser = find_input, required_unless_present = "band", conflicts_with_all = ["test", "trials", "set", "threads"])]
     recordings: Option<PathBuf>,
     /// Test the default constants: fit only the offset, gain and attitude (the finger's orientation
     /// on the plate) of each session.

@@ -50,7 +50,7 @@ From a TOPIC with a sensor_msgs/PointCloud2, or a sensor_msgs/Image of depths wi
   rotation_deg = [-120, 0, 0]")]
 pub(super) struct Args {
     /// A run's folder, a scene (.toml) with an object, or the name of a scene in scenes/.
-    #[arg(required_unless_present = "topic")]
+    #[arg(required_unless_present = "topic", conflicts_with_all = ["info", "domain", "timeout"])]
     path: Option<PathBuf>,
     /// Run only: planner whose belief is written.
     #[arg(long)]

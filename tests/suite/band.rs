@@ -179,7 +179,8 @@ fn a_band_is_learned_by_a_command() {
     refused(&["--band", &six, "--set", "touches=5"], &["at least 7"]);
     refused(&["--band", &toy, "--test"], &["gp.band", "objects"]);
     refused(&["plate.json", "--band", &toy], &["--band", "cannot be used with"]);
-    refused(&["plate.json", "--trials", "3"], &["--band"]);
+    refused(&["plate.json", "--trials", "3"], &["--trials", "cannot be used with"]);
+    refused(&["--trials", "3"], &["--band"]);
     refused(&["--band", &toy, "--shear", "shear.json"], &["--shear", "cannot be used with"]);
     fails(folder.path(), &["run", &toy, "--set", "gp.band=\"foo\""], &["gp.band", "leave_one_out"]);
     let pitch = "scene.finger.other_pitches_deg=[0]";

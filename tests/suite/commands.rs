@@ -167,7 +167,7 @@ fn options_of_another_input_are_refused() {
         (&["export", "runs/small", "--topic", "/view", "--out", "view.ply"], with),
         (&["export", "--topic", "/view", "--out", "view.ply", "--grid", "3"], with),
         (&["export", "--topic", "/view", "--out", "view.obj"], "ending in .ply"),
-        (&["export", "runs/small", "--domain", "3"], "--topic"),
+        (&["export", "runs/small", "--domain", "3", "--out", "it.ply"], with),
         (&["compare", "runs/small", "--threads", "2"], "--sensors"),
         (&["compare", "toy", "--sensors", "biotac", "--svg", "it.svg"], with),
         (&["compare", "toy", "--sensors", "biotac,skin"], "gelsight_mini"),
