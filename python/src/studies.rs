@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Measures the levels and effects of the scene at `path`, as the command `palpate accuracy` does.
-/// `counts` are the touches, trials and held-out targets or trials, where given, then the pairs, the
-/// touches per trial and the seed. `look` and `stop` are those of `Experiment.run`.
+/// `counts` are the touches, trials and held-out targets or trials, where given, then the pairs,
+/// the touches per trial and the seed. `look` and `stop` are those of `Experiment.run`.
 #[pyfunction]
 #[pyo3(signature = (path, sets, *, against, tolerance, counts, is_full, look, stop))]
 #[allow(clippy::too_many_arguments)]
