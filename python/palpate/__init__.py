@@ -17,6 +17,7 @@ from ._palpate import Ball, Belief, Exploration, Scene, Touch, Zone, __version__
 from ._palpate import planners as _planners
 from ._run import Comparison, Run
 from ._scene import read_mesh, write_mesh
+from ._studies import accuracy, calibrate_band, identify
 
 if TYPE_CHECKING:
     from ._gaussian_process import GaussianProcess
@@ -38,8 +39,11 @@ __all__ = [
     "Touch",
     "Zone",
     "__version__",
+    "accuracy",
+    "calibrate_band",
     "check",
     "errors",
+    "identify",
     "read_mesh",
     "write_mesh",
 ]

@@ -30,6 +30,9 @@ __all__ = [
     "Touch",
     "Zone",
     "__version__",
+    "accuracy",
+    "calibrate_band",
+    "identify",
     "main",
     "planners",
     "read_mesh",
@@ -526,3 +529,35 @@ def read_mesh(
 ) -> tuple[tuple[_Array, npt.NDArray[np.uint32]], str]: ...
 def main(arguments: Sequence[str], load_planner: Callable[[str], Any]) -> int: ...
 def planners() -> list[str]: ...
+def accuracy(
+    path: str,
+    sets: Sequence[str],
+    *,
+    against: str | None,
+    tolerance: str | None,
+    counts: tuple[int | None, int | None, int | None, int, int, int],
+    is_full: bool,
+    look: Callable[[int, int], None],
+    stop: Callable[[], None],
+) -> str: ...
+def calibrate_band(
+    path: str,
+    sets: Sequence[str],
+    *,
+    trials: int,
+    is_test: bool,
+    look: Callable[[int, int], None],
+    stop: Callable[[], None],
+) -> str: ...
+def identify(
+    library: str,
+    path: str,
+    sets: Sequence[str],
+    *,
+    planner: str,
+    sure: float,
+    touches: int,
+    trial: int,
+    look: Callable[[int, int], None],
+    stop: Callable[[], None],
+) -> str: ...

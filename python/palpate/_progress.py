@@ -7,10 +7,11 @@ import time
 
 
 class Progress:
-    """Callback with the number of finished trials; it rewrites one line."""
+    """Callback with the number of finished pieces; it rewrites one line."""
 
-    def __init__(self, name: str, is_shown: bool) -> None:
+    def __init__(self, name: str, is_shown: bool, pieces: str = "trials") -> None:
         self._name = name
+        self._pieces = pieces
         self._is_shown = is_shown
         self._last: tuple[int, int] | None = None
         self._begun_s = time.monotonic()
@@ -21,4 +22,5 @@ class Progress:
         self._last = (done, total)
         gone_s = time.monotonic() - self._begun_s
         end = "\n" if done == total else ""
-        print(f"\r{self._name}: {done} of {total} trials, {gone_s:.1f} s", end=end, file=sys.stderr, flush=True)
+        text = f"\r{self._name}: {done} of {total} {self._pieces}, {gone_s:.1f} s"
+        print(text, end=end, file=sys.stderr, flush=True)

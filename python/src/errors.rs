@@ -62,6 +62,14 @@ pub(crate) fn run(error: RunError) -> PyErr {
     }
 }
 
+/// Converts an error of a study: of its settings, or another.
+pub(crate) fn study(error: anyhow::Error) -> PyErr {
+    match error.downcast::<ConfigError>() {
+        Ok(error) => config(error),
+        Err(error) => other(format!("{error:#}")),
+    }
+}
+
 /// Converts any other error.
 pub(crate) fn other(error: impl std::fmt::Display) -> PyErr {
     exception("PalpateError", &error.to_string(), &[])

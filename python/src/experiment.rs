@@ -295,6 +295,11 @@ impl RunCallbacks {
         }
     }
 
+    /// Counts a finished piece of a study.
+    pub(crate) fn step(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Whether a failed trial has ended the run.
     pub(crate) fn has_failure(&self) -> bool {
         self.failure.lock().is_ok_and(|failure| failure.is_some())

@@ -25,6 +25,7 @@ mod program;
 mod recognition;
 mod run;
 mod scene;
+mod studies;
 mod target;
 mod zone;
 
@@ -52,5 +53,8 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(mesh::read_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(program::main, module)?)?;
     module.add_function(wrap_pyfunction!(program::planners, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::accuracy, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::calibrate_band, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::identify, module)?)?;
     Ok(())
 }

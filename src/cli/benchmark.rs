@@ -4,14 +4,11 @@ use super::find::find;
 use super::host::Host;
 use super::output::{Overwrite, make_folder};
 use super::prepare::set_thread_count;
-use super::run::{self, name_objects};
+use super::run;
 use super::terminal::{Completion, Verbosity, print};
-use crate::experiment::Experiment;
-use crate::experiment::store::{Run, write_whole};
-use crate::experiment::sweep::sweep_cases;
+use crate::experiment::store::write_whole;
 use crate::report::benchmark::{markdown, table};
-use crate::study::benchmark::{BenchmarkSource, PROTOCOL, REFERENCE, protocol_sha256, summarise};
-use crate::study::compare::compare;
+use crate::study::benchmark::{self, BenchmarkSpec, PROTOCOL};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -48,8 +45,6 @@ pub(super) struct Args {
 
 /// Folder of the protocol's file.
 const SUITE: &str = "experiments/suite";
-/// Number of objects, and the settings, of the quick variant.
-const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 
 pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
     let name = format!("benchmark-{PROTOCOL}");
@@ -61,45 +56,29 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     files.iter().try_for_each(|file| args.force.check_file(file))?;
     set_thread_count(args.threads)?;
 
-    let mut cases = sweep_cases(&path)?;
-    let mut options = run::Args::of(&args.planner, args.threads, args.fresh);
-    if args.quick {
-        cases.truncate(QUICK.0);
-        options.set.extend(QUICK.1.map(String::from));
-    }
-    let load = |case| {
-        run::with_planners(&options.set, &args.planner, |sets| {
-            Experiment::load_cell(&path, case, sets)
-        })
-    };
-    let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
-    let mut stop = None;
-    let mut runs = Vec::new();
-    for experiment in experiments {
-        let part = folder.join(&experiment.name);
-        let made =
-            run::run_missing(&options, experiment, Some(part.clone()), &mut stop, talk, host)?;
-        match made.outcome(talk) {
-            Completion::Done => runs.push((part.display().to_string(), Run::read(&part)?)),
-            Completion::Interrupted => {
-                let folder = folder.display();
-                talk.note(format!(
-                    "stopped; the trials are in {folder}; repeat the command to continue"
-                ));
-                return Ok(Completion::Interrupted);
-            }
-            other => return Ok(other),
-        }
-    }
-    let mut compared = compare(&runs, REFERENCE)?;
-    name_objects(&mut compared, &name);
-    let source = BenchmarkSource {
-        protocol_sha256: protocol_sha256(&path)?,
-        quick: args.quick,
+    let spec = BenchmarkSpec {
+        path: &path,
+        folder: &folder,
+        planners: &args.planner,
+        is_quick: args.quick,
         commit: host.commit,
     };
-    let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
-    let result = summarise(source, &runs, &compared);
+    let options = run::Args::of(&args.planner, args.threads, args.fresh);
+    let (mut stop, mut outcome) = (None, Completion::Done);
+    let result = benchmark::run(&spec, &mut |experiment, part| {
+        let made = run::run_missing(&options, experiment, Some(part), &mut stop, talk, host)?;
+        outcome = made.outcome(talk);
+        Ok(matches!(outcome, Completion::Done))
+    })?;
+    let Some(result) = result else {
+        if matches!(outcome, Completion::Interrupted) {
+            let folder = folder.display();
+            talk.note(format!(
+                "stopped; the trials are in {folder}; repeat the command to continue"
+            ));
+        }
+        return Ok(outcome);
+    };
     make_folder(&folder)?;
     let [json, table_file] = &files;
     write_whole(json, serde_json::to_string_pretty(&result)? + "\n")?;

@@ -1,15 +1,14 @@
 //! Command `palpate calibrate`.
 
-use super::columns::{aligned, cell};
+use super::calibrate_band::{self, BandArgs};
+use super::calibration_text as text;
 use super::find::find_input;
-use super::terminal::{Completion, print};
+use super::output::Overwrite;
+use super::terminal::{Completion, Verbosity, print};
 use crate::sim::finger::calibration::constants::FingerConstants;
-use crate::sim::finger::calibration::fit::{Fit, FreeParameters, fit};
-use crate::sim::finger::calibration::score::{
-    HeldOutResult, Score, jackknife_factor, leave_one_out,
-};
-use crate::sim::finger::calibration::session::Session;
-use crate::sim::finger::calibration::shear::{ShearComparison, ShearRecordings, compare};
+use crate::sim::finger::calibration::fit::{FreeParameters, fit};
+use crate::sim::finger::calibration::score::leave_one_out;
+use crate::sim::finger::calibration::shear::{ShearRecordings, compare};
 use crate::sim::finger::effects::friction::FrictionEffect;
 use crate::sim::finger::effects::sensor;
 use crate::sim::finger::effects::skin::SkinModel;
@@ -21,7 +20,8 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Fit the finger's constants to recordings on a flat plate, and score them on held-out sensors.
-/// Pads and rigid tips are calibrated by `palpate register --ball`.
+/// Pads and rigid tips are calibrated by `palpate register --ball`. With --band, fit the 95 % band
+/// of beliefs.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -29,11 +29,18 @@ Examples:
   palpate calibrate models/biotac/flat_plate.json --out sensor.toml
   palpate calibrate models/biotac/flat_plate.json --attitude-only
   palpate calibrate models/biotac/flat_plate.json --shear models/biotac/shear.json
-  palpate calibrate models/biotac/flat_plate.json --model shell")]
+  palpate calibrate models/biotac/flat_plate.json --model shell
+  palpate calibrate --band experiments/suite/choosing.toml --set touches=60
+  palpate calibrate --band my-objects.toml --out bands/mine
+  palpate calibrate --band experiments/suite/reporting.toml --test     coverage of the experiment's own band
+
+With --band, runs trials on objects whose surface is known and fits the two half-widths of the 95 % band by quantile \
+regression. Writes band.toml, the table [gp.band] of an experiment, and reliability.svg. The printed coverage is that \
+of objects left out of the learning.")]
 pub struct Args {
     /// Recordings; the format is that of models/biotac/flat_plate.json.
-    #[arg(value_parser = find_input)]
-    recordings: PathBuf,
+    #[arg(value_parser = find_input, required_unless_present = "band", conflicts_with_all = ["test", "trials", "set", "threads"])]
+    recordings: Option<PathBuf>,
     /// Test the default constants: fit only the offset, gain and attitude (the finger's orientation
     /// on the plate) of each session.
     #[arg(long)]
@@ -46,8 +53,13 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t)]
     model: Skin,
     /// Write the constants fitted to all sensors to this file; a scene names it in effects.sensor.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["attitude_only", "shear"])]
+    /// With --band, folder for the results [default: runs/band-EXPERIMENT].
+    #[arg(long, value_name = "FILE|FOLDER", conflicts_with_all = ["attitude_only", "shear"])]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    band: BandArgs,
+    #[command(flatten)]
+    force: Overwrite,
 }
 
 #[derive(Clone, Copy, Default, clap::ValueEnum)]
@@ -59,9 +71,16 @@ enum Skin {
     Shell,
 }
 
-pub fn run(args: &Args) -> anyhow::Result<Completion> {
-    let name = args.recordings.display();
-    let recordings: Recordings = read(&args.recordings)?;
+pub fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
+    if let Some(experiment) = &args.band.band {
+        return calibrate_band::run(experiment, &args.band, args.out.as_deref(), args.force, talk);
+    }
+    let path = args.recordings.as_deref().context("allowed is a file with recordings")?;
+    if let Some(out) = &args.out {
+        args.force.check_file(out)?;
+    }
+    let name = path.display();
+    let recordings: Recordings = read(path)?;
     recordings.check().with_context(|| format!("{name}: not a recording"))?;
     let model = match args.model {
         Skin::Columns => SkinModel::Columns,
@@ -77,7 +96,7 @@ pub fn run(args: &Args) -> anyhow::Result<Completion> {
             let recording = same.with_context(|| format!("{name}: no sensor {}", of.sensor))?;
             let friction = FrictionEffect::default();
             let found = compare(&start, &friction, recording, of).with_context(refused)?;
-            print(&shear_table(&found, friction.stiffness_n_m))?;
+            print(&text::shear(&found, friction.stiffness_n_m))?;
         }
         return Ok(Completion::Done);
     }
@@ -85,17 +104,16 @@ pub fn run(args: &Args) -> anyhow::Result<Completion> {
         if args.attitude_only { FreeParameters::Sessions } else { FreeParameters::Constants };
     let held_out = leave_one_out(&start, sensors, free).with_context(refused)?;
     for held in &held_out {
-        print(&held_out_text(held))?;
+        print(&text::held_out(held))?;
     }
-    let whole: Vec<Score> = held_out.iter().map(HeldOutResult::overall).collect();
-    print(&table(vec![row("all sensors", &Score::of(whole.iter()))]))?;
+    print(&text::overall(&held_out))?;
     if free == FreeParameters::Constants {
         let all: Vec<&PlateRecording> = sensors.iter().collect();
         let fit = fit(&start, &all, free).with_context(refused)?;
-        print(&format!("constants fitted to {}", names(sensors.iter().map(|s| &s.sensor))))?;
-        print(&estimates(&fit, &held_out))?;
+        print(&format!("constants fitted to {}", text::names(sensors.iter().map(|s| &s.sensor))))?;
+        print(&text::estimates(&fit, &held_out))?;
         for (session, recording) in fit.sessions.iter().zip(sensors) {
-            print(&format!("  {}: {}", recording.sensor, session_text(session)))?;
+            print(&format!("  {}: {}", recording.sensor, text::session(session)))?;
         }
         let text = format!(
             "# Constants of the sensor for model = \"{}\" of [effects.skin], fitted by palpate calibrate \
@@ -122,96 +140,4 @@ fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
         let (line, what) = (error.line(), format::json(&error));
         anyhow!("{name}:{line}: not a recording: {what}")
     })
-}
-
-/// Table of the electrodes' responses to tangential force, measured and modelled.
-fn shear_table(found: &ShearComparison, stiffness_n_m: f64) -> String {
-    let ShearComparison { sensor, lateral, axial } = found;
-    let mut rows = vec![["  counts per N", "lateral", "model", "axial", "model"].map(String::from)];
-    rows.extend((0..lateral.measured.len()).map(|i| {
-        let [a, b, c, d] = [lateral.measured, lateral.model, axial.measured, axial.model]
-            .map(|slopes| cell(Some(slopes[i]), 0));
-        [format!("  E{}", i + 1), a, b, c, d]
-    }));
-    let table = aligned(&rows);
-    let values = [("lateral", lateral), ("axial", axial)].map(|(name, of)| {
-        let [least, most] = of.ratios();
-        format!(
-            "  {name}: correlation {:.2}; ratios of the eight largest slopes {least:.2} to {most:.2}; \
-             best stiffness {:.0} N/m",
-            of.correlation(),
-            stiffness_n_m / of.scale()
-        )
-    });
-    format!("sensor {sensor}, skin stiffness {stiffness_n_m} N/m\n{table}{}\n", values.join("\n"))
-}
-
-fn held_out_text(held: &HeldOutResult) -> String {
-    let from = match held.others.is_empty() {
-        true => "the default constants".into(),
-        false => format!("constants fitted to {}", names(held.others.iter())),
-    };
-    let mut text = format!("sensor {} with {from}\n", held.sensor);
-    text += &estimates(&held.fit, &[]);
-    for session in &held.fit.sessions {
-        text += &format!("  session: {}\n", session_text(session));
-    }
-    let mut rows = Vec::new();
-    for (force_n, score) in &held.loads {
-        rows.push(row(&format!("{force_n:.1} N"), score));
-    }
-    rows.push(row("all loads", &held.overall()));
-    text + &table(rows)
-}
-
-/// Lists the constants of a fit; `held_out` are fits without one sensor each.
-fn estimates(fit: &Fit, held_out: &[HeldOutResult]) -> String {
-    let mut text = String::new();
-    for found in &fit.estimates {
-        text += &format!("  {:22} {:.2e} */÷ {:.2}", found.key, found.value, found.factor);
-        if let Some(factor) = jackknife_factor(held_out, found.key) {
-            text += &format!(", between sensors */÷ {factor:.2}");
-        }
-        text.push('\n');
-    }
-    for lost in &fit.refused {
-        text += &format!(
-            "  {:22} refused: the fit ran to its bound {:e}, the recordings do not determine it; {:e} is kept\n",
-            lost.key, lost.bound, lost.kept
-        );
-    }
-    text
-}
-
-fn session_text(session: &Session) -> String {
-    let rolls: Vec<String> =
-        session.roll_rad.iter().map(|roll| format!("{:.0}", roll.to_degrees())).collect();
-    format!(
-        "conductivity {:.2}, gain {:.2}, pitch {:.1}°, roll {}° by load",
-        session.offset,
-        session.gain,
-        session.pitch_rad.to_degrees(),
-        rolls.join(", ")
-    )
-}
-
-fn names<'a>(sensors: impl Iterator<Item = &'a String>) -> String {
-    sensors.map(String::as_str).collect::<Vec<_>>().join(", ")
-}
-
-fn row(what: &str, score: &Score) -> [String; 6] {
-    [
-        format!("  {what}"),
-        cell(Some(score.model_counts), 0),
-        cell(Some(score.no_change_counts), 0),
-        cell(Some(score.offset_counts), 0),
-        cell(score.mean_change_counts, 0),
-        format!("{}/{}", score.right, score.signed),
-    ]
-}
-
-fn table(rows: Vec<[String; 6]>) -> String {
-    let head =
-        ["  mean error, counts", "model", "no change", "offset alone", "mean change", "signs"];
-    aligned(&[vec![head.map(String::from)], rows].concat())
 }

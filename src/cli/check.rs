@@ -3,7 +3,7 @@
 use super::find::{EXPERIMENTS, find, located};
 use super::host::Host;
 use super::output::Overwrite;
-use super::prepare::{planners_setting, prepare_simulation, set_thread_count};
+use super::prepare::{prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::backend_settings::arm_tables;
@@ -14,6 +14,7 @@ use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{
     CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, run_check,
 };
+use crate::study::planners::planners_setting;
 use anyhow::{Context, bail};
 use palpate_input::format::counted;
 use std::path::PathBuf;

@@ -1,9 +1,10 @@
 //! Lookup of experiments and scenes by name: `bird` finds `experiments/bird.toml`.
 
 pub(super) use crate::experiment::experiment::SCENES;
+pub(super) use crate::study::is_experiment;
 use anyhow::{bail, ensure};
 use palpate_geometry::import::is_mesh_file;
-use palpate_input::{files, shipped};
+use palpate_input::shipped;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
@@ -49,15 +50,6 @@ pub(super) fn find_input(path: &str) -> Result<PathBuf, Infallible> {
 /// Returns the path as [`find_input`] does.
 pub(super) fn located(path: &Path) -> PathBuf {
     shipped::locate(path, None).unwrap_or_else(|| path.into())
-}
-
-/// Whether the file is an experiment: experiments have `planners` or `scene`, scenes do not. An
-/// unreadable file counts as a scene.
-pub(super) fn is_experiment(path: &Path) -> bool {
-    files::text(path, files::TEXT_MAX)
-        .ok()
-        .and_then(|text| text.parse::<toml::Table>().ok())
-        .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
 }
 
 /// Sorted names of the files in `folder` that [`find`] finds.

@@ -14,10 +14,14 @@ use std::path::Path;
 #[command(after_help = "\
 Examples:
   palpate list                 everything that has a name
-  palpate list planners")]
+  palpate list planners
+  palpate list --reference > reference.md")]
 pub(super) struct Args {
     /// Kind to list [default: all].
     kind: Option<Kind>,
+    /// Print every command, setting and column as Markdown.
+    #[arg(long, conflicts_with = "kind")]
+    reference: bool,
 }
 
 /// Kinds of listed items.
@@ -46,6 +50,10 @@ const KINDS: &[(Kind, &str, Lister)] = &[
 ];
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
+    if args.reference {
+        print(super::reference().trim_end())?;
+        return Ok(Completion::Done);
+    }
     let wanted = KINDS.iter().filter(|(kind, ..)| args.kind.is_none_or(|wanted| wanted == *kind));
     let sections: Vec<String> =
         wanted.map(|(_, title, lines)| format!("{title}\n{}", two_columns(&lines()))).collect();

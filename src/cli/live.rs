@@ -3,29 +3,28 @@
 use super::find::{EXPERIMENTS, SCENES, find, find_input, is_experiment};
 use super::host::Host as Program;
 use super::new::{self, Written};
-use super::prepare::{connect_arm, load_experiment, planners_setting, prepare_simulation};
+use super::prepare::{connect_arm, load_experiment, prepare_simulation};
 use super::progress::stop_on_interrupt;
-use super::run::with_planners;
 use super::terminal::{Completion, Verbosity, command_line, error, print};
 use crate::experiment::Experiment;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::planner_names::known_planners;
 use crate::experiment::store::{RESOLVED, Run, RunFolder};
+use crate::live::files::{file_name, open_browser};
 use crate::live::session::{Session, replay};
 use crate::live::{Brought, Host, MeshWish, Server};
 use crate::report;
+use crate::study::planners::{planners_setting, with_planners};
 use anyhow::Context;
 use palpate_geometry::import::is_mesh_file;
 use palpate_input::error::InputError;
 use palpate_input::files;
-use std::io::Write as _;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use tempfile::NamedTempFile;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -279,9 +278,6 @@ struct Page {
     wishes: Sender<Experiment>,
 }
 
-/// Endings of mesh files that the page takes: one file holds all.
-const ENDINGS: [&str; 4] = ["stl", "obj", "ply", "glb"];
-
 impl Host for Page {
     fn bring(&self, wish: &MeshWish, mesh: &[u8]) -> Result<Brought, InputError> {
         let path = self.folder.join(file_name(&wish.name)?);
@@ -323,60 +319,15 @@ impl Host for Page {
     }
 }
 
-/// Returns the name under which the page's file is stored: letters, digits and `-_.`.
-fn file_name(name: &str) -> Result<String, InputError> {
-    let wrong = || {
-        let allowed = ENDINGS.join(", .");
-        InputError::new(format!("file name {name:?}: allowed are names that end in .{allowed}"))
-    };
-    let (stem, ending) = name.rsplit_once('.').ok_or_else(wrong)?;
-    let ending = ending.to_lowercase();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
-    let stem: String = stem.chars().map(|c| if is_plain(c) { c } else { '-' }).take(60).collect();
-    let stem = stem.trim_matches('-');
-    let is_fine = ENDINGS.contains(&ending.as_str()) && !stem.is_empty();
-    is_fine.then(|| format!("{stem}.{ending}")).ok_or_else(wrong)
-}
-
 /// Returns a folder that does not exist, for a run that is started on the page.
 fn new_folder(name: &str) -> PathBuf {
     let folder = |number: u32| Path::new("runs").join(format!("{name}-live-{number}"));
     (1..).map(folder).find(|path| !path.exists()).unwrap_or_else(|| folder(0))
 }
 
-/// Writes a file in `folder` that only this user can read and that leads a browser to `url`. Other
-/// users see the arguments of a process, so that the token cannot be one.
-fn entry_file(folder: &Path, url: &str) -> std::io::Result<NamedTempFile> {
-    files::make_folder(folder)?;
-    let mut file = tempfile::Builder::new().prefix("live-").suffix(".html").tempfile_in(folder)?;
-    write!(
-        file,
-        "<!doctype html>\n<meta charset=\"utf-8\">\n<title>Palpate live</title>\n\
-         <meta http-equiv=\"refresh\" content=\"0;url={url}\">\n<a href=\"{url}\">Palpate live</a>\n"
-    )?;
-    Ok(file)
-}
-
-/// Opens the page if there is a screen, by a file that lasts as long as the returned value. Errors
-/// are ignored, because the address is printed.
-fn open_browser(url: &str) -> Option<NamedTempFile> {
-    let has_screen =
-        ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
-    let opener = match () {
-        () if cfg!(target_os = "macos") => "open",
-        () if has_screen => "xdg-open",
-        () => return None,
-    };
-    let file = entry_file(Path::new("runs"), url).ok()?;
-    let path = file.path().canonicalize().ok()?;
-    let quiet = || std::process::Stdio::null();
-    let _ = std::process::Command::new(opener).arg(path).stdout(quiet()).stderr(quiet()).spawn();
-    Some(file)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Args, address, file_name};
+    use super::{Args, address};
     use clap::{Args as _, FromArgMatches};
 
     #[test]
@@ -389,23 +340,6 @@ mod tests {
         let expected = "palpate live real_arm --set trials=2 --planner human --listen 0.0.0.0:80 \
                         --approve --clear-fault";
         assert_eq!(command, expected);
-    }
-
-    #[test]
-    fn names_of_files_stay_in_their_folder() {
-        for (name, expected) in [
-            ("part.stl", Some("part.stl")),
-            ("My Part (2).STL", Some("My-Part--2.stl")),
-            ("../../etc/part.obj", Some("etc-part.obj")),
-            ("..\\part.ply", Some("part.ply")),
-            (".stl", None),
-            ("part", None),
-            ("part.gltf", None),
-            ("part.toml", None),
-            ("..", None),
-        ] {
-            assert_eq!(file_name(name).ok().as_deref(), expected, "{name}");
-        }
     }
 
     #[test]

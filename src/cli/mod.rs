@@ -4,12 +4,10 @@ mod accuracy;
 mod benchmark;
 mod calibrate;
 mod calibrate_band;
+mod calibration_text;
 mod camera;
 mod check;
-mod choices;
-mod columns;
 mod compare;
-mod completions;
 mod doctor;
 mod doctor_arm;
 mod export;
@@ -19,7 +17,6 @@ mod identify;
 mod known_body;
 mod list;
 mod live;
-mod look;
 mod new;
 mod output;
 mod picture;
@@ -41,11 +38,14 @@ mod show;
 mod slow_steps;
 mod step;
 mod terminal;
+mod topic;
 mod watch;
 
 pub use host::Host;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap_complete::{Shell, generate};
 use setting_tip::with_setting_tip;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -57,8 +57,11 @@ use terminal::{Completion, Verbosity, print};
 struct Cli {
     #[command(flatten)]
     talk: Verbosity,
+    /// Print the completion script of a shell.
+    #[arg(long, value_name = "SHELL")]
+    completions: Option<Shell>,
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 const EXAMPLES: &str = "\
@@ -95,13 +98,11 @@ enum Command {
     Live(live::Args),
     /// Identify an object of a library, and its pose, by touch.
     Identify(identify::Args),
-    /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts as a point
-    /// cloud.
+    /// Export a run's belief (the estimated surface) as a mesh, or a scene's contacts or a camera's
+    /// view as a point cloud.
     Export(export::Args),
-    /// Compare planners over several runs.
+    /// Compare planners over several runs, or fingertip sensors on the same experiments.
     Compare(compare::Args),
-    /// Compare fingertip sensors on the same experiments.
-    Sensors(sensors::Args),
     /// Run a fixed protocol over many objects and rank planners, your own too.
     Benchmark(benchmark::Args),
     /// Test planners for regressions against a stored baseline.
@@ -110,31 +111,23 @@ enum Command {
     Accuracy(accuracy::Args),
     /// Serve a simulated robot over ROS topics in real time.
     Serve(serve::Args),
-    /// Save a view of a depth camera from its ROS topic.
-    Look(look::Args),
     /// Register the finger, a ball, a plate or an object by touch.
     Register(register::Args),
     /// Replay a recorded trial and compare commands and results.
     Replay(replay::Args),
-    /// Fit the finger's constants to recordings on a flat plate.
+    /// Fit the finger's constants to recordings on a flat plate, or the 95 % band to objects.
     Calibrate(calibrate::Args),
-    /// Learn the 95 % band from objects of known shape, or test it.
-    CalibrateBand(calibrate_band::Args),
-    /// List experiments, scenes, planners, measures and effects.
+    /// List experiments, scenes, planners, measures and effects; print the reference.
     List(list::Args),
     /// Print the state of MuJoCo, display, ROS, clock and files, with remedies.
     Doctor(doctor::Args),
-    /// Print a shell completion script.
-    Completions(completions::Args),
-    /// Print every command, setting and column as Markdown.
-    Reference(reference::Args),
 }
 
 /// Groups of commands in the help; the last group has all others.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "live", "identify", "report", "show", "export"]),
-    ("Evaluate", &["compare", "sensors", "benchmark", "check", "accuracy", "calibrate-band"]),
-    ("Robot", &["serve", "look", "register", "replay", "calibrate"]),
+    ("Evaluate", &["compare", "benchmark", "check", "accuracy"]),
+    ("Robot", &["serve", "register", "replay", "calibrate"]),
     ("More", &[]),
 ];
 
@@ -176,7 +169,19 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
     let cli = (parser.clone().try_get_matches_from(&arguments))
         .and_then(|found| Cli::from_arg_matches(&found))
         .unwrap_or_else(|error| with_setting_tip(error, &parser, &arguments).exit());
-    match run_command(cli, host) {
+    let result = match (cli.completions, cli.command) {
+        (Some(shell), None) => complete(shell),
+        (None, Some(command)) => run_command(command, cli.talk, host),
+        (Some(_), Some(_)) => {
+            let text = "--completions SHELL prints a script: allowed is no command beside it";
+            parser.clone().error(ErrorKind::ArgumentConflict, text).exit()
+        }
+        (None, None) => {
+            let text = "a command is missing; `palpate --help` lists all";
+            parser.clone().error(ErrorKind::MissingSubcommand, text).exit()
+        }
+    };
+    match result {
         Ok(Completion::Done) => 0,
         Ok(Completion::Failed) => 1,
         Ok(Completion::Undecided) => 3,
@@ -188,7 +193,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
     }
 }
 
-fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Completion> {
+fn run_command(command: Command, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
     match command {
         Command::New(args) => new::run(&args, talk),
         Command::Run(args) => run::run(&args, talk, host),
@@ -197,22 +202,25 @@ fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Comple
         Command::Live(args) => live::run(&args, talk, host),
         Command::Identify(args) => identify::run(&args, talk),
         Command::Export(args) => export::run(&args, talk),
-        Command::Compare(args) => compare::run(&args),
-        Command::Sensors(args) => sensors::run(&args, talk),
+        Command::Compare(args) => compare::run(&args, talk),
         Command::Benchmark(args) => benchmark::run(&args, talk, host),
         Command::Check(args) => check::run(&args, talk, host),
         Command::Accuracy(args) => accuracy::run(&args, talk),
         Command::Serve(args) => serve::run(&args, talk),
-        Command::Look(args) => look::run(&args),
         Command::Register(args) => register::run(&args, talk),
         Command::Replay(args) => replay::run(&args, talk),
-        Command::Calibrate(args) => calibrate::run(&args),
-        Command::CalibrateBand(args) => calibrate_band::run(&args, talk),
+        Command::Calibrate(args) => calibrate::run(&args, talk),
         Command::List(args) => list::run(&args),
         Command::Doctor(args) => doctor::run(&args, host),
-        Command::Completions(args) => completions::run(&args, Cli::command()),
-        Command::Reference(_) => print(reference().trim_end()).map(|()| Completion::Done),
     }
+}
+
+/// Prints the completion script of a shell.
+fn complete(shell: Shell) -> anyhow::Result<Completion> {
+    let mut script = Vec::new();
+    generate(shell, &mut Cli::command(), "palpate", &mut script);
+    print(String::from_utf8_lossy(&script).trim_end())?;
+    Ok(Completion::Done)
 }
 
 /// Returns commands, settings and columns as Markdown, the text of `docs/reference.md`.

@@ -1,11 +1,11 @@
 //! `palpate run --plan`: estimates time and memory per shard.
 
-use super::columns::{aligned, duration};
 use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::runner::{self, Shard};
+use crate::report::columns::{aligned, duration};
 use palpate_input::format::counted;
 use std::sync::atomic::Ordering;
 use std::time::Instant;

@@ -7,19 +7,13 @@ use crate::experiment::store::Journal;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use palpate_explore::backend::arm::Arm;
 use palpate_explore::backend::interlock::StartCheckSettings;
 use palpate_input::config::ConfigError;
 use palpate_input::format::counted;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Returns the `--set` assignment of an experiment's planners.
-pub(super) fn planners_setting<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let names: Vec<String> = names.map(|name| format!("{name:?}")).collect();
-    format!("planners=[{}]", names.join(","))
-}
 
 /// Limits the number of threads of the process; 0 means all cores.
 pub(super) fn set_thread_count(threads: u16) -> anyhow::Result<()> {
@@ -57,17 +51,6 @@ pub(super) fn prepare_environment(
     talk: Verbosity,
 ) -> anyhow::Result<Arc<Environment>> {
     Ok(Arc::new(report_slow_steps(talk, |tell| Environment::build_with_progress(scene, tell))?))
-}
-
-/// Rejects a scene of a whole object for a command that needs a zone.
-pub(super) fn needs_zone(scene: &Scene, path: &Path) -> anyhow::Result<()> {
-    ensure!(
-        scene.whole_object.is_none(),
-        "{}: [whole_object] explores a whole object, but this command needs one side of it; allowed is a \
-         scene with [zone]",
-        path.display()
-    );
-    Ok(())
 }
 
 /// Rejects an option that does not apply to `path`. Each entry holds the option's name, whether it

@@ -1,10 +1,9 @@
 //! Command `palpate run`.
 
-use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::plan::plan;
-use super::prepare::{connect_arm, planners_setting, prepare_simulation, set_thread_count};
+use super::prepare::{connect_arm, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::rehearse;
 use super::step::{Stepper, is_unregistered};
@@ -19,9 +18,10 @@ use crate::experiment::store::{RECORDINGS, RowCounts, Run, RunFolder};
 use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::TrialEvent;
 use crate::report;
-use crate::study::compare::{SuiteComparison, compare};
+use crate::report::compare as comparison;
+use crate::study::compare::{compare, name_objects};
+use crate::study::planners::with_planners;
 use anyhow::{Context, bail, ensure};
-use palpate_input::config::ConfigError;
 use palpate_input::error::InputError;
 use palpate_input::files;
 use palpate_input::format::counted;
@@ -56,7 +56,7 @@ pub(super) struct Args {
     experiment: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
-    pub(super) set: Vec<String>,
+    set: Vec<String>,
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -233,39 +233,15 @@ fn compare_cells(
     // Cells with different planners, or without ground truth, cannot be compared.
     let Ok(mut compared) = compare(&runs, against) else { return Ok(()) };
     name_objects(&mut compared, name);
-    let mut text = compare::text(&compared);
+    let mut text = comparison::text(&compared);
     if !args.no_report {
-        let page = compare::write(folder, name, &first.question, &compared)?;
+        let page = comparison::write(folder, name, &first.question, &compared)?;
         text += &format!("\npage: {}", page.display());
     }
     if !args.json {
         print(&text)?;
     }
     Ok(())
-}
-
-/// Shortens the names of a sweep's objects by the name of the sweep and the key of the scenes.
-pub(super) fn name_objects(compared: &mut SuiteComparison, sweep: &str) {
-    for object in &mut compared.objects {
-        let label = object.strip_prefix(sweep).unwrap_or(object);
-        *object = label.trim_start_matches("-scene").trim_start_matches('-').to_owned();
-    }
-}
-
-/// Loads the experiment with the settings of `--set` and adds the planners of `--planner`.
-pub(super) fn with_planners(
-    sets: &[String],
-    planners: &[String],
-    load: impl Fn(&[String]) -> Result<Experiment, ConfigError>,
-) -> Result<Experiment, ConfigError> {
-    let experiment = load(sets)?;
-    if planners.is_empty() {
-        return Ok(experiment);
-    }
-    let listed = |name: &&String| experiment.planners.contains(name);
-    let too = planners.iter().filter(|name| !listed(name));
-    let planners = planners_setting(experiment.planners.iter().chain(too));
-    load(&[sets, &[planners]].concat())
 }
 
 /// Result of a run.

@@ -1,7 +1,7 @@
 //! `palpate export SCENE`: touches a grid of targets and writes the contact cloud.
 
 use super::output::{Overwrite, make_folder};
-use super::prepare::{needs_zone, prepare_environment, prepare_simulator};
+use super::prepare::{prepare_environment, prepare_simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::scan;
@@ -9,6 +9,7 @@ use crate::experiment::store::write_whole;
 use crate::report::points::PointCloud;
 use crate::report::{files, scan as drawing};
 use crate::sim::Scene;
+use crate::study::needs_zone;
 use anyhow::Context;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::Outcome;

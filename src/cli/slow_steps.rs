@@ -8,9 +8,12 @@ use std::time::{Duration, Instant};
 // heuristic: a shorter wait needs no message.
 const SLOW_STEP: Duration = Duration::from_secs(1);
 
-/// Runs `work`, which reports the name of each step at its start, and prints the names of slow
-/// steps to stderr.
-pub(super) fn report_slow_steps<T>(talk: Verbosity, work: impl FnOnce(&dyn Fn(&str)) -> T) -> T {
+/// Runs `work`, which reports the name of each step at its start, or an empty one at the end of a
+/// step that no other follows, and prints the names of slow steps to stderr.
+pub(super) fn report_slow_steps<T>(
+    talk: Verbosity,
+    work: impl FnOnce(&(dyn Fn(&str) + Sync)) -> T,
+) -> T {
     let show = |step: &str| {
         if !talk.quiet {
             print_stderr(&format!("{step} ..."));
@@ -22,7 +25,7 @@ pub(super) fn report_slow_steps<T>(talk: Verbosity, work: impl FnOnce(&dyn Fn(&s
 fn showing_slow<T>(
     patience: Duration,
     show: impl Fn(&str) + Send,
-    work: impl FnOnce(&dyn Fn(&str)) -> T,
+    work: impl FnOnce(&(dyn Fn(&str) + Sync)) -> T,
 ) -> T {
     let (begin, begun) = channel();
     std::thread::scope(|scope| {
@@ -39,10 +42,11 @@ fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) 
         loop {
             match begun.recv_timeout(patience) {
                 Ok(next) => step = next,
+                Err(RecvTimeoutError::Timeout) if step.is_empty() => {}
                 Err(RecvTimeoutError::Timeout) => break,
                 Err(RecvTimeoutError::Disconnected) => return,
             }
-            if shown.elapsed() > REPORT_INTERVAL * patience {
+            if !step.is_empty() && shown.elapsed() > REPORT_INTERVAL * patience {
                 break;
             }
         }

@@ -5,6 +5,7 @@
 //! in a report: by replaying the touches so far.
 
 mod desk;
+pub mod files;
 mod guard;
 mod human;
 mod order;

@@ -14,11 +14,13 @@ use crate::experiment::metrics::silhouette::TENTHS;
 use crate::experiment::planner_names::ORACLE;
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::mean;
+use crate::experiment::store::write_whole;
 use crate::study::compare::{
     BASELINE_PLANNER, Entrant, ObjectResult, SuiteComparison, gap_closed, geometric_mean,
     interquartile_mean_interval, profile, win_probability,
 };
 use palpate_input::format::counted;
+use std::path::{Path, PathBuf};
 
 /// Seed of all bootstraps.
 const SEED: u64 = 0;
@@ -299,4 +301,28 @@ fn draw(
     }
     panel.name_axes(canvas, x_name, y_name);
     sheet.canvas.finish()
+}
+
+/// Name of the page in its folder.
+pub const PAGE: &str = "suite.html";
+
+/// Formats the tables of a comparison for a terminal, per object and overall.
+pub fn text(compared: &SuiteComparison) -> String {
+    format!("{}\n{}", per_object_table(compared).text(), overall(compared).text())
+}
+
+/// Writes a comparison to a folder as a page and a CSV table; returns the page's path.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(
+    folder: &Path,
+    name: &str,
+    question: &str,
+    compared: &SuiteComparison,
+) -> anyhow::Result<PathBuf> {
+    let page = folder.join(PAGE);
+    write_whole(&page, html(name, question, compared))?;
+    file(compared).write_csv(&folder.join("suite.csv"))?;
+    Ok(page)
 }

@@ -13,8 +13,9 @@ use super::style::{self, FAINT_INK, FRAME, SMALL_PX, TEXT_PX};
 use super::table::digits;
 use super::whole_object;
 use crate::experiment::measure::Measure;
-use crate::experiment::row::{TrialRow, planner_rows};
+use crate::experiment::row::TrialRow;
 use crate::experiment::store::Run;
+use crate::study::export::{median_index, ranked};
 use anyhow::Context;
 use palpate_explore::task::Zone;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -40,23 +41,6 @@ const ERROR_PX: [f64; 2] = [152.0, 84.0];
 const BAR_PX: [f64; 2] = [50.0, 260.0];
 /// Width that the colour bar and its label need.
 const WIDTH_MIN_PX: f64 = 460.0;
-
-/// Returns the finished trials of a planner with their final errors, the smallest error first;
-/// empty without ground truth.
-pub fn ranked<'a>(run: &'a Run, planner: &'a str) -> Vec<(&'a TrialRow, f64)> {
-    let experiment = &run.experiment;
-    let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
-    let error = |row| experiment.error_measure().value(row, experiment.touches);
-    let mut ranked: Vec<(&TrialRow, f64)> =
-        finished.filter_map(|row| Some((row, error(row)?))).collect();
-    ranked.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-    ranked
-}
-
-/// Returns the index of the median in a list of this length; of the two middle ones the first.
-pub fn median_index(count: usize) -> usize {
-    count.saturating_sub(1) / 2
-}
 
 /// Describes the place of a trial among the trials of its planner by final error.
 pub fn rank_words(run: &Run, planner: &str, trial: u32) -> String {

@@ -8,8 +8,10 @@ pub mod benchmark;
 pub mod camera_view;
 pub mod canvas;
 pub mod check;
+pub mod columns;
 pub mod compare;
 pub mod explorer;
+pub mod export;
 pub mod figures;
 pub mod files;
 pub mod film;
@@ -17,6 +19,7 @@ pub mod findings;
 mod glossary;
 pub mod heat_map;
 pub mod html;
+pub mod identify;
 pub mod legend;
 pub mod orientation;
 pub mod page;
@@ -33,8 +36,9 @@ pub mod solid;
 pub mod style;
 pub mod table;
 pub mod tables {
-    //! Tables of a run, for its page and its folder.
+    //! Tables of runs and studies.
 
+    pub mod accuracy;
     pub mod comparison;
     pub mod summary;
 }

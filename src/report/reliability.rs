@@ -1,10 +1,12 @@
-//! Reliability diagram of a band: the share of the truth below each quantile.
+//! Reliability diagram of a band, the share of the truth below each quantile, and the table of its
+//! coverage.
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
+use super::columns::{aligned_rows, cell};
 use super::legend::{FigureLayout, Swatch};
 use super::style::{self, FAINT_INK};
-use crate::study::band::LEVELS;
+use crate::study::band::{BandCoverage, COUNTS, LEVELS};
 
 /// Colours of the touch counts, few to many (viridis, van der Walt and Smith 2015).
 const COLOURS: [&str; 7] =
@@ -44,4 +46,37 @@ pub fn draw(counts: &[(u32, [f64; LEVELS.len()])]) -> String {
         panel.curve(&mut sheet.canvas, &line, &style::stroke(colour(i), 1.8));
     }
     sheet.canvas.finish()
+}
+
+/// Returns the coverage of each object and of their mean after each count.
+pub fn table(covered: &[BandCoverage]) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for it in covered {
+        if !names.contains(&it.object.as_str()) {
+            names.push(&it.object);
+        }
+    }
+    let counts: Vec<u32> =
+        COUNTS.into_iter().filter(|n| covered.iter().any(|it| it.touches == *n)).collect();
+    type Value = fn(&BandCoverage) -> Option<f64>;
+    let values: [Value; 2] = [|it| Some(it.coverage), |it| it.reachable_coverage];
+    let row = |name: &str, holds: &dyn Fn(&BandCoverage) -> bool| {
+        let mut cells = vec![name.to_string()];
+        for value in values {
+            for &count in &counts {
+                let at = covered.iter().filter(|it| it.touches == count && holds(it));
+                let at: Vec<f64> = at.filter_map(value).collect();
+                let mean = at.iter().sum::<f64>() / at.len() as f64;
+                cells.push(cell(Some(mean).filter(|mean| mean.is_finite()), 3));
+            }
+        }
+        cells
+    };
+    let mut lines = vec![vec!["coverage of the 95 % band".to_string()]];
+    for what in ["", "reach. "] {
+        lines[0].extend(counts.iter().map(|count| format!("{what}{count}")));
+    }
+    lines.extend(names.iter().map(|name| row(name, &|it| it.object == *name)));
+    lines.push(row("mean", &|_| true));
+    aligned_rows(&lines)
 }

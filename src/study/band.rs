@@ -5,19 +5,30 @@
 //! at the probability 0.025; every object and count weighs the same. Learning without a fifth of
 //! the objects shows the coverage of objects that the band has not seen.
 
-use crate::experiment::Simulation;
+use super::needs_zone;
+use crate::experiment::planner_names::ORACLE;
+use crate::experiment::sweep::sweep_cases;
 use crate::experiment::trial::TrialEvent;
+use crate::experiment::{Experiment, Simulation};
+use anyhow::ensure;
 use palpate_explore::band::{BandFeatures, COEFFICIENTS, LearnedBand, relative_width};
 use palpate_gp::math::bfgs::{BfgsClimb, BfgsOptions};
 use palpate_gp::math::optimize::Bounds;
 use palpate_input::error::InputError;
+use palpate_input::tables;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Touch counts after which beliefs are sampled, once there is a fit.
 pub const COUNTS: [u32; 10] = [1, 2, 4, 7, 10, 15, 20, 30, 45, 60];
+
+/// Smallest number of objects that a band is learned from.
+// heuristic: one object of each fold, and one more.
+const OBJECTS_MIN: usize = 6;
 
 /// Step between the test places of a grid.
 // heuristic: neighbouring errors are correlated, so that more places add little.
@@ -57,24 +68,177 @@ const WEIGHT_EXPONENTS: [f64; 2] = [0.75, 0.25];
 
 /// A test place of a belief, with the true height there.
 #[derive(Clone, Debug)]
-pub struct BandSample {
+struct BandSample {
     /// Number of touches.
-    pub count: u32,
+    count: u32,
     /// Whether the finger can touch the surface there.
-    pub is_reachable: bool,
+    is_reachable: bool,
     /// True height above the datum, m.
-    pub height_m: f64,
+    height_m: f64,
     /// Features of the belief.
-    pub features: BandFeatures,
+    features: BandFeatures,
 }
 
 /// Samples of all trials of an object.
 #[derive(Clone, Debug)]
-pub struct ObjectSamples {
+struct ObjectSamples {
     /// Name of the object.
-    pub object: String,
+    object: String,
     /// Samples of its beliefs.
-    pub samples: Vec<BandSample>,
+    samples: Vec<BandSample>,
+}
+
+/// Experiments and extent of the study.
+pub struct BandSpec {
+    /// Name of the experiments, which the band keeps.
+    name: String,
+    /// Experiments over zones of known objects, one per object.
+    experiments: Vec<Experiment>,
+    /// Trials per planner and object.
+    trials: u32,
+    /// Band that is tested; `None` to learn one.
+    tested: Option<LearnedBand>,
+}
+
+/// Progress of the study.
+pub enum BandProgress<'a> {
+    /// A step of a preparation begins, or with `None` its last one has ended.
+    Step(Option<&'a str>),
+    /// A touch was made.
+    Touch,
+}
+
+/// Band with its coverage.
+pub struct BandResult {
+    /// Learned band; `None` if one was tested.
+    pub band: Option<LearnedBand>,
+    /// Coverage of each object after each count of touches, by a band that was learned without the
+    /// object, or by the tested one.
+    pub coverage: Vec<BandCoverage>,
+    /// Shares of the truth below the quantiles at [`LEVELS`] after counts of touches.
+    pub reliability: Vec<(u32, [f64; LEVELS.len()])>,
+}
+
+/// Part of an experiment's file with a band.
+#[derive(Serialize)]
+struct BandFile<'a> {
+    gp: BandTable<'a>,
+}
+
+#[derive(Serialize)]
+struct BandTable<'a> {
+    band: &'a LearnedBand,
+}
+
+impl BandSpec {
+    /// Loads the experiment at `path` or, if it has a sweep, its cases; `trials` are those of each
+    /// planner and object. With `is_test` the experiment's own band is tested.
+    ///
+    /// # Errors
+    /// If the experiments have no zone, too few objects, no touches after a fit, or no band to
+    /// test.
+    pub fn load(path: &Path, sets: &[String], trials: u32, is_test: bool) -> anyhow::Result<Self> {
+        let cases = sweep_cases(path)?;
+        let experiments = match cases.is_empty() {
+            true => vec![Experiment::load(path, sets)?],
+            false => (cases.iter())
+                .map(|case| Experiment::load_cell(path, case, sets))
+                .collect::<Result<_, _>>()?,
+        };
+        for experiment in &experiments {
+            needs_zone(&experiment.scene, path)?;
+        }
+        let name = path.display().to_string();
+        ensure!(
+            is_test || experiments.len() >= OBJECTS_MIN,
+            "{name}: has {} objects; a band is learned from at least {OBJECTS_MIN}, listed in [sweep] scene",
+            experiments.len()
+        );
+        let first = &experiments[0];
+        let sampled = COUNTS.into_iter().find(|&count| count >= first.first_fit());
+        let least = sampled.unwrap_or(COUNTS[0]);
+        ensure!(
+            sampled.is_some_and(|least| first.touches >= least),
+            "{name}: touches = {}, of which {} are initial; allowed is at least {least}, with a fit after one of \
+             the counts {COUNTS:?}",
+            first.touches,
+            first.first_fit(),
+        );
+        let tested = first.gp.band.learned().filter(|_| is_test).cloned();
+        ensure!(
+            !is_test || tested.is_some(),
+            "{name}: gp.band has no half-widths to test; allowed is \"objects\" or a table of this command"
+        );
+        Ok(Self { name, experiments, trials, tested })
+    }
+
+    /// Number of touches of all trials.
+    pub fn touches(&self) -> u64 {
+        let of = |experiment: &Experiment| {
+            planners(experiment).count() as u64 * u64::from(experiment.touches)
+        };
+        u64::from(self.trials) * self.experiments.iter().map(of).sum::<u64>()
+    }
+}
+
+/// Planners of an experiment without the oracle.
+fn planners(experiment: &Experiment) -> impl Iterator<Item = &String> {
+    experiment.planners.iter().filter(|name| *name != ORACLE)
+}
+
+/// Learns the band from trials on all objects, or tests one; `None` if `stop` becomes true.
+///
+/// # Errors
+/// If an experiment cannot be simulated, a planner is not available, or a trial ended early.
+pub fn run(
+    spec: BandSpec,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(BandProgress) + Sync),
+) -> anyhow::Result<Option<BandResult>> {
+    let BandSpec { name, experiments, trials, tested } = spec;
+    let mut objects = Vec::new();
+    for experiment in experiments {
+        let object = object_name(&experiment);
+        let begin = |name: &str| progress(BandProgress::Step(Some(name)));
+        let simulation = Simulation::new_with_progress(experiment, &begin);
+        progress(BandProgress::Step(None));
+        let simulation = simulation?;
+        let jobs: Vec<(u32, &String)> = (0..trials)
+            .flat_map(|trial| planners(simulation.experiment()).map(move |name| (trial, name)))
+            .collect();
+        let touched = || progress(BandProgress::Touch);
+        let samples = (jobs.into_par_iter())
+            .filter(|_| !stop.load(Ordering::Relaxed))
+            .map(|(trial, name)| sample_trial(&simulation, name, trial, &touched))
+            .collect::<Result<Vec<_>, _>>()?;
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        objects.push(ObjectSamples { object, samples: samples.concat() });
+    }
+    let all: Vec<&ObjectSamples> = objects.iter().collect();
+    let learned_from = format!("{name}, {} objects", objects.len());
+    let (band, bands) = match tested {
+        Some(band) => (None, vec![band; objects.len()]),
+        None => (Some(learn(&all, learned_from)), left_out_bands(&objects).unwrap_or_default()),
+    };
+    let covered = objects.iter().zip(&bands);
+    let coverage = covered.flat_map(|(object, band)| coverage(object, band)).collect();
+    Ok(Some(BandResult { band, coverage, reliability: reliability(&objects, &bands) }))
+}
+
+/// Returns the name of an experiment's object: that of its mesh, or of the experiment.
+fn object_name(experiment: &Experiment) -> String {
+    let mesh = experiment.scene.object.as_ref().and_then(|object| object.mesh.file_stem());
+    mesh.map_or(experiment.name.clone(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Returns a band as a part of an experiment's file, the contents of `band.toml`.
+///
+/// # Errors
+/// If the band cannot be written as TOML.
+pub fn file_text(band: &LearnedBand) -> anyhow::Result<String> {
+    Ok(tables::text(&BandFile { gp: BandTable { band } })?)
 }
 
 /// Runs a trial of `planner` and returns its samples; empty without a known surface over a zone.
@@ -82,7 +246,7 @@ pub struct ObjectSamples {
 ///
 /// # Errors
 /// If the planner is not available, or the trial ended early.
-pub fn sample_trial(
+fn sample_trial(
     simulation: &Simulation,
     planner: &str,
     trial: u32,
@@ -120,7 +284,7 @@ pub fn sample_trial(
 }
 
 /// Learns the band from objects.
-pub fn learn(objects: &[&ObjectSamples], learned_from: String) -> LearnedBand {
+fn learn(objects: &[&ObjectSamples], learned_from: String) -> LearnedBand {
     let [mut below, above] = [0, 1].map(|side| half_width(objects, side));
     below[0] += UNSEEN.ln();
     let mut band = LearnedBand { learned_from: Cow::Owned(learned_from), below, above, tail: 1.0 };
@@ -240,7 +404,7 @@ pub struct BandCoverage {
 }
 
 /// Returns the coverage of each object by `band` after each count.
-pub fn coverage(object: &ObjectSamples, band: &LearnedBand) -> Vec<BandCoverage> {
+fn coverage(object: &ObjectSamples, band: &LearnedBand) -> Vec<BandCoverage> {
     let of_count = |&touches: &u32| {
         let samples = object.samples.iter().filter(|sample| sample.count == touches);
         let (mut all, mut inside, mut reached, mut reached_inside, mut score_m) = (0, 0, 0, 0, 0.0);
@@ -268,7 +432,7 @@ pub fn coverage(object: &ObjectSamples, band: &LearnedBand) -> Vec<BandCoverage>
 
 /// Returns the band learned without each object's fold, one per object; `None` with fewer than two
 /// objects.
-pub fn left_out_bands(objects: &[ObjectSamples]) -> Option<Vec<LearnedBand>> {
+fn left_out_bands(objects: &[ObjectSamples]) -> Option<Vec<LearnedBand>> {
     let folds = FOLDS.min(objects.len());
     let without = |fold: usize| {
         let kept = objects.iter().enumerate().filter(|(i, _)| i % folds != fold);
@@ -286,7 +450,7 @@ pub const LEVELS: [f64; 11] = [0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.9
 
 /// Returns, for each count of touches, the share of the truth below the quantile at each of
 /// [`LEVELS`], every object the same. `bands` has one band for each object.
-pub fn reliability(
+fn reliability(
     objects: &[ObjectSamples],
     bands: &[LearnedBand],
 ) -> Vec<(u32, [f64; LEVELS.len()])> {

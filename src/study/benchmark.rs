@@ -3,19 +3,21 @@
 //! The protocol is an experiment file with a sweep of scenes. Its hash covers that file and all
 //! files that it names, so results of different protocols cannot be taken for each other.
 
-use super::compare::{Entrant, SuiteComparison, gap_closed, geometric_mean};
+use super::compare::{Entrant, SuiteComparison, compare, gap_closed, geometric_mean, name_objects};
+use super::planners::with_planners;
 use crate::experiment::Experiment;
 use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::median;
 use crate::experiment::store::Run;
+use crate::experiment::sweep::sweep_cases;
 use palpate_input::error::InputError;
 use palpate_input::files;
 use palpate_input::format::hex;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Version of the protocol. A new one needs a new file in `experiments/suite`.
 pub const PROTOCOL: &str = "2";
@@ -174,6 +176,62 @@ pub struct BenchmarkSource<'a> {
     pub quick: bool,
     /// Commit of the build.
     pub commit: &'a str,
+}
+
+/// Protocol and extent of the study.
+pub struct BenchmarkSpec<'a> {
+    /// File of the protocol.
+    pub path: &'a Path,
+    /// Folder of the objects' runs.
+    pub folder: &'a Path,
+    /// Planners beside those of the protocol.
+    pub planners: &'a [String],
+    /// Whether objects and trials are left out.
+    pub is_quick: bool,
+    /// Commit of the build.
+    pub commit: &'a str,
+}
+
+/// Number of objects, and the settings, of the quick variant.
+const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
+
+/// Runs the protocol: `run_missing` runs the missing trials of an object in a folder and returns
+/// whether all are finished. Returns `None` as soon as they are not.
+///
+/// # Errors
+/// If the protocol cannot be read, or `run_missing` fails.
+pub fn run(
+    spec: &BenchmarkSpec,
+    run_missing: &mut dyn FnMut(Experiment, PathBuf) -> anyhow::Result<bool>,
+) -> anyhow::Result<Option<BenchmarkResult>> {
+    let mut cases = sweep_cases(spec.path)?;
+    let mut sets = Vec::new();
+    if spec.is_quick {
+        cases.truncate(QUICK.0);
+        sets.extend(QUICK.1.map(String::from));
+    }
+    let load = |case| {
+        with_planners(&sets, spec.planners, |sets| Experiment::load_cell(spec.path, case, sets))
+    };
+    let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let mut runs = Vec::new();
+    for experiment in experiments {
+        let part = spec.folder.join(&experiment.name);
+        if !run_missing(experiment, part.clone())? {
+            return Ok(None);
+        }
+        runs.push((part.display().to_string(), Run::read(&part)?));
+    }
+    let mut compared = compare(&runs, REFERENCE)?;
+    let name = spec.path.file_stem().unwrap_or_default().to_string_lossy();
+    name_objects(&mut compared, &name);
+    let source = BenchmarkSource {
+        protocol_sha256: protocol_sha256(spec.path)?,
+        quick: spec.is_quick,
+        commit: spec.commit,
+    };
+    let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
+    Ok(Some(summarise(source, &runs, &compared)))
 }
 
 /// Summarises the runs of a benchmark, one per object in the order of `compared.objects`.

@@ -288,3 +288,11 @@ fn estimate(
     });
     IntervalEstimate { value, interval: Some(central_95(found.collect())) }
 }
+
+/// Shortens the names of a sweep's objects by the name of the sweep and the key of the scenes.
+pub fn name_objects(compared: &mut SuiteComparison, sweep: &str) {
+    for object in &mut compared.objects {
+        let label = object.strip_prefix(sweep).unwrap_or(object);
+        *object = label.trim_start_matches("-scene").trim_start_matches('-').to_owned();
+    }
+}

@@ -8,19 +8,20 @@ use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::runner::{Progress, missing_jobs, run_in_memory};
 use crate::experiment::statistics::equal_error::{EqualError, equal_error};
 use crate::experiment::statistics::summary::{self, CurvePoint, EventCounts};
-use crate::experiment::sweep::SweepCase;
+use crate::experiment::sweep::{SweepCase, sweep_cases};
 use crate::experiment::{Experiment, Simulation};
+use anyhow::ensure;
 use palpate_input::config::{ConfigError, Loader};
 use palpate_input::error::InputError;
 use palpate_input::tables;
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// A finger with its sensor: what it changes in a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorKit {
-    /// Name in tables and of `--sensor`.
+    /// Name in tables and of `--sensors`.
     pub name: &'static str,
     /// Settings in the form of `--set`; the effects beside `registration` are these alone.
     sets: &'static [&'static str],
@@ -100,6 +101,14 @@ pub const KITS: [SensorKit; 8] = [
     },
 ];
 
+/// Experiments of the study, and its threads.
+pub struct SensorSpec {
+    /// Experiments of each object with each kit.
+    objects: Vec<Vec<(SensorKit, Experiment)>>,
+    /// Threads; 0 means all cores.
+    threads: usize,
+}
+
 /// Results of all kits on one object: an experiment whose planners are the kits.
 pub struct SensorResults {
     /// Experiment with the names of the kits in place of planners.
@@ -112,10 +121,7 @@ pub struct SensorResults {
 
 impl SensorKit {
     /// Reads the experiment at `path`, or a case of its sweep, with this kit on a kinematic stage.
-    ///
-    /// # Errors
-    /// See [`Experiment::load`].
-    pub fn load(
+    fn load(
         &self,
         path: &Path,
         case: Option<&SweepCase>,
@@ -139,12 +145,72 @@ impl SensorKit {
     }
 }
 
-impl SensorResults {
-    /// Runs the trials of every kit, each with its experiment, until `stop` becomes true.
+impl SensorSpec {
+    /// Loads the experiments, and the cases of their sweeps, with each kit.
     ///
     /// # Errors
-    /// If an environment cannot be built, or a planner is not available.
-    pub fn run(
+    /// See [`Experiment::load`]; if an experiment explores a whole object.
+    pub fn load(
+        experiments: &[PathBuf],
+        kits: &[SensorKit],
+        sets: &[String],
+        threads: usize,
+    ) -> anyhow::Result<Self> {
+        let mut objects = Vec::new();
+        for path in experiments {
+            let cases = sweep_cases(path)?;
+            let cases: Vec<_> = match cases.is_empty() {
+                true => vec![None],
+                false => cases.iter().map(Some).collect(),
+            };
+            for case in cases {
+                let load = |kit: &SensorKit| Ok((*kit, kit.load(path, case, sets)?));
+                let loaded = kits.iter().map(load).collect::<anyhow::Result<Vec<_>>>()?;
+                let has_zone = loaded.iter().all(|(_, it)| it.scene.whole_object.is_none());
+                ensure!(has_zone, "{}: sensors are compared over a zone only", path.display());
+                objects.push(loaded);
+            }
+        }
+        Ok(Self { objects, threads })
+    }
+
+    /// Number of objects.
+    pub fn objects(&self) -> usize {
+        self.objects.len()
+    }
+
+    /// Number of trials of all kits on all objects.
+    pub fn trials(&self) -> u64 {
+        self.objects.iter().flatten().map(|(_, it)| u64::from(it.trials)).sum()
+    }
+}
+
+/// Runs the trials of every kit on every object, until `stop` becomes true; returns the results of
+/// the finished objects. `finished` is called with these after each object.
+///
+/// # Errors
+/// If an environment cannot be built, a planner is not available, or `finished` fails.
+pub fn run(
+    spec: &SensorSpec,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(Progress) + Sync),
+    finished: &mut dyn FnMut(&[SensorResults]) -> anyhow::Result<()>,
+) -> anyhow::Result<Vec<SensorResults>> {
+    let mut results = Vec::new();
+    for kits in &spec.objects {
+        let result = SensorResults::of_object(kits, spec.threads, stop, progress)?;
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        results.extend(result);
+        finished(&results)?;
+    }
+    Ok(results)
+}
+
+impl SensorResults {
+    /// Runs the trials of every kit, each with its experiment, until `stop` becomes true.
+    fn of_object(
         kits: &[(SensorKit, Experiment)],
         threads: usize,
         stop: &AtomicBool,

@@ -153,7 +153,7 @@ fn a_band_is_learned_by_a_command() {
     let (six, toy) = (at("suite/six.toml"), at("toy.toml"));
     let few =
         ["--set", "touches=10", "--set", "grid=13", "--set", "planners=[\"sobol\"]", "--trials=1"];
-    let learn = [&["--quiet", "calibrate-band", &six, "--out", "out"], &few[..]].concat();
+    let learn = [&["--quiet", "calibrate", "--band", &six, "--out", "out"], &few[..]].concat();
     let text = succeeds(folder.path(), &learn);
     assert!(text.contains("[gp.band]") && text.contains("ring"), "{text}");
     for file in ["band.toml", "coverage.json", "reliability.svg", "reliability.png"] {
@@ -167,14 +167,21 @@ fn a_band_is_learned_by_a_command() {
     );
     fs::write(folder.path().join("mine.toml"), mine).unwrap();
     succeeds(folder.path(), &["--quiet", "run", "mine.toml", "--no-report"]);
-    let test = ["--quiet", "calibrate-band", "mine.toml", "--test", "--trials=1"];
+    let test = ["--quiet", "calibrate", "--band", "mine.toml", "--test", "--trials=1"];
     assert!(succeeds(folder.path(), &test).contains("ring"));
     // The same command replaces its own result.
     assert_eq!(palpate(folder.path(), &learn).status.code(), Some(0));
 
-    fails(folder.path(), &["calibrate-band", &toy], &["at least 6", "[sweep]"]);
-    fails(folder.path(), &["calibrate-band", &six, "--set", "touches=5"], &["at least 7"]);
-    fails(folder.path(), &["calibrate-band", &toy, "--test"], &["gp.band", "objects"]);
+    let refused = |options: &[&str], words: &[&str]| {
+        fails(folder.path(), &[&["calibrate"], options].concat(), words);
+    };
+    refused(&["--band", &toy], &["at least 6", "[sweep]"]);
+    refused(&["--band", &six, "--set", "touches=5"], &["at least 7"]);
+    refused(&["--band", &toy, "--test"], &["gp.band", "objects"]);
+    refused(&["plate.json", "--band", &toy], &["--band", "cannot be used with"]);
+    refused(&["plate.json", "--trials", "3"], &["--trials", "cannot be used with"]);
+    refused(&["--trials", "3"], &["--band"]);
+    refused(&["--band", &toy, "--shear", "shear.json"], &["--shear", "cannot be used with"]);
     fails(folder.path(), &["run", &toy, "--set", "gp.band=\"foo\""], &["gp.band", "leave_one_out"]);
     let pitch = "scene.finger.other_pitches_deg=[0]";
     fails(folder.path(), &["run", &toy, "--set", pitch], &["other_pitches_deg", "swept"]);

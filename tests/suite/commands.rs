@@ -152,8 +152,30 @@ fn the_help_lists_each_command_once_in_its_group() {
 #[test]
 fn shells_are_told_how_to_complete() {
     for shell in ["bash", "zsh", "fish"] {
-        let script = succeeds(Path::new("."), &["completions", shell]);
+        let script = succeeds(Path::new("."), &["--completions", shell]);
         assert!(script.contains("accuracy") && script.contains("no-report"), "{shell}");
+    }
+}
+
+/// Options that apply to one kind of input are refused with another.
+#[test]
+fn options_of_another_input_are_refused() {
+    let folder = folder();
+    let with = "cannot be used with";
+    for (arguments, words) in [
+        (&["export", "--topic", "/view"][..], "--out"),
+        (&["export", "runs/small", "--topic", "/view", "--out", "view.ply"], with),
+        (&["export", "--topic", "/view", "--out", "view.ply", "--grid", "3"], with),
+        (&["export", "--topic", "/view", "--out", "view.obj"], "ending in .ply"),
+        (&["export", "runs/small", "--domain", "3", "--out", "it.ply"], with),
+        (&["compare", "runs/small", "--threads", "2"], "--sensors"),
+        (&["compare", "toy", "--sensors", "biotac", "--svg", "it.svg"], with),
+        (&["compare", "toy", "--sensors", "biotac,skin"], "gelsight_mini"),
+        (&["list", "planners", "--reference"], with),
+        (&["--completions", "bash", "list"], "--completions"),
+        (&["--quiet"], "--help"),
+    ] {
+        fails(folder.path(), arguments, &[words]);
     }
 }
 

@@ -6,6 +6,7 @@ use palpate::experiment::store::Run;
 use palpate::report::film;
 use palpate::report::raster::pixels;
 use palpate::report::table::digits;
+use palpate::study::export;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
@@ -83,7 +84,7 @@ fn a_film_shows_every_belief_of_the_median_trial() {
 fn a_frame_states_the_recorded_error() {
     let folder = run();
     let mut run = Run::read(&folder.path().join("runs/small")).unwrap();
-    let trial = film::ranked(&run, "random")[1].0.trial;
+    let trial = export::ranked(&run, "random")[1].0.trial;
     run.experiment.report.trial = trial;
     let row = run.rows.iter().find(|row| row.trial == trial).unwrap();
     let counts = film::counts(&run, row, 6);

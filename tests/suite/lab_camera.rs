@@ -1,4 +1,4 @@
-//! `palpate look` with a camera of another implementation; see `lab`.
+//! `palpate export --topic` with a camera of another implementation; see `lab`.
 
 use crate::common::program::{fails, folder, succeeds};
 use std::process::{Child, Command, Stdio};
@@ -32,7 +32,7 @@ fn points(ply: &[u8]) -> Vec<[f32; 3]> {
 fn a_view_is_saved_from_cloud_and_depths() {
     let folder = folder();
     let look = |topic, wait_s| {
-        ["look", topic, "--out", "view.ply", "--domain", DOMAIN, "--timeout", wait_s]
+        ["export", "--topic", topic, "--out", "view.ply", "--domain", DOMAIN, "--timeout", wait_s]
     };
     for confirmation in ["best_effort", "reliable"] {
         let mut driver = camera(confirmation);

@@ -44,7 +44,7 @@ pub struct LearnedBand {
     pub tail: f64,
 }
 
-/// Band `objects`: what `palpate calibrate-band experiments/suite/choosing.toml --set touches=60`
+/// Band `objects`: what `palpate calibrate --band experiments/suite/choosing.toml --set touches=60`
 /// prints, to three decimals.
 pub static OBJECTS: LearnedBand = LearnedBand {
     learned_from: Cow::Borrowed("experiments/suite/choosing.toml"),

@@ -40,7 +40,7 @@ pub struct GpSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inducing_touches: Option<u32>,
     /// Calibration of the band: `"likelihood"`, `"leave_one_out"`, `"objects"`, or a table of
-    /// `palpate calibrate-band`.
+    /// `palpate calibrate --band`.
     #[serde(skip_serializing_if = "is_default")]
     pub band: Band,
     /// Log-normal priors of the hyperparameters.
@@ -72,12 +72,12 @@ impl Kernels {
 #[serde(
     untagged,
     expecting = "allowed are \"likelihood\", \"leave_one_out\", \"objects\", and a table of \
-                 palpate calibrate-band: learned_from, below, above, tail"
+                 palpate calibrate --band: learned_from, below, above, tail"
 )]
 pub enum Band {
     /// A built-in calibration.
     Named(BandName),
-    /// Half-widths learned from objects, as printed by `palpate calibrate-band`.
+    /// Half-widths learned from objects, as printed by `palpate calibrate --band`.
     Learned(LearnedBand),
 }
 

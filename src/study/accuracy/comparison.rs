@@ -13,6 +13,7 @@ use crate::sim::Scene;
 use anyhow::{Context, bail};
 use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::Rules;
+use palpate_input::tables;
 use serde::Serialize;
 
 /// Offset of the seeds of held-out targets and trials; larger than any number of them.
@@ -69,6 +70,16 @@ pub struct CheapestScene {
     pub held_out: Variant,
     /// Whether it stays within the tolerance on held-out data.
     pub is_confirmed: bool,
+}
+
+impl CheapestScene {
+    /// Returns the scene as TOML.
+    ///
+    /// # Errors
+    /// If TOML has no form for a setting.
+    pub fn toml(&self) -> anyhow::Result<String> {
+        Ok(tables::text(&self.scene)?)
+    }
 }
 
 impl AccuracyComparison {

@@ -1,14 +1,14 @@
-//! Tables for the terminal.
+//! Cells and columns of tables for the terminal.
 
-pub(super) use crate::report::table::aligned as aligned_rows;
+pub use crate::report::table::aligned as aligned_rows;
 
 /// Formats cells in aligned columns: the first column left-aligned, the others right-aligned.
-pub(super) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
+pub fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
     aligned_rows(lines)
 }
 
 /// Removes the columns that have no value in any line; the first line is the header.
-pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
+pub fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
     for column in (0..lines.first().map_or(0, Vec::len)).rev() {
         if lines.len() > 1 && lines.iter().skip(1).all(|line| line[column] == EMPTY_CELL) {
             lines.iter_mut().for_each(|line| drop(line.remove(column)));
@@ -18,15 +18,15 @@ pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
 }
 
 /// Text of a cell without a value.
-pub(super) const EMPTY_CELL: &str = "-";
+pub const EMPTY_CELL: &str = "-";
 
 /// Formats a number; a dash if there is none.
-pub(super) fn cell(value: Option<f64>, decimals: usize) -> String {
+pub fn cell(value: Option<f64>, decimals: usize) -> String {
     value.map_or(EMPTY_CELL.into(), |value| format!("{value:.decimals$}"))
 }
 
 /// Formats a duration in us, ms or s.
-pub(super) fn duration(s: f64) -> String {
+pub fn duration(s: f64) -> String {
     match s {
         s if s < 1e-3 => format!("{:.1} us", 1e6 * s),
         s if s < 1.0 => format!("{:.2} ms", 1e3 * s),

@@ -1,66 +1,39 @@
 //! Unit and up axis of a mesh, each with the evidence for it. If the evidence is ambiguous, the
-//! user is asked on a terminal; elsewhere the most plausible value is taken and named as a guess.
+//! user is asked if possible; otherwise the most plausible value is taken and named as a guess.
 
-use super::terminal::{Verbosity, print_stderr};
 use crate::sim::placement::{self, USUAL_UNITS, UpAxis};
 use crate::sim::scene::Unit;
 use clap::ValueEnum;
 use palpate_geometry::import::FileStatements;
 use palpate_geometry::mesh::Mesh;
-use std::io::{self, BufRead, IsTerminal};
 
 /// Value with the evidence for it.
-pub(super) struct Choice<T> {
+pub struct Choice<T> {
     pub(super) value: T,
     pub(super) evidence: String,
 }
 
 /// Way to settle an ambiguous value.
 #[derive(Clone, Copy)]
-pub(super) struct Asker {
-    can_ask: bool,
-    talk: Verbosity,
+pub struct Asker<'a> {
+    /// Returns the index that the user selects among choices for a question; `None` if the user
+    /// cannot be asked or does not answer.
+    pub choose: &'a dyn Fn(&str, &[&str]) -> Option<usize>,
+    /// Prints a note.
+    pub note: &'a dyn Fn(&str),
 }
 
-/// Number of times that an invalid answer is asked for again.
-const TRIES: usize = 3;
-
-impl Asker {
-    /// Creates an asker, which asks if input and output are a terminal and `take_defaults` is not
-    /// set.
-    pub(super) fn new(take_defaults: bool, talk: Verbosity) -> Self {
-        let is_terminal = io::stdin().is_terminal() && io::stderr().is_terminal();
-        Self { can_ask: is_terminal && !take_defaults, talk }
-    }
-
+impl Asker<'_> {
     /// Returns the value that the user selects among `choices` (values and their descriptions), and
     /// whether it was confirmed; `None` if there are none. The first is the default. A default that
     /// is not confirmed is a guess: the note `why` says so.
     fn choose<T: Copy>(self, what: &str, choices: &[(T, String)], why: &str) -> Option<(T, bool)> {
         let default = choices.first()?.0;
-        if !self.can_ask {
-            self.talk.note(why);
-            return Some((default, false));
+        let words: Vec<&str> = choices.iter().map(|(_, words)| words.as_str()).collect();
+        if let Some((value, _)) = (self.choose)(what, &words).and_then(|index| choices.get(index)) {
+            return Some((*value, true));
         }
-        let lines =
-            choices.iter().enumerate().map(|(i, (_, words))| format!("  {} {words}", i + 1));
-        print_stderr(&format!("{what}?\n{}", lines.collect::<Vec<_>>().join("\n")));
-        for _ in 0..TRIES {
-            print_stderr(&format!("number, 1 to {} [1]:", choices.len()));
-            let mut answer = String::new();
-            if !matches!(io::stdin().lock().read_line(&mut answer), Ok(1..)) {
-                break;
-            }
-            let number: Option<usize> = match answer.trim() {
-                "" => Some(1),
-                text => text.parse().ok(),
-            };
-            let index = number.and_then(|number| number.checked_sub(1));
-            if let Some((value, _)) = index.and_then(|index| choices.get(index)) {
-                return Some((*value, true));
-            }
-        }
-        self.talk.note(why);
+        (self.note)(why);
         Some((default, false))
     }
 }
@@ -82,7 +55,7 @@ fn length(length_m: f64) -> String {
 }
 
 /// Returns the name of a unit in a sentence, where "in" would be read as a word.
-pub(super) fn label(unit: Unit) -> String {
+pub fn label(unit: Unit) -> String {
     if unit == Unit::In { "inch".into() } else { unit.to_string() }
 }
 
@@ -96,12 +69,12 @@ fn sizes(extent: f64, units: impl IntoIterator<Item = Unit>) -> String {
 
 /// Returns the unit of a mesh, and the factor that makes it explorable if no unit does. `extent` is
 /// the largest in the file's numbers; `is_stl` for a format in which millimetres are usual.
-pub(super) fn unit(
+pub fn unit(
     extent: f64,
     is_stl: bool,
     given: Option<Unit>,
     stated: &FileStatements,
-    asker: Asker,
+    asker: Asker<'_>,
 ) -> Choice<(Unit, f64)> {
     let all = || sizes(extent, USUAL_UNITS);
     let named = stated.metres_per_unit.as_ref().and_then(|stated| {
@@ -114,7 +87,7 @@ pub(super) fn unit(
         let size_m = extent * unit.metres_per_unit();
         let scale = placement::explorable_scale(size_m);
         if scale != 1.0 {
-            asker.talk.note(format!(
+            (asker.note)(&format!(
                 "in {} ({evidence}) the object measures {}, and a finger explores {}: use another --unit \
                  ({}), or set object.scale = {scale} in the scene for a model of it",
                 label(unit),
@@ -130,7 +103,7 @@ pub(super) fn unit(
         [] => {
             let unit = Unit::M;
             let scale = placement::explorable_scale(extent * unit.metres_per_unit());
-            asker.talk.note(format!(
+            (asker.note)(&format!(
                 "the unit is unknown: no usual one gives a size of {} ({}); the mesh is scaled to {}; if \
                  you know the unit, name it, as in --unit mm",
                 explorable(),
@@ -183,12 +156,12 @@ fn explorable() -> String {
 
 /// Returns the up axis of a mesh in the frame of its file; `is_y_usual` for a format in which y is
 /// usually up.
-pub(super) fn up(
+pub fn up(
     mesh: &Mesh,
     given: Option<UpAxis>,
     stated: &FileStatements,
     is_y_usual: bool,
-    asker: Asker,
+    asker: Asker<'_>,
 ) -> Choice<UpAxis> {
     if let Some(up) = given {
         return Choice { value: up, evidence: format!("--up {}", name(&up)) };
@@ -235,7 +208,7 @@ pub(super) fn up(
 }
 
 /// Returns the command-line name of a value.
-pub(super) fn name(value: &impl ValueEnum) -> String {
+pub fn name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or(String::new(), |value| value.get_name().into())
 }
 

@@ -1,0 +1,61 @@
+//! Sentences of an identification.
+
+use crate::experiment::metrics::recognition::{NONE, RecognitionMetrics};
+use crate::study::identify::IdentifyResult;
+use palpate_input::format::counted;
+
+/// Number of hypotheses in a line.
+const LISTED: usize = 3;
+
+/// Returns the likeliest hypotheses after a touch.
+pub fn line(count: u32, found: &RecognitionMetrics) -> String {
+    let mut likely: Vec<(&String, &f64)> = found.probabilities.iter().collect();
+    likely.sort_by(|a, b| b.1.total_cmp(a.1));
+    let likely = likely.iter().take(LISTED).map(|(name, p)| format!("{} {p:.3}", named(name)));
+    format!("touch {count:>2}: {}", likely.collect::<Vec<_>>().join(", "))
+}
+
+/// Returns the name of a hypothesis in a sentence.
+fn named(name: &str) -> &str {
+    if name == NONE { "none of these" } else { name }
+}
+
+/// Returns what is there, where, how sure, after how many touches.
+pub fn conclusion(result: &IdentifyResult) -> String {
+    let IdentifyResult { touches, found, is_sure } = result;
+    let touches = counted(*touches, "touch");
+    let confidence = found.confidence();
+    if !*is_sure {
+        return format!(
+            "undecided after {touches}: most likely {} ({confidence:.3})",
+            named(&found.object)
+        );
+    }
+    if found.object == NONE {
+        return format!(
+            "none of the library's objects ({confidence:.3}), after {touches}; explore its shape with \
+             palpate run"
+        );
+    }
+    let pose = &found.pose;
+    let numbers = |values: &[f64], decimals: usize| {
+        let each = values.iter().map(|value| format!("{value:.decimals$}"));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let mut text = format!(
+        "{} ({confidence:.3}), after {touches}\nposition_m = [{}]\nrotation_deg = [{}]\nits surface is \
+         there within {:.1} mm on average (95 %)",
+        found.object,
+        numbers(&pose.position_m, 4),
+        numbers(&pose.rotation_deg, 1),
+        1e3 * pose.distance_95_m
+    );
+    if let Some(error) = &found.error {
+        let is_right = if error.hypothesis == found.object { "right" } else { "wrong" };
+        text += &format!("\n{is_right}: the object is {}", error.object);
+        if let Some(distance_m) = error.distance_m {
+            text += &format!(", its surface {:.2} mm off", 1e3 * distance_m);
+        }
+    }
+    text
+}
