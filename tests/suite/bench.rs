@@ -29,11 +29,11 @@ fn shares_are_rates_over_those_of_the_limits() {
     let mut all =
         [piece("a", 1e4, 0.0), piece("b", 0.0, 1e5), piece("c", 2e4, 5e4), piece("d", 0.0, 0.0)];
     let timed = time(&mut all, 5);
-    assert_eq!((timed[0].of_product, timed[1].of_stream), (Some(1.0), Some(1.0)));
+    assert_eq!((timed[0].of_peak, timed[1].of_stream), (Some(1.0), Some(1.0)));
     let rate = |flops: f64| 1e-9 * flops / timed[2].time_s;
     let near = |a: Option<f64>, b: f64| (a.unwrap() / b - 1.0).abs() < 1e-9;
     assert!(near(timed[2].gflops, rate(2e4)) && near(timed[2].gbytes, rate(5e4)));
-    assert!(timed[2].of_product > Some(0.0) && timed[2].of_stream > Some(0.0));
-    assert_eq!((timed[3].gflops, timed[3].of_product), (None, None));
+    assert!(timed[2].of_peak > Some(0.0) && timed[2].of_stream > Some(0.0));
+    assert_eq!((timed[3].gflops, timed[3].of_peak), (None, None));
     assert_eq!((timed[3].gbytes, timed[3].of_stream), (None, None));
 }
