@@ -16,8 +16,6 @@ from .errors import PalpateError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ._run import Run
-
 #: Version of the format that `to_lerobot` writes.
 LEROBOT_VERSION = "v3.0"
 
@@ -45,33 +43,39 @@ def _pyarrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def to_parquet(run: Run, folder: str | os.PathLike[str]) -> None:
-    """Writes the data frames of a run as Parquet."""
+def to_parquet(folder: str | os.PathLike[str], settings: str, frames: dict[str, pd.DataFrame]) -> None:
+    """Writes the data frames of a run as Parquet, each to a file of its name."""
     arrow, parquet = _pyarrow()
     Path(folder).mkdir(parents=True, exist_ok=True)
-    metadata = {"palpate.version": __version__, "palpate.settings": run.to_toml()}
-    for name, frame in (("trials", run.trials()), ("touches", run.touches())):
+    metadata = {"palpate.version": __version__, "palpate.settings": settings}
+    for name, frame in frames.items():
         table = arrow.Table.from_pandas(frame, preserve_index=False)
         table = table.replace_schema_metadata({**(table.schema.metadata or {}), **metadata})
         parquet.write_table(table, Path(folder) / f"{name}.parquet")
 
 
-def to_lerobot(run: Run, folder: str | os.PathLike[str]) -> None:
-    """Writes a run as a LeRobotDataset."""
+def to_lerobot(
+    folder: str | os.PathLike[str],
+    experiment: str,
+    planners: list[str],
+    settings: str,
+    trials: pd.DataFrame,
+    touches: pd.DataFrame,
+) -> None:
+    """Writes a run of `experiment` as a LeRobotDataset."""
     arrow, parquet = _pyarrow()
     root = Path(folder)
     if root.exists() and (not root.is_dir() or any(root.iterdir())):
         raise PalpateError(f"{root}: the folder is not empty; allowed is a new folder")
-    trials, touches = run.trials(), run.touches()
     trials = trials[trials["touches"] > 0].reset_index(drop=True)
     if trials.empty:
         raise PalpateError("no trial of the run has a touch; a dataset needs one")
-    features, data = _frames(run, trials, touches)
-    tasks = [f"Explore {run.name} by touch: planner {planner}" for planner in run.planners]
+    features, data = _frames(trials, touches)
+    tasks = [f"Explore {experiment} by touch: planner {planner}" for planner in planners]
     lengths = trials["touches"].to_numpy()
     ends = np.cumsum(lengths)
     starts = ends - lengths
-    data["task_index"] = np.repeat([run.planners.index(name) for name in trials["planner"]], lengths)
+    data["task_index"] = np.repeat([planners.index(planner) for planner in trials["planner"]], lengths)
     data["episode_index"] = np.repeat(np.arange(len(trials)), lengths)
     data["index"] = np.arange(len(data["episode_index"]))
     data["frame_index"] = data["index"] - np.repeat(starts, lengths)
@@ -92,7 +96,7 @@ def to_lerobot(run: Run, folder: str | os.PathLike[str]) -> None:
 
     episodes = {
         "episode_index": np.arange(len(trials)),
-        "tasks": [[tasks[run.planners.index(name)]] for name in trials["planner"]],
+        "tasks": [[tasks[planners.index(planner)]] for planner in trials["planner"]],
         "length": lengths,
         "data/chunk_index": files // FILES_PER_CHUNK,
         "data/file_index": files % FILES_PER_CHUNK,
@@ -133,7 +137,7 @@ def to_lerobot(run: Run, folder: str | os.PathLike[str]) -> None:
         "features": features,
     }
     (root / "meta/info.json").write_text(json.dumps(info, indent=4))
-    (root / "meta/palpate.toml").write_text(f"# Palpate {__version__}\n{run.to_toml()}")
+    (root / "meta/palpate.toml").write_text(f"# Palpate {__version__}\n{settings}")
 
 
 def _file(folder: str, number: int) -> str:
@@ -147,7 +151,7 @@ def _array(arrow: Any, values: npt.NDArray[Any], dtype: str) -> Any:
     return flat if len(flat) == len(values) else arrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
 
 
-def _frames(run: Run, trials: pd.DataFrame, touches: pd.DataFrame) -> tuple[dict[str, Any], _Columns]:
+def _frames(trials: pd.DataFrame, touches: pd.DataFrame) -> tuple[dict[str, Any], _Columns]:
     """Returns the features of the frames, and their columns in the order of `trials`."""
     contact_names = ["contact_x_m", "contact_y_m", "contact_z_m"]
     target_names = [name for name in touches.columns if name.startswith(("target_", "ahead_"))]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import Unpack
 
-from ._settings import SceneSettings
+from ._scene_settings import SceneSettings
 
 __version__: str
 COMMIT: str

@@ -178,7 +178,7 @@ class Run:
         """
         from ._datasets import to_parquet
 
-        to_parquet(self, folder)
+        to_parquet(folder, self.to_toml(), {"trials": self.trials(), "touches": self.touches()})
 
     def to_lerobot(self, folder: str | os.PathLike[str]) -> None:
         """Writes a LeRobotDataset v3.0 to a new folder: an episode per trial, a frame per touch.
@@ -193,7 +193,7 @@ class Run:
         """
         from ._datasets import to_lerobot
 
-        to_lerobot(self, folder)
+        to_lerobot(folder, self.name, self.planners, self.to_toml(), self.trials(), self.touches())
 
     def rows(self) -> bytes:
         """Returns the trials as JSON lines: the bytes of the program's `trials.jsonl`."""

@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
 
 from . import _palpate
+from ._scene_settings import Table
 
 #: File or name of a file.
 _File = str | os.PathLike[str]
-#: Table of settings.
-_Table = Mapping[str, Any]
 
 
 class ExperimentSettings(TypedDict, total=False):
@@ -21,7 +20,7 @@ class ExperimentSettings(TypedDict, total=False):
 
     name: str
     question: str
-    scene: _File | _Table | _palpate.Scene
+    scene: _File | Table | _palpate.Scene
     planners: Sequence[Any] | Mapping[str, Any]
     trials: int
     seed: int
@@ -32,31 +31,12 @@ class ExperimentSettings(TypedDict, total=False):
     views: int
     further_views: int
     grid: int
-    gp: _File | _Table
-    recognition: _Table
-    planning: _Table
-    report: _Table
-    backend: _File | _Table
-    truth: _Table
-
-
-class SceneSettings(TypedDict, total=False):
-    """Settings of a scene; `docs/reference.md` describes them and the keys of the tables."""
-
-    simulator: str
-    object: _Table
-    library: _Table
-    pose: _Table
-    function: str
-    zone: _Table
-    whole_object: _Table
-    finger: _Table
-    arm: _Table
-    effects: _Table
-    sensor: _Table
-    camera: _Table
-    solver: _Table
-    touch: _Table
+    gp: _File | Table
+    recognition: Table
+    planning: Table
+    report: Table
+    backend: _File | Table
+    truth: Table
 
 
 def assignments(settings: Mapping[str, Any]) -> list[str]:

@@ -13,7 +13,7 @@ use palpate::explore::evidence::Outcome;
 use palpate::explore::view::SeenSurface;
 use palpate::format::counted;
 use palpate::math::seed::stream;
-use palpate::sim::camera::probe::CameraProbe;
+use palpate::sim::camera_probe::CameraProbe;
 use palpate::sim::library::LoadedLibrary;
 use palpate::task::Target;
 use pyo3::prelude::*;

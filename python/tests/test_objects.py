@@ -8,7 +8,8 @@ import numpy as np
 import own
 import palpate
 import pytest
-from palpate._settings import ExperimentSettings, SceneSettings
+from palpate._scene_settings import SceneSettings
+from palpate._settings import ExperimentSettings
 from palpate.errors import ConfigError, PalpateError
 from test_scene import sphere
 

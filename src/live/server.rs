@@ -9,7 +9,7 @@ use super::order::Order;
 use super::picture::{self, BeliefView, Picture, Shown};
 use crate::experiment::metrics::truth::Truth;
 use crate::report::canvas::escape;
-use crate::report::explorer::choice;
+use crate::report::explorer::{self, choice};
 use crate::report::html;
 use anyhow::Context;
 use http_body_util::channel::Channel;
@@ -235,8 +235,8 @@ impl Server {
             (Method::GET, "/live.css") => Ok(file("text/css", STYLE.to_owned())),
             (Method::GET, "/live.js") => {
                 let view = BeliefView::of(shown.as_ref().map(|shown| &*shown.desk));
-                let scripts = [view.scripts, &[SCRIPT]].concat();
-                Ok(file("text/javascript; charset=utf-8", scripts.join("\n")))
+                let script = explorer::script(view.scripts) + SCRIPT;
+                Ok(file("text/javascript; charset=utf-8", script))
             }
             (Method::GET, "/events") => Ok(self.events(cut)),
             (Method::GET, "/beliefs") => {

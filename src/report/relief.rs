@@ -4,21 +4,30 @@ use super::axes::{Axis, Length, rounded};
 use super::canvas::{Anchor, Area, Canvas, PointPx, pair};
 use super::style::{self, FAINT_INK, SMALL_PX};
 use nalgebra::Vector3;
+use serde::Serialize;
 
-/// Direction of the light: from the front, so that no relief is dark, and from the viewer's side.
-const LIGHT: Vector3<f64> = Vector3::new(0.45, 0.7, 0.55);
-/// Fraction of ambient light.
-const AMBIENT: f64 = 0.35;
+/// Light on a drawn surface, and the direction from which it is viewed at first.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Shading {
+    /// Direction of the light (x, height, z), of any length.
+    light: [f64; 3],
+    /// Fraction of ambient light.
+    ambient: f64,
+    /// Azimuth of the viewer, turned about z from y, the direction of touch.
+    pub azimuth_deg: f64,
+    /// Elevation of the viewer.
+    elevation_deg: f64,
+}
+
+/// Shading of figures and of the page's views. The light is from the front, so that no relief is
+/// dark, and from the viewer's side.
+// heuristic: colours of σ can be told apart on a slope from an ambient light of .5 on, and neither
+// side of a bulge hides much.
+pub const SHADING: Shading =
+    Shading { light: [0.45, 0.7, 0.55], ambient: 0.5, azimuth_deg: 38.0, elevation_deg: 24.0 };
 /// Smallest depth of a relief as a fraction of the zone's longer side; a flatter one is stretched
 /// to it.
 const DEPTH_MIN: f64 = 0.25;
-
-/// Default azimuth of the viewer, turned about z from y, the direction of touch; a heuristic:
-/// neither side of a bulge hides much.
-pub const AZIMUTH_DEG: f64 = 38.0;
-// Elevation of the viewer.
-// heuristic: neither side of a bulge hides much.
-const ELEVATION_DEG: f64 = 24.0;
 
 /// Attributes of marks whose colours do not change on a dark page, because the relief's do not.
 pub const ON_RELIEF: &str = r#"class="relief""#;
@@ -39,7 +48,7 @@ impl Camera {
     /// corner.
     pub fn from_azimuth(azimuth_deg: f64, stretch: f64) -> Self {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
-        let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
+        let (sin_e, cos_e) = SHADING.elevation_deg.to_radians().sin_cos();
         let toward = Vector3::new(sin_a * cos_e, cos_a * cos_e, sin_e);
         let right = Vector3::new(-cos_a, sin_a, 0.0);
         Self { right, up: toward.cross(&right), toward, stretch, scale: 1.0, shift: [0.0, 0.0] }
@@ -152,7 +161,7 @@ impl ReliefPanel {
         let Space { x_m, z_m, height_m } = space;
         let corner = |i: usize| Vector3::new(x_m[i & 1], height_m[(i >> 1) & 1], z_m[(i >> 2) & 1]);
         let corners: Vec<_> = (0..8).map(corner).collect();
-        let camera = Camera::from_azimuth(AZIMUTH_DEG, space.stretch());
+        let camera = Camera::from_azimuth(SHADING.azimuth_deg, space.stretch());
         let px_per_m = camera.scale(&corners, inner);
         Self { space, camera: camera.scaled(px_per_m, &corners, inner), area, unit }
     }
@@ -371,7 +380,8 @@ fn mean_height(axis: &Axis, corners: &[Vector3<f64>]) -> f64 {
 
 /// Returns the brightness of a matt face with this unit normal (x, height, z), 0..1.
 pub fn brightness(normal: &Vector3<f64>) -> f64 {
-    AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT.normalize()).max(0.0)
+    let Shading { light, ambient, .. } = SHADING;
+    ambient + (1.0 - ambient) * normal.dot(&Vector3::from(light).normalize()).max(0.0)
 }
 
 /// Returns whether a polygon contains a point, by the parity of its crossings.

@@ -1,9 +1,9 @@
 //! Tests that the arm's kinematic chain and its MuJoCo model agree.
 
+use crate::common::shipped::anywhere;
 use palpate::math::seed;
 use palpate::robot::arm::{ArmSettings, Chain, Joints};
 use palpate::sim::{Environment, Scene};
-use rand::RngExt;
 use std::path::Path;
 
 fn environment(arm: Option<ArmSettings>) -> Environment {
@@ -30,14 +30,6 @@ fn chains() -> [(Environment, Chain); 3] {
         let chain = environment.chain().unwrap();
         (environment, chain)
     })
-}
-
-fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
-    let mut q = Joints::zeros();
-    for (q, joint) in q.iter_mut().zip(&chain.joints) {
-        *q = random.random_range(joint.q_limits[0]..joint.q_limits[1]);
-    }
-    q
 }
 
 /// Flange heights at q = 0, metres: mlogoth/PA10 `pa10_csl.urdf.xacro` (C), OpenHRP3

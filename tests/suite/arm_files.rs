@@ -1,12 +1,13 @@
 //! Tests of arms from URDF and MJCF files, against MuJoCo's reading of the same files.
 
 use crate::common::program::fails;
+use crate::common::six::list;
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use nalgebra::{DMatrix, Isometry3, Vector3};
 use palpate::robot::arm::{ArmSettings, Chain, Joints};
+use palpate::sim::arm_mjcf::arm;
 use palpate::sim::environment::Environment;
-use palpate::sim::mjcf::arm::arm;
 use proptest::prelude::*;
 use std::fmt::Write;
 use std::path::Path;
@@ -27,10 +28,6 @@ fn joint() -> impl Strategy<Value = RandomJoint> {
     let axis = [-1.0..1.0, -1.0..1.0, 0.2..1.0f64];
     (near(), turn(), axis, prop::bool::weighted(0.2))
         .prop_map(|(xyz, rpy, axis, is_prismatic)| RandomJoint { xyz, rpy, axis, is_prismatic })
-}
-
-fn list(numbers: &[f64]) -> String {
-    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }
 
 const LINK: &str = r#"<inertial><origin xyz="0.01 0 0.02"/><mass value="2"/>

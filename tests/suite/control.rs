@@ -1,5 +1,6 @@
 //! Tests of the controller: tracking where possible, and limits everywhere.
 
+use crate::common::shipped::anywhere;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use palpate::explore::control::{Controller, Goal, posture};
 use palpate::math::seed;
@@ -9,7 +10,6 @@ use palpate::robot::arm::{ArmSettings, Chain, Joints};
 use palpate::robot::finger::Finger;
 use palpate::sim::{Environment, Scene};
 use proptest::prelude::*;
-use rand::RngExt;
 use std::path::Path;
 
 const PERIOD_S: f64 = 0.004;
@@ -52,14 +52,6 @@ fn drive(
         off = (chain.forward(&q).translation.vector - goal.x_wt.translation.vector).norm();
     }
     (q, damping, off)
-}
-
-fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
-    let mut q = Joints::zeros();
-    for (q, joint) in q.iter_mut().zip(&chain.joints) {
-        *q = random.random_range(joint.q_limits[0]..joint.q_limits[1]);
-    }
-    q
 }
 
 proptest! {

@@ -1,6 +1,6 @@
 //! Tests of the reachable surface of a whole object with straight approaches.
 
-use crate::common::shapes::{box_corners, box_mesh, point, sphere_mesh};
+use crate::common::shapes::{box_mesh, boxes, point, sphere_mesh};
 use nalgebra::{UnitVector3, Vector3};
 use palpate::experiment::metrics::shape::{FingerReach, TrueShape};
 use palpate::geometry::bvh::MeshBvh;
@@ -25,19 +25,6 @@ fn touched(mesh: &MeshBvh, spots: &[SurfacePoint], radius_m: f64) -> Vec<bool> {
 fn spread(mesh: Mesh, count: usize) -> (MeshBvh, Vec<SurfacePoint>) {
     let spots = over_surface(&mesh, count);
     (MeshBvh::new(mesh), spots)
-}
-
-/// Boxes between two corners each, as one mesh.
-fn boxes(corners: &[[[f64; 3]; 2]]) -> Mesh {
-    let mut vertices = Vec::new();
-    let mut triangles = Vec::new();
-    for [low, high] in corners {
-        let base = vertices.len() as u32;
-        vertices.extend(box_corners((*low).into(), (*high).into()));
-        let faces = crate::common::shapes::BOX;
-        triangles.extend(faces.map(|face| face.map(|corner| base + corner)));
-    }
-    Mesh::new(&vertices, &triangles).unwrap().0
 }
 
 #[test]

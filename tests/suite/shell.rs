@@ -1,7 +1,8 @@
 //! Tests of the shell skin: presses against an independent shell solver, energy, and stability.
 
 use crate::common::counting::allocations;
-use crate::common::shapes::{BOX, box_corners, mesh, point, square};
+use crate::common::quiet::is_finite;
+use crate::common::shapes::{box_mesh, mesh, point, square};
 use crate::common::shipped::{contact, environment};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate::geometry::bvh::MeshBvh;
@@ -202,13 +203,6 @@ fn left_and_right_are_alike() {
     assert!(left.force_n.y.abs() > 0.1 * left.force_n.norm(), "{left:?}");
 }
 
-fn is_finite(load: &ContactLoad) -> bool {
-    let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
-    vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
-        && load.energy_j.is_finite()
-        && load.pressure_pa.is_finite()
-}
-
 /// A correction never increases the energy, from any state.
 #[test]
 fn a_correction_never_adds_energy() {
@@ -244,11 +238,10 @@ fn a_correction_never_adds_energy() {
 /// millimetre, and retraction.
 #[test]
 fn nothing_makes_it_diverge() {
-    let blade = box_corners(point(-0.05, -2e-4, -0.05), point(0.05, 2e-4, 0.0));
     let tip = [point(0.0, 0.0, 0.0), point(-3e-4, -3e-4, -0.02), point(3e-4, -3e-4, -0.02)];
     let needle = [&tip[..], &[point(0.0, 4e-4, -0.02)]].concat();
     let objects = [
-        mesh(&blade, &BOX),
+        box_mesh(point(-0.05, -2e-4, -0.05), point(0.05, 2e-4, 0.0)),
         mesh(&needle, &[[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]]),
         square(0.1, 2),
     ]

@@ -6,10 +6,11 @@ use crate::figures::reads_well;
 use crate::page::{CLOCK, DRIVER, browser_or_note, log};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use palpate::geometry::decimate::decimate;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
+use palpate::report::relief::brightness;
 use palpate::report::solid::{PlannerSurfaces, SurfaceFrame, counts, figure, section};
 use serde_json::Value;
 use std::fs;
@@ -154,6 +155,17 @@ fn a_corner_may_lie_far_back() {
     let given: Vec<usize> = triangles.as_flattened().iter().map(|&i| i as usize).collect();
     assert_eq!(values, given);
     assert!(data["error_range"].is_null() && data["truth"].is_null());
+}
+
+/// The scripts have the light of the printed figures: a face towards it and one away from it.
+#[test]
+fn the_view_has_the_light_of_the_figures() {
+    let html = section(&sequences(), None, 0).unwrap();
+    let json = html.split("const SHADING = ").nth(1).unwrap().split(';').next().unwrap();
+    let shading: Value = serde_json::from_str(json).unwrap();
+    let light = Vector3::from_iterator(numbers(&shading["light"]));
+    assert_eq!(shading["ambient"], brightness(&-light.normalize()));
+    assert!((brightness(&light.normalize()) - 1.0).abs() < 1e-12);
 }
 
 #[test]

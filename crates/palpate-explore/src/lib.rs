@@ -53,6 +53,7 @@
 pub mod backend;
 pub mod band;
 pub mod belief;
+mod contact;
 pub mod control;
 pub mod episode;
 pub mod evidence;
@@ -63,6 +64,7 @@ pub mod probe;
 pub mod recognition;
 pub mod registration;
 pub mod robot;
+mod surface_belief;
 pub mod surface_evidence;
 pub mod task;
 pub mod view;

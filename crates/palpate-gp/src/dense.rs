@@ -1,7 +1,7 @@
 //! Cholesky factorisation and inversion of a whole covariance matrix.
 
-use super::tiles::{self, Columns, ColumnsMut};
 pub use super::tiles::NotPositiveDefinite;
+use super::tiles::{self, Columns, ColumnsMut};
 use crate::math::simd::{widest, widest_dot};
 
 /// A symmetric matrix that is factored in place; only its lower triangle is read and written.

@@ -21,8 +21,8 @@ pub(super) const WIDE: usize = 8;
 
 /// Largest order that is one block, which fits into a second-level cache of 1 MB.
 const WHOLE: usize = 320;
-/// Number of rows and of columns of a block of a larger matrix; the fastest of 128, 192, 256 and 320
-/// from order 1000 on.
+/// Number of rows and of columns of a block of a larger matrix; the fastest of 128, 192, 256 and
+/// 320 from order 1000 on.
 const BLOCK: usize = 128;
 
 /// Returns the distance of columns of `rows` numbers: a multiple of [`WIDE`], and not of a page,

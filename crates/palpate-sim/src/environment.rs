@@ -1,8 +1,8 @@
 //! Environment of a trial: loaded scene and search tree, constant and shared by all threads.
 
+use super::arm_mjcf::arm;
 use super::camera::{VisibleScene, capsules_at_home};
 use super::library::LoadedLibrary;
-use super::mjcf::arm::arm;
 use super::notice;
 use super::scene::{AnalyticCurve, ObjectSettings, Scene, SimulatorKind, Unit};
 use crate::finger::Fingertip;
@@ -93,7 +93,7 @@ impl Environment {
         #[cfg(feature = "mujoco")]
         if settings.model.ends_with(".xml") {
             let path = settings.model.as_ref();
-            return super::mujoco::arm_parts(path, settings.tip.as_deref()).map(Some);
+            return super::arm_mjcf::arm_parts(path, settings.tip.as_deref()).map(Some);
         }
         settings.parts()
     }

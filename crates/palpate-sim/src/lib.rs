@@ -1,6 +1,8 @@
 //! Simulation: the object, the physics of the finger, and the simulated robots.
 
+pub mod arm_mjcf;
 pub mod camera;
+pub mod camera_probe;
 pub mod environment;
 pub mod finger;
 pub mod home;
@@ -12,6 +14,8 @@ pub mod mjcf;
 mod model_file;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
+#[cfg(feature = "mujoco")]
+mod mujoco_log;
 mod notice;
 pub mod placement;
 pub mod probe;

@@ -7,9 +7,10 @@
 pub mod zone;
 
 use super::canvas::escape;
+use super::relief::SHADING;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// Script shared by the views of surfaces.
 pub const PARTS: &str = include_str!("parts.js");
@@ -70,9 +71,14 @@ impl InteractiveView<'_> {
              <script>\n{}\n{CONTROLS}</script>\n</section>\n",
             self.class,
             self.note,
-            self.scripts.join("\n"),
+            script(self.scripts),
         )
     }
+}
+
+/// Returns the scripts of a view as one, with the light and the first view of the printed figures.
+pub fn script(parts: &[&str]) -> String {
+    format!("{}\nconst SHADING = {};\n", parts.join("\n"), json!(SHADING))
 }
 
 /// Function that gives the touch counts of a planner whose beliefs are shown.

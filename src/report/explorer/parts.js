@@ -1,5 +1,6 @@
 // Shared parts of the views of surfaces: numbers from text, labels, colour scales, marks of touches,
-// turning by hand. A script that uses them has the element `explorer`, the `data` and `draw`.
+// turning by hand. A script that uses them has the element `explorer`, the `data` and `draw`;
+// `SHADING` has the light and the first view of the printed figures.
 "use strict";
 
 const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
@@ -21,6 +22,11 @@ const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const paint = (name) => getComputedStyle(explorer).getPropertyValue(`--${name}`).trim();
 const onPaper = (pair) => pair[dark.matches ? 1 : 0];
 dark.addEventListener("change", () => draw());
+
+function unitVector(v) {
+  const length = Math.hypot(...v);
+  return v.map((part) => part / length);
+}
 
 // Returns about `aim` round numbers between two ends.
 function roundNumbers(low, high, aim) {

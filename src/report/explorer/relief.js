@@ -3,10 +3,8 @@
 "use strict";
 
 function reliefView(canvas) {
-  // Initial view and direction of light, as in the printed figures, with more ambient light, so
-  // that colours are readable on a slope.
-  const turn = { azimuth: 38, elevation: 24, isDragged: false };
-  const [LIGHT, AMBIENT, DIRECT] = [unit([0.45, 0.7, 0.55]), 0.5, 0.62];
+  const turn = { azimuth: SHADING.azimuth_deg, elevation: SHADING.elevation_deg, isDragged: false };
+  const [LIGHT, AMBIENT] = [unitVector(SHADING.light), SHADING.ambient];
   let known, xs, zs, stretch, columns, count, low, high, ends, middle, sides, contourStep, scales, size;
 
   // Takes the present data.
@@ -28,11 +26,6 @@ function reliefView(canvas) {
       error: errorScale(0.5 * (high - low), "error: belief too low | too high"),
     };
     size = Math.hypot(sides[0], sides[1] * stretch, sides[2]);
-  }
-
-  function unit(v) {
-    const length = Math.hypot(...v);
-    return v.map((part) => part / length);
   }
 
   // Returns the mapping from space to canvas: orthographic, with the same scale from every
@@ -63,9 +56,9 @@ function reliefView(canvas) {
       const [i, j] = [k % columns, Math.floor(k / columns)];
       const h = Math.min(Math.max(field[k], low), high);
       const slope = (a, b, step) => (Number.isNaN(a - b) ? 0 : stretch * (a - b) / (2 * step));
-      const normal = unit([-slope(at(i + 1, j), at(i - 1, j), stepX), 1, -slope(at(i, j + 1), at(i, j - 1), stepZ)]);
+      const normal = unitVector([-slope(at(i + 1, j), at(i - 1, j), stepX), 1, -slope(at(i, j + 1), at(i, j - 1), stepZ)]);
       const facing = normal.reduce((sum, part, axis) => sum + part * LIGHT[axis], 0);
-      const values = [...project(xs[i], h, zs[j]), Math.min(AMBIENT + DIRECT * Math.max(facing, 0), 1), h, ...tint(k)];
+      const values = [...project(xs[i], h, zs[j]), AMBIENT + (1 - AMBIENT) * Math.max(facing, 0), h, ...tint(k)];
       values.forEach((value, axis) => { corners[axis][k] = value; });
     }
     for (let j = 1; j < zs.length; j++) {

@@ -2,7 +2,7 @@
 
 use crate::report::axes::{Axis, MM};
 use crate::report::canvas::{Anchor, Area, Canvas, PointPx};
-use crate::report::relief::{self, AZIMUTH_DEG, Camera, Relief, brightness};
+use crate::report::relief::{self, Camera, Relief, SHADING, brightness};
 use crate::report::style::{self, INK, SMALL_PX};
 use nalgebra::Vector3;
 use palpate_geometry::solids::{Triangles, normals};
@@ -15,7 +15,7 @@ const SCALE_PX: f64 = 60.0;
 
 /// Returns the camera in front, on the side that a finger touches along −y, or behind.
 fn camera(is_behind: bool) -> Camera {
-    Camera::from_azimuth(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 }, 1.0)
+    Camera::from_azimuth(SHADING.azimuth_deg + if is_behind { 180.0 } else { 0.0 }, 1.0)
 }
 
 /// Returns the scale, in pixels per metre, at which `points` fit into a panel from both sides.

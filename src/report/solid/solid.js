@@ -15,11 +15,10 @@ function frameOf(state) {
 function prepare() {}
 
 function viewOf(canvas) {
-  // Initial view and direction of light (to the right, up and towards the viewer), as in the
-  // printed figures, with more ambient light, so that colours are readable on a slope.
-  const FIRST = { azimuth: 38, elevation: 24, zoom: 1 };
+  const FIRST = { azimuth: SHADING.azimuth_deg, elevation: SHADING.elevation_deg, zoom: 1 };
   const turn = { ...FIRST, isDragged: false };
-  const [LIGHT, STRENGTH] = [[0.08, 0.17, 0.98], [0.45, 0.6]];
+  // Direction of the light to the right, up and towards the viewer.
+  const LIGHT = axes(FIRST).map((row) => dot(row, unitVector(SHADING.light)));
   // Opacity of the true surface in front of the belief, and the least distance for it, relative to
   // the size.
   const [OPACITY, LIFT] = [0.62, 0.004];
@@ -44,18 +43,26 @@ function viewOf(canvas) {
     };
   }
 
+  // Returns the directions to the right, up and towards the viewer.
+  function axes({ azimuth, elevation }) {
+    const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
+    const [sa, ca, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
+    return [[-ca, sa, 0], [-se * sa, -se * ca, ce], [sa * ce, ca * ce, se]];
+  }
+
+  function dot(row, p) {
+    return row[0] * p[0] + row[1] * p[1] + row[2] * p[2];
+  }
+
   // Returns the mapping from space to canvas: orthographic, with the same scale from every
   // direction.
   function camera(width, height) {
-    const [a, e] = [turn.azimuth, turn.elevation].map((degrees) => degrees * Math.PI / 180);
-    const [sa, ca, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
-    const rows = [[-ca, sa, 0], [-se * sa, -se * ca, ce], [sa * ce, ca * ce, se]];
+    const rows = axes(turn);
     const middle = [width / 2, (height - FOOT) / 2];
     const scale = turn.zoom * Math.min(width, height - FOOT) / (2.06 * data.reach);
-    const along = (row, p) => row[0] * p[0] + row[1] * p[1] + row[2] * p[2];
     return {
       rows, middle, scale,
-      at: (p) => [middle[0] + scale * along(rows[0], p), middle[1] - scale * along(rows[1], p), along(rows[2], p)],
+      at: (p) => [middle[0] + scale * dot(rows[0], p), middle[1] - scale * dot(rows[1], p), dot(rows[2], p)],
     };
   }
 
@@ -72,7 +79,7 @@ function viewOf(canvas) {
       turn: [0, 1, 2].flatMap((column) => rows.map((row) => row[column])),
       scale: [2 * scale / width, 2 * scale / height, -0.4 / data.reach],
       shift: [2 * middle[0] / width - 1, 1 - 2 * middle[1] / height, 0],
-      light: LIGHT, strength: STRENGTH,
+      light: LIGHT, ambient: SHADING.ambient,
     };
     const over = isTruthShown && { mesh: truth, tints: truthTints, opacity: OPACITY, lift: 0.4 * LIFT };
     return paintAll(view, { mesh: frame.mesh, tints }, over);

@@ -48,12 +48,11 @@ const VERTEX = `
 const FRAGMENT = `
   precision mediump float;
   uniform vec3 light;
-  uniform vec2 strength;
-  uniform float opacity;
+  uniform float ambient, opacity;
   varying vec3 facing, paint;
   void main() {
     vec3 outward = normalize(gl_FrontFacing ? facing : -facing);
-    float bright = min(strength.x + strength.y * max(dot(outward, light), 0.0), 1.0);
+    float bright = mix(ambient, 1.0, max(dot(outward, light), 0.0));
     gl_FragColor = vec4(paint * bright * opacity, opacity);
   }`;
 
@@ -96,8 +95,8 @@ function painter(redraw) {
     return () => gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_SHORT, 0);
   }
 
-  // `view`: width and height in pixels, turn by columns, scale and shift to −1 … 1, ambient and
-  // directed light. An overlaid mesh is drawn where it is in front by `lift` at least.
+  // `view`: width and height in pixels, turn by columns, scale and shift to −1 … 1, light and
+  // its ambient fraction. An overlaid mesh is drawn where it is in front by `lift` at least.
   function paintAll(view, { mesh, tints }, over) {
     [sheet.width, sheet.height] = [view.width, view.height];
     gl.viewport(0, 0, view.width, view.height);
@@ -108,7 +107,7 @@ function painter(redraw) {
     gl.uniformMatrix3fv(uniform("turn"), false, view.turn);
     gl.uniform3fv(uniform("scale"), view.scale);
     gl.uniform3fv(uniform("light"), view.light);
-    gl.uniform2fv(uniform("strength"), view.strength);
+    gl.uniform1f(uniform("ambient"), view.ambient);
     gl.uniform3fv(uniform("shift"), view.shift);
     gl.uniform1f(uniform("opacity"), 1);
     gl.enable(gl.DEPTH_TEST);

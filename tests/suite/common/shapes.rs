@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate::geometry::mesh::Mesh;
+use palpate::geometry::solids;
 use palpate::geometry::sweep::Capsule;
 
 pub type Triangle = [Point3<f64>; 3];
@@ -24,33 +25,20 @@ pub fn soup(triangles: &[Triangle]) -> Option<Mesh> {
     Mesh::new(&triangles.concat(), &indices).ok().map(|(mesh, _)| mesh)
 }
 
-pub const BOX: [[u32; 3]; 12] = [
-    [0, 2, 1],
-    [1, 2, 3],
-    [4, 5, 6],
-    [5, 7, 6],
-    [0, 1, 4],
-    [1, 5, 4],
-    [2, 6, 3],
-    [3, 6, 7],
-    [0, 4, 2],
-    [2, 4, 6],
-    [1, 3, 5],
-    [3, 7, 5],
-];
-
-pub fn box_corners(low: Point3<f64>, high: Point3<f64>) -> Vec<Point3<f64>> {
-    (0..8)
-        .map(|i| {
-            let pick =
-                |bit: usize, axis: usize| if i >> bit & 1 == 0 { low[axis] } else { high[axis] };
-            point(pick(0, 0), pick(1, 1), pick(2, 2))
-        })
-        .collect()
+/// Boxes between two corners each, as one mesh.
+pub fn boxes(corners: &[[[f64; 3]; 2]]) -> Mesh {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for [low, high] in corners {
+        let (corners, faces) = solids::box_mesh(*low, *high);
+        let base = vertices.len() as u32;
+        vertices.extend(corners);
+        triangles.extend(faces.iter().map(|face| face.map(|corner| base + corner)));
+    }
+    mesh(&vertices, &triangles)
 }
 
 pub fn box_mesh(low: Point3<f64>, high: Point3<f64>) -> Mesh {
-    mesh(&box_corners(low, high), &BOX)
+    boxes(&[[low.into(), high.into()]])
 }
 
 /// A square of the given half side in the plane z = 0, in many triangles.

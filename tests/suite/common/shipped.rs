@@ -1,7 +1,9 @@
 //! Shipped scenes with changed settings, and common queries of them.
 
 use palpate::explore::evidence::{Contact, Outcome};
+use palpate::robot::arm::{Chain, Joints};
 use palpate::sim::{Environment, Scene};
+use rand::RngExt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -32,4 +34,13 @@ pub fn toy(x: f64) -> f64 {
 #[track_caller]
 pub fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");
+}
+
+/// A posture within the limits of all joints.
+pub fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
+    let mut q = Joints::zeros();
+    for (q, joint) in q.iter_mut().zip(&chain.joints) {
+        *q = random.random_range(joint.q_limits[0]..joint.q_limits[1]);
+    }
+    q
 }

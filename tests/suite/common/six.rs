@@ -18,7 +18,7 @@ const JOINTS: [([f64; 3], [f64; 3], f64); 6] = [
 /// A home posture in front of the container.
 pub const HOME_DEG: [f64; 6] = [72.15, -93.98, 112.78, -65.22, 77.48, -77.17];
 
-fn list(numbers: &[f64]) -> String {
+pub fn list(numbers: &[f64]) -> String {
     numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }
 

@@ -95,14 +95,6 @@ pub fn with_finger_of_size(
     }
 }
 
-/// Whether every number of a load is finite.
-pub fn is_finite(load: &ContactLoad) -> bool {
-    let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
-    vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
-        && load.energy_j.is_finite()
-        && load.pressure_pa.is_finite()
-}
-
 /// Multiplies all stiffnesses of the skin.
 pub fn stiffen(effects: &mut Effects, times: f64) {
     if let Some(skin) = &mut effects.skin {

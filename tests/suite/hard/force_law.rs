@@ -1,7 +1,8 @@
 //! Hard cases of the force for a pose of the finger: laws of press, release, slip and rest.
 
 use super::case::{Case, Outcome, all, case, require};
-use super::finger_on_wall::{FingerOnWall, is_finite, stiffen, with_finger, with_finger_of_size};
+use super::finger_on_wall::{FingerOnWall, stiffen, with_finger, with_finger_of_size};
+use crate::common::quiet::is_finite;
 use nalgebra::{Isometry3, Vector3};
 use palpate::backend::Fault;
 use palpate::math::seed;

@@ -2,9 +2,10 @@
 //! closed form, so the laws bound its distance from equilibrium.
 
 use super::case::{Case, Outcome, all, case, require};
-use super::finger_on_wall::{FingerOnWall, is_finite, with_finger};
+use super::finger_on_wall::{FingerOnWall, with_finger};
 use super::force_law::{effects, laws_of, poses};
 use super::solids::{both, mesh, needle};
+use crate::common::quiet::is_finite;
 use palpate::backend::Fault;
 use palpate::geometry::solids::box_mesh;
 use palpate::sim::finger::Effects;

@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
 use palpate_sim::Environment;
-use palpate_sim::camera::probe::seen;
+use palpate_sim::camera_probe::seen;
 
 /// Checks the views that an experiment reads from files.
 ///

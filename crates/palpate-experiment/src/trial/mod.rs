@@ -24,7 +24,7 @@ use palpate_explore::task::{Action, Approach, Target};
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::math::seed;
 use palpate_sim::Environment;
-use palpate_sim::camera::{self, probe::CameraProbe};
+use palpate_sim::camera_probe::{self, CameraProbe};
 use rand_chacha::ChaCha8Rng;
 use std::cell::OnceCell;
 use std::fmt::Display;
@@ -177,7 +177,7 @@ fn run_touches(
     for (view, error) in row.views.iter_mut().zip(episode.belief().rigid_errors()) {
         view.error = Some(error);
         if let Target::Look { camera } = view.target {
-            view.true_error = camera::probe::true_error(&truth.environment, camera, seeds);
+            view.true_error = camera_probe::true_error(&truth.environment, camera, seeds);
         }
     }
     verify(experiment, &mut episode, row)

@@ -3,17 +3,15 @@
 mod height_field;
 mod over_zone;
 mod quantiles;
-mod random_field;
 mod reach;
 mod solid;
-mod surface_belief;
 mod touches;
 
+pub use crate::surface_belief::{
+    BelievedSurface, Deviation, HeightPredictions, RandomField, Reduction, SurfaceBelief,
+};
 pub use height_field::HeightField;
-pub(crate) use over_zone::LOOKED_AT;
 pub use quantiles::BAND;
-pub use random_field::{RandomField, Reduction};
-pub use surface_belief::{BelievedSurface, Deviation, HeightPredictions, SurfaceBelief};
 
 use super::evidence::Outcome;
 use super::gp_settings::GpSettings;
@@ -26,6 +24,7 @@ use palpate_gp::fit::Fit;
 use palpate_input::error::InputError;
 use palpate_input::format;
 use serde::{Deserialize, Serialize};
+use std::any::Any;
 use std::ops::Deref;
 
 /// Belief of one trial: a belief of the surface, whose methods it has, and hypotheses about the
@@ -169,5 +168,17 @@ impl Deref for Belief {
 impl<B: SurfaceBelief + 'static> From<B> for Belief {
     fn from(surface: B) -> Self {
         Self { surface: Box::new(surface), hypotheses: None }
+    }
+}
+
+impl dyn SurfaceBelief {
+    /// Returns the belief over a zone by a Gaussian process, if it is one.
+    pub fn height_field(&self) -> Option<&HeightField> {
+        (self as &dyn Any).downcast_ref()
+    }
+
+    /// Returns the belief of a whole object, if it is one.
+    pub fn implicit_surface(&self) -> Option<&ImplicitSurface> {
+        (self as &dyn Any).downcast_ref()
     }
 }

@@ -1,10 +1,11 @@
 //! The belief of a height field as a surface belief.
 
+use super::HeightField;
 use super::solid::below_heights;
-use super::{
-    BelievedSurface, Deviation, HeightField, HeightPredictions, RandomField, SurfaceBelief,
-};
 use crate::evidence::{Evidence, Outcome};
+use crate::surface_belief::{
+    self, BelievedSurface, Deviation, HeightPredictions, LOOKED_AT, RandomField, SurfaceBelief,
+};
 use crate::surface_evidence::Silhouette;
 use crate::task::{Region, Target};
 use crate::view::{LookOffer, RigidError, SeenSurface};
@@ -73,7 +74,7 @@ impl SurfaceBelief for HeightField {
 
     fn shape(&self) -> Option<BelievedSurface> {
         let posterior = self.surface()?;
-        let shape = super::surface_belief::over_zone(&self.zone, posterior, &self.silhouette());
+        let shape = surface_belief::over_zone(&self.zone, posterior, &self.silhouette());
         let seen = posterior.observations();
         let point = |(i, &height): (usize, &f64)| {
             self.zone.point(&seen.place(i).collect::<Vec<_>>(), height)
@@ -110,12 +111,4 @@ impl SurfaceBelief for HeightField {
     fn posterior(&self) -> Option<&Posterior> {
         self.surface()
     }
-
-    fn height_field(&self) -> Option<&HeightField> {
-        Some(self)
-    }
 }
-
-/// Number of places that a look is imagined to show.
-// heuristic: a mean over them is within a few percent.
-pub(crate) const LOOKED_AT: usize = 100;

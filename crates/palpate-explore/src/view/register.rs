@@ -14,7 +14,7 @@
 //! the curvature of Louis 1982); the errors get mean and covariance of the mixture of peaks.
 
 use super::seen::{ERRORS, SeenSurface};
-use crate::evidence::Contact;
+use crate::contact::Contact;
 use nalgebra::{Cholesky, Isometry3, Point3, SMatrix, SVector};
 use palpate_geometry::primitives::extent;
 use palpate_gp::math::normal;

@@ -3,7 +3,7 @@
 
 use super::doubt::ViewDoubt;
 use super::{CorrectedElement, SeenSurface};
-use crate::evidence::Contact;
+use crate::contact::Contact;
 use nalgebra::Point3;
 
 /// Depth within swept space, m, and in standard deviations of an element, beyond which it is not

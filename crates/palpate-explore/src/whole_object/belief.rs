@@ -2,8 +2,10 @@
 
 use super::ImplicitSurface;
 use super::surface::{Surface, steepness};
-use crate::belief::{BelievedSurface, Deviation, LOOKED_AT, RandomField, Reduction, SurfaceBelief};
 use crate::evidence::{Evidence, Outcome};
+use crate::surface_belief::{
+    BelievedSurface, Deviation, LOOKED_AT, RandomField, Reduction, SurfaceBelief,
+};
 use crate::task::{Region, Target};
 use crate::view::{LookOffer, RigidError};
 use nalgebra::{Point3, UnitVector3};
@@ -155,10 +157,6 @@ impl SurfaceBelief for ImplicitSurface {
 
     fn posterior(&self) -> Option<&Posterior> {
         Some(self.surface()?.posterior())
-    }
-
-    fn implicit_surface(&self) -> Option<&ImplicitSurface> {
-        Some(self)
     }
 }
 

@@ -3,7 +3,6 @@
 mod file;
 mod intrinsics;
 mod pcd;
-pub mod probe;
 pub mod settings;
 
 pub use settings::CameraSettings;

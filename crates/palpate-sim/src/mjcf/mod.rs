@@ -1,17 +1,17 @@
 //! Conversion of a scene to MJCF, the text that MuJoCo compiles into a model. Numbers are in SI
 //! units, in `W`.
 
-pub mod arm;
 mod robot;
 mod scenery;
 mod text;
 
+use super::arm_mjcf::list;
 use super::environment::{CLEARANCE_M, Environment, ObjectShape};
 use super::scene::Scene;
 use super::solver::{Collision, Integrator, Sdf};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
-use text::{CONTACT, TABLE, list, mesh_asset, pose};
+use text::{CONTACT, TABLE, mesh_asset, pose};
 
 // heuristic: time step of a model for viewing, the period of the PA-10's servo.
 const PICTURE_STEP_S: f64 = 0.002;

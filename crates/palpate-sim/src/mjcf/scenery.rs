@@ -1,6 +1,7 @@
 //! Scenery of a rendered scene: backing board of the object, floor, cameras, lights.
 
-use super::text::{list, mesh_asset, pose};
+use super::text::{mesh_asset, pose};
+use crate::arm_mjcf::list;
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use palpate_explore::robot::arm::Chain;
 use palpate_explore::task::{Task, Zone};

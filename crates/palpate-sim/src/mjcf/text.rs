@@ -1,5 +1,6 @@
 //! Shared fragments of MJCF.
 
+use crate::arm_mjcf::list;
 use nalgebra::{Isometry3, Point3};
 use palpate_geometry::mesh::Mesh;
 use std::fmt::Display;
@@ -17,12 +18,6 @@ pub(super) const LINK: &str =
 /// Attributes of the table, and of a finger with a skin, if they collide with links.
 pub(super) const TABLE: &str =
     r#"contype="2" conaffinity="2" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
-
-/// Returns the numbers separated by spaces.
-pub(super) fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
-    let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
-    texts.join(" ")
-}
 
 /// Returns a pose as attributes.
 pub(super) fn pose(x: &Isometry3<f64>) -> String {

@@ -1,7 +1,5 @@
 //! MuJoCo bindings: compilation of models, and the plant that steps one.
 
-mod arm_file;
-mod arm_joint;
 mod dynamic;
 mod joint_servo;
 mod models;
@@ -11,15 +9,13 @@ mod plant;
 #[cfg(feature = "viewer")]
 pub mod window;
 
-pub use arm_file::arm_parts;
 pub use dynamic::DynamicBackend;
 pub use models::{CompiledModels, StepLimit, Substeps};
 pub use plant::Plant;
 
+use crate::mujoco_log::quiet;
 use mujoco_rs::wrappers::MjModel;
-use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
 use palpate_input::error::InputError;
-use std::sync::Once;
 
 /// Returns the error of a model that lacks a `part` of a robot with a finger.
 fn lacking(part: &str) -> InputError {
@@ -35,17 +31,6 @@ pub fn version() -> &'static str {
 /// (glibc sets ENOMEM if the heap of the main arena cannot grow, and allocates elsewhere) Another
 /// thread has another arena.
 const SPURIOUS: &str = "unknown error in attribute";
-
-/// Stops MuJoCo from writing messages; call it before any model is compiled.
-fn quiet() {
-    static QUIET: Once = Once::new();
-    QUIET.call_once(|| {
-        // A diverging trial is a fault in its row, not a line in MUJOCO_LOG.TXT.
-        let quiet = log_config().with_logto_console(false).with_logto_file(false);
-        // SAFETY: no thread can use MuJoCo yet, because this precedes every model.
-        unsafe { set_log_config(quiet) };
-    });
-}
 
 /// Compiles a model; with an implicit integrator, its servos become those of a [`Plant`].
 ///

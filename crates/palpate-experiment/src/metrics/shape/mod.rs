@@ -4,6 +4,7 @@ mod reach;
 
 pub use reach::FingerReach;
 
+use super::mean;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::task::approach::attitude;
 use palpate_explore::whole_object::Surface;
@@ -74,13 +75,6 @@ fn f_score(from_true_m: &[f64], from_believed_m: &[f64], limit_m: f64) -> f64 {
     let (recall, precision) = (within(from_true_m), within(from_believed_m));
     let sum = precision + recall;
     if sum > 0.0 { round_share(2.0 * precision * recall / sum) } else { 0.0 }
-}
-
-/// Mean of numbers; `None` if there are none.
-fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let (count, sum) =
-        values.into_iter().fold((0_u32, 0.0), |(count, sum), value| (count + 1, sum + value));
-    (count > 0).then(|| sum / f64::from(count))
 }
 
 /// Rounds a share to six decimals, finer than the samples resolve: each row stores one per touch.

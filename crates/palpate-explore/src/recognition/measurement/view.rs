@@ -124,7 +124,8 @@ impl ViewMeasurement {
         Peak { errors, sum, log_integral }
     }
 
-    /// Adds `share` of the derivatives of a peak's integral by the pose.
+    /// Adds `share` of the derivatives of a peak's integral by the pose. They leave out the change
+    /// of the peak's volume, which is large only where points scatter by many deviations.
     fn add_derivatives(
         &self,
         peak: &Peak,
@@ -311,7 +312,8 @@ mod tests {
             let slope = (at(step).value - at(-step).value) / (2.0 * step);
             let sum = at(0.0);
             let scale = sum.information[(axis, axis)].sqrt() + 1.0;
-            prop_assert!((sum.gradient[axis] - slope).abs() < 0.1 * scale, "{} {slope}", sum.gradient[axis]);
+            // The change of the peak's volume is left out.
+            prop_assert!((sum.gradient[axis] - slope).abs() < 0.005 * scale, "{} {slope}", sum.gradient[axis]);
             prop_assert!(sum.information.symmetric_eigenvalues().min() > -1e-6 * scale * scale);
         }
     }

@@ -1,7 +1,7 @@
 //! Arms from MJCF files, which MuJoCo reads.
 
-use super::arm_joint::{check_constraints, motor, name};
-use super::quiet;
+use super::joint::{check_constraints, motor, name};
+use crate::mujoco_log::quiet;
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase, MjtJoint, MjtObjBase};
 use nalgebra::{

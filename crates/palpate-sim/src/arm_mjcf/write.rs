@@ -1,10 +1,9 @@
 //! MJCF of an arm from its model: masses, friction, velocity servos.
 
-use super::text::list;
 use palpate_explore::robot::arm::chain::JOINTS_APART;
 use palpate_explore::robot::arm::model::{BASE, CapsuleModel, JointModel};
 use palpate_explore::robot::arm::{ArmModel, JointType};
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 
 /// Gain of a joint's velocity servo over its rotor's inertia, 1/s; a heuristic: the largest for
 /// which a step of 2 ms, explicit in the velocity, would be stable. The inertia that a servo feels
@@ -79,4 +78,10 @@ fn capsules(model: &ArmModel, link: &str) -> String {
         }
     };
     of_link.map(geom).collect()
+}
+
+/// Returns the numbers separated by spaces.
+pub(crate) fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
+    texts.join(" ")
 }

@@ -1,24 +1,27 @@
 //! The trait of beliefs about a surface.
 
-use super::{HeightField, RandomField};
+mod random_field;
+
+pub use random_field::{RandomField, Reduction};
+
 use crate::evidence::Outcome;
 use crate::surface_evidence::Silhouette;
 use crate::task::zone::grid_triangles;
 use crate::task::{Region, Target, Zone};
 use crate::view::{LookOffer, RigidError};
-use crate::whole_object::ImplicitSurface;
 use nalgebra::Point3;
 use palpate_geometry::solids::Triangles;
 use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 use palpate_gp::math::normal;
+use std::any::Any;
 
 /// A belief about the surface in a region, from the outcomes of actions.
 ///
 /// Points of its domain are places (x) or (x, z) of a zone, or points of `W` around a whole object.
 /// A planner asks a belief, and the [region](Self::region) only where it samples targets.
-pub trait SurfaceBelief: Send + Sync {
+pub trait SurfaceBelief: Any + Send + Sync {
     /// Region that is explored.
     fn region(&self) -> Region;
 
@@ -162,16 +165,6 @@ pub trait SurfaceBelief: Send + Sync {
     fn posterior(&self) -> Option<&Posterior> {
         None
     }
-
-    /// Returns the belief over a zone by a Gaussian process, if it is one.
-    fn height_field(&self) -> Option<&HeightField> {
-        None
-    }
-
-    /// Returns the belief of a whole object, if it is one.
-    fn implicit_surface(&self) -> Option<&ImplicitSurface> {
-        None
-    }
 }
 
 /// Predicted heights at some places.
@@ -207,12 +200,16 @@ pub struct BelievedSurface {
     pub contacts_w: Vec<Point3<f64>>,
 }
 
+/// Number of places that a look is imagined to show.
+// heuristic: a mean over them is within a few percent.
+pub(crate) const LOOKED_AT: usize = 100;
+
 /// Points along each side of a zone for drawing.
 // heuristic: sufficient for display.
 const PER_SIDE: usize = 21;
 
 /// Returns the believed surface over a zone where a surface is likely.
-pub(super) fn over_zone(
+pub(crate) fn over_zone(
     zone: &Zone,
     field: &dyn RandomField,
     silhouette: &Silhouette,

@@ -1,7 +1,7 @@
 //! Probe with a camera: it looks itself, and passes touches on.
 
-use super::TrueError;
 use crate::Environment;
+use crate::camera::TrueError;
 use palpate_explore::backend::Fault;
 use palpate_explore::evidence::{End, Outcome};
 use palpate_explore::probe::Probe;
