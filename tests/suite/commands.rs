@@ -92,7 +92,7 @@ fn a_setting_given_as_an_option_is_answered_with_its_assignment() {
     for arguments in [
         &["run", "small.toml", "--thread", "2"][..],
         &["run", "small.toml", "--gp", "2"],
-        &["compare", "runs/a", "--trials", "2"],
+        &["list", "--trials", "2"],
     ] {
         let message = stderr(&palpate(folder.path(), arguments));
         assert!(message.contains("unexpected argument"), "{message}");
