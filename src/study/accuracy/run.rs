@@ -43,7 +43,8 @@ pub struct AccuracySpec {
     pub trials: Option<u16>,
     /// Touches per trial.
     pub trial_touches: u16,
-    /// Held-out targets or trials; `None` for 200 targets of effects, otherwise the number compared.
+    /// Held-out targets or trials; `None` for 200 targets of effects, otherwise as many as
+    /// compared.
     pub held_out: Option<u16>,
     /// Seed of the targets.
     pub seed: u16,
