@@ -4,6 +4,7 @@ use crate::common::outcomes::outcome;
 use nalgebra::Vector3;
 use palpate::experiment::recording::recorded_trial::ResumedProbe;
 use palpate::experiment::sweep::sweep_cases;
+use palpate::experiment::trial::TrialEvent;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::Contact;
@@ -128,6 +129,60 @@ fn a_silhouette_is_found() {
         assert!(row.touches.iter().all(|touch| touch.fallback.is_none()), "{scene}");
     }
     assert!(found < 0.65 * by_share, "{found} {by_share}");
+}
+
+/// A sphere of radius r touches a plane of angle φ at r·sin(φ) uphill of its target.
+#[test]
+fn on_a_plane_the_expected_contact_is_uphill() {
+    let (zone, slope) = (zone(), 0.5f64);
+    let finger = Finger { radius_m: 0.007, length_m: 0.0, ..Finger::default() };
+    let mut belief =
+        HeightField::new(zone.clone(), GpSettings::default()).with_finger(finger.clone());
+    for target in zone.grid(6) {
+        let p_wt = zone.point(&target, slope * target[0]);
+        let contact = Contact::new(p_wt, Vector3::y());
+        belief.observe(&target.as_slice().into(), &outcome(&zone, &finger, p_wt, Some(contact)));
+    }
+    let target = vec![0.5 * SIDE_M; 2];
+    assert_eq!(belief.expected_contacts(std::slice::from_ref(&target))[0], target);
+    belief.refit().unwrap();
+    let expected = &belief.expected_contacts(std::slice::from_ref(&target))[0];
+    let uphill_m = finger.radius_m * slope.atan().sin();
+    let off_m = (expected[0] - target[0] - uphill_m).hypot(expected[1] - target[1]);
+    // A step of its grid, to both sides.
+    assert!(off_m < finger.radius_m / 4.0, "{expected:?}, {uphill_m} m uphill of {target:?}");
+}
+
+/// Contacts on an outline lie nearer to the places where the belief expects them than to their
+/// targets.
+#[test]
+fn contacts_lie_where_they_are_expected() {
+    let sets = ["planners=[\"sobol\"]", "trials=1", "grid=21", "touches=30", "initial_touches=5"];
+    let mut sets: Vec<String> = sets.map(String::from).into();
+    sets.push("scene = \"scenes/suite/star.toml\"".into());
+    sets.push("gp = \"experiments/beliefs/objects.toml\"".into());
+    let experiment = Experiment::load(Path::new("experiments/bird.toml"), &sets).unwrap();
+    let simulation = Simulation::new(experiment).unwrap();
+    let mut beliefs = Vec::new();
+    let mut probe = simulation.probe(0).unwrap();
+    let planner = planner::by_name("sobol").unwrap();
+    let row = simulation.trial_with(&mut *probe, planner, 0, &mut |event| {
+        if let TrialEvent::Finished(touch) = event {
+            beliefs.push(touch.belief.clone());
+        }
+        Ok(None)
+    });
+    let zone = simulation.task().zone().unwrap();
+    let [mut off_m, mut away_m] = [0.0; 2];
+    for (belief, touch) in beliefs.iter().zip(&row.touches[1..]).skip(9) {
+        let Some(p_wc) = touch.contact() else { continue };
+        let at = zone.place(&p_wc);
+        let distance_m = |place: &[f64]| (place[0] - at[0]).hypot(place[1] - at[1]);
+        let target = touch.target.place().unwrap().to_vec();
+        off_m += distance_m(&belief.expected_contacts(std::slice::from_ref(&target))[0]);
+        away_m += distance_m(&target);
+    }
+    assert!(off_m < 0.9 * away_m, "{off_m} of {away_m} m");
 }
 
 /// A resumed trial plans as if uninterrupted: its rows contain the volumes that its touches swept.

@@ -325,7 +325,7 @@ fn zone_text(name: &str, scene: &str, gp: &str) -> String {
         "name = \"{name}\"\n\
          question = \"Which planner explores {name} best?\"\n\
          scene = \"{scene}\"\n\
-         planners = [\"silhouette\", \"active\", \"sobol\", \"random\"]\n\
+         planners = [\"expected_contact\", \"active\", \"sobol\", \"random\"]\n\
          trials = 12                 # of each planner\n\
          seed = 1\n\
          initial_touches = 5         # random touches, the same for all planners\n\

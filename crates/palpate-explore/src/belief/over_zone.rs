@@ -56,6 +56,10 @@ impl SurfaceBelief for HeightField {
         self.target(place)
     }
 
+    fn expected_contacts(&self, places: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.expected_contacts(places)
+    }
+
     fn heights(&self, places: &[Vec<f64>], probabilities: &[f64]) -> Option<HeightPredictions> {
         let predictions = self.surface()?.predict(places.iter().map(Vec::as_slice));
         let quantiles_m = self.predicted_quantiles_m(places, &predictions, probabilities)?;

@@ -27,11 +27,7 @@ impl HeightField {
             return vec![true; places.len()];
         };
         let grid = Grid::new(&self.zone, STEP * finger.radius_m);
-        let nodes = || grid.places.iter().map(Vec::as_slice);
-        let likely = self.surface_evidence().silhouette().is_likely(nodes());
-        let heights_m: Vec<f64> = (surface.means(nodes()).into_iter().zip(likely))
-            .map(|(mean, is_likely)| if is_likely { mean } else { f64::NEG_INFINITY })
-            .collect();
+        let heights_m = self.likely_heights_m(surface, &grid);
         let mut is_reached = vec![false; heights_m.len()];
         for pitched in finger.pitched() {
             let hull = Hull::new(&pitched, grid.step_m);
@@ -72,6 +68,41 @@ impl HeightField {
             Some(pitch_deg) => Target::Tilted { place: at, pitch_deg },
             None => place.into(),
         }
+    }
+
+    /// Returns the places where touches at `places`, with the finger's own pitch, are expected to
+    /// make contact: where its hull meets the mean of the likely surface, on a grid. A touch that
+    /// meets none, or meets it at its target, is expected at its target, and so are all without a
+    /// finger or before the first fit.
+    pub fn expected_contacts(&self, places: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let (Some(finger), Some(surface)) = (&self.finger, &self.surface) else {
+            return places.to_vec();
+        };
+        let grid = Grid::new(&self.zone, STEP * finger.radius_m);
+        let heights_m = self.likely_heights_m(surface, &grid);
+        let hull = Hull::new(finger, grid.step_m);
+        let contact = |place: &Vec<f64>| {
+            let under = hull.parts.iter().filter_map(|(steps, front_m)| {
+                let node = grid.beside(grid.nearest(&self.zone, place), *steps)?;
+                Some((heights_m[node] - front_m, node, *steps))
+            });
+            match under.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((tip_m, node, steps)) if tip_m.is_finite() && steps != [0, 0] => {
+                    grid.places[node].clone()
+                }
+                _ => place.clone(),
+            }
+        };
+        places.iter().map(contact).collect()
+    }
+
+    /// Returns the mean at the nodes of a grid; −∞ where no surface is likely.
+    fn likely_heights_m(&self, surface: &Posterior, grid: &Grid) -> Vec<f64> {
+        let nodes = || grid.places.iter().map(Vec::as_slice);
+        let likely = self.surface_evidence().silhouette().is_likely(nodes());
+        (surface.means(nodes()).into_iter().zip(likely))
+            .map(|(mean, is_likely)| if is_likely { mean } else { f64::NEG_INFINITY })
+            .collect()
     }
 
     /// Distance from `target` to the contact that a touch there is expected to make, where the hull
@@ -167,6 +198,14 @@ impl Grid {
             known.fold(f64::NEG_INFINITY, f64::max)
         };
         nodes.map(at).collect()
+    }
+
+    /// Returns the index of the node some steps beside another; `None` outside the grid.
+    fn beside(&self, node: usize, [di, dj]: [i32; 2]) -> Option<usize> {
+        let [width, height] = self.counts;
+        let (i, j) = (node as i32 % width + di, node as i32 / width + dj);
+        let is_inside = (0..width).contains(&i) && (0..height).contains(&j);
+        is_inside.then_some((j * width + i) as usize)
     }
 
     /// Returns the index of the node nearest to `place`.

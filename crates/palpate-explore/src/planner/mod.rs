@@ -4,6 +4,7 @@
 
 mod active;
 pub mod candidates;
+mod expected_contact;
 mod grid;
 mod information;
 mod integrated_variance;
@@ -50,6 +51,7 @@ planners! {
     grid: "grid",
     integrated_variance: "integrated_variance",
     silhouette: "silhouette",
+    expected_contact: "expected_contact",
     slope: "slope",
     travel: "travel",
     ucb: "ucb",

@@ -163,6 +163,23 @@ impl Search {
         sobol::places(zone, count, self.rng.random())
     }
 
+    /// Returns evenly spread places, more of them on the zone's border, different ones on each
+    /// call.
+    pub fn places_to_border(&mut self, zone: &Zone, count: u32) -> Vec<Vec<f64>> {
+        let (lower, upper) = corners(zone, MARGIN);
+        let places = sobol::places(zone, count, self.rng.random());
+        let moved = |place: &Vec<f64>| {
+            let sides = place.iter().zip(zone.sides()).zip(lower.iter().zip(&upper));
+            let stretched = sides.map(|((at, [low, high]), (lower, upper))| {
+                lower + (at - low) / (high - low) * (upper - lower)
+            });
+            let mut inside = Vec::new();
+            clamp(zone, &stretched.collect::<Vec<f64>>(), &mut inside);
+            inside
+        };
+        places.iter().map(moved).collect()
+    }
+
     /// Returns `values` and their gradients by central differences, one-sided at a zone's border.
     pub fn with_gradients<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
         &self,

@@ -34,7 +34,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 
 /// Length scales of the committee, in units of the fitted ones. A heuristic: on the suite's tuning
 /// objects, the fitted ones alone, and a third and three times, did no better.
-const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
+pub(super) const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
 fn plan(search: &mut Search, seed: u32, belief: &Belief, zone: &Zone) -> Plan {
     let Some(known) = belief.explorable() else { return search.anywhere(belief) };

@@ -89,6 +89,12 @@ pub trait SurfaceBelief: Any + Send + Sync {
         place.into()
     }
 
+    /// Returns the places where touches at `places` of a zone are expected to make contact: by
+    /// default the same.
+    fn expected_contacts(&self, places: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        places.to_vec()
+    }
+
     /// Whether the finger can reach a target in the region.
     fn reaches(&self, _target: &Target) -> bool {
         true
