@@ -2,7 +2,7 @@
 //! `tests/ros2/franka_driver.py`, on another implementation of DDS, run in a network namespace by
 //! `make test PART=ros2`.
 
-use crate::common::driver::{driver, off_mm, passes_its_own_tests, refused, said, touch};
+use crate::common::driver::{assert_on_plane, driver, passes_its_own_tests, refused, said, touch};
 use crate::common::lab::{Network, count};
 use serde_json::json;
 use std::thread::sleep;
@@ -44,9 +44,8 @@ fn an_fr3_touches_where_the_surface_is() {
         let network = network(number);
         let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets));
-        println!("{options:?}: off by {off_mm:.3?} mm");
-        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{off_mm:?}");
+        let row = touch(&network, touches, folder.path(), &sets);
+        assert_on_plane(&row, &format!("{options:?}"));
         let ended = twin.end();
         println!("{ended}");
         assert_eq!(ended["dropped"], json!({}), "{ended}");

@@ -1,7 +1,7 @@
 //! Tests of a UR5e behind `ur_robot_driver` as its sources describe it: `tests/ros2/ur_driver.py`,
 //! on another implementation of DDS, run in a network namespace by `make test PART=ros2`.
 
-use crate::common::driver::{driver, off_mm, passes_its_own_tests, refused, said, touch};
+use crate::common::driver::{assert_on_plane, driver, passes_its_own_tests, refused, said, touch};
 use crate::common::lab::{
     BALL_EXPERIMENT, End, Network, TwinProcess, count, end_planners_marked, signal,
 };
@@ -55,9 +55,8 @@ fn a_ur_touches_where_the_surface_is() {
         let network = network(number);
         let twin = driver(PEER, &network, &options);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&touch(&network, touches, folder.path(), &sets));
-        println!("{options:?}: off by {off_mm:.3?} mm");
-        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{off_mm:?}");
+        let row = touch(&network, touches, folder.path(), &sets);
+        assert_on_plane(&row, &format!("{options:?}"));
         let ended = twin.end();
         assert_eq!(ended["dropped"], json!({}), "{ended}");
         let active = ended["active"].to_string();
@@ -92,9 +91,7 @@ fn a_calibrated_ur_touches_where_the_surface_is() {
     }
     let calibrated = format!("scene.arm.calibration=\"{}\"", model.display());
     let row = touch(&network, count("PALPATE_UR_TOUCHES", 6), &out, &[&calibrated]);
-    let off_mm = off_mm(&row);
-    println!("calibrated: off by {off_mm:.3?} mm");
-    assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{off_mm:?}");
+    assert_on_plane(&row, "calibrated");
     twin.end();
 }
 
@@ -186,8 +183,7 @@ fn a_paused_ur_is_waited_for() {
         let network = network(number);
         let twin = driver(PEER, &network, &["--from-motion", "--event", event]);
         let folder = tempfile::tempdir().unwrap();
-        let off_mm = off_mm(&touch(&network, 2, folder.path(), &[]));
-        assert!(off_mm.iter().all(|off_mm| *off_mm < 0.1), "{event}: {off_mm:?}");
+        assert_on_plane(&touch(&network, 2, folder.path(), &[]), event);
         twin.end();
     }
 }
