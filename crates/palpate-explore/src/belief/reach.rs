@@ -82,8 +82,9 @@ impl HeightField {
         let heights_m = self.likely_heights_m(surface, &grid);
         let hull = Hull::new(finger, grid.step_m);
         let contact = |place: &Vec<f64>| {
+            let tip = grid.nearest(&self.zone, place);
             let under = hull.parts.iter().filter_map(|(steps, front_m)| {
-                let node = grid.beside(grid.nearest(&self.zone, place), *steps)?;
+                let node = grid.beside(tip, *steps)?;
                 Some((heights_m[node] - front_m, node, *steps))
             });
             match under.max_by(|a, b| a.0.total_cmp(&b.0)) {

@@ -11,12 +11,12 @@
 //! the contacts evenly and up to the border; in a half-empty one it lies beside the object, and the
 //! reduction counts. Around a whole object the planner is `active`.
 //!
-//! As for `silhouette`, places are weighted by the square root of their optimistic probability, and
-//! variances are those of a committee of length scales.
+//! The planner weights places and averages over a committee of length scales as `silhouette` does.
 
+use super::active;
 use super::plan::{Plan, PlannerEntry};
 use super::search::Search;
-use super::silhouette::COMMITTEE;
+use super::silhouette::for_committee;
 use super::sobol;
 use crate::belief::{Belief, RandomField};
 use crate::task::{Region, Zone};
@@ -35,9 +35,7 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
         Box::new(move |belief: &Belief| {
             Ok(match (belief.region(), belief.explorable()) {
                 (Region::Zone(zone), Some(field)) => plan(&mut search, seed, belief, &zone, field),
-                (Region::Ball(_), Some(_)) => search
-                    .plan(belief, |points, gradients| belief.surface_variances(points, gradients)),
-                (_, None) => search.anywhere(belief),
+                _ => active::plan(&mut search, belief),
             })
         })
     },
@@ -71,20 +69,15 @@ fn plan(
     let (mut scores, candidates): (Vec<f64>, Vec<Vec<f64>>) =
         chances.filter(|(chance, _)| *chance > 0.0).unzip();
     let contacts = belief.expected_contacts(&candidates);
-    let committee: Vec<_> = COMMITTEE.iter().filter_map(|scale| field.scaled(*scale)).collect();
     let mut gains = vec![0.0; candidates.len()];
-    let mut add = |member: &dyn RandomField| {
+    for_committee(field, |member| {
         let variances = member.variances(&contacts, &mut []);
         let reductions = member.reduction(&places, weights.clone()).at(&contacts);
         for (gain, (variance, reduction)) in gains.iter_mut().zip(variances.iter().zip(reductions))
         {
             *gain += variance.max(0.0).powf(fill) * reduction.max(0.0).powf(1.0 - fill);
         }
-    };
-    committee.iter().for_each(|member| add(&**member));
-    if committee.is_empty() {
-        add(field);
-    }
+    });
     scores.iter_mut().zip(&gains).for_each(|(score, gain)| *score *= gain);
     match scores.iter().zip(candidates).max_by(|a, b| a.0.total_cmp(b.0)) {
         Some((_, place)) => search.plan_at(belief, zone, place),

@@ -34,7 +34,16 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 
 /// Length scales of the committee, in units of the fitted ones. A heuristic: on the suite's tuning
 /// objects, the fitted ones alone, and a third and three times, did no better.
-pub(super) const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
+const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
+
+/// Calls `add` with each belief of the committee, or with `field` alone if it has no length scales.
+pub(super) fn for_committee(field: &dyn RandomField, mut add: impl FnMut(&dyn RandomField)) {
+    let committee: Vec<_> = COMMITTEE.iter().filter_map(|scale| field.scaled(*scale)).collect();
+    committee.iter().for_each(|member| add(&**member));
+    if committee.is_empty() {
+        add(field);
+    }
+}
 
 fn plan(search: &mut Search, seed: u32, belief: &Belief, zone: &Zone) -> Plan {
     let Some(known) = belief.explorable() else { return search.anywhere(belief) };
@@ -48,16 +57,11 @@ fn plan(search: &mut Search, seed: u32, belief: &Belief, zone: &Zone) -> Plan {
     let (chances, candidates): (Vec<f64>, Vec<Vec<f64>>) =
         chances.filter(|(chance, _)| *chance > 0.0).unzip();
     let mut falls = vec![0.0; candidates.len()];
-    let mut add = |member: &dyn RandomField| {
+    for_committee(known, |member| {
         let reduction = member.reduction(&places, weights.clone());
         let reductions = reduction.at(&candidates);
         falls.iter_mut().zip(reductions).for_each(|(sum, fall)| *sum += fall);
-    };
-    let committee: Vec<_> = COMMITTEE.iter().filter_map(|scale| known.scaled(*scale)).collect();
-    committee.iter().for_each(|member| add(&**member));
-    if committee.is_empty() {
-        add(known);
-    }
+    });
     // Time in units of a touch that begins where the last one ended.
     let last = belief.targets().pop();
     let time = |place: &[f64]| {
