@@ -453,6 +453,39 @@ mod tests {
     }
 
     #[test]
+    fn rows_are_solved_and_a_square_is_subtracted_as_by_nalgebra() {
+        const HEIGHT: usize = 24;
+        const COUNT: usize = 330;
+        for n in [1, 8, 33, 330] {
+            let a = matrix(n);
+            let l = a.clone().cholesky().expect("positive definite").l();
+            let mut factored = dense(&a);
+            factored.factor(a.diagonal().max()).expect("positive definite");
+            let b = DMatrix::from_fn(HEIGHT, n, |i, j| ((i * 5 + j * 3) as f64).cos());
+            let mut rows = vec![0.0; HEIGHT * factored.padded()];
+            rows[..HEIGHT * n].copy_from_slice(b.as_slice());
+            factored.solve_rows(&mut rows, HEIGHT);
+            let solved = DMatrix::from_column_slice(HEIGHT, n, &rows[..HEIGHT * n]);
+            let residual = solved * l.transpose() - b;
+            assert!(residual.amax() < 1e-12, "{n}: {}", residual.amax());
+
+            let p = DMatrix::from_fn(n, COUNT, |i, j| ((i * 3 + j * 7) as f64).sin());
+            let mut rest = dense(&a);
+            let mut columns = vec![0.0; rest.stride() * COUNT];
+            for (to, from) in columns.chunks_exact_mut(rest.stride()).zip(p.column_iter()) {
+                to[..n].copy_from_slice(from.as_slice());
+            }
+            rest.subtract_square(&columns);
+            let expected = &a - &p * p.transpose();
+            for j in 0..n {
+                for (below, entry) in rest.column(j).iter().enumerate() {
+                    assert!((entry - expected[(j + below, j)]).abs() < 1e-10, "{n}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn an_indefinite_row_is_refused_and_leaves_the_factor_whole() {
         let mut ours = appended(&matrix(3));
         let before = ours.rows.clone();

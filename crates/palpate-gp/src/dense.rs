@@ -128,7 +128,7 @@ impl DenseMatrix {
     /// the order are zero.
     pub(super) fn subtract_square(&mut self, p: &[f64]) {
         let stride = self.stride;
-        let count = p.len() / stride.max(1);
+        let count = p.len() / stride;
         let matrix = ColumnsMut { entries: &mut self.entries, stride };
         tiles::subtract_square(matrix, Columns { entries: p, stride }, self.padded, count);
     }
