@@ -4,8 +4,8 @@ use super::find::find;
 use super::host::Host;
 use super::output::{Overwrite, make_folder};
 use super::prepare::set_thread_count;
-use super::run;
 use super::terminal::{Completion, Verbosity, print};
+use super::trials::{TrialOptions, Trials, completion};
 use crate::experiment::store::write_whole;
 use crate::report::benchmark::{markdown, table};
 use crate::study::benchmark::{self, BenchmarkSpec, PROTOCOL};
@@ -18,7 +18,7 @@ Examples:
   palpate benchmark --planner my_planner:MyPlanner       the built-in planners and one of your own
   palpate benchmark --out runs/mine --threads 8
 
-Runs a fixed protocol, experiments/suite/benchmark-2.toml: objects, planners, touches, trials and seeds. Writes \
+Runs a fixed protocol, experiments/suite/benchmark-3.toml: objects, planners, touches, trials and seeds. Writes \
 benchmark.json and the table benchmark.md, with a run's folder for each object. Ctrl-C stops it; the same command \
 continues it, and runs only the missing planners. Results of two programs can be compared if the protocol's version and \
 hash in their files are equal. --quick runs a part of the protocol and marks its files.")]
@@ -30,7 +30,7 @@ pub(super) struct Args {
     /// comparable.
     #[arg(long)]
     quick: bool,
-    /// Folder for the results [default: runs/benchmark-2, or runs/benchmark-2-quick].
+    /// Folder for the results [default: runs/benchmark-3, or runs/benchmark-3-quick].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Threads; 0 means all cores. Results do not depend on it.
@@ -63,11 +63,12 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
         is_quick: args.quick,
         commit: host.commit,
     };
-    let options = run::Args::of(&args.planner, args.threads, args.fresh);
-    let (mut stop, mut outcome) = (None, Completion::Done);
+    let options =
+        TrialOptions { threads: args.threads, is_fresh: args.fresh, ..TrialOptions::default() };
+    let mut trials = Trials::new(options, talk, host);
+    let mut outcome = Completion::Done;
     let result = benchmark::run(&spec, &mut |experiment, part| {
-        let made = run::run_missing(&options, experiment, Some(part), &mut stop, talk, host)?;
-        outcome = made.outcome(talk);
+        outcome = completion(&trials.run(experiment, part)?, talk);
         Ok(matches!(outcome, Completion::Done))
     })?;
     let Some(result) = result else {

@@ -3,13 +3,14 @@
 use super::find::{EXPERIMENTS, find, located};
 use super::host::Host;
 use super::output::Overwrite;
-use super::prepare::{prepare_simulation, set_thread_count};
+use super::prepare::{check_applicable, prepare_simulation, set_thread_count};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
+use super::replay::replay;
 use super::terminal::{Completion, Verbosity, print};
+use crate::experiment::Experiment;
 use crate::experiment::backend_settings::arm_tables;
 use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
-use crate::experiment::{Experiment, Simulation};
 use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{
     CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, run_check,
@@ -17,8 +18,8 @@ use crate::study::check::{
 use crate::study::planners::planners_setting;
 use anyhow::{Context, bail};
 use palpate_input::format::counted;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -27,6 +28,8 @@ Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl --accept 'length scales are fitted in logarithms'
   palpate check container --planner my_planner:Widest --baseline widest.jsonl
   palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
+  palpate check runs/container_finger/recordings/active-0000.mcap
+  palpate check FILE.mcap --set scene.touch.press_m=0.001    first difference under a changed setting
 
 Runs the first four trials of every planner. If their rows equal the baseline's byte for byte, the planner is identical \
 and the test ends. Otherwise new and old trials with the same seeds are paired on the mean log error over the touches. \
@@ -34,17 +37,22 @@ Trials are added in tens until a confidence sequence decides: better, ok (the up
 worse. After --max-trials the result is undecided. Other measures are Holm-corrected and can only be worse. Run time is \
 not tested.
 
+A recording (.mcap of `palpate run --record`) is its own baseline: its readings are fed to the current servo, belief and \
+planner, and every command and every touch's row is compared. A trial of a real arm that was interrupted and continued is \
+recorded in parts (active-0000.mcap, active-0000-part-2.mcap, …): given the first, all are replayed.
+
 Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 error.")]
 pub(super) struct Args {
-    /// An experiment (.toml), or the name of one in experiments/.
-    experiment: PathBuf,
+    /// An experiment (.toml), the name of one in experiments/, or a recording (.mcap).
+    #[arg(value_name = "EXPERIMENT")]
+    path: PathBuf,
     /// Check this planner instead of the experiment's, built in or Python (MODULE:CLASS); may be
     /// repeated.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
-    /// Baseline file, written by --accept.
+    /// Baseline file of an experiment, written by --accept.
     #[arg(long, value_name = "FILE")]
-    baseline: PathBuf,
+    baseline: Option<PathBuf>,
     /// Maximum number of trials per planner.
     #[arg(long, default_value_t = 50, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     max_trials: u32,
@@ -66,6 +74,9 @@ pub(super) struct Args {
     /// Change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Print the result of a recording as JSON.
+    #[arg(long)]
+    json: bool,
     /// Threads; 0 means all cores. Results do not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
@@ -79,7 +90,25 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
-    let path = find(&args.experiment, EXPERIMENTS)?;
+    let is_recording = args.path.extension().is_some_and(|extension| extension == "mcap");
+    let experiment = "an experiment (.toml)";
+    let options = [
+        ("--planner", !args.planner.is_empty(), !is_recording, experiment),
+        ("--baseline", args.baseline.is_some(), !is_recording, experiment),
+        ("--accept", args.accept.is_some(), !is_recording, experiment),
+        ("--junit", args.junit.is_some(), !is_recording, experiment),
+        ("--markdown", args.markdown.is_some(), !is_recording, experiment),
+        ("--svg", args.svg.is_some(), !is_recording, experiment),
+        ("--json", args.json, is_recording, "a recording (.mcap)"),
+    ];
+    check_applicable(&args.path, &options)?;
+    if is_recording {
+        return replay(&args.path, &args.set, args.json, talk);
+    }
+    let path = find(&args.path, EXPERIMENTS)?;
+    let Some(baseline) = &args.baseline else {
+        bail!("{}: a check needs --baseline FILE; write it with --accept REASON", path.display());
+    };
     let mut sets = args.set.clone();
     if !args.planner.is_empty() {
         sets.push(planners_setting(args.planner.iter()));
@@ -91,11 +120,11 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
         args.force.check_file(path)?;
     }
     let old = match &args.accept {
-        Some(_) if !args.baseline.exists() => None,
+        Some(_) if !baseline.exists() => None,
         _ => {
-            let path = located(&args.baseline);
+            let path = located(baseline);
             if !path.exists() {
-                let file = args.baseline.display();
+                let file = baseline.display();
                 bail!("{file}: no such baseline; write it with --accept REASON");
             }
             let old = StoredBaseline::read(&path)?;
@@ -114,7 +143,22 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     }
     let stop = stop_on_interrupt("trials")?;
     if let Some(why) = &args.accept {
-        return accept_baseline(args, &simulation, old.as_ref(), why, &stop, talk);
+        args.force.check_file(baseline)?;
+        let jobs = runner::missing_jobs(&simulation, &[])?;
+        let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
+        let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
+        let rows = runner::run_in_memory(&simulation, jobs, args.threads.into(), &stop, &tick)?;
+        bar.finish_and_clear();
+        if stop.load(Ordering::Relaxed) {
+            return Ok(Completion::Interrupted);
+        }
+        let (old, is_part) = (old.as_ref(), !args.planner.is_empty());
+        let new = accepted(&simulation, &rows, why, old, is_part, &rules(args))?;
+        write_whole(baseline, &new.text()?)?;
+        let mut text = format!("{} in {}", counted(rows.len(), "trial"), baseline.display());
+        new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
+        print(&text)?;
+        return Ok(Completion::Done);
     }
     let mut old = old.context("no baseline")?;
     let rules = rules(args);
@@ -126,7 +170,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
     let held = run_check(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
     bar.finish_and_clear();
-    print_results(args, &name, &old, &held, &rules)?;
+    print_results(args, (&name, baseline), &old, &held, &rules)?;
     Ok(match held.is_stopped {
         true => Completion::Interrupted,
         false => match held.verdict() {
@@ -143,12 +187,12 @@ fn rules(args: &Args) -> CheckOptions {
 
 fn print_results(
     args: &Args,
-    name: &str,
+    (name, baseline): (&str, &Path),
     old: &StoredBaseline,
     held: &CheckResult,
     rules: &CheckOptions,
 ) -> anyhow::Result<()> {
-    let file = args.baseline.display();
+    let file = baseline.display();
     let mut text = format!("{name} against {file} ({})\n{}", old.header.why, table(held).text());
     for remark in remarks(held, rules, args.max_trials) {
         text += &format!("{remark}\n");
@@ -168,31 +212,4 @@ fn print_results(
         write(path, draw(name, held, rules))?;
     }
     Ok(())
-}
-
-/// Runs all trials and writes them as the baseline.
-fn accept_baseline(
-    args: &Args,
-    simulation: &Simulation,
-    old: Option<&StoredBaseline>,
-    why: &str,
-    stop: &AtomicBool,
-    talk: Verbosity,
-) -> anyhow::Result<Completion> {
-    args.force.check_file(&args.baseline)?;
-    let jobs = runner::missing_jobs(simulation, &[])?;
-    let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
-    let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
-    let threads = args.threads.into();
-    let rows = runner::run_in_memory(simulation, jobs, threads, stop, &tick)?;
-    bar.finish_and_clear();
-    if stop.load(Ordering::Relaxed) {
-        return Ok(Completion::Interrupted);
-    }
-    let new = accepted(simulation, &rows, why, old, !args.planner.is_empty(), &rules(args))?;
-    write_whole(&args.baseline, &new.text()?)?;
-    let mut text = format!("{} in {}", counted(rows.len(), "trial"), args.baseline.display());
-    new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
-    print(&text)?;
-    Ok(Completion::Done)
 }

@@ -1,11 +1,12 @@
 //! Command `palpate identify`.
 
 use super::find::{SCENES, find, find_input};
-use super::prepare::{prepare_arm, prepare_simulation};
+use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
 use super::terminal::{Completion, Verbosity, print};
 use crate::report::identify::{conclusion, line};
 use crate::study::identify::{self as study, IdentifySpec};
+use crate::study::run::start_arm;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -65,7 +66,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
     let stop = stop_on_interrupt("touches")?;
     if let Some(arm) = simulation.connect()? {
         let start_checks = &simulation.experiment().backend.start_checks;
-        prepare_arm(&arm, start_checks, args.clear_fault)?;
+        start_arm(&arm, start_checks, args.clear_fault)?;
     }
     let found = study::run(&simulation, &spec, &stop, &mut |touches, found| {
         let _ = print(&line(touches, found));

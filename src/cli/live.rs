@@ -1,29 +1,26 @@
 //! Command `palpate live`.
 
 use super::find::{EXPERIMENTS, SCENES, find, find_input, is_experiment};
-use super::host::Host as Program;
-use super::new::{self, Written};
-use super::prepare::{connect_arm, load_experiment, prepare_simulation};
+use super::host::Host;
+use super::live_page::{Page, new_folder};
+use super::prepare::{load_experiment, prepare_simulation};
 use super::progress::stop_on_interrupt;
 use super::terminal::{Completion, Verbosity, command_line, error, print};
 use crate::experiment::Experiment;
 use crate::experiment::analysis::Analysis;
-use crate::experiment::planner_names::known_planners;
-use crate::experiment::store::{RESOLVED, Run, RunFolder};
-use crate::live::files::{file_name, open_browser};
+use crate::experiment::store::{RESOLVED, Run};
+use crate::live::Server;
+use crate::live::files::open_browser;
 use crate::live::session::{Session, replay};
-use crate::live::{Brought, Host, MeshWish, Server};
 use crate::report;
-use crate::study::planners::{planners_setting, with_planners};
-use anyhow::Context;
+use crate::study::planners::with_planners;
+use crate::study::run::{RunSpec, open};
 use palpate_geometry::import::is_mesh_file;
-use palpate_input::error::InputError;
-use palpate_input::files;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 #[derive(clap::Args)]
@@ -106,10 +103,10 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 /// Wait for a start on the page.
 const LOOK: Duration = Duration::from_millis(200);
 
-pub(super) fn run(args: &Args, talk: Verbosity, program: &Program) -> anyhow::Result<Completion> {
+pub(super) fn run(args: &Args, talk: Verbosity, program: &Host) -> anyhow::Result<Completion> {
     let interrupt = stop_on_interrupt("touches")?;
     let (wishes, starts) = channel();
-    let page = Page { folder: Path::new("runs").join("live"), brought: Mutex::new(None), wishes };
+    let page = Page::new(wishes);
     let work = match &args.path {
         Some(path) => Some(work(args, path, &page)?),
         None => None,
@@ -163,32 +160,18 @@ fn work(args: &Args, path: &Path, page: &Page) -> anyhow::Result<Work> {
         };
         return Ok(Work::Experiment(Box::new(experiment)));
     }
-    let folder = page.folder.to_string_lossy().into_owned();
-    let words = [path.to_string_lossy().into_owned(), "--out".into(), folder];
-    let written = new::write(&new::Args::of_words(&own_files(&words))?, Verbosity { quiet: true })?;
     let planners = match args.planner.is_empty() {
         true => vec!["active".into(), "random".into()],
         false => args.planner.clone(),
     };
-    Ok(Work::Experiment(Box::new(brought(&written.experiment, &planners, &args.set)?)))
-}
-
-/// Adds the options of files that belong to the page.
-fn own_files(words: &[String]) -> Vec<String> {
-    words.iter().cloned().chain(["--yes".into(), "--force".into()]).collect()
-}
-
-/// Returns one trial of an experiment that was written for a mesh.
-fn brought(path: &Path, planners: &[String], sets: &[String]) -> anyhow::Result<Experiment> {
-    let own = [planners_setting(planners.iter()), "trials=1".into()];
-    Ok(Experiment::load(path, &[&own[..], sets].concat())?)
+    Ok(Work::Experiment(Box::new(page.experiment(&path, &planners, &args.set)?)))
 }
 
 /// Command with its page.
 struct Live<'a> {
     args: &'a Args,
     talk: Verbosity,
-    program: &'a Program<'a>,
+    program: &'a Host<'a>,
     server: Arc<Server>,
     /// Set by Ctrl-C.
     interrupt: Arc<AtomicBool>,
@@ -235,11 +218,14 @@ impl Live<'_> {
         }
         let simulation = prepare_simulation(experiment, self.talk)?.with_planners(own);
         let mut session = Session::new(simulation, Arc::clone(&self.interrupt));
-        let commit = self.program.commit;
-        let fresh = self.args.fresh;
-        let (mut folder, done) = RunFolder::open(&path, session.simulation(), commit, fresh)?;
-        let (clears_fault, command) = (self.args.clear_fault, self.args.command_after_fault());
-        connect_arm(session.simulation_mut(), &path, clears_fault, command)?;
+        let spec = RunSpec {
+            folder: &path,
+            commit: self.program.commit,
+            is_fresh: self.args.fresh,
+            clears_fault: self.args.clear_fault,
+            command_after_fault: &self.args.command_after_fault(),
+        };
+        let (mut folder, done) = open(session.simulation_mut(), spec)?;
         let desk = Arc::clone(session.desk());
         desk.set_start(self.args.hold, self.args.approve);
         let truth = session.simulation().truth().clone();
@@ -267,62 +253,6 @@ impl Live<'_> {
         desk.close(rows, &line);
         Ok(if is_whole { Completion::Done } else { Completion::Interrupted })
     }
-}
-
-/// Files and trials that the page may change.
-struct Page {
-    /// Folder of all files that the page writes.
-    folder: PathBuf,
-    /// Experiment that was written last.
-    brought: Mutex<Option<PathBuf>>,
-    wishes: Sender<Experiment>,
-}
-
-impl Host for Page {
-    fn bring(&self, wish: &MeshWish, mesh: &[u8]) -> Result<Brought, InputError> {
-        let path = self.folder.join(file_name(&wish.name)?);
-        let out = self.folder.to_string_lossy().into_owned();
-        let mut words = vec![path.to_string_lossy().into_owned(), "--out".into(), out];
-        let pairs = [
-            ("--side", Some(&wish.side)),
-            ("--finger", Some(&wish.finger)),
-            ("--unit", wish.unit.as_ref()),
-        ];
-        for (option, value) in pairs {
-            words.extend(value.into_iter().flat_map(|value| [option.to_owned(), value.clone()]));
-        }
-        words.extend(wish.around.then(|| "--around".to_owned()));
-        let write = || -> anyhow::Result<Brought> {
-            files::make_folder(&self.folder).with_context(|| self.folder.display().to_string())?;
-            let args = new::Args::of_words(&own_files(&words))?;
-            let mut brought = self.brought.lock().unwrap_or_else(PoisonError::into_inner);
-            files::replace_by(&path, |to| std::io::Write::write_all(to, mesh))?;
-            let Written { words, experiment, picture, .. } =
-                new::write(&args, Verbosity { quiet: true })?;
-            let picture = std::fs::read(&picture).unwrap_or_default();
-            *brought = Some(experiment);
-            Ok(Brought { words, picture })
-        };
-        write().map_err(|error| InputError::new(format!("{error:#}")))
-    }
-
-    fn start(&self, planners: Vec<String>) -> Result<(), InputError> {
-        let path = self.brought.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let path = path.ok_or_else(|| InputError::new("no mesh was brought"))?;
-        let loaded = brought(&path, &planners, &[]);
-        let experiment = loaded.map_err(|error| InputError::new(format!("{error:#}")))?;
-        self.wishes.send(experiment).map_err(|_| InputError::new("the command has ended"))
-    }
-
-    fn planners(&self) -> Vec<String> {
-        known_planners().map(|(name, _)| name.to_owned()).collect()
-    }
-}
-
-/// Returns a folder that does not exist, for a run that is started on the page.
-fn new_folder(name: &str) -> PathBuf {
-    let folder = |number: u32| Path::new("runs").join(format!("{name}-live-{number}"));
-    (1..).map(folder).find(|path| !path.exists()).unwrap_or_else(|| folder(0))
 }
 
 #[cfg(test)]

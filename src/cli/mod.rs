@@ -17,6 +17,7 @@ mod identify;
 mod known_body;
 mod list;
 mod live;
+mod live_page;
 mod new;
 mod output;
 mod picture;
@@ -35,10 +36,12 @@ mod sensors;
 mod serve;
 mod setting_tip;
 mod show;
+mod show_scene;
 mod slow_steps;
 mod step;
 mod terminal;
 mod topic;
+mod trials;
 mod watch;
 
 pub use host::Host;
@@ -105,7 +108,7 @@ enum Command {
     Compare(compare::Args),
     /// Run a fixed protocol over many objects and rank planners, your own too.
     Benchmark(benchmark::Args),
-    /// Test planners for regressions against a stored baseline.
+    /// Test planners for regressions against a stored baseline, or a program against a recording.
     Check(check::Args),
     /// Measure the error and time of simulation levels and effects of a scene.
     Accuracy(accuracy::Args),
@@ -113,8 +116,6 @@ enum Command {
     Serve(serve::Args),
     /// Register the finger, a ball, a plate or an object by touch.
     Register(register::Args),
-    /// Replay a recorded trial and compare commands and results.
-    Replay(replay::Args),
     /// Fit the finger's constants to recordings on a flat plate, or the 95 % band to objects.
     Calibrate(calibrate::Args),
     /// List experiments, scenes, planners, measures and effects; print the reference.
@@ -127,7 +128,7 @@ enum Command {
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Explore", &["new", "run", "live", "identify", "report", "show", "export"]),
     ("Evaluate", &["compare", "benchmark", "check", "accuracy"]),
-    ("Robot", &["serve", "register", "replay", "calibrate"]),
+    ("Robot", &["serve", "register", "calibrate"]),
     ("More", &[]),
 ];
 
@@ -208,7 +209,6 @@ fn run_command(command: Command, talk: Verbosity, host: &Host) -> anyhow::Result
         Command::Accuracy(args) => accuracy::run(&args, talk),
         Command::Serve(args) => serve::run(&args, talk),
         Command::Register(args) => register::run(&args, talk),
-        Command::Replay(args) => replay::run(&args, talk),
         Command::Calibrate(args) => calibrate::run(&args, talk),
         Command::List(args) => list::run(&args),
         Command::Doctor(args) => doctor::run(&args, host),

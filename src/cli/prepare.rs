@@ -3,13 +3,10 @@
 use super::find::is_experiment;
 use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
-use crate::experiment::store::Journal;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, bail};
-use palpate_explore::backend::arm::Arm;
-use palpate_explore::backend::interlock::StartCheckSettings;
 use palpate_input::config::ConfigError;
 use palpate_input::format::counted;
 use std::path::Path;
@@ -75,45 +72,4 @@ pub(super) fn prepare_simulator(
     simulator.check_reach()?;
     simulator.notices().iter().for_each(|notice| talk.note(notice));
     Ok(simulator)
-}
-
-/// Connects to a real arm and checks that it may be moved; first clears latched faults if
-/// `clears_fault`. A simulation needs nothing.
-///
-/// # Errors
-/// If a fault halted the run of this folder, with the command that continues it; if the arm cannot
-/// be reached, or may not move.
-pub(super) fn connect_arm(
-    simulation: &mut Simulation,
-    folder: &Path,
-    clears_fault: bool,
-    command: String,
-) -> anyhow::Result<()> {
-    if !simulation.is_real() {
-        return Ok(());
-    }
-    // Before the connection: another program may hold the folder.
-    if let Some(reason) = Journal::open(folder)?.halt_reason().filter(|_| !clears_fault) {
-        bail!(
-            "{}: a fault halted the run: {reason}\ncheck the arm, then continue with: {command}\n(or use --fresh to \
-             start again)",
-            folder.display(),
-        );
-    }
-    match simulation.connect()? {
-        Some(arm) => prepare_arm(&arm, &simulation.experiment().backend.start_checks, clears_fault),
-        None => Ok(()),
-    }
-}
-
-/// Checks that a real arm may be moved; first clears faults latched on the robot if `clear_fault`.
-pub(super) fn prepare_arm(
-    arm: &Arc<dyn Arm>,
-    settings: &StartCheckSettings,
-    clear_fault: bool,
-) -> anyhow::Result<()> {
-    if clear_fault {
-        arm.clear_fault()?;
-    }
-    Ok(Arc::clone(arm).check_start(settings)?)
 }

@@ -3,7 +3,7 @@
 use super::find::{SCENES, find, find_input, is_experiment};
 use super::known_body::KnownBodyArgs;
 use super::output::Overwrite;
-use super::prepare::{prepare_arm, prepare_simulator};
+use super::prepare::prepare_simulator;
 use super::progress::{progress_bar, step};
 use super::register_cloud::{CloudArgs, register_cloud};
 use super::terminal::{Completion, Verbosity, print};
@@ -11,6 +11,7 @@ use crate::experiment::backend_settings::BackendSettings;
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::sim::{Scene, known_body};
+use crate::study::run::start_arm;
 use anyhow::Context;
 use palpate_explore::evidence::Outcome;
 use palpate_explore::registration::{RegistrationDesign, register};
@@ -96,7 +97,7 @@ pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
         None => simulator.probe(args.seed)?,
         Some((_, connector)) => {
             let arm = connector.connect(&robot.chain, settings.dry)?;
-            prepare_arm(&arm, &settings.start_checks, args.clear_fault)?;
+            start_arm(&arm, &settings.start_checks, args.clear_fault)?;
             Box::new(simulator.servo_within(arm.backend(), args.seed, &settings.interlocks)?)
         }
     };

@@ -1,10 +1,11 @@
 //! Rehearsal of a run: `palpate run --dry`.
 
-use super::prepare::{prepare_arm, prepare_simulation};
+use super::prepare::prepare_simulation;
 use super::progress::stop_on_interrupt;
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::Experiment;
 use crate::experiment::backend_settings::arm_tables;
+use crate::study::run::start_arm;
 use anyhow::{Context, bail};
 use palpate_explore::backend::pace;
 use palpate_explore::belief::Belief;
@@ -29,7 +30,7 @@ pub(super) fn run(
         bail!("--dry: a simulation touches without risk; allowed with {}", arm_tables());
     }
     if let Some(arm) = simulation.connect()? {
-        prepare_arm(&arm, &simulation.experiment().backend.start_checks, clears_fault)?;
+        start_arm(&arm, &simulation.experiment().backend.start_checks, clears_fault)?;
     }
     let body = simulation.backend(None)?.context("the arm does not move")?;
     let mut servo = simulation.servo(body, simulation.body_seed(0))?;

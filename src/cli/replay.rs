@@ -1,41 +1,26 @@
-//! Command `palpate replay`.
+//! Replay of a recording: `palpate check FILE.mcap`.
 
 use super::prepare::prepare_simulation;
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::recording::recorded_trial::parts;
-use crate::experiment::recording::replay::{self, Difference, ReplayResult};
+use crate::experiment::recording::replay::{self as recorded_replay, Difference, ReplayResult};
 use anyhow::Context;
 use palpate_input::format::counted;
 use palpate_input::format::shorten;
 use palpate_ros::recording::RecordedTrial;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  palpate run container_finger --record
-  palpate replay runs/container_finger/recordings/active-0000.mcap
-  palpate replay FILE --set scene.touch.press_m=0.001    first difference under a changed setting
-
-Feeds the recorded readings to the current servo, belief and planner, and compares every command and every touch's row \
-with the recording. A trial of a real arm that was interrupted and continued is recorded in parts (active-0000.mcap, \
-active-0000-part-2.mcap, …): given the first, all are replayed. Exit codes: 0 no difference, 1 a difference, 2 error.")]
-pub(super) struct Args {
-    /// Recording, written by `palpate run --record`.
-    file: PathBuf,
-    /// Change one setting; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Print the result as JSON.
-    #[arg(long)]
+/// Replays a recording, with all its parts, and prints whether anything differs.
+pub(super) fn replay(
+    file: &Path,
+    sets: &[String],
     json: bool,
-}
-
-pub(super) fn run(args: &Args, talk: Verbosity) -> anyhow::Result<Completion> {
-    let parts = parts(&args.file).into_iter().map(|file| ReplayedPart::of(file, args, talk));
+    talk: Verbosity,
+) -> anyhow::Result<Completion> {
+    let parts = parts(file).into_iter().map(|file| ReplayedPart::of(file, sets, talk));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
-    match args.json {
+    match json {
         true => {
             let mut parts = parts.iter().map(ReplayedPart::json);
             let mut found = parts.next().unwrap_or_default();
@@ -59,12 +44,12 @@ struct ReplayedPart {
 }
 
 impl ReplayedPart {
-    fn of(file: PathBuf, args: &Args, talk: Verbosity) -> anyhow::Result<Self> {
+    fn of(file: PathBuf, sets: &[String], talk: Verbosity) -> anyhow::Result<Self> {
         let name = || file.display().to_string();
         let recorded = RecordedTrial::read(&file).with_context(name)?;
-        let experiment = replay::experiment(&recorded, &file, &args.set)?;
+        let experiment = recorded_replay::experiment(&recorded, &file, sets)?;
         let simulation = prepare_simulation(experiment, talk)?;
-        let replay = replay::replay(&simulation, &recorded).with_context(name)?;
+        let replay = recorded_replay::replay(&simulation, &recorded).with_context(name)?;
         Ok(Self { file, recorded, replay })
     }
 

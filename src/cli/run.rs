@@ -3,33 +3,20 @@
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
 use super::plan::plan;
-use super::prepare::{connect_arm, prepare_simulation, set_thread_count};
-use super::progress::{stop_on_interrupt, touch_step, touches_bar};
+use super::prepare::set_thread_count;
 use super::rehearse;
-use super::step::{Stepper, is_unregistered};
-use super::terminal::{Completion, Verbosity, command_line, error, print, print_fitted};
-use crate::experiment::Simulation;
+use super::terminal::{Completion, Verbosity, command_line, print, print_fitted};
+use super::trials::{TrialOptions, Trials, completion};
+use crate::experiment::Experiment;
 use crate::experiment::analysis::Analysis;
-use crate::experiment::backend_settings::arm_tables;
-use crate::experiment::experiment::Experiment;
-use crate::experiment::row::TrialId;
-use crate::experiment::runner::{self, Progress, RealRun, Shard};
-use crate::experiment::store::{RECORDINGS, RowCounts, Run, RunFolder};
-use crate::experiment::sweep::sweep_cases;
-use crate::experiment::trial::TrialEvent;
+use crate::experiment::runner::Shard;
+use crate::experiment::store::Run;
 use crate::report;
 use crate::report::compare as comparison;
-use crate::study::compare::{compare, name_objects};
-use crate::study::planners::with_planners;
+use crate::study::run::{self as study, Cells};
 use anyhow::{Context, bail, ensure};
-use palpate_input::error::InputError;
-use palpate_input::files;
 use palpate_input::format::counted;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -50,7 +37,7 @@ An experiment with a [sweep] runs each combination in runs/NAME. Planners are co
 combinations and per combination, relative to sobol (or the first baseline): tables, the page suite.html
 and the table suite.csv. Use `palpate compare` for another reference planner.";
 
-#[derive(clap::Args, Default)]
+#[derive(clap::Args)]
 pub(super) struct Args {
     /// Experiment file (TOML), or the name of one in experiments/.
     experiment: PathBuf,
@@ -107,47 +94,18 @@ pub(super) struct Args {
 }
 
 impl Args {
-    /// Options of a run with additional planners, all others at their defaults.
-    pub(super) fn of(planners: &[String], threads: u16, fresh: bool) -> Self {
-        Self { planner: planners.to_vec(), threads, fresh, ..Self::default() }
-    }
-
-    /// Checks that the options apply to a simulation or a real arm.
-    fn check(&self, simulation: &Simulation) -> anyhow::Result<()> {
-        let simulator = simulation.experiment().scene.simulator;
-        if self.record && !simulator.moves_finger() && !simulation.is_real() {
-            let body = simulator.name();
-            bail!(
-                "--record: simulator = \"{body}\" does not move, so there is nothing to record; allowed are \
-                 \"kinematic\" and \"dynamic\""
-            );
+    /// Options of the trials.
+    fn options(&self) -> TrialOptions {
+        TrialOptions {
+            threads: self.threads,
+            is_fresh: self.fresh,
+            shard: self.shard,
+            is_recorded: self.record,
+            clears_fault: self.clear_fault,
+            asks: (self.step || self.no_step).then_some(self.step),
+            beside: self.experiment.parent().unwrap_or(Path::new("")).into(),
+            command_after_fault: self.command_after_fault(),
         }
-        if self.step && !simulation.is_real() {
-            bail!("--step: a simulation needs no operator; allowed with {}", arm_tables());
-        }
-        if self.shard.is_some() && simulation.is_real() {
-            bail!("--shard: a real arm runs one trial at a time; remove --shard");
-        }
-        Ok(())
-    }
-
-    /// Whether an operator is asked before each touch of a real arm.
-    fn is_asked(&self, run: &Path, talk: Verbosity) -> bool {
-        if self.step || self.no_step {
-            return self.step;
-        }
-        let beside = self.experiment.parent().unwrap_or(Path::new(""));
-        if !is_unregistered(&[Path::new(""), beside, run]) {
-            return false;
-        }
-        let is_terminal = std::io::stdin().is_terminal();
-        if !is_terminal {
-            talk.note(
-                "the arm has no registration.toml, and stdin is no terminal: touches are made without \
-                 asking; --step reads the answers from stdin",
-            );
-        }
-        is_terminal
     }
 
     /// Suffix of a shard's folder name.
@@ -174,224 +132,81 @@ impl Args {
 
 pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<Completion> {
     let path = find(&args.experiment, EXPERIMENTS)?;
-    let cases = sweep_cases(&path)?;
     set_thread_count(args.threads)?;
-    let mut stop = None;
-    if cases.is_empty() {
-        let out = args.out.clone();
-        let experiment =
-            with_planners(&args.set, &args.planner, |sets| Experiment::load(&path, sets))?;
-        if args.dry {
-            return rehearse::run(experiment, args.clear_fault, talk);
-        }
-        if let Some(shards) = args.plan {
-            return plan(experiment, shards, args.threads, talk);
-        }
-        return run_one(args, experiment, out, &mut stop, talk, host);
+    let Cells { sweep, mut experiments } = study::cells(&path, &args.set, &args.planner)?;
+    if args.dry || args.plan.is_some() {
+        let option = if args.dry { "--dry" } else { "--plan" };
+        let is_one = sweep.is_none();
+        ensure!(is_one, "{}: {option} needs an experiment without a [sweep]", path.display());
+        let experiment = experiments.remove(0);
+        return match args.plan {
+            Some(shards) => plan(experiment, shards, args.threads, talk),
+            None => rehearse::run(experiment, args.clear_fault, talk),
+        };
     }
-    for (option, is_given) in [("--plan", args.plan.is_some()), ("--dry", args.dry)] {
-        ensure!(!is_given, "{}: {option} needs an experiment without a [sweep]", path.display());
-    }
-    // All combinations are loaded before the first is run.
-    let load = |case| {
-        with_planners(&args.set, &args.planner, |sets| Experiment::load_cell(&path, case, sets))
+    let mut trials = Trials::new(args.options(), talk, host);
+    let Some(name) = sweep else {
+        let experiment = experiments.remove(0);
+        let usual = || Path::new("runs").join(format!("{}{}", experiment.name, args.suffix()));
+        let path = args.out.clone().unwrap_or_else(usual);
+        return run_one(args, &mut trials, experiment, &path, talk);
     };
-    let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let first = experiments[0].clone();
-    let name = first.name.strip_suffix(&cases[0].label).unwrap_or(&first.name);
-    let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(name));
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(&name));
+    let part = if args.out.is_none() { args.suffix() } else { String::new() };
     let mut paths = Vec::new();
     for experiment in experiments {
-        let part = if args.out.is_none() { args.suffix() } else { String::new() };
-        paths.push(folder.join(format!("{}{part}", experiment.name)));
-        match run_one(args, experiment, paths.last().cloned(), &mut stop, talk, host)? {
-            Completion::Done => (),
+        let path = folder.join(format!("{}{part}", experiment.name));
+        match run_one(args, &mut trials, experiment, &path, talk)? {
+            Completion::Done => paths.push(path),
             other => return Ok(other),
         }
     }
-    if args.shard.is_none() {
-        compare_cells(args, &first, name, &folder, paths)?;
+    if args.shard.is_none()
+        && let Some(compared) = study::compare_cells(&name, &first, paths)?
+    {
+        let mut text = comparison::text(&compared);
+        if !args.no_report {
+            let page = comparison::write(&folder, &name, &first.question, &compared)?;
+            text += &format!("\npage: {}", page.display());
+        }
+        if !args.json {
+            print(&text)?;
+        }
     }
     Ok(Completion::Done)
 }
 
-/// Preferred reference planner of a sweep's comparison.
-const REFERENCE: &str = "sobol";
-
-/// Compares the finished runs of a sweep: prints tables and writes a page to its folder.
-fn compare_cells(
-    args: &Args,
-    first: &Experiment,
-    name: &str,
-    folder: &Path,
-    paths: Vec<PathBuf>,
-) -> anyhow::Result<()> {
-    let read = |path: PathBuf| anyhow::Ok((path.display().to_string(), Run::read(&path)?));
-    let runs: Vec<(String, Run)> = paths.into_iter().map(read).collect::<Result<_, _>>()?;
-    let is_usual = first.planners.iter().any(|planner| planner == REFERENCE);
-    let against = if is_usual { REFERENCE } else { first.baselines()[0] };
-    // Cells with different planners, or without ground truth, cannot be compared.
-    let Ok(mut compared) = compare(&runs, against) else { return Ok(()) };
-    name_objects(&mut compared, name);
-    let mut text = comparison::text(&compared);
-    if !args.no_report {
-        let page = comparison::write(folder, name, &first.question, &compared)?;
-        text += &format!("\npage: {}", page.display());
-    }
-    if !args.json {
-        print(&text)?;
-    }
-    Ok(())
-}
-
-/// Result of a run.
-pub(super) struct RunResult {
-    path: PathBuf,
-    /// Number of trials run and their duration.
-    summary: String,
-    tally: RowCounts,
-    /// Expected number of trials.
-    total: u64,
-    /// Place and reason of a real arm's halt, and the results kept.
-    halt: Option<String>,
-}
-
-impl RunResult {
-    fn is_finished(&self) -> bool {
-        self.tally.trials as u64 == self.total
-    }
-
-    /// Returns the outcome; prints to stderr the number of failed trials and the first failure.
-    pub(super) fn outcome(&self, talk: Verbosity) -> Completion {
-        let RowCounts { trials, failed } = &self.tally;
-        let all_failed = *trials > 0 && failed.len() == *trials;
-        if let Some((TrialId { trial, planner }, reason)) = failed.first() {
-            let words = format!(
-                "{} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}",
-                failed.len()
-            );
-            match all_failed {
-                true => error(words),
-                false => talk.note(words),
-            }
-        }
-        match () {
-            () if !self.is_finished() => Completion::Interrupted,
-            () if all_failed => Completion::Failed,
-            () => Completion::Done,
-        }
-    }
-}
-
-/// Runs the missing trials.
-pub(super) fn run_missing(
-    args: &Args,
-    experiment: Experiment,
-    out: Option<PathBuf>,
-    stop: &mut Option<Arc<AtomicBool>>,
-    talk: Verbosity,
-    host: &Host,
-) -> anyhow::Result<RunResult> {
-    let (own, lacking) = host.load_planners(&experiment.planners);
-    let simulation = prepare_simulation(experiment, talk)?;
-    let mut simulation = simulation.with_planners(own);
-    let experiment = simulation.experiment();
-    args.check(&simulation)?;
-    let path = out.unwrap_or_else(|| {
-        PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
-    });
-    let (mut folder, done) = RunFolder::open(&path, &simulation, host.commit, args.fresh)?;
-    connect_arm(&mut simulation, &path, args.clear_fault, args.command_after_fault())?;
-    let simulation = simulation;
-    let experiment = simulation.experiment();
-    let recorded = args.record.then_some(path.as_path());
-    if recorded.is_some() {
-        let folder = path.join(RECORDINGS);
-        files::make_folder(&folder).with_context(|| folder.display().to_string())?;
-    }
-    let stop = match stop {
-        Some(stop) => stop,
-        None => stop.insert(stop_on_interrupt("trials")?),
-    };
-
-    // A planner that cannot be loaded is an error only if trials of it are missing.
-    let why = |error: InputError| lacking.unwrap_or(error.into());
-    let mut jobs = runner::missing_jobs(&simulation, &done).map_err(why)?;
-    if let Some(shard) = args.shard {
-        shard.retain(&mut jobs);
-    }
-    let total = (done.len() + jobs.len()) as u64;
-    let bar = touches_bar(talk, experiment, [jobs.len(), done.len()]);
-    let begun = Instant::now();
-    let tick = |progress: Progress| touch_step(talk, &bar, experiment, progress);
-    let (count, halt) = match simulation.is_real() {
-        true => {
-            let is_asked = args.is_asked(&path, talk);
-            let new = || Stepper::new(&simulation, std::io::stdin().lock());
-            let mut stepper = is_asked.then(new).transpose()?;
-            let mut ask = |event: &TrialEvent| match (event, &mut stepper) {
-                (TrialEvent::Next(next), Some(stepper)) => {
-                    bar.suspend(|| stepper.ask(next)).inspect_err(|_| {
-                        // The operator's stop is one between two touches, like Ctrl-C.
-                        stop.store(true, Ordering::Relaxed);
-                    })
-                }
-                (TrialEvent::Next(_) | TrialEvent::Finished(_), _) => Ok(None),
-            };
-            let run = RealRun {
-                simulation: &simulation,
-                folder: &mut folder,
-                stop,
-                recorded,
-                view: None,
-                progress: &tick,
-                observer: &mut ask,
-            };
-            run.run(&done)?
-        }
-        false => {
-            let threads = args.threads.into();
-            (runner::run(&simulation, &mut folder, jobs, threads, stop, recorded, &tick)?, None)
-        }
-    };
-    bar.finish_and_clear();
-    let tally = folder.sort(experiment)?;
-    let mut words =
-        format!("{} in {:.1} s", counted(count, "trial"), begun.elapsed().as_secs_f64());
-    if !done.is_empty() {
-        words += &format!(", {} already done", done.len());
-    }
-    Ok(RunResult { path, summary: words, tally, total, halt })
-}
-
+/// Runs the trials of an experiment that a folder lacks, and writes and prints the results.
 fn run_one(
     args: &Args,
+    trials: &mut Trials,
     experiment: Experiment,
-    out: Option<PathBuf>,
-    stop: &mut Option<Arc<AtomicBool>>,
+    path: &Path,
     talk: Verbosity,
-    host: &Host,
 ) -> anyhow::Result<Completion> {
-    let made = run_missing(args, experiment, out, stop, talk, host)?;
-    let RunResult { path, summary: words, total, halt, .. } = &made;
+    let made = trials.run(experiment, path)?;
+    let mut words = format!("{} in {:.1} s", counted(made.count, "trial"), made.time_s);
+    if made.done > 0 {
+        words += &format!(", {} already done", made.done);
+    }
     // A shard is not summarised: its rows may not fit in memory.
     if args.shard.is_some() {
         print(&format!("{words}\nrows in {}", path.display()))?;
-        return Ok(made.outcome(talk));
+        return Ok(completion(&made, talk));
     }
 
     let run = Run::read(path)?;
     let mut text = format!("{}\n{words}", report::tables::summary::text(&run, args.wide));
     let analysis = Analysis::new(&run);
-    let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
     if let Some(conclusion) = report::findings::conclusion(&run, &analysis) {
         text += &format!("\n{conclusion}");
     }
     report::write_tables(&run, &analysis, path)?;
     if !made.is_finished() {
-        text +=
-            &format!("\nstopped with {} of {total} trials in {}", run.rows.len(), path.display());
-        if halt.is_none() || is_asked {
+        let (rows, total) = (run.rows.len(), made.total);
+        text += &format!("\nstopped with {rows} of {total} trials in {}", path.display());
+        if made.halt.is_none() || trials.is_stopped() {
             text += "; repeat the command to continue";
         }
     } else if args.no_report {
@@ -405,13 +220,13 @@ fn run_one(
         true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
         false => print_fitted(&text)?,
     }
-    if let Some(halt) = halt {
-        if !is_asked {
+    if let Some(halt) = &made.halt {
+        if !trials.is_stopped() {
             bail!("{halt}\nfix the cause, then continue with: {}", args.command_after_fault());
         }
         talk.note(format!("{halt}; repeat the command to continue"));
     }
-    Ok(made.outcome(talk))
+    Ok(completion(&made, talk))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! * [`export`]: choice of the belief that is exported.
 //! * [`identify`]: an object of a library, identified by touch.
 //! * [`planners`]: planners that are added to those of an experiment.
+//! * [`run`]: runs in folders, and the comparison of a sweep's runs.
 //! * [`sensors`]: the same experiment with every kind of fingertip.
 //! * [`setup`]: scene and experiment for a mesh.
 
@@ -20,6 +21,7 @@ pub mod compare;
 pub mod export;
 pub mod identify;
 pub mod planners;
+pub mod run;
 pub mod sensors;
 pub mod setup;
 

@@ -228,7 +228,7 @@ fn a_run_that_was_halted_goes_on() {
     assert!(after.starts_with(&journal) && lines(&after) == 6);
     // Both parts of the recording can be replayed, on any machine.
     let whole = out.join("recordings/random-0000.mcap");
-    let replay = network.palpate(&["replay", whole.to_str().unwrap()]).output().unwrap();
+    let replay = network.palpate(&["check", whole.to_str().unwrap()]).output().unwrap();
     let values = String::from_utf8_lossy(&replay.stdout).into_owned();
     assert!(replay.status.success(), "{values}{}", String::from_utf8_lossy(&replay.stderr));
     assert!(

@@ -247,7 +247,7 @@ fn a_recording_of_a_drawn_object_is_replayed() {
     succeeds(folder.path(), &run.into_iter().chain(sets).collect::<Vec<_>>());
     for number in ["0000", "0001"] {
         let recording = format!("it/recordings/sobol-{number}.mcap");
-        let says = succeeds(folder.path(), &["replay", &recording]);
+        let says = succeeds(folder.path(), &["check", &recording]);
         assert!(says.contains("2 touches identical"), "{says}");
     }
 }

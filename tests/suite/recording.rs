@@ -636,20 +636,24 @@ fn the_program_records_and_replays() {
     assert_eq!(rows("bare"), rows("run"));
     for name in ["random-0000", "random-0001", "active-0000", "active-0001"] {
         let file = format!("run/recordings/{name}.mcap");
-        let said = succeeds(path, &["replay", &file]);
+        let said = succeeds(path, &["check", &file]);
         assert!(said.contains("3 touches identical"), "{said}");
     }
     let file = "run/recordings/active-0001.mcap";
-    let json = succeeds(path, &["replay", file, "--json"]);
+    let json = succeeds(path, &["check", file, "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&json["replay"]["touches"], &json["trial"]), (&3.into(), &1.into()));
-    let changed = ["replay", file, "--set", "scene.touch.approach_m_s=0.011"];
+    let changed = ["check", file, "--set", "scene.touch.approach_m_s=0.011"];
     let other = run_to_end(&mut command(path, &changed), "replay");
     assert_eq!(other.status.code(), Some(1), "{}", stderr(&other));
     let words = String::from_utf8(other.stdout).unwrap();
     assert!(words.contains("touch 1 differs at tick "), "{words}");
-    fails(path, &["replay", "small.toml"], &["small.toml", "not a recording"]);
-    fails(path, &["replay", "none.mcap"], &["none.mcap"]);
+    fails(path, &["check", "small.toml"], &["small.toml", "--baseline"]);
+    fails(path, &["check", "small.toml", "--json"], &["--json", "a recording"]);
+    fails(path, &["check", file, "--accept", "why"], &["--accept", "an experiment"]);
+    fs::write(path.join("text.mcap"), experiment).unwrap();
+    fails(path, &["check", "text.mcap"], &["text.mcap", "not a recording"]);
+    fails(path, &["check", "none.mcap"], &["none.mcap"]);
     let cast =
         ["run", "small.toml", "--set", "scene.simulator=\"swept\"", "--record", "--out", "cast"];
     fails(path, &cast, &["--record", "\"swept\"", "nothing to record"]);
@@ -695,10 +699,10 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
         assert_eq!((replay.touches, replay.is_cut, replay.difference), (touches, false, None));
     }
     let file = path.to_str().unwrap();
-    let said = succeeds(folder.path(), &["replay", file]);
+    let said = succeeds(folder.path(), &["check", file]);
     assert_eq!(said.matches("touches identical").count(), 3, "{said}");
     assert!(said.contains("5 touches identical in decisions and belief, 4 of them from earlier"));
-    let json = succeeds(folder.path(), &["replay", file, "--json"]);
+    let json = succeeds(folder.path(), &["check", file, "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["parts"][1]["made_before"], 4);
     // A difference in a later part counts as a difference of the trial.
@@ -708,6 +712,6 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let mut bytes = fs::read(&parts[2]).unwrap();
     bytes.truncate(bytes.len() / 2);
     fs::write(&parts[2], bytes).unwrap();
-    let cut = succeeds(folder.path(), &["replay", file]);
+    let cut = succeeds(folder.path(), &["check", file]);
     assert!(cut.contains("ends before the trial"), "{cut}");
 }
