@@ -3,6 +3,7 @@
 use super::table::{Cell, Column, Table};
 use crate::experiment::measure::Direction;
 use crate::study::benchmark::{BenchmarkResult, RelativeError};
+use crate::study::check::measures::ERROR_FLOOR_M;
 
 fn judged(error: &RelativeError) -> Cell {
     let cell = Cell::estimate(error.estimate());
@@ -18,6 +19,8 @@ pub fn table(result: &BenchmarkResult) -> Table {
         Column::new("better on"),
         Column::new("worse on"),
         Column::new("gap closed").unit("%", 100.0, 0),
+        Column::new("full zones").unit("%", 100.0, 0),
+        Column::new("open zones").unit("%", 100.0, 0),
     ];
     let after = |budget: &u32| Column::new(format!("after {budget}"));
     let last = [Column::new("failed")];
@@ -36,6 +39,8 @@ pub fn table(result: &BenchmarkResult) -> Table {
             count(planner.better_on),
             count(planner.worse_on),
             planner.gap_closed.into(),
+            planner.gap_closed_full.into(),
+            planner.gap_closed_open.into(),
         ];
         row.extend(after);
         row.push(format!("{} of {}", planner.failures, planner.trials + planner.failures).into());
@@ -71,7 +76,9 @@ fn note(result: &BenchmarkResult) -> String {
         "Error: exp(mean log error over the touches after the initial ones), relative to `{against}` in \
          the same trial; geometric mean over trials and objects, with the 95 % interval of a bootstrap \
          over trials. Less is better; better and worse on: objects whose interval excludes 1. Gap \
-         closed: share of the way from `random` to `oracle`, which uses the ground truth. After N: error \
-         after N touches, relative to that of `{against}`. Failed trials have no error."
+         closed: share of the way from `random` to `oracle`, which uses the ground truth; also over the \
+         zones that their object fills, and over those that it leaves open. After N: error after N \
+         touches, relative to that of `{against}`. Errors below {:.0} µm count as that. Failed trials have no error.",
+        1e6 * ERROR_FLOOR_M
     )
 }

@@ -3,27 +3,30 @@
 //! The protocol is an experiment file with a sweep of scenes. Its hash covers that file and all
 //! files that it names, so results of different protocols cannot be taken for each other.
 
+use super::check::measures::ERROR_FLOOR_M;
 use super::compare::{Entrant, SuiteComparison, compare, gap_closed, geometric_mean, name_objects};
-use super::planners::with_planners;
+use super::run::cells;
 use crate::experiment::Experiment;
 use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::median;
 use crate::experiment::store::Run;
-use crate::experiment::sweep::sweep_cases;
 use palpate_input::error::InputError;
 use palpate_input::files;
 use palpate_input::format::hex;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Version of the protocol. A new one needs a new file in `experiments/suite`.
-pub const PROTOCOL: &str = "2";
+pub const PROTOCOL: &str = "3";
 
 /// Planner whose errors are the unit.
 pub const REFERENCE: &str = "sobol";
+
+/// End of the names of scenes whose object fills the zone.
+const FULL: &str = "_full";
 
 /// Seed of all bootstraps.
 const SEED: u64 = 0;
@@ -77,6 +80,10 @@ pub struct PlannerResult {
     pub worse_on: usize,
     /// Share of the way from `random` to the oracle, in mean log error.
     pub gap_closed: Option<f64>,
+    /// The same over the objects that fill their zone.
+    pub gap_closed_full: Option<f64>,
+    /// The same over the others.
+    pub gap_closed_open: Option<f64>,
     /// Error after each budget, relative to the reference.
     pub after: Vec<RelativeError>,
     /// Finished trials on all objects.
@@ -202,22 +209,17 @@ const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 /// If the protocol cannot be read, or `run_missing` fails.
 pub fn run(
     spec: &BenchmarkSpec,
-    run_missing: &mut dyn FnMut(Experiment, PathBuf) -> anyhow::Result<bool>,
+    run_missing: &mut dyn FnMut(Experiment, &Path) -> anyhow::Result<bool>,
 ) -> anyhow::Result<Option<BenchmarkResult>> {
-    let mut cases = sweep_cases(spec.path)?;
-    let mut sets = Vec::new();
+    let sets = if spec.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
+    let mut experiments = cells(spec.path, &sets, spec.planners)?.experiments;
     if spec.is_quick {
-        cases.truncate(QUICK.0);
-        sets.extend(QUICK.1.map(String::from));
+        experiments.truncate(QUICK.0);
     }
-    let load = |case| {
-        with_planners(&sets, spec.planners, |sets| Experiment::load_cell(spec.path, case, sets))
-    };
-    let experiments = cases.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let mut runs = Vec::new();
     for experiment in experiments {
         let part = spec.folder.join(&experiment.name);
-        if !run_missing(experiment, part.clone())? {
+        if !run_missing(experiment, &part)? {
             return Ok(None);
         }
         runs.push((part.display().to_string(), Run::read(&part)?));
@@ -289,7 +291,12 @@ fn planner(
         .zip(entrant.scores())
         .map(|(object, scores)| on_object(object, scores))
         .collect();
-    let all: Vec<usize> = (0..objects.len()).collect();
+    let gap = |is_counted: &dyn Fn(&str) -> bool| {
+        let counted = |index: &usize| is_counted(&compared.objects[*index]);
+        let counted: Vec<usize> = (0..objects.len()).filter(counted).collect();
+        (!counted.is_empty()).then(|| gap_closed(compared, entrant, &counted, SEED))?
+    };
+    let is_full = |name: &str| name.ends_with(FULL);
     let number = |is_it: fn(&RelativeError) -> bool| {
         objects.iter().filter(|object| is_it(&object.error)).count()
     };
@@ -298,7 +305,9 @@ fn planner(
         error: RelativeError::new(&entrant.scores()),
         better_on: number(RelativeError::is_below_1),
         worse_on: number(RelativeError::is_above_1),
-        gap_closed: gap_closed(compared, entrant, &all, SEED).map(|gap| gap.value),
+        gap_closed: gap(&|_| true).map(|gap| gap.value),
+        gap_closed_full: gap(&is_full).map(|gap| gap.value),
+        gap_closed_open: gap(&|name| !is_full(name)).map(|gap| gap.value),
         after: budgets.iter().map(|&budget| after(entrant, runs, compared, budget)).collect(),
         trials: objects.iter().map(|object| object.trials).sum(),
         failures: objects.iter().map(|object| object.failures).sum(),
@@ -324,9 +333,12 @@ fn after(
     RelativeError::new(&strata.iter().map(Vec::as_slice).collect::<Vec<_>>())
 }
 
-/// Errors after some touches of a planner's finished trials, in metres.
+/// Errors after some touches of a planner's finished trials, in metres, at least
+/// [`ERROR_FLOOR_M`].
 fn errors_m(run: &Run, planner: &str, budget: u32) -> HashMap<u32, f64> {
     let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
     let measure = run.experiment.error_measure();
-    finished.filter_map(|row| Some((row.trial, measure.value(row, budget)?))).collect()
+    finished
+        .filter_map(|row| Some((row.trial, measure.value(row, budget)?.max(ERROR_FLOOR_M))))
+        .collect()
 }

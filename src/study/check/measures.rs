@@ -20,17 +20,23 @@ pub struct CheckMeasure {
     pub value: fn(&TrialRow, &Experiment) -> Option<f64>,
 }
 
-/// Lower bound on errors and path lengths before taking the logarithm.
+/// Lower bound on path lengths, times and shares before taking the logarithm.
 const LOG_FLOOR: f64 = 1e-12;
+
+/// Smallest error that counts, m: on a flat surface a smooth belief errs by rounding, and ratios of
+/// such errors say nothing.
+// heuristic: a thirtieth of the repeatability of the most precise arm here, the UR5e's 0.03 mm.
+pub const ERROR_FLOOR_M: f64 = 1e-6;
 
 fn log(value: f64) -> f64 {
     value.max(LOG_FLOOR).ln()
 }
 
 /// Error of a trial in metres: the RMSE over a zone, the Chamfer distance around a whole object;
-/// `None` if it was not computed.
+/// `None` if it was not computed. It is at least [`ERROR_FLOOR_M`].
 fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
-    RMSE.value(row, touches).or_else(|| CHAMFER.value(row, touches))
+    let error_m = RMSE.value(row, touches).or_else(|| CHAMFER.value(row, touches))?;
+    Some(error_m.max(ERROR_FLOOR_M))
 }
 
 fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Option<f64> {

@@ -1,5 +1,6 @@
 //! Belief of the heights of a surface over a zone: a Gaussian process with its uncertainty.
 
+use super::mean_grid::MeanGrid;
 use crate::evidence::{Contact, End, FreeVolume};
 use crate::free_space::FreeSpaceBound;
 use crate::gp_settings::{Band, BandName, GpSettings};
@@ -19,6 +20,7 @@ use palpate_gp::{
     Hyperparameters, KnownError, Observation, Observations, Range, SearchBox, TouchNoise,
 };
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Largest signal's standard deviation with a view, over the heights' root mean square. Many
 /// heights of a smooth surface make ever larger ones more likely, and with them rounding errors of
@@ -76,6 +78,9 @@ pub struct HeightField {
     /// `surface`, conditioned also on the unreached targets, which are not worth another touch.
     #[serde(skip)]
     planning_posterior: Option<Posterior>,
+    /// Mean of `surface` under the finger's hull, once it is asked for.
+    #[serde(skip)]
+    pub(super) reach: OnceLock<MeanGrid>,
 }
 
 /// Selection in place of that of a stored belief.
@@ -104,6 +109,7 @@ impl HeightField {
             fit: None,
             surface: None,
             planning_posterior: None,
+            reach: OnceLock::new(),
         }
     }
 
@@ -340,6 +346,7 @@ impl HeightField {
     /// Conditions the variance of `surface` on the unreached targets, and on places where a camera
     /// saw that there is nothing.
     fn explore(&mut self, surface: &Posterior) -> Result<(), CovarianceError> {
+        self.reach = OnceLock::new();
         let empty = self.presence.seen_through();
         let unreached = self.unreached.iter().chain(&empty).map(Vec::as_slice);
         self.planning_posterior = match self.inducing() {

@@ -1,6 +1,7 @@
 //! Belief after some actions: the surface in a zone or a ball, and hypotheses about the object.
 
 mod height_field;
+mod mean_grid;
 mod over_zone;
 mod quantiles;
 mod reach;

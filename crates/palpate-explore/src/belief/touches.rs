@@ -7,6 +7,7 @@ use crate::task::stroke::FIRST_SOURCE;
 use crate::view::SeenSurface;
 use nalgebra::Vector3;
 use palpate_gp::{KnownError, Observation, Slope};
+use std::sync::OnceLock;
 
 /// Distance between contact and target above which the target counts as unreached, in units of the
 /// zone's sides; a heuristic: well above rounding, below the grid spacing of any figure.
@@ -53,6 +54,7 @@ impl HeightField {
     /// Adds evidence that belongs to the last target; the belief changes at the next
     /// [`refit`](Self::refit).
     pub fn add(&mut self, evidence: &Evidence) {
+        self.reach = OnceLock::new();
         match evidence {
             Evidence::Points(points) => self.add_points(points),
             Evidence::Free(free) => {

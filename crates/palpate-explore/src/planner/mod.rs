@@ -24,7 +24,6 @@ mod slope;
 mod sobol;
 pub mod stroke;
 mod travel;
-mod ucb;
 
 pub use offer::{ActionKind, LookOffer, Offer, StrokeOffer};
 pub use plan::{
@@ -54,7 +53,6 @@ planners! {
     expected_contact: "expected_contact",
     slope: "slope",
     travel: "travel",
-    ucb: "ucb",
     random_strokes: "random_strokes",
     raster: "raster",
     information: "information",

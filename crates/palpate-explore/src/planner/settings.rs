@@ -22,8 +22,6 @@ pub struct PlanningSettings {
     pub slope: SlopeSettings,
     /// Settings of `travel`.
     pub travel: TravelSettings,
-    /// Settings of `ucb`.
-    pub ucb: UcbSettings,
 }
 
 impl Default for PlanningSettings {
@@ -38,7 +36,6 @@ impl Default for PlanningSettings {
             oracle: Default::default(),
             slope: Default::default(),
             travel: Default::default(),
-            ucb: Default::default(),
         }
     }
 }
@@ -131,21 +128,6 @@ impl Default for TravelSettings {
     }
 }
 
-/// Settings of `ucb`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct UcbSettings {
-    /// Number κ of standard deviations added to the mean.
-    pub kappa: f64,
-}
-
-impl Default for UcbSettings {
-    /// Returns the defaults of `ucb`. Heuristic: about the upper end of the 95 % band.
-    fn default() -> Self {
-        Self { kappa: 2.0 }
-    }
-}
-
 impl Validate for PlanningSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("direct_evaluations", self.direct_evaluations.into(), 1.0..=1e6);
@@ -162,6 +144,5 @@ impl Validate for PlanningSettings {
         rules.number("oracle.candidates", self.oracle.candidates.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);
-        rules.number("ucb.kappa", self.ucb.kappa, 0.0..=1e3);
     }
 }
