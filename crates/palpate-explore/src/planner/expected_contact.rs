@@ -16,7 +16,7 @@
 use super::active;
 use super::plan::{Plan, PlannerEntry};
 use super::search::Search;
-use super::silhouette::for_committee;
+use super::silhouette::others;
 use super::sobol;
 use crate::belief::{Belief, RandomField};
 use crate::task::{Region, Zone};
@@ -46,6 +46,10 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 const PLACES: u32 = 256;
 const CANDIDATES: u32 = 500;
 
+/// Number of candidates that the whole committee rates, the best ones with the fitted lengths.
+// heuristic: a fifth of the candidates; the rest is rarely the best with other lengths.
+const SHORTLIST: usize = 100;
+
 /// Share of the zone with a likely surface up to which only the reduction counts.
 // heuristic: of 0.6 and 0.8, the smaller error on the tuning half of the suite.
 const HALF_EMPTY: f64 = 0.8;
@@ -65,22 +69,55 @@ fn plan(
     let weigh = |place: &Vec<f64>| silhouette.optimistic_probability(place).sqrt();
     let weights: Vec<f64> = places.iter().map(weigh).collect();
     let candidates = search.places_to_border(zone, CANDIDATES);
-    let chances = candidates.into_iter().map(|place| (silhouette.hit_probability(&place), place));
-    let (mut scores, candidates): (Vec<f64>, Vec<Vec<f64>>) =
-        chances.filter(|(chance, _)| *chance > 0.0).unzip();
-    let contacts = belief.expected_contacts(&candidates);
-    let mut gains = vec![0.0; candidates.len()];
-    for_committee(field, |member| {
-        let variances = member.variances(&contacts, &mut []);
-        let reductions = member.reduction(&places, weights.clone()).at(&contacts);
-        for (gain, (variance, reduction)) in gains.iter_mut().zip(variances.iter().zip(reductions))
-        {
-            *gain += variance.max(0.0).powf(fill) * reduction.max(0.0).powf(1.0 - fill);
+    let mut touches: Vec<Touch> = (candidates.iter().cloned())
+        .zip(belief.expected_contacts(&candidates))
+        .map(|(place, contact)| Touch {
+            chance: silhouette.hit_probability(&place),
+            place,
+            contact,
+            gain: 0.0,
+        })
+        .filter(|touch| touch.chance > 0.0)
+        .collect();
+    let add_gains = |member: &dyn RandomField, touches: &mut [Touch]| {
+        let contacts: Vec<Vec<f64>> = touches.iter().map(|touch| touch.contact.clone()).collect();
+        let mut gains = vec![1.0; contacts.len()];
+        let mut weigh = |values: Vec<f64>, exponent: f64| {
+            let weights = values.iter().map(|value| value.max(0.0).powf(exponent));
+            gains.iter_mut().zip(weights).for_each(|(gain, weight)| *gain *= weight);
+        };
+        if fill > 0.0 {
+            weigh(member.variances(&contacts, &mut []), fill);
         }
-    });
-    scores.iter_mut().zip(&gains).for_each(|(score, gain)| *score *= gain);
-    match scores.iter().zip(candidates).max_by(|a, b| a.0.total_cmp(b.0)) {
-        Some((_, place)) => search.plan_at(belief, zone, place),
+        if fill < 1.0 {
+            weigh(member.reduction(&places, weights.clone()).at(&contacts), 1.0 - fill);
+        }
+        touches.iter_mut().zip(gains).for_each(|(touch, gain)| touch.gain += gain);
+    };
+    add_gains(field, &mut touches);
+    touches.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    touches.truncate(SHORTLIST);
+    others(field).iter().for_each(|member| add_gains(&**member, &mut touches));
+    match touches.into_iter().max_by(|a, b| a.score().total_cmp(&b.score())) {
+        Some(touch) => search.plan_at(belief, zone, touch.place),
         None => search.anywhere(belief),
+    }
+}
+
+/// A possible touch.
+struct Touch {
+    /// Target.
+    place: Vec<f64>,
+    /// Place of the expected contact.
+    contact: Vec<f64>,
+    /// Probability of a contact.
+    chance: f64,
+    /// Gain there, summed over the committee.
+    gain: f64,
+}
+
+impl Touch {
+    fn score(&self) -> f64 {
+        self.chance * self.gain
     }
 }

@@ -36,8 +36,17 @@ pub(super) const ENTRY: PlannerEntry = PlannerEntry {
 /// objects, the fitted ones alone, and a third and three times, did no better.
 const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
+/// Returns the beliefs of the committee with other lengths than `field`.
+pub(super) fn others(field: &dyn RandomField) -> Vec<Box<dyn RandomField>> {
+    COMMITTEE
+        .iter()
+        .filter(|scale| **scale != 1.0)
+        .filter_map(|scale| field.scaled(*scale))
+        .collect()
+}
+
 /// Calls `add` with each belief of the committee, or with `field` alone if it has no length scales.
-pub(super) fn for_committee(field: &dyn RandomField, mut add: impl FnMut(&dyn RandomField)) {
+fn for_committee(field: &dyn RandomField, mut add: impl FnMut(&dyn RandomField)) {
     let committee: Vec<_> = COMMITTEE.iter().filter_map(|scale| field.scaled(*scale)).collect();
     committee.iter().for_each(|member| add(&**member));
     if committee.is_empty() {
