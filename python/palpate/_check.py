@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 __all__ = ["Check", "check"]
 
 #: Verdicts that pass.
-PASSED = ("identical", "better", "ok")
+PASSED = ("accepted", "identical", "better", "ok")
 
 
 class Check:
     """Result of a regression test."""
 
     def __init__(self, found: dict[str, Any]) -> None:
-        #: Worst verdict of all planners: identical, better, ok, undecided, worse or missing.
+        #: Worst verdict of all planners: identical, better, ok, undecided, worse or missing; or accepted.
         self.verdict: str = found["verdict"]
         #: Remarks, a sentence each.
         self.remarks: list[str] = found["remarks"]
@@ -32,6 +32,15 @@ class Check:
     def passed(self) -> bool:
         """Whether no planner is worse, missing or undecided."""
         return self.verdict in PASSED
+
+    def raise_if_worse(self) -> None:
+        """Raises an AssertionError with the table, unless the test passed; for pytest and scripts.
+
+        Raises:
+            AssertionError: if a planner is worse, missing or undecided.
+        """
+        if not self.passed:
+            raise AssertionError(f"planners: {self.verdict}\n{self!r}")
 
     def table(self) -> pd.DataFrame:
         """Returns a row per planner and measure: change and its 95 % interval, percent; verdict; trials."""
@@ -52,17 +61,17 @@ def check(
     tolerance: float = 0.05,
     max_trials: int = 50,
     threads: int = 0,
-) -> Check | None:
+) -> Check:
     """Tests planners for regressions against a stored baseline, as the command `palpate check` does.
 
-        assert palpate.check("container", "widest.jsonl", [Widest]).passed
+        palpate.check("container", "widest.jsonl", [Widest]).raise_if_worse()
 
     Args:
         experiment: an experiment, its file, or the name of an experiment of the package.
         baseline: file of the baseline; `accept` writes it.
         planners: as for `Experiment.run`; the baseline's other planners are then left alone. Default: the
             experiment's planners; a planner that only the baseline has is then missing.
-        accept: reason to write the current results to the baseline; the function then returns None.
+        accept: reason to write the current results to the baseline; the verdict is then "accepted".
         tolerance: largest relative increase in error that still passes.
         max_trials: maximum number of trials per planner.
         threads: number of threads, 0 for all cores.
@@ -75,4 +84,7 @@ def check(
     if not 1e-4 <= tolerance <= 10:
         raise ValueError(f"tolerance = {tolerance}: allowed is 0.0001 to 10")
     found = loaded._check(os.fspath(baseline), planners, accept, tolerance, max_trials, threads)
-    return None if found is None else Check(found)
+    if found is None:
+        written = {"verdict": "accepted", "remarks": [], "table": {}, "text": f"baseline in {os.fspath(baseline)}"}
+        return Check(written)
+    return Check(found)

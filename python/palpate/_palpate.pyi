@@ -139,6 +139,46 @@ class Belief:
 
         They are those of the band `gp.band`.
         """
+    def mean_gradient(self, points: npt.ArrayLike) -> _Array:
+        """Gradient of `mean`, shape (..., d)."""
+    def covariance(self, a: npt.ArrayLike, b: npt.ArrayLike | None = None, *, explorable: bool = False) -> _Array:
+        """Covariance of the heights at `a` and `b` (by default `a`) without touch noise, shape (n, m), square metres.
+
+        Around an object it is that of the field; with `explorable`, that of `explorable_variance`.
+        """
+    def rsample(self, points: npt.ArrayLike, n: int, rng: np.random.Generator) -> _Array:
+        """Draws `n` surfaces from the belief, jointly at all points, shape (n, m), metres, without touch noise.
+
+        Around an object the draws are of the field.
+        """
+    def condition_on_observations(self, points: npt.ArrayLike, heights_m: Sequence[float] | None = None) -> Belief:
+        """Returns the belief after touches with contacts at `points`, with the same hyperparameters (zones only).
+
+        The contacts are at `heights_m`, or where the surface is expected.
+
+        Raises:
+            ValueError: before the first fit, or for another number of heights.
+        """
+    def scaled(self, factor: float) -> Belief:
+        """Returns the belief with all length scales multiplied by `factor`.
+
+        A committee of such beliefs covers what few touches leave open.
+
+        Raises:
+            ValueError: before the first fit, or for a factor that is not above 0.
+        """
+    def probability_of_surface(self, points: npt.ArrayLike, *, optimistic: bool = False) -> _Array:
+        """Probability that a surface is present at each point.
+
+        With `optimistic` it is the larger one that the built-in planners weigh places with.
+        """
+    def probability_of_contact(self, points: npt.ArrayLike) -> _Array:
+        """Probability that a touch at each point makes contact, there or beside it."""
+    def expected_contacts(self, points: npt.ArrayLike) -> _Array:
+        """Places where touches at the points are expected to make contact, shape (..., d).
+
+        There the finger's hull meets the estimated surface.
+        """
     def reachable(self, points: npt.ArrayLike) -> _Array:
         """Whether the finger can touch the estimated surface at each point: 1 or 0."""
     def variance_gradient(self, points: npt.ArrayLike) -> _Array:

@@ -214,6 +214,8 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
         parameters = inspect.signature(factory).parameters
     except ValueError:
         parameters = {}  # type: ignore[assignment]
+    if _is_plan(factory, parameters, offered):
+        return PlanFunction(factory)
     wanted = parameters.get("zone") if "zone" in offered else None
     if zone is None and wanted is not None and wanted.default is inspect.Parameter.empty:
         raise PlannerError(f"{factory!r} has a parameter zone, but a whole object has none: use belief.ball")
@@ -223,6 +225,27 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
     if not _plans(planner):
         raise PlannerError(f"{planner!r} has no method plan(belief)")
     return planner
+
+
+def _is_plan(factory: Factory, parameters: Mapping[str, inspect.Parameter], offered: Mapping[str, Any]) -> bool:
+    """Whether a function is itself a plan: all that it needs is one argument, the belief."""
+    needed = [name for name, it in parameters.items() if it.default is inspect.Parameter.empty and it.kind in _NAMED]
+    return not isinstance(factory, (type, InstanceFactory)) and len(needed) == 1 and needed[0] not in offered
+
+
+#: Kinds of parameters that take one argument.
+_NAMED = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+
+
+class PlanFunction:
+    """Planner that is a function of the belief."""
+
+    def __init__(self, function: Factory) -> None:
+        self.function = function
+
+    def plan(self, belief: Any) -> Any:
+        """Returns what the function returns."""
+        return self.function(belief)
 
 
 def target_of(planned: Any) -> list[float] | str:

@@ -9,12 +9,16 @@ use crate::pickle::{self, Reduced, Version};
 use crate::places::{Places, rows, seen_at};
 use crate::recognition;
 use crate::zone::Zone;
-use nalgebra::Point3;
-use numpy::{PyArray1, PyArray2, PyArrayDyn};
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyReadonlyArray2};
 use palpate::explore::belief::HeightField;
+use palpate::explore::evidence::Contact;
+use palpate::explore::surface_evidence::Silhouette;
 use palpate::explore::whole_object::ImplicitSurface;
 use palpate::format::counted;
 use palpate::gp::Posterior;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::reduction::VarianceReduction;
 use palpate::task::{Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -76,7 +80,45 @@ impl Belief {
         }
         places.reshape_vectors(points.py(), &gradients, dimension)
     }
+
+    /// Gaussian process of the belief, conditioned also on targets without contact where
+    /// `is_explorable`; `None` before the first fit.
+    fn process(&self, is_explorable: bool) -> Option<&Posterior> {
+        match self.0.height_field().filter(|_| is_explorable) {
+            Some(field) => field.planning_posterior(),
+            None => self.0.posterior(),
+        }
+    }
+
+    /// Reads points of the process's domain.
+    fn in_domain(&self, points: &Bound<'_, PyAny>) -> PyResult<Places> {
+        Places::of(points, self.0.height_field().map_or(3, |field| field.zone().dimension()))
+    }
+
+    fn probabilities<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        name: &str,
+        of: impl Fn(&Silhouette, &[f64]) -> f64,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let belief = self.over_zone(name)?;
+        let places = Places::of(points, belief.zone().dimension())?;
+        let silhouette = belief.surface_evidence().silhouette();
+        let values = places.each.iter().map(|place| of(&silhouette, place)).collect();
+        places.reshape(points.py(), values)
+    }
 }
+
+/// Posterior covariances of places, one row for each of `a`.
+fn covariances(process: &Posterior, a: &Places, b: &Places) -> Vec<Vec<f64>> {
+    let places: Vec<&[f64]> = a.each.iter().map(Vec::as_slice).collect();
+    VarianceReduction::new(process, b.each.iter().map(Vec::as_slice)).covariances(&places)
+}
+
+/// Part of the signal's variance that is added to the diagonal of a covariance before it is
+/// factored.
+// heuristic: far below any noise, above rounding.
+const JITTER: f64 = 1e-9;
 
 fn variances(posterior: &Posterior, places: &[Vec<f64>]) -> Vec<f64> {
     posterior.variances(places, &mut [])
@@ -135,6 +177,157 @@ impl Belief {
         let unknown = || vec![vec![f64::NAN; p.len()]; places.each.len()];
         let rows = belief.quantiles_m(&places.each, &p).unwrap_or_else(unknown);
         places.reshape_vectors(points.py(), &rows, p.len())
+    }
+
+    /// Gradient of `mean`, shape (..., d).
+    fn mean_gradient<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let belief = self.over_zone("mean_gradient")?;
+        let dimension = belief.zone().dimension();
+        let places = Places::of(points, dimension)?;
+        let mut gradients = vec![vec![f64::NAN; dimension]; places.each.len()];
+        if let Some(surface) = belief.surface() {
+            let scratch = &mut Scratch::default();
+            for (place, gradient) in places.each.iter().zip(&mut gradients) {
+                surface.mean_gradient(place, gradient, scratch);
+            }
+        }
+        places.reshape_vectors(points.py(), &gradients, dimension)
+    }
+
+    /// Covariance of the heights at `a` and `b` (by default `a`) without touch noise, shape (n, m),
+    /// square metres; around an object, of the field. With `explorable`, that of
+    /// `explorable_variance`.
+    #[pyo3(signature = (a, b = None, *, explorable = false))]
+    fn covariance<'py>(
+        &self,
+        a: &Bound<'py, PyAny>,
+        b: Option<&Bound<'py, PyAny>>,
+        explorable: bool,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (a, b, py) = (self.in_domain(a)?, self.in_domain(b.unwrap_or(a))?, a.py());
+        let found = fork::detach(py, || match self.process(explorable) {
+            Some(process) => covariances(process, &a, &b),
+            None => vec![vec![f64::NAN; b.each.len()]; a.each.len()],
+        })?;
+        rows(py, &found, b.each.len())
+    }
+
+    /// Draws `n` surfaces from the belief, jointly at all points, shape (n, m), metres, with a
+    /// NumPy generator `rng`; around an object, of the field. Without touch noise.
+    fn rsample<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        n: usize,
+        rng: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (places, py) = (self.in_domain(points)?, points.py());
+        let normal = rng.call_method1("standard_normal", ((n, places.each.len()),))?;
+        let normal: PyReadonlyArray2<'_, f64> = normal.extract()?;
+        let normal: Vec<f64> = normal.as_array().iter().copied().collect();
+        let count = places.each.len();
+        let Some(process) = self.process(false) else {
+            return rows(py, &vec![vec![f64::NAN; count]; n], count);
+        };
+        let drawn = fork::detach(py, || {
+            let signal2 = process.hyperparameters().signal_sd.powi(2);
+            let covariances = covariances(process, &places, &places).concat();
+            let covariance = DMatrix::from_vec(count, count, covariances);
+            let factor = (covariance + DMatrix::identity(count, count) * (JITTER * signal2))
+                .cholesky()
+                .map(|factor| factor.l())?;
+            let means = DVector::from_vec(process.means(places.each.iter().map(Vec::as_slice)));
+            let draw = |normal: &[f64]| &means + &factor * DVector::from_column_slice(normal);
+            let draws = normal.chunks(count.max(1)).map(|normal| draw(normal).as_slice().to_vec());
+            Some(draws.collect::<Vec<_>>())
+        })?;
+        let lost = || PyValueError::new_err("the covariance of the points cannot be factored");
+        rows(py, &drawn.ok_or_else(lost)?, count)
+    }
+
+    /// Returns the belief after touches with contacts at `points`, shape (m, d): at `heights_m`, or
+    /// where the surface is expected. Hyperparameters stay. Over a zone, after the first fit.
+    #[pyo3(signature = (points, heights_m = None))]
+    fn condition_on_observations(
+        &self,
+        points: &Bound<'_, PyAny>,
+        heights_m: Option<Vec<f64>>,
+    ) -> PyResult<Self> {
+        let belief = self.over_zone("condition_on_observations")?;
+        let (zone, places) = (belief.zone(), self.in_domain(points)?);
+        let Some(surface) = belief.surface() else {
+            return Err(PyValueError::new_err("the belief has no fit yet"));
+        };
+        let means = || surface.means(places.each.iter().map(Vec::as_slice));
+        let heights_m = heights_m.unwrap_or_else(means);
+        if heights_m.len() != places.each.len() {
+            let (found, allowed) = (heights_m.len(), places.each.len());
+            let message = format!("heights_m has {found} numbers; allowed are {allowed}");
+            return Err(PyValueError::new_err(message));
+        }
+        let mut after = self.0.clone();
+        for (place, height_m) in places.each.iter().zip(heights_m) {
+            let toward_w = zone.x_wz() * Vector3::y();
+            let contact = Contact::new(zone.point(place, height_m), toward_w);
+            let contact = Contact { has_normal: false, ..contact };
+            after.observe(&place.clone().into(), &contact.into());
+        }
+        after.condition().map_err(errors::other)?;
+        Ok(Self(after))
+    }
+
+    /// Returns the belief with all length scales multiplied by `factor`, after the first fit; a
+    /// committee of such beliefs covers what few touches leave open.
+    fn scaled(&self, factor: f64) -> PyResult<Self> {
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err(PyValueError::new_err(format!("factor = {factor}; allowed is above 0")));
+        }
+        let Some(fit) = self.0.fit().cloned() else {
+            return Err(PyValueError::new_err("the belief has no fit yet"));
+        };
+        let (mut after, mut scaled) = (self.0.clone(), fit.clone());
+        let lengths = &mut scaled.hyperparameters.length_scales;
+        lengths.iter_mut().for_each(|length| *length *= factor);
+        after.condition_on(Some(&fit), &scaled).map_err(errors::other)?;
+        Ok(Self(after))
+    }
+
+    /// Probability that a surface is present at each point; with `optimistic`, the larger one that
+    /// the built-in planners weigh places with.
+    #[pyo3(signature = (points, *, optimistic = false))]
+    fn probability_of_surface<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        optimistic: bool,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let of = match optimistic {
+            true => Silhouette::optimistic_probability,
+            false => Silhouette::probability,
+        };
+        self.probabilities(points, "probability_of_surface", of)
+    }
+
+    /// Probability that a touch at each point makes contact, there or beside it.
+    fn probability_of_contact<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.probabilities(points, "probability_of_contact", Silhouette::hit_probability)
+    }
+
+    /// Places where touches at the points are expected to make contact, shape (..., d): where the
+    /// finger's hull meets the estimated surface.
+    fn expected_contacts<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let belief = self.over_zone("expected_contacts")?;
+        let dimension = belief.zone().dimension();
+        let places = Places::of(points, dimension)?;
+        let contacts = belief.expected_contacts(&places.each);
+        places.reshape_vectors(points.py(), &contacts, dimension)
     }
 
     /// Whether the finger can touch the estimated surface at each point: 1 or 0.

@@ -157,7 +157,7 @@ pub(crate) fn curves<'py>(
     run: &Run,
     id: Option<&str>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let id = id.unwrap_or(run.experiment.error_measure().id);
+    let id = id.unwrap_or(run.error_measure().id);
     let mut measures = measures_with_columns(&run.rows);
     let Some(measure) = measures.find(|measure| measure.id == id) else {
         let names = measures_with_columns(&run.rows).map(|measure| measure.id);

@@ -130,7 +130,7 @@ impl Run {
         found.set_item("conclusion", findings::conclusion(run, &analysis))?;
         found.set_item("verdicts", findings::verdicts(run, &analysis))?;
         found.set_item("best", findings::best(run, &analysis))?;
-        found.set_item("measure", run.experiment.error_measure().id)?;
+        found.set_item("measure", run.error_measure().id)?;
         found.set_item("table", columns::comparisons(py, &analysis.comparisons)?)?;
         found.set_item("equal_error", columns::equal_errors(py, &analysis.equal_errors)?)?;
         Ok(found)

@@ -28,9 +28,10 @@ def experiment():
 
 def test_a_planner_is_checked_against_its_baseline(experiment, tmp_path):
     baseline = tmp_path / "middle.jsonl"
-    assert palpate.check(experiment, baseline, [own.Middle], accept="first", max_trials=6) is None
+    assert palpate.check(experiment, baseline, [own.Middle], accept="first", max_trials=6).verdict == "accepted"
     same = palpate.check(experiment, baseline, [own.Middle], max_trials=6)
     assert same.passed and same.verdict == "identical"
+    same.raise_if_worse()
     assert list(same.table().planner) == ["own:Middle"] and "identical" in repr(same)
     # Another planner is added to the file, and the first one is kept.
     palpate.check(experiment, baseline, ["sobol"], accept="sobol too", max_trials=6)
@@ -39,6 +40,8 @@ def test_a_planner_is_checked_against_its_baseline(experiment, tmp_path):
     assert palpate.check(experiment, baseline, max_trials=6).verdict == "missing"
     missing = palpate.check(experiment, baseline, ["random"], max_trials=6)
     assert missing.verdict == "missing" and not missing.passed
+    with pytest.raises(AssertionError, match="missing"):
+        missing.raise_if_worse()
     with pytest.raises(PalpateError):
         palpate.check(experiment, tmp_path / "none.jsonl", [own.Middle])
     with pytest.raises(ValueError, match="tolerance"):

@@ -42,6 +42,25 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     assert len(run.summary().query("planner == 'own:Middle'")) > 0
 
 
+def middle(belief):
+    return 0.5 * (belief.zone.lower + belief.zone.upper)
+
+
+def at(share, belief):
+    return belief.zone.lower + share * (belief.zone.upper - belief.zone.lower)
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+def test_a_function_of_the_belief_is_a_planner(isolate):
+    toy = palpate.Experiment.load("toy", touches=4, initial_touches=3)
+    run = toy.run([middle, functools.partial(at, 0.25), own.Middle], trials=1, isolate=isolate)
+    assert run.trials()["failure"].isna().all()
+    last = run.touches().query("touch == 4").set_index("planner")["target_x_m"]
+    lower, upper = -2.0, 2.0
+    assert last["test_planners:middle"] == 0.5 * (lower + upper)
+    assert last["test_planners:at(0.25)"] == lower + 0.25 * (upper - lower)
+
+
 def further(touch):
     """Returns the points of a touch after the point of contact."""
     evidence = touch["outcome"].get("evidence", [])

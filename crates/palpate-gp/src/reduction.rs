@@ -146,6 +146,21 @@ impl<'a> VarianceReduction<'a> {
         reductions
     }
 
+    /// Returns the posterior covariances of each of `places` with the references, without noise:
+    /// one row a place.
+    pub fn covariances(&self, places: &[&[f64]]) -> Vec<Vec<f64>> {
+        let signal2 = self.posterior.hyperparameters().signal_sd.powi(2);
+        let mut covariances = vec![[0.0; MANY]; self.references.len()];
+        let mut rows: Vec<Vec<f64>> = Vec::with_capacity(places.len());
+        self.posterior.whitened(places, |solved, _, count| {
+            let block = &places[rows.len()..][..count];
+            self.covary(block, solved, &self.references, &self.whitened, &mut covariances);
+            let row = |lane: usize| covariances.iter().map(|lanes| signal2 * lanes[lane]).collect();
+            rows.extend((0..count).map(row));
+        });
+        rows
+    }
+
     /// Writes the posterior covariances of each of `others` with up to sixteen places, in units of
     /// the signal's variance; both come with their L⁻¹·k(X, ·).
     fn covary(
@@ -223,6 +238,37 @@ mod tests {
                 });
                 let twin = falls.sum::<f64>() / at.len() as f64;
                 prop_assert!((found - twin).abs() < 1e-10, "{found} {twin}");
+            }
+        }
+
+        /// The covariance of a place with itself is its variance; with another it is what an exact
+        /// observation there takes from it.
+        #[test]
+        fn covariances_are_those_of_the_field(
+            touches in prop::collection::vec(place(), 1..30),
+            places in prop::collection::vec(place(), 1..40),
+        ) {
+            let mut observations = Observations::new(2);
+            touches.iter().for_each(|at| observations.push_height(at, at[0]));
+            let noise = NoiseRatio { height: 0.05, slope: 0.1, known: 0.0 };
+            let hyperparameters = Hyperparameters::new(2.0, vec![0.4, 0.7], noise, 0.0);
+            let posterior = Posterior::new(&Matern52, hyperparameters, observations).unwrap();
+            let asked: Vec<&[f64]> = places.iter().map(<[f64; 2]>::as_slice).collect();
+            let first = asked[0];
+            let rows = VarianceReduction::new(&posterior, asked.iter().copied()).covariances(&asked);
+            prop_assert_eq!(rows.len(), asked.len());
+            let scratch = &mut Scratch::default();
+            for (i, place) in asked.iter().enumerate() {
+                prop_assert!((rows[i][i] - posterior.variance(place, scratch)).abs() < 1e-10);
+                prop_assert!((rows[i][0] - rows[0][i]).abs() < 1e-10);
+            }
+            let mut after = posterior.clone();
+            after.add(first, 0.0).unwrap();
+            let noise2 = posterior.hyperparameters().noise_sd.powi(2) + 4.0 * posterior.jitter();
+            for (row, place) in rows.iter().zip(&asked) {
+                let fall = posterior.variance(place, scratch) - after.variance(place, scratch);
+                let twin = row[0] * row[0] / (rows[0][0] + noise2);
+                prop_assert!((fall - twin).abs() < 1e-9, "{fall} {twin}");
             }
         }
 
