@@ -103,6 +103,10 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 /// Wait for a start on the page.
 const LOOK: Duration = Duration::from_millis(200);
 
+/// Longest wait for the page of a browser that was opened.
+// heuristic: a slow start of a browser.
+const OPENING: Duration = Duration::from_secs(20);
+
 pub(super) fn run(args: &Args, talk: Verbosity, program: &Host) -> anyhow::Result<Completion> {
     let interrupt = stop_on_interrupt("touches")?;
     let (wishes, starts) = channel();
@@ -113,8 +117,9 @@ pub(super) fn run(args: &Args, talk: Verbosity, program: &Host) -> anyhow::Resul
     };
     let server = Server::open(args.listen, Box::new(page))?;
     print(&format!("live page: {}", server.url()))?;
-    let _entry = if args.no_browser { None } else { open_browser(&server.url()) };
-    let live = Live { args, talk, program, server, interrupt };
+    let entry = if args.no_browser { None } else { open_browser(&server.url()) };
+    let is_opened = entry.is_some();
+    let live = Live { args, talk, program, server, interrupt, is_opened };
     let mut outcome = work.map_or(Ok(Completion::Done), |work| live.show(work))?;
     while let Some(experiment) = live.next(&starts) {
         // A mistake on the page leaves the page open.
@@ -175,6 +180,8 @@ struct Live<'a> {
     server: Arc<Server>,
     /// Set by Ctrl-C.
     interrupt: Arc<AtomicBool>,
+    /// Whether a browser was opened.
+    is_opened: bool,
 }
 
 impl Live<'_> {
@@ -230,6 +237,9 @@ impl Live<'_> {
         desk.set_start(self.args.hold, self.args.approve);
         let truth = session.simulation().truth().clone();
         self.server.show(Arc::clone(&desk), truth, &path);
+        if self.is_opened {
+            desk.await_page(OPENING);
+        }
         let halted = session.run(&mut folder, &done)?;
         let experiment = desk.experiment();
         let tally = folder.sort(experiment)?;

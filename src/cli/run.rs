@@ -199,6 +199,9 @@ fn run_one(
     let run = Run::read(path)?;
     let mut text = format!("{}\n{words}", report::tables::summary::text(&run, args.wide));
     let analysis = Analysis::new(&run);
+    if let Some(failures) = report::findings::failures(&run) {
+        text += &format!("\n{failures}");
+    }
     if let Some(conclusion) = report::findings::conclusion(&run, &analysis) {
         text += &format!("\n{conclusion}");
     }

@@ -149,24 +149,24 @@ impl<'a> Trials<'a> {
     }
 }
 
-/// Returns how a run ends the program; prints to stderr the number of failed trials and the first
-/// failure.
+/// Returns how a run ends the program: it failed if a planner failed in each of its trials. Prints
+/// to stderr the number of failed trials and the first failure.
 pub(super) fn completion(result: &RunResult, talk: Verbosity) -> Completion {
-    let RowCounts { trials, failed } = &result.tally;
-    let all_failed = *trials > 0 && failed.len() == *trials;
+    let RowCounts { trials, failed, incomplete } = &result.tally;
+    let is_one_without = !incomplete.is_empty();
     if let Some((TrialId { trial, planner }, reason)) = failed.first() {
         let words = format!(
             "{} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}",
             failed.len()
         );
-        match all_failed {
+        match is_one_without {
             true => error(words),
             false => talk.note(words),
         }
     }
     match () {
         () if !result.is_finished() => Completion::Interrupted,
-        () if all_failed => Completion::Failed,
+        () if is_one_without => Completion::Failed,
         () => Completion::Done,
     }
 }

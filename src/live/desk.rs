@@ -13,6 +13,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// Speed of simulated trials on a page that was opened for them.
+// heuristic: ten touches a second can be followed.
+const WATCHED_SPEED: f64 = 10.0;
+
 /// Time after the last sign of a visible page after which a real arm holds before its next touch.
 // heuristic: several signs, which a page gives every second, may be late.
 const LEASE: Duration = Duration::from_secs(5);
@@ -373,6 +377,19 @@ impl Desk {
                 track.status = Status::YourTurn;
                 state.version += 1;
             }
+            state = self.wait(state);
+        }
+    }
+
+    /// Paces simulated trials for a person who watches, and waits for a visible page, but no longer
+    /// than `at_most`.
+    pub fn await_page(&self, at_most: Duration) {
+        let mut state = self.lock();
+        if !self.is_real {
+            state.speed = WATCHED_SPEED;
+        }
+        let begun = Instant::now();
+        while state.seen.is_none() && begun.elapsed() < at_most && !self.is_stopped() {
             state = self.wait(state);
         }
     }

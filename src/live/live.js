@@ -209,7 +209,7 @@ function show(state) {
   explorer.hidden = !state.planners;
   if (!state.planners) return;
   find("question").textContent = state.question;
-  const others = state.trials > 1 ? `Trial ${state.trial + 1} of ${state.trials}. ` : "";
+  const others = state.trials > 1 ? `Trial ${state.trial} of 0 to ${state.trials - 1}. ` : "";
   const real = state.is_real ? "A real arm. It holds when no page is visible. " : "";
   const phase = { running: state.is_held ? "Held." : "Running.", ended: "Ended." }[state.phase];
   find("status").textContent = `${others}${real}${phase}`;
@@ -220,7 +220,7 @@ function show(state) {
   explorer.querySelector("[name=speed]").value = state.speed ?? "";
   if (before && before.trial !== state.trial) chosen = null;
   find("trials").hidden = state.phase !== "ended" || state.trials < 2;
-  Object.assign(find("trial"), { max: state.trials, value: state.trial + 1 });
+  Object.assign(find("trial"), { min: 0, max: state.trials - 1, value: state.trial });
   for (const planner of state.planners) {
     const panel = panelOf(planner);
     panel.figure.style.setProperty("--own", onPaper(planner.colours));
@@ -295,7 +295,7 @@ find("target").addEventListener("submit", async (event) => {
   if (await order("touch", { planner, target: numbers })) target = null;
 });
 find("confirm").addEventListener("click", () => order("confirm", { planner: find("target").dataset.planner }));
-find("trial").addEventListener("change", ({ target: { value } }) => order("trial", { number: Number(value) - 1 }));
+find("trial").addEventListener("change", ({ target: { value } }) => order("trial", { number: Number(value) }));
 find("slider").addEventListener("input", ({ target: { value, max } }) => {
   chosen = value === max ? null : Number(value);
   refresh();

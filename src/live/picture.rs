@@ -1,6 +1,7 @@
 //! Data for viewers: the desk's state, and beliefs replayed from the touches so far.
 
 use super::desk::{Desk, Phase, Status, Track};
+use crate::experiment::Experiment;
 use crate::experiment::metrics::truth::Truth;
 use crate::experiment::planner_names::HUMAN;
 use crate::experiment::row::TouchRow;
@@ -20,9 +21,12 @@ const TRIANGLES: usize = 8000;
 pub(super) fn state(desk: &Desk) -> Value {
     let (experiment, measure) = (desk.experiment(), desk.experiment().error_measure());
     let state = desk.lock();
+    // A person plans without the ground truth, as all planners do.
+    let is_played = is_played(experiment, state.phase);
     let planner = |(name, track): (&String, &Track)| {
         let count = track.row.touches.len() as u32;
-        let errors = (1..=count).filter_map(|touches| {
+        let rated = if is_played { 0 } else { count };
+        let errors = (1..=rated).filter_map(|touches| {
             let value = measure.value(&track.row, touches)?;
             Some((touches, value * measure.unit.per_si))
         });
@@ -65,6 +69,11 @@ pub(super) fn state(desk: &Desk) -> Value {
         "log": state.log,
         "planners": experiment.planners.iter().zip(&state.tracks).map(planner).collect::<Vec<_>>(),
     })
+}
+
+/// Whether a person plans now: true errors and the other planners' surfaces are then hidden.
+fn is_played(experiment: &Experiment, phase: Phase) -> bool {
+    phase == Phase::Running && experiment.planners.iter().any(|name| name == HUMAN)
 }
 
 /// Number of hypotheses that are shown.
@@ -114,14 +123,17 @@ impl Picture {
         };
         experiment.report.trial = trial;
         let mut truth = self.truth.clone();
-        // A person plans without the ground truth, as all planners do.
-        if phase == Phase::Running && experiment.planners.iter().any(|name| name == HUMAN) {
+        let is_played = is_played(&experiment, phase);
+        if is_played {
             truth.heights_m.fill(None);
             truth.mesh = None;
         }
         let run = Run { experiment, truth, rows, unlisted: 0 };
         let first = run.experiment.first_fit();
         let count = |planner: &str| -> Vec<u32> {
+            if is_played && planner != HUMAN {
+                return Vec::new();
+            }
             let row = run.rows.iter().find(|row| row.planner == planner);
             let count = row.map_or(0, |row| row.touches.len() as u32).min(touches);
             (count >= first).then_some(count).into_iter().collect()

@@ -78,7 +78,8 @@ fn note(result: &BenchmarkResult) -> String {
          over trials. Less is better; better and worse on: objects whose interval excludes 1. Gap \
          closed: share of the way from `random` to `oracle`, which uses the ground truth; also over the \
          zones that their object fills, and over those that it leaves open. After N: error after N \
-         touches, relative to that of `{against}`. Errors below {:.0} µm count as that. Failed trials have no error.",
+         touches, relative to that of `{against}`. Errors below {:.0} µm count as that. A failed trial counts \
+         with its last belief to the end.",
         1e6 * ERROR_FLOOR_M
     )
 }

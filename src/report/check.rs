@@ -4,7 +4,7 @@
 use super::canvas::{Anchor, Area, Canvas, escape};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use super::table::{Cell, Column, Table};
-use crate::study::check::{CheckOptions, CheckResult, PlannerResult, Verdict};
+use crate::study::check::{CheckOptions, CheckResult, MeasureResult, PlannerResult, Verdict};
 use palpate_input::format::counted;
 
 /// Returns the name of a verdict.
@@ -58,19 +58,15 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
                 counted(count, "trial")
             )
         }));
-        remarks.extend(planner.judgements.first().map(|first| {
+        let is_open = |first: &&MeasureResult| first.verdict == Verdict::Undecided;
+        remarks.extend(planner.judgements.first().filter(is_open).map(|first| {
             let percent = 100.0 * rules.tolerance;
             let wanted =
                 first.trials_needed.map_or("more than 100000".into(), |count| count.to_string());
-            let is_open = first.verdict == Verdict::Undecided;
-            let then = if is_open {
-                format!("; the limit was {most} (--max-trials)")
-            } else {
-                String::new()
-            };
             let title = first.judged.title;
             format!(
-                "{name}: detecting a loss of {percent} % in {title} needs {wanted} trials{then}"
+                "{name}: detecting a loss of {percent} % in {title} needs {wanted} trials; the limit \
+                 was {most} (--max-trials)"
             )
         }));
     }

@@ -3,10 +3,11 @@
 use super::table::{digits, shown, verdict};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::measure::{
-    self, CENTRED_R, CHAMFER, COVERAGE, Direction, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
-    VERIFICATION_COVERAGE, VERIFICATION_RMSE,
+    self, CENTRED_R, CHAMFER, COVERAGE, Direction, EDGE_RMSE, Measure, R, REACHABLE_RMSE,
+    REPEATABILITY, RMSE, VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
 use crate::experiment::metrics::constant_r;
+use crate::experiment::row::planner_rows;
 use crate::experiment::statistics::comparison::PairedComparison;
 use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
@@ -25,9 +26,8 @@ pub fn notices(run: &Run) -> Vec<String> {
 
 /// Returns the findings as sentences, the most important first.
 pub fn sentences(run: &Run) -> Vec<String> {
-    let planners = &run.experiment.planners;
-    let curves: Vec<Curve> = (planners.iter())
-        .map(|name| (name.as_str(), summary::curve(&run.experiment, &run.rows, name)))
+    let curves: Vec<Curve> = (run.completed_planners().into_iter())
+        .map(|name| (name, summary::curve(&run.experiment, &run.rows, name)))
         .filter(|(_, points)| !points.is_empty())
         .collect();
     if curves.is_empty() {
@@ -148,8 +148,8 @@ fn needed(
 
 /// Returns the touches that the other planners need for the first baseline's final error.
 fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
-    let name = *run.experiment.baselines().first()?;
-    let error = run.experiment.error_measure();
+    let name = baseline(run)?;
+    let error = run.error_measure();
     let compared = curves.iter().map(|(planner, points)| {
         let points = points.iter().filter(|point| point.of(error).is_some());
         (*planner, points.cloned().collect::<Vec<_>>())
@@ -182,17 +182,54 @@ fn band_coverage(curves: &[Curve]) -> Option<String> {
     Some(format!("Fraction of the truth inside the 95 % band of the last belief: {shares}."))
 }
 
+/// Returns the planners that failed, with the rule by which their trials count; `None` without a
+/// failure.
+pub fn failures(run: &Run) -> Option<String> {
+    let planner = |name: &String| {
+        let rows = || planner_rows(&run.rows, name);
+        let failed = rows().filter(|row| row.failure.is_some()).count();
+        match (failed, rows().count()) {
+            (0, _) => None,
+            (failed, all) if failed == all => {
+                Some(format!("{name} failed in each of {}", counted(all, "trial")))
+            }
+            (failed, all) => Some(format!("{name} failed in {failed} of {all} trials")),
+        }
+    };
+    let found: Vec<String> = run.experiment.planners.iter().filter_map(planner).collect();
+    let rule = "a failed trial counts with its last belief to the end, a planner without a complete \
+                trial is left out";
+    (!found.is_empty()).then(|| format!("{} ({rule}).", found.join("; ")))
+}
+
+/// Returns the first baseline with a complete trial.
+fn baseline(run: &Run) -> Option<&str> {
+    let completed = run.completed_planners();
+    run.experiment.baselines().into_iter().find(|name| completed.contains(name))
+}
+
+/// Returns which part of the surface the errors are of, if not the whole.
+fn judged_part(run: &Run) -> Option<String> {
+    let is_part = run.error_measure().id == REACHABLE_RMSE.id;
+    let share = run.truth.unreachable_share().filter(|_| is_part)?;
+    Some(format!(
+        "Errors are those where the finger can touch the surface; {:.0} % of it is left out.",
+        100.0 * share
+    ))
+}
+
 /// Returns the verdict on a run as sentences, only with what its intervals establish; empty without
-/// a belief.
+/// a belief. It begins with failures.
 pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
-    let baselines = run.experiment.baselines();
-    let baseline = baselines.first().copied().unwrap_or_default();
+    let baseline = baseline(run).unwrap_or_default();
     let trials = final_errors(run, analysis, baseline).map(|it| it.paired.trials).max();
     let compared = match trials.and_then(too_few) {
         Some(too_few) => [Some(too_few), None],
         None => [error_verdict(run, analysis, baseline), touches_verdict(run, analysis, baseline)],
     };
-    compared.into_iter().flatten().chain(calibration(run)).collect()
+    let compared: Vec<String> = compared.into_iter().flatten().chain(calibration(run)).collect();
+    let part = judged_part(run).filter(|_| !compared.is_empty());
+    failures(run).into_iter().chain(compared).chain(part).collect()
 }
 
 /// Ratio of the trials that detect a difference with a probability of 80 % to those whose 95 %
@@ -217,7 +254,7 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
     if let Some(too_few) = too_few(paired.trials) {
         return Some(too_few);
     }
-    let error = run.experiment.error_measure();
+    let error = run.error_measure();
     let [low, high] = paired.interval?;
     let shown = |value: f64| digits(error.unit.per_si * value);
     let size = |[low, high]: [f64; 2]| {
@@ -236,6 +273,10 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
         }
         Some(_) => format!("{baseline} is best: {planner} has {} more {after}.", size([low, high])),
         None => {
+            let (words, ends) = match paired.mean < 0.0 {
+                true => ("less", [-high, -low]),
+                false => ("more", [low, high]),
+            };
             let ratio = 0.5 * (high - low) / paired.mean.abs();
             let needed = (POWER * paired.trials as f64 * ratio * ratio).ceil();
             let needed = match needed <= PROPOSED_MAX {
@@ -244,12 +285,8 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
                 }
                 false => format!("more than {PROPOSED_MAX} trials would be needed to show one"),
             };
-            let [low, high] = [low, high].map(shown);
-            format!(
-                "No difference is established: {planner} has {} {} [{low}, {high}] {after}; {needed}.",
-                shown(paired.mean),
-                error.unit.symbol,
-            )
+            let size = size(ends);
+            format!("No difference is established: {planner} has {size} {words} {after}; {needed}.")
         }
     })
 }
@@ -265,8 +302,7 @@ fn smallest_error<'a>(
     run: &'a Run,
     analysis: &'a Analysis<'a>,
 ) -> Option<&'a PairedComparison<'a>> {
-    let baseline = *run.experiment.baselines().first()?;
-    let found = final_errors(run, analysis, baseline);
+    let found = final_errors(run, analysis, baseline(run)?);
     found.min_by(|a, b| a.paired.mean.total_cmp(&b.paired.mean))
 }
 
@@ -304,9 +340,14 @@ fn final_errors<'a>(
     analysis: &'a Analysis<'a>,
     baseline: &'a str,
 ) -> impl Iterator<Item = &'a PairedComparison<'a>> + Clone + use<'a> {
-    let id = run.experiment.error_measure().id;
+    let (id, completed) = (run.error_measure().id, run.completed_planners());
+    let completed: Vec<String> = completed.into_iter().map(String::from).collect();
     let found = analysis.comparisons.iter();
-    found.filter(move |it| it.baseline == baseline && it.measure.id == id)
+    found.filter(move |it| {
+        it.baseline == baseline
+            && it.measure.id == id
+            && completed.iter().any(|name| name == it.planner)
+    })
 }
 
 /// Returns which planners have a smaller error after the last touch than the first baseline.
@@ -316,7 +357,7 @@ fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Strin
     let groups = found.map(|it| {
         (it.planner, verdict_group(verdict(it.paired.interval, 0.0, it.measure.direction)))
     });
-    let error = run.experiment.error_measure().title;
+    let error = run.error_measure().title;
     let words = [
         format!("a smaller {error} than {baseline}"),
         format!("a larger {error} than {baseline}"),
@@ -329,9 +370,10 @@ fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Strin
 
 /// Returns which planners need fewer touches than the first baseline for its final error.
 fn touches_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
-    let id = run.experiment.error_measure().id;
-    let found = analysis.equal_errors.iter();
-    let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
+    let (id, completed) = (run.error_measure().id, run.completed_planners());
+    let found = analysis.equal_errors.iter().filter(|it| {
+        it.baseline == baseline && it.measure.id == id && completed.contains(&it.planner)
+    });
     let groups = found.map(|it| {
         (it.planner, verdict_group(verdict(it.ratio.interval, 1.0, Direction::Minimise)))
     });
@@ -343,14 +385,14 @@ fn touches_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Str
 
 /// Returns which planners have calibrated bands after the last touch.
 fn calibration(run: &Run) -> Option<String> {
-    let groups = run.experiment.planners.iter().filter_map(|name| {
+    let groups = run.completed_planners().into_iter().filter_map(|name| {
         let points = summary::curve(&run.experiment, &run.rows, name);
         let group = match share_in_band(&points)? {
             share if CALIBRATED.contains(&share) => 0,
             share if share < *CALIBRATED.start() => 1,
             _ => 2,
         };
-        Some((name.as_str(), group))
+        Some((name, group))
     });
     let words = [
         "calibrated (90 to 98 % of the truth in its 95 % band)",

@@ -333,12 +333,13 @@ fn after(
     RelativeError::new(&strata.iter().map(Vec::as_slice).collect::<Vec<_>>())
 }
 
-/// Errors after some touches of a planner's finished trials, in metres, at least
-/// [`ERROR_FLOOR_M`].
+/// Errors after some touches of a planner's trials, in metres, at least [`ERROR_FLOOR_M`]; empty
+/// without a complete trial.
 fn errors_m(run: &Run, planner: &str, budget: u32) -> HashMap<u32, f64> {
-    let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
+    let is_counted = run.completed_planners().contains(&planner);
     let measure = run.experiment.error_measure();
-    finished
+    planner_rows(&run.rows, planner)
+        .filter(|_| is_counted)
         .filter_map(|row| Some((row.trial, measure.value(row, budget)?.max(ERROR_FLOOR_M))))
         .collect()
 }

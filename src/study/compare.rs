@@ -123,11 +123,15 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<SuiteComparison,
     Ok(SuiteComparison { reference: against.into(), objects, contenders })
 }
 
-/// Mean log RMSE of a planner's finished trials.
+/// Mean log RMSE of a planner's trials; a failed one counts with its last belief to the end.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
     let of = CHECK_MEASURES[0].value;
-    let finished = planner_rows(&run.rows, planner).filter(|row| row.failure.is_none());
-    finished.filter_map(|row| Some((row.trial, of(row, &run.experiment)?))).collect()
+    if !run.completed_planners().contains(&planner) {
+        return HashMap::new();
+    }
+    planner_rows(&run.rows, planner)
+        .filter_map(|row| Some((row.trial, of(row, &run.experiment)?)))
+        .collect()
 }
 
 /// Results of a planner relative to `unit`, the mean log RMSE of the reference's trials.

@@ -2,13 +2,14 @@
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::analysis::Analysis;
-use palpate::experiment::measure::{Direction, MEASURES, PanelAxis};
+use palpate::experiment::measure::{COVERAGE, Direction, MEASURES, PanelAxis, RMSE};
 use palpate::experiment::metrics::recognition::{
     NONE, PoseRow, RecognitionError, RecognitionMetrics,
 };
 use palpate::experiment::metrics::shape::ShapeMetrics;
 use palpate::experiment::metrics::silhouette::SilhouetteMetrics;
 use palpate::experiment::report_settings::Claim;
+use palpate::experiment::row::TrialRow;
 use palpate::experiment::store::Run;
 use palpate::explore::evidence::End;
 use palpate::report;
@@ -389,4 +390,71 @@ fn a_run_ends_with_one_conclusion() {
         "{open}"
     );
     assert!(say(|_| 1.0, 4).contains("too few"));
+}
+
+/// A trial that failed counts with its last belief to the end, in the verdict and in every table;
+/// nothing is said about a planner that failed in each of its trials, and the verdict begins with
+/// the failures.
+#[test]
+fn failed_trials_do_not_vanish() {
+    let settings = CURVE.replace("trials = 2", "trials = 12");
+    let failing = |is_failed: fn(&TrialRow) -> bool| {
+        let mut run = run(&settings);
+        for row in run.rows.iter_mut().filter(|row| is_failed(row)) {
+            row.touches.truncate(8);
+            row.failure = Some("out of range".into());
+        }
+        run
+    };
+    let some = failing(|row| row.planner == "active" && row.trial < 5);
+    let analysis = Analysis::new(&some);
+    let verdicts = report::findings::verdicts(&some, &analysis);
+    assert!(verdicts[0].starts_with("active failed in 5 of 12 trials ("), "{verdicts:?}");
+    assert!(verdicts[1].contains("12 trials"), "{verdicts:?}");
+    let row = some.rows.iter().find(|row| row.failure.is_some()).unwrap();
+    for measure in [&RMSE, &COVERAGE] {
+        assert_eq!(measure.value(row, 12), measure.value(row, 8), "{}", measure.id);
+        assert!(measure.value(row, 12).is_some());
+    }
+    assert_eq!(row.path_m(12), row.path_m(8));
+    let unfailed = TrialRow { failure: None, ..row.clone() };
+    assert_eq!((RMSE.value(&unfailed, 12), unfailed.path_m(12)), (None, None));
+    let note = report::tables::summary::note(&some);
+    assert!(note.contains("12 trials; active finished 7"), "{note}");
+
+    let all = failing(|row| row.planner == "active");
+    let analysis = Analysis::new(&all);
+    let verdicts = report::findings::verdicts(&all, &analysis);
+    assert!(verdicts[0].starts_with("active failed in each of 12 trials ("), "{verdicts:?}");
+    assert!(verdicts[1..].iter().all(|it| !it.contains("active")), "{verdicts:?}");
+    let said = report::findings::sentences(&all).join(" ");
+    assert!(!said.contains("active"), "{said}");
+    let conclusion = report::findings::conclusion(&all, &analysis);
+    assert!(conclusion.is_none_or(|it| !it.contains("active")));
+}
+
+/// Where the finger cannot reach a part of the surface, planners are judged by the rest, and the
+/// share that is left out is told.
+#[test]
+fn planners_are_judged_where_the_finger_reaches() {
+    let settings = CURVE.replace("trials = 2", "trials = 12").replace(", \"sobol\"", "");
+    let mut run = run(&settings);
+    for row in &mut run.rows {
+        for metrics in row.touches.iter_mut().filter_map(|touch| touch.metrics.as_mut()) {
+            let reached_mm = if row.planner == "active" { 1.0 } else { 2.0 };
+            metrics.reachable_rmse_m = Some(1e-3 * reached_mm);
+            metrics.rmse_m = 0.01;
+        }
+    }
+    assert_eq!(run.error_measure().id, "rmse_m");
+    let places = run.truth.is_reachable.len();
+    run.truth.is_reachable[..places / 4].fill(false);
+    assert_eq!(run.error_measure().id, "reachable_rmse_m");
+    let analysis = Analysis::new(&run);
+    let conclusion = report::findings::conclusion(&run, &analysis).unwrap();
+    assert!(conclusion.starts_with("active is better: 1.00 mm"), "{conclusion}");
+    let verdicts = report::findings::verdicts(&run, &analysis);
+    let share = 100.0 * run.truth.unreachable_share().unwrap();
+    let told = format!("{share:.0} % of it is left out");
+    assert!(verdicts.iter().any(|it| it.contains(&told)), "{verdicts:?}");
 }

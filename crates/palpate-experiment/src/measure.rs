@@ -19,11 +19,7 @@ pub static MEASURES: &[Measure] = &[
     CENTRED_R,
     RMSE,
     EDGE_RMSE,
-    measure(Minimise, "reachable_rmse_m", "RMSE, reachable", MM)
-        .from(Source::Metrics(|it| it.reachable_rmse_m))
-        .aggregated(Aggregate::Median)
-        .drawn(PanelAxis::LogBeside(&UNREACHABLE_RMSE))
-        .error(),
+    REACHABLE_RMSE,
     UNREACHABLE_RMSE,
     measure(Minimise, "max_error_m", "maximum error", MM)
         .from(Source::Metrics(|it| Some(it.max_error_m)))
@@ -133,6 +129,13 @@ pub const EDGE_RMSE: Measure = measure(Minimise, "edge_rmse_m", "RMSE in the out
     .from(Source::Metrics(|it| it.edge_rmse_m))
     .aggregated(Aggregate::Median)
     .drawn(PanelAxis::Log)
+    .error();
+
+/// Root mean square error where the finger can touch the surface.
+pub const REACHABLE_RMSE: Measure = measure(Minimise, "reachable_rmse_m", "RMSE, reachable", MM)
+    .from(Source::Metrics(|it| it.reachable_rmse_m))
+    .aggregated(Aggregate::Median)
+    .drawn(PanelAxis::LogBeside(&UNREACHABLE_RMSE))
     .error();
 
 const UNREACHABLE_RMSE: Measure = measure(Minimise, "unreachable_rmse_m", "RMSE, unreachable", MM)
@@ -398,10 +401,14 @@ impl Measure {
         self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
     }
 
-    /// Value after some touches; `None` if the trial has no value.
+    /// Value after some touches; `None` if the trial has no value. A failed trial keeps the last
+    /// value before its failure.
     pub fn value(&self, row: &TrialRow, touches: u32) -> Option<f64> {
         match self.source {
             Source::Trial(of) => of(row, touches),
+            _ if row.ended_before(touches) => {
+                row.touches.iter().rev().find_map(|touch| self.value_after_touch(touch))
+            }
             _ => self.value_after_touch(row.touches.get((touches as usize).checked_sub(1)?)?),
         }
     }

@@ -161,6 +161,12 @@ impl TrialRow {
         Self::without_touches(trial, planner, Some(format!("before the first touch: {fault}")))
     }
 
+    /// Whether the trial failed before this number of touches. Its last belief then counts to the
+    /// end.
+    pub fn ended_before(&self, touches: u32) -> bool {
+        self.failure.is_some() && self.touches.len() < touches as usize
+    }
+
     /// Returns all actions up to touch `touches`, in order.
     pub fn steps(&self, touches: u32) -> impl Iterator<Item = Step<'_>> {
         let touched = self.touches.iter().take(touches as usize).zip(0..);
@@ -178,9 +184,13 @@ impl TrialRow {
 
     /// Travel of the finger over its first `touches` touches, along straight lines: between places
     /// of a zone; around an object between contacts, or the aimed points of touches without
-    /// contact. `None` for a trial with fewer touches.
+    /// contact. `None` for a trial with fewer touches that did not fail.
     pub fn path_m(&self, touches: u32) -> Option<f64> {
-        let places = self.touches.get(..touches as usize)?.iter().flat_map(TouchRow::places);
+        let made = match self.ended_before(touches) {
+            true => &self.touches[..],
+            false => self.touches.get(..touches as usize)?,
+        };
+        let places = made.iter().flat_map(TouchRow::places);
         let steps = places.clone().zip(places.skip(1));
         let lengths = steps.map(|(from, to)| {
             let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));

@@ -58,7 +58,13 @@ pub fn table_after(run: &Run, counts: &[u32]) -> Table {
 /// Returns the note that explains the cells of [`table`].
 pub fn note(run: &Run) -> String {
     let trials = counted(run.experiment.trials, "trial");
-    format!("n = {trials}; ± is one standard error of the mean.")
+    let fewer = |name: &String| {
+        let rows = || planner_rows(&run.rows, name);
+        let complete = rows().filter(|row| row.failure.is_none()).count();
+        (complete < rows().count()).then(|| format!("; {name} finished {complete}"))
+    };
+    let fewer: String = run.experiment.planners.iter().filter_map(fewer).collect();
+    format!("n = {trials}{fewer}; ± is one standard error of the mean.")
 }
 
 /// Returns the numbers that decide between planners after each tabled touch count: the error with
@@ -70,8 +76,8 @@ pub fn brief(run: &Run) -> Table {
     let has = |measure: &Measure| {
         run.rows.iter().any(|row| measure.value(row, row.touches.len() as u32).is_some())
     };
-    let error = match has(experiment.error_measure()) {
-        true => experiment.error_measure(),
+    let error = match has(run.error_measure()) {
+        true => run.error_measure(),
         false => &VERIFICATION_RMSE,
     };
     let heads = [
@@ -261,18 +267,21 @@ fn event_line(planner: &str, events: &EventCounts) -> Option<String> {
             "touch",
             " aborted: limit of force, pressure or depth, or no contact location",
         ),
+        (events.no_variance, "random target", " instead of planned ones: no variance is left"),
         (
-            events.no_variance,
+            events.duplicate_target,
             "random target",
-            " instead of planned ones: no variance left at the best one",
+            " instead of planned ones, which had been touched before",
         ),
-        (events.duplicate_target, "random target", " instead of planned ones: repeated target"),
     ];
     let found: Vec<String> = counts
         .iter()
         .filter(|(count, ..)| *count > 0)
         .map(|(count, what, rest)| match count {
-            1 => counted(count, what) + &rest.replace("planned ones", "a planned one"),
+            1 => {
+                let one = rest.replace("planned ones, which", "a planned one, which");
+                counted(count, what) + &one.replace("planned ones", "a planned one")
+            }
             _ => counted(count, what) + rest,
         })
         .collect();

@@ -50,7 +50,7 @@ fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Optio
 pub static CHECK_MEASURES: &[CheckMeasure] = &[
     CheckMeasure::log("mean_log_rmse", "mean log error over the touches", |row, of| {
         let after = of.first_fit()..=of.touches;
-        let whole = row.touches.len() >= of.touches as usize;
+        let whole = row.touches.len() >= of.touches as usize || row.failure.is_some();
         let logs = after.filter_map(|n| error_m(row, n).map(log));
         let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
         (whole && count > 0.0).then(|| sum / count)

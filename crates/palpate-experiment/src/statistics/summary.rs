@@ -98,8 +98,9 @@ pub(crate) fn fitted<'a>(
     planner: &'a str,
     touches: u32,
 ) -> Vec<&'a TrialRow> {
-    let is_fitted = |row: &&TrialRow| {
-        row.touches.get(touches as usize - 1).is_some_and(|touch| touch.fit.is_some())
+    let is_fitted = |row: &&TrialRow| match row.ended_before(touches) {
+        true => row.touches.iter().any(|touch| touch.fit.is_some()),
+        false => row.touches.get(touches as usize - 1).is_some_and(|touch| touch.fit.is_some()),
     };
     planner_rows(rows, planner).filter(is_fitted).collect()
 }

@@ -31,9 +31,10 @@ use self::io::{io_error, remove};
 use self::provenance::{CONTENT, InputHashes};
 use self::surface::{MESH, SURFACE};
 use crate::experiment::Experiment;
+use crate::measure::{Measure, REACHABLE_RMSE};
 use crate::metrics::truth::Truth;
 use crate::notice;
-use crate::row::{TrialId, TrialRow};
+use crate::row::{TrialId, TrialRow, planner_rows};
 use crate::simulation::Simulation;
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -170,14 +171,18 @@ impl RunFolder {
     pub fn sort(self, experiment: &Experiment) -> Result<RowCounts, RunError> {
         let file = self.path.join(TRIALS);
         let (mut places, mut tally) = (Vec::new(), RowCounts::default());
+        let mut complete: BTreeMap<String, bool> = BTreeMap::new();
         rows::scan(&file, experiment, |row, bytes| {
             let id = row.id();
             if experiment.contains_trial(&id) {
                 tally.trials += 1;
+                *complete.entry(row.planner).or_default() |= row.failure.is_none();
                 tally.failed.extend(row.failure.map(|reason| (id.clone(), reason)));
             }
             places.push((id, bytes));
         })?;
+        let incomplete = complete.into_iter().filter(|(_, is_complete)| !is_complete);
+        tally.incomplete = incomplete.map(|(planner, _)| planner).collect();
         tally.failed.sort_by(|(a, _), (b, _)| rows::order(a, b, experiment));
         if !rows::is_sorted(&places, experiment) {
             places.sort_by(|(a, _), (b, _)| rows::order(a, b, experiment));
@@ -198,6 +203,8 @@ pub struct RowCounts {
     pub trials: usize,
     /// Failed trials, in order, with the reason.
     pub failed: Vec<(TrialId, String)>,
+    /// Planners of which a trial is stored and none is complete.
+    pub incomplete: Vec<String>,
 }
 
 impl Run {
@@ -220,6 +227,22 @@ impl Run {
         rows.sort_by(|(a, _), (b, _)| rows::order(a, b, &experiment));
         let rows = rows.into_iter().map(|(_, row)| row).collect();
         Ok(Self { experiment, truth, rows, unlisted })
+    }
+
+    /// Planners with at least one complete trial; nothing is said about the others.
+    pub fn completed_planners(&self) -> Vec<&str> {
+        let is_complete =
+            |name: &&String| planner_rows(&self.rows, name).any(|row| row.failure.is_none());
+        self.experiment.planners.iter().filter(is_complete).map(String::as_str).collect()
+    }
+
+    /// Error measure that ranks the planners: where a zone has places that the finger cannot reach,
+    /// that of the others.
+    pub fn error_measure(&self) -> &'static Measure {
+        match self.truth.unreachable_share() {
+            Some(_) if self.experiment.scene.whole_object.is_none() => &REACHABLE_RMSE,
+            _ => self.experiment.error_measure(),
+        }
     }
 
     /// Notices about what limits the meaning of the numbers.

@@ -139,6 +139,13 @@ impl Truth {
         self.is_reachable.iter().filter(|&&is_reachable| is_reachable).count()
     }
 
+    /// Share of the test points on the surface that the finger cannot reach; `None` if it reaches
+    /// all or none.
+    pub fn unreachable_share(&self) -> Option<f64> {
+        let (reached, all) = (self.reachable_count(), self.surface_count());
+        (0 < reached && reached < all).then(|| 1.0 - reached as f64 / all as f64)
+    }
+
     /// Lowest and highest surface above the datum; `None` without a surface.
     pub fn span_m(&self) -> Option<[f64; 2]> {
         let heights_m = || self.heights_m.iter().flatten().copied();
