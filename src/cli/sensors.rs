@@ -2,7 +2,7 @@
 
 use super::find::{EXPERIMENTS, find};
 use super::output::{Overwrite, make_folder};
-use super::progress::{progress_bar, stop_on_interrupt};
+use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Completion, Verbosity, print};
 use crate::experiment::runner::Progress;
 use crate::experiment::store::write_whole;
@@ -56,7 +56,7 @@ pub(super) fn run(
     let bar = progress_bar(talk, "sensors", "trials", spec.trials(), 0);
     let progress = |progress: Progress| {
         if matches!(progress, Progress::Trial(_)) {
-            bar.inc(1);
+            step(talk, &bar);
         }
     };
     let results = study::run(&spec, &stop, &progress, &mut |results| {

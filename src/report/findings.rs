@@ -159,7 +159,7 @@ fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     let error_m = last.of(error)?.median;
     let goal = format!(
         "the median {} that {name} has after {} ({} mm)",
-        error.title,
+        error_words(run),
         counted(last.touches, "touch"),
         median(last, error)?
     );
@@ -208,12 +208,20 @@ fn baseline(run: &Run) -> Option<&str> {
     run.experiment.baselines().into_iter().find(|name| completed.contains(name))
 }
 
+/// Returns the error that ranks the planners in words.
+fn error_words(run: &Run) -> &'static str {
+    match run.error_measure() {
+        error if error.id == REACHABLE_RMSE.id => "RMSE within reach",
+        error => error.title,
+    }
+}
+
 /// Returns which part of the surface the errors are of, if not the whole.
 fn judged_part(run: &Run) -> Option<String> {
     let is_part = run.error_measure().id == REACHABLE_RMSE.id;
     let share = run.truth.unreachable_share().filter(|_| is_part)?;
     Some(format!(
-        "Errors are those where the finger can touch the surface; {:.0} % of it is left out.",
+        "Within reach are the places where the finger can touch the surface; {:.0} % of it is left out.",
         100.0 * share
     ))
 }
@@ -263,7 +271,7 @@ pub fn conclusion(run: &Run, analysis: &Analysis) -> Option<String> {
     };
     let after = format!(
         "{} than {baseline} after {} (mean of {}, 95 % interval)",
-        error.title,
+        error_words(run),
         counted(run.experiment.touches, "touch"),
         counted(paired.trials, "trial")
     );
@@ -357,7 +365,7 @@ fn error_verdict(run: &Run, analysis: &Analysis, baseline: &str) -> Option<Strin
     let groups = found.map(|it| {
         (it.planner, verdict_group(verdict(it.paired.interval, 0.0, it.measure.direction)))
     });
-    let error = run.error_measure().title;
+    let error = error_words(run);
     let words = [
         format!("a smaller {error} than {baseline}"),
         format!("a larger {error} than {baseline}"),
