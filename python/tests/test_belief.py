@@ -87,9 +87,6 @@ def test_wrong_arguments_are_named(belief, places):
         belief.condition_on_observations(places[:1], [0.0, 0.0])
     with pytest.raises(ValueError, match=r"shape \[2, 3\]"):
         belief.covariance(np.zeros((2, 3)))
-    empty = palpate.Scene.load("container").exploration().belief if hasattr(palpate.Scene, "exploration") else None
-    if empty is not None:
-        assert np.isnan(empty.covariance(places)).all()
 
 
 def planner(score):
@@ -129,7 +126,7 @@ def silhouette(belief, candidates, references):
 def test_a_built_in_planner_can_be_written_in_python(score):
     """Over the same trials its error is that of the built-in one, within what other candidates change."""
     experiment = palpate.Experiment.load("container", touches=16, initial_touches=5, seed=4)
-    run = experiment.run({"mine": planner(score), "theirs": score.__name__, "random": "random"}, trials=6)
+    run = experiment.run([("mine", planner(score)), score.__name__, "random"], trials=6)
     trials = run.touches().query("touch > 6")
     error = trials.assign(log=np.log(trials["rmse_m"])).groupby("planner")["log"].mean()
     mine, theirs = (error[name] for name in run.planners[:2])
