@@ -66,24 +66,24 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     let options =
         TrialOptions { threads: args.threads, is_fresh: args.fresh, ..TrialOptions::default() };
     let mut trials = Trials::new(options, talk, host);
-    let mut outcome = Completion::Done;
+    let (mut is_interrupted, mut is_failed) = (false, false);
     let result = benchmark::run(&spec, &mut |experiment, part| {
-        outcome = completion(&trials.run(experiment, part)?, talk);
-        Ok(matches!(outcome, Completion::Done))
+        match completion(&trials.run(experiment, part)?, talk) {
+            Completion::Interrupted => is_interrupted = true,
+            Completion::Failed => is_failed = true,
+            Completion::Done | Completion::Undecided => (),
+        }
+        Ok(!is_interrupted)
     })?;
     let Some(result) = result else {
-        if matches!(outcome, Completion::Interrupted) {
-            let folder = folder.display();
-            talk.note(format!(
-                "stopped; the trials are in {folder}; repeat the command to continue"
-            ));
-        }
-        return Ok(outcome);
+        let folder = folder.display();
+        talk.note(format!("stopped; the trials are in {folder}; repeat the command to continue"));
+        return Ok(Completion::Interrupted);
     };
     make_folder(&folder)?;
     let [json, table_file] = &files;
     write_whole(json, serde_json::to_string_pretty(&result)? + "\n")?;
     write_whole(table_file, markdown(&result))?;
     print(&format!("{}\n{} and {}", table(&result).text(), json.display(), table_file.display()))?;
-    Ok(Completion::Done)
+    Ok(if is_failed { Completion::Failed } else { Completion::Done })
 }

@@ -154,13 +154,15 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     let first = experiments[0].clone();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(&name));
     let part = if args.out.is_none() { args.suffix() } else { String::new() };
-    let mut paths = Vec::new();
+    let (mut paths, mut is_failed) = (Vec::new(), false);
     for experiment in experiments {
         let path = folder.join(format!("{}{part}", experiment.name));
         match run_one(args, &mut trials, experiment, &path, talk)? {
-            Completion::Done => paths.push(path),
-            other => return Ok(other),
+            Completion::Interrupted => return Ok(Completion::Interrupted),
+            Completion::Failed => is_failed = true,
+            Completion::Done | Completion::Undecided => (),
         }
+        paths.push(path);
     }
     if args.shard.is_none()
         && let Some(compared) = study::compare_cells(&name, &first, paths)?
@@ -174,7 +176,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
             print(&text)?;
         }
     }
-    Ok(Completion::Done)
+    Ok(if is_failed { Completion::Failed } else { Completion::Done })
 }
 
 /// Runs the trials of an experiment that a folder lacks, and writes and prints the results.

@@ -111,9 +111,10 @@ impl Zone {
             && self.depth_m.is_none_or(|[near_m, far_m]| is_within([-far_m, -near_m], y_m))
     }
 
-    /// Returns the place at fractions 0..1 of the sides.
+    /// Returns the place at fractions 0..1 of the sides, which rounding does not put outside.
     pub fn at(&self, fractions: &[f64]) -> Vec<f64> {
-        self.sides().zip(fractions).map(|([low, high], t)| low + (high - low) * t).collect()
+        let between = |([low, high], t): ([f64; 2], &f64)| (low + (high - low) * t).min(high);
+        self.sides().zip(fractions).map(between).collect()
     }
 
     /// Pose of `Z` in `W`.

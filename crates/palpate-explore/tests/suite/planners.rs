@@ -12,6 +12,7 @@ use palpate_gp::kernel::SquaredExponential;
 use palpate_gp::math::seed;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::reduction::VarianceReduction;
+use proptest::prelude::*;
 use rand::RngExt;
 
 const SQUARE: Zone = Zone { datum_y_m: Some(-0.6), ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
@@ -298,5 +299,21 @@ fn grid_goes_from_coarse_to_fine() {
     for place in SQUARE.grid(17) {
         let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
         assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");
+    }
+}
+
+proptest! {
+    /// The place at any fractions lies in the zone, the corners included: a lattice ends on them.
+    #[test]
+    fn fractions_are_places_of_the_zone(
+        low in [-1.0..1.0, -1.0..1.0],
+        side in [1e-4..2.0, 1e-4..2.0],
+        share in [0.0..=1.0, 0.0..=1.0],
+    ) {
+        let [x_m, z_m] = [0, 1].map(|i| [low[i], low[i] + side[i]]);
+        let zone = Zone::new(x_m, Some(z_m));
+        for share in [share, [0.0, 1.0], [1.0, share[0]]] {
+            prop_assert!(zone.contains(&zone.at(&share)));
+        }
     }
 }
