@@ -171,15 +171,19 @@ def _frames(trials: pd.DataFrame, touches: pd.DataFrame) -> tuple[dict[str, Any]
         reward = np.where(is_first | np.isnan(gain), 0.0, gain)
     else:
         reward = np.zeros(len(touches))
+    # A stroke ends elsewhere, a tap where it begins.
+    action = touches[target_names]
+    for end in [name for name in touches.columns if name in ("end_x_m", "end_z_m")]:
+        action = action.assign(**{end: touches[end].fillna(touches[end.replace("end", "target")])})
     data: _Columns = {
         "observation.state": state,
-        "action": touches[target_names].to_numpy(dtype=np.float32),
+        "action": action.to_numpy(dtype=np.float32),
         "next.contact": result,
         "next.reward": reward.astype(np.float32),
         "next.done": is_last,
     }
     contact = [*contact_names, "is_contact"]
-    names = {"observation.state": contact, "action": target_names, "next.contact": contact}
+    names = {"observation.state": contact, "action": list(action.columns), "next.contact": contact}
     features = {
         name: {"dtype": str(values.dtype), "shape": list(values.shape[1:]) or [1], "names": names.get(name)}
         for name, values in data.items()

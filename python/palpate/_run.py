@@ -102,7 +102,12 @@ class Run:
         return _frame(self._core.trials())
 
     def touches(self) -> pd.DataFrame:
-        """Returns a row per touch: target, contact, hyperparameters, and every measure after it."""
+        """Returns a row per touch: target, contact, hyperparameters, and every measure after it.
+
+        Where there are any: normals and standard deviations of contacts, ends of strokes, pitches. `points` counts the
+        points of the surface that the touch showed. Columns without a value are left out; `attrs["units"]` has the
+        units.
+        """
         return _frame(self._core.touches())
 
     def summary(self) -> pd.DataFrame:
@@ -214,4 +219,12 @@ def _frame(columns: dict[str, object]) -> pd.DataFrame:
     # Imported on first use, because it takes longer than all other imports.
     import pandas as pd
 
-    return pd.DataFrame(columns)
+    # Reasons that are missing stay None, as a column of texts would make them NaN.
+    found = {name: pd.Series(it, dtype=object) if isinstance(it, list) else it for name, it in columns.items()}
+    frame = pd.DataFrame(found)
+    frame.attrs["units"] = {name: unit for name in found for end, unit in UNITS.items() if name.endswith(end)}
+    return frame
+
+
+#: Units of columns by the ends of their names.
+UNITS = {"_m": "m", "_s": "s", "_deg": "deg"}

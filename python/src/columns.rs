@@ -28,6 +28,18 @@ fn numbers(
     table.set_item(name, PyArray1::from_vec(table.py(), values))
 }
 
+/// Adds a column unless no row has a value.
+fn some_numbers(
+    table: &Bound<'_, PyDict>,
+    name: &str,
+    mut values: impl Iterator<Item = Option<f64>> + Clone,
+) -> PyResult<()> {
+    match values.clone().any(|value| value.is_some()) {
+        true => numbers(table, name, values.by_ref()),
+        false => Ok(()),
+    }
+}
+
 fn counts(
     table: &Bound<'_, PyDict>,
     name: &str,
@@ -76,6 +88,28 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     for (axis, name) in ["contact_x_m", "contact_y_m", "contact_z_m"].iter().enumerate() {
         numbers(&table, name, touches().map(|touch| Some(touch.contact()?[axis])))?;
     }
+    for (axis, name) in ["normal_x", "normal_y", "normal_z"].iter().enumerate() {
+        let measured = |touch: &TouchRow| {
+            let contact = touch.outcome.contact().filter(|contact| contact.has_normal)?;
+            Some(contact.normal_w[axis])
+        };
+        some_numbers(&table, name, touches().map(measured))?;
+    }
+    let sd_m = |touch: &TouchRow| {
+        let contact = touch.outcome.contact()?;
+        let variance = contact.normal_w.dot(&(contact.covariance_w? * contact.normal_w));
+        Some(variance.max(0.0).sqrt())
+    };
+    some_numbers(&table, "contact_sd_m", touches().map(sd_m))?;
+    for (axis, name) in ["end_x_m", "end_z_m"].iter().enumerate() {
+        let end = |touch: &TouchRow| {
+            let target = Some(&touch.target).filter(|target| target.slide_m() > 0.0)?;
+            target.end()?.get(axis).copied()
+        };
+        some_numbers(&table, name, touches().map(end))?;
+    }
+    some_numbers(&table, "pitch_deg", touches().map(|touch| touch.target.pitch_deg()))?;
+    counts(&table, "points", touches().map(|touch| touch.outcome.points().len()))?;
     numbers(&table, "planned_sd_m", touches().map(|touch| touch.planned_sd_m))?;
     words(&table, "fallback", touches().map(|touch| touch.fallback.map(fallback)))?;
     let fit = |of: fn(&palpate::gp::Hyperparameters) -> f64| {
@@ -85,7 +119,7 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     numbers(&table, "noise_sd_m", fit(|found| found.noise_sd))?;
     for measure in measures_with_columns(&run.rows) {
         let values = all.iter().map(|(row, count, _)| measure.value(row, *count as u32));
-        numbers(&table, measure.id, values)?;
+        some_numbers(&table, measure.id, values)?;
     }
     Ok(table)
 }
@@ -98,7 +132,7 @@ pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     counts(&table, "touches", records.iter().map(|(point, _)| point.touches as usize))?;
     counts(&table, "trials", records.iter().map(|(point, _)| point.trials))?;
     for (i, column) in columns(&run.experiment, &run.rows).iter().enumerate() {
-        numbers(&table, column, records.iter().map(|(_, values)| values[i]))?;
+        some_numbers(&table, column, records.iter().map(|(_, values)| values[i]))?;
     }
     Ok(table)
 }

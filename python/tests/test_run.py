@@ -1,5 +1,6 @@
 """Tests of runs and their data frames."""
 
+import json
 import os
 import signal
 import subprocess
@@ -143,3 +144,29 @@ def test_the_package_is_light_to_import(tmp_path):
 def test_a_frame_is_a_frame(toy):
     assert isinstance(toy.touches(), pd.DataFrame)
     assert isinstance(repr(toy) + repr(toy.zone) + repr(toy.belief(0, "random", 12)), str)
+
+
+def test_frames_tell_units_and_leave_out_what_nothing_has():
+    run = palpate.Experiment.load("toy", touches=8).run(["random"], trials=2)
+    trials, touches = run.trials(), run.touches()
+    assert all(failure is None for failure in trials["failure"])
+    assert not touches.drop(columns=["fallback"]).isna().all().any()
+    assert touches.attrs["units"]["rmse_m"] == "m" and "r" not in touches.attrs["units"]
+    assert "end_x_m" not in touches and "normal_x" not in touches
+    assert (touches["points"] == (touches["outcome"] == "contact")).all()
+
+
+def test_frames_and_actions_tell_strokes_from_taps(tmp_path):
+    pytest.importorskip("pyarrow")
+    experiment = palpate.Experiment.load("container_strokes", touches=6, initial_touches=2)
+    run = experiment.run(["random_strokes"], trials=1)
+    touches = run.touches()
+    strokes = touches["end_x_m"].notna()
+    assert strokes.any() and not strokes.all()
+    assert (touches.loc[strokes, "points"] > 1).any()
+    run.to_lerobot(tmp_path / "set")
+    names = json.loads((tmp_path / "set/meta/info.json").read_text())["features"]["action"]["names"]
+    assert names == ["target_x_m", "target_z_m", "end_x_m", "end_z_m"]
+    data = pd.read_parquet(tmp_path / "set/data/chunk-000/file-000.parquet")
+    moved = [abs(end - start) > 0 for start, _, end, _ in data["action"]]
+    assert moved == list(strokes)
