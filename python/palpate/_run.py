@@ -220,7 +220,9 @@ def _frame(columns: dict[str, object]) -> pd.DataFrame:
     import pandas as pd
 
     # Reasons that are missing stay None, as a column of texts would make them NaN.
-    found = {name: pd.Series(it, dtype=object) if isinstance(it, list) else it for name, it in columns.items()}
+    found = {
+        name: pd.Series(it, dtype=object) if isinstance(it, list) and None in it else it for name, it in columns.items()
+    }
     frame = pd.DataFrame(found)
     frame.attrs["units"] = {name: unit for name in found for end, unit in UNITS.items() if name.endswith(end)}
     return frame

@@ -110,7 +110,7 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     }
     some_numbers(&table, "pitch_deg", touches().map(|touch| touch.target.pitch_deg()))?;
     counts(&table, "points", touches().map(|touch| touch.outcome.points().len()))?;
-    numbers(&table, "planned_sd_m", touches().map(|touch| touch.planned_sd_m))?;
+    some_numbers(&table, "planned_sd_m", touches().map(|touch| touch.planned_sd_m))?;
     words(&table, "fallback", touches().map(|touch| touch.fallback.map(fallback)))?;
     let fit = |of: fn(&palpate::gp::Hyperparameters) -> f64| {
         touches().map(move |touch| Some(of(&touch.fit.as_ref()?.hyperparameters)))
