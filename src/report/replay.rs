@@ -114,6 +114,14 @@ pub fn marks(
     touches.iter().enumerate().map(move |(i, touch)| (touch, style::touch(i < initial)))
 }
 
+/// Returns where the paper shows such a figure, for a run beside its claims.
+pub fn in_paper(run: &Run, figure: &str) -> String {
+    match run.experiment.report.claims.is_empty() {
+        true => String::new(),
+        false => format!(" Corresponds to {figure} of Yi et al. 2016."),
+    }
+}
+
 /// Returns a sentence of a caption on where beliefs are drawn; empty if the surface is everywhere.
 pub fn drawn_caption(run: &Run) -> &'static str {
     match run.truth.surface_count() < run.truth.places.len() {

@@ -28,8 +28,8 @@ pub(super) const LEAST_SHARE: f64 = 1e-4;
 pub struct InteractiveView<'a> {
     /// Colour maps: name in the scripts, and label. The first one is the default.
     pub colours: &'a [(&'a str, &'a str)],
-    /// Whether the true surface is visible by default; `None` if it is not known.
-    pub truth: Option<bool>,
+    /// Whether there is a true surface, which is then visible by default.
+    pub has_truth: bool,
     /// CSS class of the canvas.
     pub class: &'a str,
     /// Explanation below the canvas, as HTML.
@@ -50,11 +50,9 @@ impl InteractiveView<'_> {
         if !self.colours.is_empty() {
             controls += &choice("colour", self.colours.iter().copied());
         }
-        if let Some(is_shown) = self.truth {
-            let checked = if is_shown { " checked" } else { "" };
-            controls += &format!(
-                "<label><input type=\"checkbox\" name=\"truth\"{checked}> true surface</label>\n"
-            );
+        if self.has_truth {
+            controls +=
+                "<label><input type=\"checkbox\" name=\"truth\" checked> true surface</label>\n";
         }
         // `<` is escaped so that the data cannot close the script element.
         let json = data.to_string().replace('<', "\\u003c");

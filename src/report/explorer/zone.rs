@@ -32,10 +32,9 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     let bytes = BYTES_OF_PLACE * experiment.planners.len() * places;
     let counts = counts(experiment.first_fit(), experiment.touches, bytes);
     let Some(data) = data(run, &|_| counts.clone())? else { return Ok(String::new()) };
-    // The true curve hides nothing, so it is visible by default.
-    let (class, colours, is_shown, help) = match data["z"].is_null() {
-        true => ("curve", &[][..], true, "Drag the slider, or press the arrow keys."),
-        false => ("surface", &COLOURS[..], false, HELP),
+    let (class, colours, help) = match data["z"].is_null() {
+        true => ("curve", &[][..], "Drag the slider, or press the arrow keys."),
+        false => ("surface", &COLOURS[..], HELP),
     };
     let note = format!(
         "Trial {}. Blue: the {}; red: those of the planner; the last one is larger.{} \
@@ -44,8 +43,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
         counted(run.experiment.initial_touches, "initial touch"),
         drawn_caption(run)
     );
-    Ok(InteractiveView { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }
-        .html(&data))
+    Ok(InteractiveView { colours, has_truth: true, class, note, scripts: &SCRIPTS }.html(&data))
 }
 
 const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \

@@ -7,7 +7,7 @@ use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::Area;
 use crate::report::heat_map::{HeatMap, MapValue};
 use crate::report::legend::{FigureLayout, Swatch, miss_entry};
-use crate::report::replay::{BeliefReplay, drawn_caption};
+use crate::report::replay::{BeliefReplay, drawn_caption, in_paper};
 use crate::report::style::{self, INITIAL, PLANNED};
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
@@ -21,9 +21,10 @@ fn caption(run: &Run) -> String {
     format!(
         "Standard deviation that another touch could remove, before and after one touch of \
          {planner} in trial {}. Circle: largest value found. Crosses: points of contact, which may \
-         lie beside their targets.{} Corresponds to Fig. 6 of the paper.",
+         lie beside their targets.{}{}",
         run.experiment.report.trial,
-        drawn_caption(run)
+        drawn_caption(run),
+        in_paper(run, "Fig. 6")
     )
 }
 

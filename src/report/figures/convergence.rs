@@ -9,7 +9,9 @@ use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{FigureLayout, Swatch};
+use crate::report::replay::in_paper;
 use crate::report::style::{self, FAINT_INK};
+use crate::report::tables::summary::finished;
 use palpate_input::format::counted;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
@@ -28,11 +30,12 @@ fn caption(run: &Run) -> String {
         )
     });
     format!(
-        "Accuracy of the belief against the number of touches, and its error against the robot's time, n = {} of each planner; all planners share \
+        "Accuracy of the belief against the number of touches, and its error against the robot's time; n = {}; all planners share \
          the {}. Bands: one standard error of a mean, 95 % bootstrap \
-         interval of a median.{score} Corresponds to Fig. 4 of the paper.",
-        counted(run.experiment.trials, "trial"),
-        counted(run.experiment.initial_touches, "initial touch")
+         interval of a median.{score}{}",
+        finished(run),
+        counted(run.experiment.initial_touches, "initial touch"),
+        in_paper(run, "Fig. 4")
     )
 }
 

@@ -5,7 +5,7 @@ use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::legend::{FigureLayout, Swatch, miss_entry};
-use crate::report::replay::{self, BeliefReplay, NO_BELIEF, drawn_caption};
+use crate::report::replay::{self, BeliefReplay, NO_BELIEF, drawn_caption, in_paper};
 use crate::report::style::{self, FAINT_INK, INITIAL, INK, PLANNED, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
@@ -16,11 +16,11 @@ pub(crate) const FIGURE: ReportFigure = ReportFigure { name: "curves", caption, 
 fn caption(run: &Run) -> String {
     format!(
         "Beliefs of trial {} by number of touches: posterior mean, its 95 % band, and the true \
-         surface. Blue crosses: the {}; red: those of the planner.{} Corresponds to \
-         Fig. 3 of the paper.",
+         surface. Blue crosses: the {}; red: those of the planner.{}{}",
         run.experiment.report.trial,
         counted(run.experiment.initial_touches, "initial touch"),
-        drawn_caption(run)
+        drawn_caption(run),
+        in_paper(run, "Fig. 3")
     )
 }
 

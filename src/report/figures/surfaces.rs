@@ -9,7 +9,7 @@ use crate::report::legend::{FigureLayout, miss_entry, seen_entry, touch_entries}
 use crate::report::relief::{
     ON_RELIEF, Relief, ReliefPanel, Space, height_colour, unreachable_colour,
 };
-use crate::report::replay::{self, BeliefReplay, Grid, NO_BELIEF, drawn_caption};
+use crate::report::replay::{self, BeliefReplay, Grid, NO_BELIEF, drawn_caption, in_paper};
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
@@ -30,10 +30,11 @@ fn caption(run: &Run) -> String {
     format!(
         "Posterior mean over the zone in trial {} by number of touches, and the true object on the \
          right, with the same view, scale and colours. Blue points: the {}; red: those \
-         of the planner. Mauve: out of the finger's reach.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
+         of the planner. Mauve: out of the finger's reach.{stretched}{}{}",
         run.experiment.report.trial,
         counted(run.experiment.initial_touches, "initial touch"),
-        drawn_caption(run)
+        drawn_caption(run),
+        in_paper(run, "Figs. 5 and 7")
     )
 }
 

@@ -57,7 +57,7 @@ pub fn section(
     };
     let shell = InteractiveView {
         colours: if data["error_range"].is_null() { &COLOURS[..1] } else { &COLOURS },
-        truth: truth.as_ref().map(|_| false),
+        has_truth: truth.is_some(),
         class: "surface",
         note: format!(
             "Trial {trial}. Blue: the {}; red: those of the planner; the last one is larger, with an \

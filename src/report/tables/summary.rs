@@ -55,8 +55,8 @@ pub fn table_after(run: &Run, counts: &[u32]) -> Table {
     table.without_empty()
 }
 
-/// Returns the note that explains the cells of [`table`].
-pub fn note(run: &Run) -> String {
+/// Returns the number of trials, and of the planners that finished fewer.
+pub fn finished(run: &Run) -> String {
     let trials = counted(run.experiment.trials, "trial");
     let fewer = |name: &String| {
         let rows = || planner_rows(&run.rows, name);
@@ -64,7 +64,12 @@ pub fn note(run: &Run) -> String {
         (complete < rows().count()).then(|| format!("; {name} finished {complete}"))
     };
     let fewer: String = run.experiment.planners.iter().filter_map(fewer).collect();
-    format!("n = {trials}{fewer}; ± is one standard error of the mean.")
+    format!("{trials}{fewer}")
+}
+
+/// Returns the note that explains the cells of [`table`].
+pub fn note(run: &Run) -> String {
+    format!("n = {}; ± is one standard error of the mean.", finished(run))
 }
 
 /// Returns the numbers that decide between planners after each tabled touch count: the error with
