@@ -4,7 +4,7 @@ use super::desk::{Desk, Phase, Status, Track};
 use crate::experiment::Experiment;
 use crate::experiment::metrics::truth::Truth;
 use crate::experiment::planner_names::HUMAN;
-use crate::experiment::row::TouchRow;
+use crate::experiment::row::{TouchRow, TrialRow};
 use crate::experiment::store::Run;
 use crate::report::{explorer, solid, style, whole_object};
 use palpate_explore::evidence::End;
@@ -116,7 +116,7 @@ impl Picture {
     /// If the touches cannot be conditioned on.
     pub fn beliefs(&self, desk: &Desk, touches: u32) -> anyhow::Result<Value> {
         let mut experiment = desk.experiment().clone();
-        let (rows, trial, phase) = {
+        let (mut rows, trial, phase): (Vec<TrialRow>, _, _) = {
             let state = desk.lock();
             let rows = state.tracks.iter().map(|track| track.row.clone()).collect();
             (rows, state.trial, state.phase)
@@ -127,6 +127,9 @@ impl Picture {
         if is_played {
             truth.heights_m.fill(None);
             truth.mesh = None;
+            for touch in rows.iter_mut().flat_map(|row| &mut row.touches) {
+                (touch.metrics, touch.silhouette, touch.shape) = (None, None, None);
+            }
         }
         let run = Run { experiment, truth, rows, unlisted: 0 };
         let first = run.experiment.first_fit();
