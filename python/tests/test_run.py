@@ -152,7 +152,7 @@ def test_frames_tell_units_and_leave_out_what_nothing_has():
     assert all(failure is None for failure in trials["failure"])
     assert not touches.drop(columns=["fallback"]).isna().all().any()
     assert touches.attrs["units"]["rmse_m"] == "m" and "r" not in touches.attrs["units"]
-    assert "end_x_m" not in touches and "normal_x" not in touches
+    assert "end_x_m" not in touches and "pitch_deg" not in touches
     assert (touches["points"] == (touches["outcome"] == "contact")).all()
 
 
