@@ -8,12 +8,15 @@ use crate::program::COMMIT;
 use crate::run::Run;
 use crate::zone::Zone;
 use palpate::config::Loader;
+use palpate::error::InputError;
 use palpate::experiment::runner::{self, Progress};
 use palpate::experiment::store::{self, RunFolder, resolved, write_whole};
 use palpate::experiment::{self, Simulation};
 use palpate::explore::planner::{PlannerFactory, is_external};
 use palpate::report::check;
-use palpate::study::check::{CheckOptions, CheckResult, StoredBaseline, accepted, run_check};
+use palpate::study::check::{
+    CheckOptions, CheckResult, StoredBaseline, accepted, check_repeats, run_check,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
@@ -185,7 +188,11 @@ impl Experiment {
             return check_table(py, &result, &rules, self.0.trials).map(Some);
         };
         let total = jobs.len();
-        let run = || runner::run_in_memory(&simulation, jobs, threads, stop, &tick);
+        let run = || {
+            let rows = runner::run_in_memory(&simulation, jobs, threads, stop, &tick)?;
+            check_repeats(&simulation, &rows, threads, stop)?;
+            Ok::<_, InputError>(rows)
+        };
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
         let new = accepted(&simulation, &rows, &why, old.as_ref(), is_partial, &rules);
         let text = new.map_err(errors::other)?.text().map_err(errors::other)?;

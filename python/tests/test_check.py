@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import own
 import palpate
 import pytest
@@ -86,3 +87,15 @@ def test_errors_of_planners_are_recorded_or_raised(experiment, tmp_path):
         experiment.run([own.Raises, "random"], trials=20, on_error="raise")
     with pytest.raises(ValueError, match="on_error"):
         experiment.run(["random"], trials=1, on_error="ignore")
+
+
+class Unseeded:
+    def plan(self, belief):
+        return belief.zone.lower + np.random.default_rng().random(1) * (belief.zone.upper - belief.zone.lower)
+
+
+def test_a_planner_with_random_numbers_of_its_own_has_no_baseline(experiment, tmp_path):
+    baseline = tmp_path / "unseeded.jsonl"
+    with pytest.raises(PalpateError, match="trial 0 differs when it is repeated"):
+        palpate.check(experiment, baseline, [Unseeded], accept="first", max_trials=2)
+    assert not baseline.exists()

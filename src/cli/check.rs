@@ -13,7 +13,7 @@ use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{
-    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, run_check,
+    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, check_repeats, run_check,
 };
 use crate::study::planners::planners_setting;
 use anyhow::{Context, bail};
@@ -149,6 +149,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
         let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
         let rows = runner::run_in_memory(&simulation, jobs, args.threads.into(), &stop, &tick)?;
         bar.finish_and_clear();
+        check_repeats(&simulation, &rows, args.threads.into(), &stop)?;
         if stop.load(Ordering::Relaxed) {
             return Ok(Completion::Interrupted);
         }

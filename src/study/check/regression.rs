@@ -105,6 +105,31 @@ pub fn run_check(
     Ok(CheckResult { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
 }
 
+/// Makes the first trial of each planner again, and checks that its row is that in `rows`: a
+/// planner with random numbers of its own has no baseline.
+///
+/// # Errors
+/// If a row differs, or a planner is not available.
+pub fn check_repeats(
+    simulation: &Simulation,
+    rows: &[TrialRow],
+    threads: usize,
+    stop: &AtomicBool,
+) -> Result<(), InputError> {
+    let mut jobs = runner::missing_jobs(simulation, &[])?;
+    jobs.retain(|(trial, _)| *trial == 0);
+    let text = |row: &TrialRow| serde_json::to_string(row).unwrap_or_default();
+    for again in runner::run_in_memory(simulation, jobs, threads, stop, &|_| ())? {
+        let first = rows.iter().find(|row| row.id() == again.id());
+        if first.is_some_and(|first| text(first) != text(&again)) {
+            let problem = format!("planner {}: trial 0 differs when it is repeated", again.planner);
+            let mend = "take random numbers from the `rng` or `seed` of the constructor only";
+            return Err(InputError::new(problem).remedy(mend));
+        }
+    }
+    Ok(())
+}
+
 /// Returns the baseline of all trials of an experiment that replaces `old`. Its header lists
 /// planners that differ; planners of `old` that the experiment lacks are kept if `is_partial`.
 ///
