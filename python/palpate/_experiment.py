@@ -19,6 +19,7 @@ from ._planners import LIMIT_S, Factory, ThreadPlannerFactory, named
 from ._progress import Progress
 from ._run import Run
 from ._settings import ExperimentSettings, assignments
+from .errors import PlannerError
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -165,7 +166,8 @@ class Experiment:
                 overhead of a thread.
             isolate: run each of your own planners in its own process, which can be killed; they must be picklable.
             on_error: "record" stores an error of your own planner as the reason of its failed trial, continues, and
-                warns at the end; "raise" stops the run and raises PlannerError with the traceback.
+                warns at the end; "raise" stops the run and raises PlannerError with the traceback, from the planner's
+                exception unless it ran in another process.
             executor: runs the trials elsewhere: a `concurrent.futures.Executor`, Dask's `Client`, an executor of
                 submitit. Its workers need the same version of Palpate and the same files.
             trials_per_job: number of trials in a job of the executor; raise it if a job takes long to start.
@@ -191,7 +193,11 @@ class Experiment:
         raises = on_error == "raise"
         if executor is None:
             own, stop = list(workers.items()), partial(_stop, workers)
-            found = core.run(own, out=folder, fresh=fresh, threads=threads, raises=raises, look=look, stop=stop)
+            try:
+                found = core.run(own, out=folder, fresh=fresh, threads=threads, raises=raises, look=look, stop=stop)
+            except PlannerError as error:
+                causes = (it.error for it in workers.values() if isinstance(it, ThreadPlannerFactory))
+                raise error from next((cause for cause in causes if cause is not None), None)
         else:
             found = run_on(
                 core,

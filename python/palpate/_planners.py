@@ -283,10 +283,16 @@ class ThreadPlannerFactory:
         self._factory = factory
         self._limit_s = limit_s
         self._live: set[ThreadPlanner] = set()
+        #: First exception of a planner.
+        self.error: BaseException | None = None
+
+    def note(self, error: BaseException) -> None:
+        """Keeps the first exception of a planner."""
+        self.error = self.error or error
 
     def __call__(self, zone: Any, seed: int) -> ThreadPlanner | InlinePlanner:
         if self._limit_s is None:
-            return InlinePlanner(self._factory, zone, seed)
+            return InlinePlanner(self, self._factory, zone, seed)
         worker = ThreadPlanner(self, self._factory, zone, seed, self._limit_s)
         self._live.add(worker)
         return worker
@@ -309,7 +315,8 @@ class ThreadPlannerFactory:
 class InlinePlanner:
     """Planner of one trial that is called on the trial's thread without a time limit."""
 
-    def __init__(self, factory: Factory, zone: Any, seed: int) -> None:
+    def __init__(self, home: ThreadPlannerFactory, factory: Factory, zone: Any, seed: int) -> None:
+        self._home = home
         self._make = (factory, zone, seed)
         self._planner: Any = None
 
@@ -322,6 +329,7 @@ class InlinePlanner:
         except PlannerError:
             raise
         except BaseException as error:  # includes sys.exit in a planner
+            self._home.note(error)
             raise PlannerError(format_exception(error)) from None
 
     def close(self) -> None:
@@ -334,7 +342,7 @@ class ThreadPlanner:
     def __init__(self, home: ThreadPlannerFactory, factory: Factory, zone: Any, seed: int, limit_s: float) -> None:
         self._home = home
         self.desk = _palpate.PlannerChannel(limit_s)
-        arguments = (factory, zone, seed, self.desk)
+        arguments = (home, factory, zone, seed, self.desk)
         self._thread = threading.Thread(target=_serve, args=arguments, daemon=True)
         self._thread.start()
 
@@ -353,7 +361,7 @@ class ThreadPlanner:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, ctypes.py_object(SystemExit))
 
 
-def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.PlannerChannel) -> None:
+def _serve(home: ThreadPlannerFactory, factory: Factory, zone: Any, seed: int, desk: _palpate.PlannerChannel) -> None:
     try:
         belief = desk.next()
         planner: Any = make(factory, zone, seed) if belief is not None else None
@@ -363,4 +371,5 @@ def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.PlannerChannel
             del belief
             belief = desk.next()
     except BaseException as error:  # includes sys.exit in a planner
+        home.note(error)
         desk.fail(str(error) if isinstance(error, PlannerError) else format_exception(error))

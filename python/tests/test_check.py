@@ -83,8 +83,12 @@ def test_errors_of_planners_are_recorded_or_raised(experiment, tmp_path):
     with pytest.warns(RuntimeWarning, match="2 trials failed"):
         run = experiment.run([own.Raises, "random"], trials=2)
     assert run.trials().failure.notna().sum() == 2
-    with pytest.raises(PlannerError, match="own:Raises, trial"):
-        experiment.run([own.Raises, "random"], trials=20, on_error="raise")
+    for limit_s in (60.0, None):
+        with pytest.raises(PlannerError, match="own:Raises, trial") as raised:
+            experiment.run([own.Raises, "random"], trials=20, on_error="raise", limit_s=limit_s)
+        cause = raised.value.__cause__
+        assert isinstance(cause, ValueError) and str(cause) == "no idea"
+        assert cause.__traceback__ is not None
     with pytest.raises(ValueError, match="on_error"):
         experiment.run(["random"], trials=1, on_error="ignore")
 
