@@ -152,9 +152,10 @@ class Belief:
         Around an object the draws are of the field.
         """
     def condition_on_observations(self, points: npt.ArrayLike, heights_m: Sequence[float] | None = None) -> Belief:
-        """Returns the belief after touches with contacts at `points`, with the same hyperparameters (zones only).
+        """Returns the belief after touches with contacts at `points`, with the same hyperparameters.
 
-        The contacts are at `heights_m`, or where the surface is expected.
+        Over a zone the contacts are at `heights_m`, or where the surface is expected; around an object the points are
+        in the world frame.
 
         Raises:
             ValueError: before the first fit, or for another number of heights.

@@ -9,7 +9,7 @@ use crate::pickle::{self, Reduced, Version};
 use crate::places::{Places, rows, seen_at};
 use crate::recognition;
 use crate::zone::Zone;
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyReadonlyArray2};
 use palpate::explore::belief::HeightField;
 use palpate::explore::evidence::Contact;
@@ -19,7 +19,7 @@ use palpate::format::counted;
 use palpate::gp::Posterior;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::reduction::VarianceReduction;
-use palpate::task::{Region, Target};
+use palpate::task::{Aim, Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -81,12 +81,26 @@ impl Belief {
         places.reshape_vectors(points.py(), &gradients, dimension)
     }
 
-    /// Gaussian process of the belief, conditioned also on targets without contact where
-    /// `is_explorable`; `None` before the first fit.
-    fn process(&self, is_explorable: bool) -> Option<&Posterior> {
-        match self.0.height_field().filter(|_| is_explorable) {
-            Some(field) => field.planning_posterior(),
-            None => self.0.posterior(),
+    /// Posterior covariances of places, one row for each of `a`, conditioned also on targets
+    /// without contact where `is_explorable`; `None` before the first fit.
+    fn covariances(&self, a: &Places, b: &Places, is_explorable: bool) -> Option<Vec<Vec<f64>>> {
+        if let Some(belief) = self.0.implicit_surface() {
+            return Some(belief.surface()?.covariances_m2(&a.points_w(), &b.points_w()));
+        }
+        let process = match self.0.height_field().filter(|_| is_explorable) {
+            Some(field) => field.planning_posterior()?,
+            None => self.0.posterior()?,
+        };
+        let places: Vec<&[f64]> = a.each.iter().map(Vec::as_slice).collect();
+        let references = VarianceReduction::new(process, b.each.iter().map(Vec::as_slice));
+        Some(references.covariances(&places))
+    }
+
+    /// Means at places; `None` before the first fit.
+    fn means(&self, places: &Places) -> Option<Vec<f64>> {
+        match self.0.implicit_surface() {
+            Some(belief) => Some(belief.surface()?.values(&places.points_w())),
+            None => Some(self.0.field()?.means(&places.each)),
         }
     }
 
@@ -109,13 +123,7 @@ impl Belief {
     }
 }
 
-/// Posterior covariances of places, one row for each of `a`.
-fn covariances(process: &Posterior, a: &Places, b: &Places) -> Vec<Vec<f64>> {
-    let places: Vec<&[f64]> = a.each.iter().map(Vec::as_slice).collect();
-    VarianceReduction::new(process, b.each.iter().map(Vec::as_slice)).covariances(&places)
-}
-
-/// Part of the signal's variance that is added to the diagonal of a covariance before it is
+/// Part of the largest variance that is added to the diagonal of a covariance before it is
 /// factored.
 // heuristic: far below any noise, above rounding.
 const JITTER: f64 = 1e-9;
@@ -208,11 +216,9 @@ impl Belief {
         explorable: bool,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let (a, b, py) = (self.in_domain(a)?, self.in_domain(b.unwrap_or(a))?, a.py());
-        let found = fork::detach(py, || match self.process(explorable) {
-            Some(process) => covariances(process, &a, &b),
-            None => vec![vec![f64::NAN; b.each.len()]; a.each.len()],
-        })?;
-        rows(py, &found, b.each.len())
+        let found = fork::detach(py, || self.covariances(&a, &b, explorable))?;
+        let unknown = || vec![vec![f64::NAN; b.each.len()]; a.each.len()];
+        rows(py, &found.unwrap_or_else(unknown), b.each.len())
     }
 
     /// Draws `n` surfaces from the belief, jointly at all points, shape (n, m), metres, with a
@@ -228,17 +234,17 @@ impl Belief {
         let normal: PyReadonlyArray2<'_, f64> = normal.extract()?;
         let normal: Vec<f64> = normal.as_array().iter().copied().collect();
         let count = places.each.len();
-        let Some(process) = self.process(false) else {
+        if self.0.posterior().is_none() {
             return rows(py, &vec![vec![f64::NAN; count]; n], count);
-        };
+        }
         let drawn = fork::detach(py, || {
-            let signal2 = process.hyperparameters().signal_sd.powi(2);
-            let covariances = covariances(process, &places, &places).concat();
+            let covariances = self.covariances(&places, &places, false)?.concat();
             let covariance = DMatrix::from_vec(count, count, covariances);
-            let factor = (covariance + DMatrix::identity(count, count) * (JITTER * signal2))
+            let jitter = JITTER * covariance.diagonal().max();
+            let factor = (covariance + DMatrix::identity(count, count) * jitter)
                 .cholesky()
                 .map(|factor| factor.l())?;
-            let means = DVector::from_vec(process.means(places.each.iter().map(Vec::as_slice)));
+            let means = DVector::from_vec(self.means(&places)?);
             let draw = |normal: &[f64]| &means + &factor * DVector::from_column_slice(normal);
             let draws = normal.chunks(count.max(1)).map(|normal| draw(normal).as_slice().to_vec());
             Some(draws.collect::<Vec<_>>())
@@ -247,27 +253,40 @@ impl Belief {
         rows(py, &drawn.ok_or_else(lost)?, count)
     }
 
-    /// Returns the belief after touches with contacts at `points`, shape (m, d): at `heights_m`, or
-    /// where the surface is expected. Hyperparameters stay. Over a zone, after the first fit.
+    /// Returns the belief after touches with contacts at `points`, shape (m, d): over a zone at
+    /// `heights_m`, or where the surface is expected; around an object in the world frame.
+    /// Hyperparameters stay. After the first fit.
     #[pyo3(signature = (points, heights_m = None))]
     fn condition_on_observations(
         &self,
         points: &Bound<'_, PyAny>,
         heights_m: Option<Vec<f64>>,
     ) -> PyResult<Self> {
-        let belief = self.over_zone("condition_on_observations")?;
-        let (zone, places) = (belief.zone(), self.in_domain(points)?);
-        let Some(surface) = belief.surface() else {
+        let places = self.in_domain(points)?;
+        let Some(means) = self.means(&places) else {
             return Err(PyValueError::new_err("the belief has no fit yet"));
         };
-        let means = || surface.means(places.each.iter().map(Vec::as_slice));
-        let heights_m = heights_m.unwrap_or_else(means);
+        let mut after = self.0.clone();
+        if let Region::Ball(ball) = self.0.region() {
+            if heights_m.is_some() {
+                return Err(PyValueError::new_err("heights_m: allowed over a zone only"));
+            }
+            for p_w in places.points_w() {
+                let aim = Aim::against(p_w, &(p_w - ball.centre_w));
+                let contact = Contact::new(p_w, -aim.direction_w.into_inner());
+                let contact = Contact { has_normal: false, ..contact };
+                after.observe(&aim.into(), &contact.into());
+            }
+            after.condition().map_err(errors::other)?;
+            return Ok(Self(after));
+        }
+        let zone = self.over_zone("condition_on_observations")?.zone();
+        let heights_m = heights_m.unwrap_or(means);
         if heights_m.len() != places.each.len() {
             let (found, allowed) = (heights_m.len(), places.each.len());
             let message = format!("heights_m has {found} numbers; allowed are {allowed}");
             return Err(PyValueError::new_err(message));
         }
-        let mut after = self.0.clone();
         for (place, height_m) in places.each.iter().zip(heights_m) {
             let toward_w = zone.x_wz() * Vector3::y();
             let contact = Contact::new(zone.point(place, height_m), toward_w);
@@ -449,8 +468,7 @@ impl Belief {
     fn field<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Field<'py>> {
         let surface = self.around("field")?.surface();
         let places = Places::of(points, 3)?;
-        let points_w: Vec<Point3<f64>> =
-            places.each.iter().map(|place| Point3::from_slice(place)).collect();
+        let points_w = places.points_w();
         let (means_m, sds_m) = fork::detach(points.py(), || match surface {
             Some(surface) => (surface.values(&points_w), surface.sds_m(&points_w)),
             None => (vec![f64::NAN; points_w.len()], vec![f64::NAN; points_w.len()]),

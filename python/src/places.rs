@@ -1,5 +1,6 @@
 //! Places as arrays of shape (…, d) in a zone of d coordinates, or (n,) if d is 1.
 
+use nalgebra::Point3;
 use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods};
 use palpate::gp::Observations;
 use pyo3::exceptions::PyValueError;
@@ -32,6 +33,11 @@ impl Places {
         };
         let flat: Vec<f64> = array.iter().copied().collect();
         Ok(Self { each: flat.chunks_exact(dimension).map(<[f64]>::to_vec).collect(), shape })
+    }
+
+    /// Returns places of three coordinates as points of the world frame.
+    pub(crate) fn points_w(&self) -> Vec<Point3<f64>> {
+        self.each.iter().map(|place| Point3::from_slice(place)).collect()
     }
 
     /// Returns a number per place, in the shape of the places.

@@ -54,6 +54,22 @@ def test_frames_have_measures_of_shapes_and_targets_of_six(run):
     assert "Chamfer" in str(run)
 
 
+def test_a_field_has_covariances_samples_and_further_contacts(run):
+    belief = run.belief(0, "active", 10)
+    points = belief.mesh(cells=16)[0][::40]
+    mean_m, deviation_m = belief.field(points)
+    covariance = belief.covariance(points)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), deviation_m, rtol=1e-6)
+    drawn = belief.rsample(points, 4000, np.random.default_rng(2))
+    assert np.all(np.abs(drawn.mean(axis=0) - mean_m) < 5 * deviation_m / np.sqrt(4000))
+    np.testing.assert_allclose(drawn.std(axis=0), deviation_m, rtol=0.1)
+    after = belief.condition_on_observations(points[:1])
+    assert len(after.targets) == 11
+    assert after.field(points[:1])[1][0] < 0.7 * deviation_m[0]
+    with pytest.raises(ValueError, match="over a zone only"):
+        belief.condition_on_observations(points[:1], [0.0])
+
+
 def test_a_belief_is_a_field_and_a_closed_surface(run):
     belief = run.belief(0, "active", 10)
     vertices_m, triangles, sd_m = belief.mesh(cells=48)

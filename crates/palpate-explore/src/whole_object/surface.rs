@@ -11,6 +11,7 @@ use palpate_geometry::primitives::extent;
 use palpate_geometry::solids::Triangles;
 use palpate_gp::Posterior;
 use palpate_gp::means::MeanField;
+use palpate_gp::reduction::VarianceReduction;
 use rayon::iter::ParallelIterator;
 use rayon::slice::ParallelSlice;
 
@@ -140,6 +141,23 @@ impl Surface {
         }
         let offset2 = self.offset_m * self.offset_m;
         variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
+    }
+
+    /// Returns the covariances of the field at each of `a_w` with each of `b_w`, m²: one row for
+    /// each of `a_w`. Errors of cameras' poses and of all contacts are common to all points.
+    pub fn covariances_m2(&self, a_w: &[Point3<f64>], b_w: &[Point3<f64>]) -> Vec<Vec<f64>> {
+        let [a, b] = [a_w, b_w]
+            .map(|points_w| points_w.iter().map(|p_w| p_w.coords.as_slice()).collect::<Vec<_>>());
+        let mut rows = VarianceReduction::new(&self.posterior, b.iter().copied()).covariances(&a);
+        let offset2 = self.offset_m * self.offset_m;
+        rows.iter_mut().flatten().for_each(|covariance| *covariance += offset2);
+        for error in &self.pose_errors {
+            let [at_a, at_b] = [&a, &b].map(|places| error.values(places, &mut []));
+            for (row, at_a) in rows.iter_mut().zip(at_a) {
+                row.iter_mut().zip(&at_b).for_each(|(covariance, at_b)| *covariance += at_a * at_b);
+            }
+        }
+        rows
     }
 
     /// Standard deviation of the surface along its normal at each of `points_w` on it: σ / |∇f|.
