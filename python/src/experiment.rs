@@ -8,14 +8,13 @@ use crate::program::COMMIT;
 use crate::run::Run;
 use crate::zone::Zone;
 use palpate::config::Loader;
-use palpate::error::InputError;
 use palpate::experiment::runner::{self, Progress};
 use palpate::experiment::store::{self, RunFolder, resolved, write_whole};
 use palpate::experiment::{self, Simulation};
 use palpate::explore::planner::{PlannerFactory, is_external};
 use palpate::report::check;
 use palpate::study::check::{
-    CheckOptions, CheckResult, StoredBaseline, accepted, check_repeats, run_check,
+    CheckOptions, CheckResult, StoredBaseline, accepted, baseline_rows, run_check,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -176,7 +175,7 @@ impl Experiment {
         let callbacks = RunCallbacks::new(look, stop, false);
         let tick = |progress: Progress| callbacks.count(&progress);
         let stop = &callbacks.is_stopped;
-        let jobs = runner::missing_jobs(&simulation, &[]).map_err(errors::other)?;
+        let total = runner::missing_jobs(&simulation, &[]).map_err(errors::other)?.len();
         let rules = CheckOptions { tolerance, ..CheckOptions::default() };
         let Some(why) = accept else {
             let mut old = old.ok_or_else(|| errors::other("no baseline"))?;
@@ -184,15 +183,10 @@ impl Experiment {
                 old.keep_planners(&self.0.planners);
             }
             let run = || run_check(&simulation, &old, &rules, threads, stop, &tick);
-            let result = callbacks.watched(py, jobs.len(), run)?.map_err(errors::other)?;
+            let result = callbacks.watched(py, total, run)?.map_err(errors::other)?;
             return check_table(py, &result, &rules, self.0.trials).map(Some);
         };
-        let total = jobs.len();
-        let run = || {
-            let rows = runner::run_in_memory(&simulation, jobs, threads, stop, &tick)?;
-            check_repeats(&simulation, &rows, threads, stop)?;
-            Ok::<_, InputError>(rows)
-        };
+        let run = || baseline_rows(&simulation, threads, stop, &tick);
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
         let new = accepted(&simulation, &rows, &why, old.as_ref(), is_partial, &rules);
         let text = new.map_err(errors::other)?.text().map_err(errors::other)?;

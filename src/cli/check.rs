@@ -13,7 +13,7 @@ use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{
-    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, check_repeats, run_check,
+    CheckOptions, CheckResult, StoredBaseline, Verdict, accepted, baseline_rows, run_check,
 };
 use crate::study::planners::planners_setting;
 use anyhow::{Context, bail};
@@ -142,14 +142,15 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
         bail!("[backend]: a check runs in simulation; allowed is none of {}", arm_tables());
     }
     let stop = stop_on_interrupt("trials")?;
-    if let Some(why) = &args.accept {
+    if args.accept.is_some() {
         args.force.check_file(baseline)?;
-        let jobs = runner::missing_jobs(&simulation, &[])?;
-        let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
-        let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
-        let rows = runner::run_in_memory(&simulation, jobs, args.threads.into(), &stop, &tick)?;
+    }
+    let (threads, most) = (args.threads.into(), runner::missing_jobs(&simulation, &[])?.len());
+    let bar = touches_bar(talk, simulation.experiment(), [most, 0]);
+    let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
+    if let Some(why) = &args.accept {
+        let rows = baseline_rows(&simulation, threads, &stop, &tick)?;
         bar.finish_and_clear();
-        check_repeats(&simulation, &rows, args.threads.into(), &stop)?;
         if stop.load(Ordering::Relaxed) {
             return Ok(Completion::Interrupted);
         }
@@ -166,10 +167,7 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     if !args.planner.is_empty() {
         old.keep_planners(&simulation.experiment().planners);
     }
-    let most = runner::missing_jobs(&simulation, &[])?.len();
-    let bar = touches_bar(talk, simulation.experiment(), [most, 0]);
-    let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
-    let held = run_check(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
+    let held = run_check(&simulation, &old, &rules, threads, &stop, &tick)?;
     bar.finish_and_clear();
     print_results(args, (&name, baseline), &old, &held, &rules)?;
     Ok(match held.is_stopped {

@@ -434,7 +434,7 @@ fn failed_trials_do_not_vanish() {
 }
 
 /// Where the finger cannot reach a part of the surface, planners are judged by the rest, and the
-/// share that is left out is told.
+/// verdict names the share that is left out.
 #[test]
 fn planners_are_judged_where_the_finger_reaches() {
     let settings = CURVE.replace("trials = 2", "trials = 12").replace(", \"sobol\"", "");
@@ -455,6 +455,6 @@ fn planners_are_judged_where_the_finger_reaches() {
     assert!(conclusion.starts_with("active is better: 1.00 mm"), "{conclusion}");
     let verdicts = report::findings::verdicts(&run, &analysis);
     let share = 100.0 * run.truth.unreachable_share().unwrap();
-    let told = format!("{share:.0} % of it is left out");
-    assert!(verdicts.iter().any(|it| it.contains(&told)), "{verdicts:?}");
+    let words = format!("{share:.0} % of it is left out");
+    assert!(verdicts.iter().any(|it| it.contains(&words)), "{verdicts:?}");
 }

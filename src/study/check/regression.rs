@@ -105,18 +105,20 @@ pub fn run_check(
     Ok(CheckResult { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
 }
 
-/// Makes the first trial of each planner again, and checks that its row is that in `rows`: a
-/// planner with random numbers of its own has no baseline.
+/// Runs all trials of an experiment for a baseline, and the first of each planner again: a planner
+/// with random numbers of its own has no baseline. Trials not started before `stop` became true are
+/// left out.
 ///
 /// # Errors
-/// If a row differs, or a planner is not available.
-pub fn check_repeats(
+/// If a repeated trial differs, a planner is not available, or threads cannot be started.
+pub fn baseline_rows(
     simulation: &Simulation,
-    rows: &[TrialRow],
     threads: usize,
     stop: &AtomicBool,
-) -> Result<(), InputError> {
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<TrialRow>, InputError> {
     let mut jobs = runner::missing_jobs(simulation, &[])?;
+    let rows = runner::run_in_memory(simulation, jobs.clone(), threads, stop, progress)?;
     jobs.retain(|(trial, _)| *trial == 0);
     let text = |row: &TrialRow| serde_json::to_string(row).unwrap_or_default();
     for again in runner::run_in_memory(simulation, jobs, threads, stop, &|_| ())? {
@@ -127,7 +129,7 @@ pub fn check_repeats(
             return Err(InputError::new(problem).remedy(mend));
         }
     }
-    Ok(())
+    Ok(rows)
 }
 
 /// Returns the baseline of all trials of an experiment that replaces `old`. Its header lists

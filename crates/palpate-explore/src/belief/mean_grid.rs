@@ -113,9 +113,7 @@ impl Grid {
         let nodes = (0..height).flat_map(|j| (0..width).map(move |i| [i, j]));
         let at = |[i, j]: [i32; 2]| {
             let known = parts.clone().filter_map(|([di, dj], offset)| {
-                let (i, j) = (i + di, j + dj);
-                let is_inside = (0..width).contains(&i) && (0..height).contains(&j);
-                is_inside.then(|| values[(j * width + i) as usize] + offset)
+                Some(values[self.node([i + di, j + dj])?] + offset)
             });
             known.fold(f64::NEG_INFINITY, f64::max)
         };
@@ -124,8 +122,13 @@ impl Grid {
 
     /// Returns the index of the node some steps beside another; `None` outside the grid.
     pub(super) fn beside(&self, node: usize, [di, dj]: [i32; 2]) -> Option<usize> {
+        let width = self.counts[0];
+        self.node([node as i32 % width + di, node as i32 / width + dj])
+    }
+
+    /// Returns the index of the node after these numbers of steps along x and z; `None` outside.
+    fn node(&self, [i, j]: [i32; 2]) -> Option<usize> {
         let [width, height] = self.counts;
-        let (i, j) = (node as i32 % width + di, node as i32 / width + dj);
         let is_inside = (0..width).contains(&i) && (0..height).contains(&j);
         is_inside.then_some((j * width + i) as usize)
     }
