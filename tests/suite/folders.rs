@@ -56,6 +56,11 @@ fn kill_and_resume(folder: &Path, kill: u64, longest: Duration, whole: &[u8]) {
     fs::remove_dir_all(&out).unwrap();
 }
 
+#[track_caller]
+fn assert_ok(output: &Output) {
+    assert!(output.status.success(), "{}", stderr(output));
+}
+
 #[test]
 fn kills_at_random_moments_of_the_first_second_all_resume() {
     let folder = folder();
@@ -187,4 +192,78 @@ fn a_journal_has_the_touches_that_were_added() {
         assert!(journal.touches(0, "random").is_empty());
         assert_eq!(journal.halt_reason(), Some("no"));
     }
+}
+
+/// A run that was moved to another user is reported and continued there, and shards of two users
+/// merge: only the contents of input files count, not their paths.
+#[test]
+fn a_run_folder_moves_to_another_user() {
+    let users = [folder(), folder()];
+    let homes = [TempDir::new().unwrap(), TempDir::new().unwrap()];
+    let at = |user: usize, name: &str| users[user].path().join(name);
+    let palpate = |user: usize, arguments: &[&str]| {
+        let mut command = command(users[user].path(), arguments);
+        command.env("PALPATE_HOME", homes[user].path());
+        command.output().unwrap()
+    };
+    // The mesh is one of the shipped files of each user.
+    for (user, home) in homes.iter().enumerate() {
+        fs::create_dir(home.path().join("models")).unwrap();
+        fs::rename(at(user, "mesh.obj"), home.path().join("models/mesh.obj")).unwrap();
+        let scene = fs::read_to_string(at(user, "scene.toml")).unwrap();
+        fs::write(at(user, "scene.toml"), scene.replace("mesh.obj", "models/mesh.obj")).unwrap();
+    }
+    let run = |user: usize, more: &[&str]| {
+        let run = ["run", "small.toml", "--set", "trials=4", "--no-report"];
+        palpate(user, &[&run, more].concat())
+    };
+    assert_ok(&run(0, &["--out", "whole"]));
+    assert_ok(&run(0, &["--out", "first", "--shard", "1/2"]));
+    assert_ok(&run(1, &["--out", "second", "--shard", "2/2"]));
+    let resolved = fs::read_to_string(at(0, "first/resolved.toml")).unwrap();
+    assert!(resolved.contains("mesh = \"models/mesh.obj\""), "{resolved}");
+    for (file, text) in fs::read_dir(at(0, "first")).unwrap().map(|entry| {
+        let path = entry.unwrap().path();
+        (path.clone(), String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned())
+    }) {
+        let home = homes[0].path().to_string_lossy();
+        assert!(!text.contains(&*home), "{}: {text}", file.display());
+    }
+
+    fs::rename(at(0, "first"), at(1, "first")).unwrap();
+    assert_ok(&palpate(1, &["report", "merged", "--merge", "first", "second"]));
+    let rows = |user: usize, run: &str| fs::read(at(user, run).join("trials.jsonl")).unwrap();
+    assert!(rows(1, "merged") == rows(0, "whole"));
+    assert_ok(&palpate(1, &["report", "first"]));
+    assert_ok(&run(1, &["--out", "first"]));
+    assert!(rows(1, "first") == rows(0, "whole"));
+
+    // Another file of the same name is another experiment.
+    let mesh = homes[1].path().join("models/mesh.obj");
+    fs::write(&mesh, fs::read_to_string(&mesh).unwrap() + "# edited\n").unwrap();
+    let refused = run(1, &["--out", "first"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("scene.object.mesh"), "{}", stderr(&refused));
+}
+
+/// A file system without locks is named, with a remedy; nothing is written.
+#[test]
+fn a_file_system_without_locks_is_refused_with_a_remedy() {
+    let folder = folder();
+    let source = folder.path().join("lockless.c");
+    fs::write(
+        &source,
+        "#include <errno.h>\nint flock(int f, int o) { errno = ENOLCK; return -1; }\n",
+    )
+    .unwrap();
+    let library = folder.path().join("lockless.so");
+    let mut compiler = Command::new("cc");
+    compiler.args(["-shared", "-fPIC", "-o"]).args([&library, &source]);
+    assert!(compiler.status().unwrap().success());
+    let mut command = begun(folder.path(), &folder.path().join("out"), &[]);
+    let refused = command.env("LD_PRELOAD", &library).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    let message = stderr(&refused);
+    assert!(message.contains("no file locks") && message.contains("--out"), "{message}");
+    assert_eq!(fs::read(folder.path().join("out/trials.jsonl")).unwrap(), b"");
 }

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// in the working directory nor beside the program.
 pub const HOME: &str = "PALPATE_HOME";
 
+/// Folders of the shipped files.
+const FOLDERS: [&str; 3] = ["experiments", "scenes", "models"];
+
 /// Whether `name` has no folder and no extension.
 pub fn is_plain(name: &Path) -> bool {
     name.extension().is_none() && name.components().count() == 1
@@ -55,11 +58,24 @@ pub fn remedy(name: &str, names: &[String]) -> String {
     }
 }
 
+/// Returns the path of the shipped file at the absolute `path` as [`locate`] finds it on every
+/// machine, such as `models/bird.glb`; `None` for other files.
+pub fn portable(path: &Path) -> Option<PathBuf> {
+    let roots = installed(None).filter_map(|folder| folder.canonicalize().ok());
+    let mut within = roots.filter_map(|root| path.strip_prefix(root).ok().map(Path::to_owned));
+    within.find(|path| FOLDERS.iter().any(|folder| path.starts_with(folder)))
+}
+
 /// Candidate locations of `folder`, in search order.
 fn folders(folder: &str, home: Option<&Path>) -> impl Iterator<Item = PathBuf> {
+    let installed = installed(home).map(move |root| root.join(folder));
+    std::iter::once(PathBuf::from(folder)).chain(installed)
+}
+
+/// Folders of the shipped files outside the working directory: beside the program, and `home`.
+fn installed(home: Option<&Path>) -> impl Iterator<Item = PathBuf> {
     let program = std::env::current_exe().ok();
-    let beside = program.and_then(|program| Some(program.parent()?.join(folder)));
+    let beside = program.and_then(|program| Some(program.parent()?.to_owned()));
     let home = home.map(Path::to_owned).or_else(|| std::env::var_os(HOME).map(PathBuf::from));
-    let home = home.map(|home| home.join(folder));
-    std::iter::once(PathBuf::from(folder)).chain(beside).chain(home)
+    beside.into_iter().chain(home)
 }

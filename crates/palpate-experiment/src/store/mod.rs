@@ -36,6 +36,7 @@ use crate::metrics::truth::Truth;
 use crate::notice;
 use crate::row::{TrialId, TrialRow, planner_rows};
 use crate::simulation::Simulation;
+use palpate_input::error::InputError;
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::Write;
@@ -273,7 +274,12 @@ fn lock(trials: &File, path: &Path) -> Result<(), RunError> {
         Err(TryLockError::WouldBlock) => {
             Err(RunError::at(path, "another run is writing this folder"))
         }
-        Err(TryLockError::Error(cause)) => Err(io_error(&path.join(TRIALS))(cause)),
+        Err(TryLockError::Error(cause)) => {
+            let cause = InputError::new(format!("this file system has no file locks ({cause})"))
+                .at(path.display())
+                .remedy("use --out on a local file system, and move the folder afterwards");
+            Err(RunError::Folder { path: path.into(), cause })
+        }
         Ok(()) => Ok(()),
     }
 }

@@ -3,7 +3,7 @@
 use super::io::{RunError, check_equal, write_changed};
 use crate::experiment::Experiment;
 use palpate_input::error::InputError;
-use palpate_input::{files, tables};
+use palpate_input::{files, shipped, tables};
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
 
@@ -47,11 +47,17 @@ pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), RunErr
     write_changed(&folder.join(RESOLVED), &relative_resolved(experiment, folder))
 }
 
-/// Checks that the run in `folder` has the same identity as `experiment`.
+/// Checks that the run in `folder` has the same identity as `experiment`. Paths do not count:
+/// the contents of their files are compared by their hashes.
 pub(super) fn check_identity(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     let found = read(folder, &[])?;
-    let identity = |experiment: &Experiment| relative_resolved(&experiment.row_settings(), folder);
+    let identity = |it: &Experiment| resolved(&without_paths(&it.row_settings()));
     check_equal(folder, RESOLVED, [&identity(&found), &identity(experiment)])
+}
+
+/// Returns the experiment with empty paths.
+pub(super) fn without_paths(experiment: &Experiment) -> Experiment {
+    experiment.with_paths(&mut |_| String::new()).unwrap_or_else(|| experiment.clone())
 }
 
 /// Checks that a `--set` assignment changes only the report.
@@ -73,12 +79,13 @@ pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
 }
 
 /// Returns [`resolved`] text with all paths relative to the run's folder, so that both can be moved
-/// together.
+/// together; the path of a shipped file is the same on every machine.
 fn relative_resolved(experiment: &Experiment, folder: &Path) -> String {
     let Ok(folder) = folder.canonicalize() else { return resolved(experiment) };
     let moved = |path: &str| {
         let path = Path::new(path);
-        relative(&path.canonicalize().unwrap_or_else(|_| path.into()), &folder)
+        let path = path.canonicalize().unwrap_or_else(|_| path.into());
+        shipped::portable(&path).unwrap_or_else(|| relative(&path, &folder))
     };
     let moved = experiment.with_paths(&mut |path| moved(path).to_string_lossy().into_owned());
     moved.as_ref().map_or_else(|| resolved(experiment), resolved)
