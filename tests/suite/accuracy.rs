@@ -13,13 +13,15 @@ use palpate::study::accuracy::deviation::{ErrorStatistics, Quantity};
 use palpate::study::accuracy::level::{FingerModel, LEVELS, converging};
 use palpate::study::accuracy::tolerance::{Origin, Tolerance};
 use palpate::study::accuracy::touches::{
-    ReferenceLoad, TargetTrials, TouchResults, noise_free, targets, touch_all,
+    Interrupted, ReferenceLoad, TargetTrials, TouchResults, noise_free, targets, touch_all,
 };
 use palpate::study::accuracy::variant::Variant;
+use palpate::study::accuracy::{self as study, AccuracyProgress, AccuracySpec};
 use palpate::task::Target;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 fn scene(sets: &[&str]) -> Scene {
     shipped::scene("container_finger.toml", sets)
@@ -49,7 +51,7 @@ fn every_level_is_a_scene_that_can_be_built_and_saved() {
 fn the_error_falls_with_the_resolution_as_it_should() {
     let scene = scene(&[]);
     let trials = TargetTrials::new(&scene, 6, 0);
-    let order = convergence::in_time_step(&scene, &trials).unwrap().unwrap();
+    let order = convergence::in_time_step(&scene, &trials, &running()).unwrap().unwrap();
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
     let poses: Vec<_> =
         touched(&scene, &trials.targets()).loads.iter().flatten().map(|load| load.motion).collect();
@@ -58,9 +60,50 @@ fn the_error_falls_with_the_resolution_as_it_should() {
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
 }
 
+/// A flag that stops nothing.
+fn running() -> AtomicBool {
+    AtomicBool::new(false)
+}
+
+/// The study stops at the next touch: what was measured before is returned.
+#[test]
+fn a_stop_ends_the_study_at_the_next_touch() {
+    let spec = AccuracySpec {
+        path: "scene".into(),
+        scene: scene(&[]),
+        against: Some(Origin::Reference),
+        tolerance: Some("1mm".parse().unwrap()),
+        touches: Some(2),
+        pairs: 0,
+        trials: None,
+        trial_touches: 1,
+        held_out: None,
+        seed: 0,
+        is_full: false,
+    };
+    let run = |until: usize| {
+        let stop = AtomicBool::new(until == 0);
+        let mut measured = 0;
+        let result = study::run(&spec, &stop, &mut |progress| {
+            measured += usize::from(matches!(progress, AccuracyProgress::Variant));
+            stop.store(measured >= until, Ordering::Relaxed);
+            Ok(())
+        });
+        result.unwrap()
+    };
+    assert!(run(0).levels.is_none());
+    let begun = run(2);
+    assert_eq!(begun.levels.unwrap().variants.len(), 1);
+    assert!(begun.orders.is_empty() && begun.cheapest.is_none());
+    let environment = Arc::new(Environment::build(noise_free(&spec.scene)).unwrap());
+    let simulator = Simulator::new(environment).unwrap();
+    let stopped = touch_all(&simulator, &targets(&spec.scene, 3, 0), 0, &AtomicBool::new(true));
+    assert!(stopped.unwrap_err().is::<Interrupted>());
+}
+
 fn touched(scene: &Scene, targets: &[Target]) -> TouchResults {
     let environment = Arc::new(Environment::build(noise_free(scene)).unwrap());
-    touch_all(&Simulator::new(environment).unwrap(), targets, 0).unwrap()
+    touch_all(&Simulator::new(environment).unwrap(), targets, 0, &running()).unwrap()
 }
 
 /// The scheme is explicit in the skin's force and semi-implicit in the joints, so of first order.
@@ -139,15 +182,16 @@ fn the_cheapest_level_is_tried_on_other_targets() {
     let named = |name: &str| Variant::named(name.into());
     let coarse = shipped::scene("container_finger.toml", &["effects.skin.samples=60"]);
     let mut levels =
-        AccuracyComparison::new(named("fine"), scene.clone(), effort, criterion).unwrap();
-    levels.add(named("coarse"), coarse).unwrap();
-    levels.add(named("same"), scene.clone()).unwrap();
+        AccuracyComparison::new(named("fine"), scene.clone(), effort, criterion, &running())
+            .unwrap();
+    levels.add(named("coarse"), coarse, &running()).unwrap();
+    levels.add(named("same"), scene.clone(), &running()).unwrap();
     let [coarse, same] = [0, 1].map(|i| levels.variants[i].clone());
     assert_eq!((same.touches, same.contact_m.unwrap().max), (4, 0.0));
     assert!(coarse.force_n.unwrap().mean > 0.0 && coarse.finger_bytes < same.finger_bytes);
     let (cheapest, _) = levels.cheapest(&tolerance, Origin::Reference).unwrap();
     assert!(cheapest.wall_s <= same.wall_s && cheapest.wall_s <= coarse.wall_s);
-    let confirmed = levels.confirm(same, scene, Origin::Reference, Some(6)).unwrap();
+    let confirmed = levels.confirm(same, scene, Origin::Reference, Some(6), &running()).unwrap();
     assert!(confirmed.is_confirmed && confirmed.held_out.touches == 6);
 }
 

@@ -9,6 +9,7 @@ use palpate::study::accuracy::tolerance::Criterion;
 use palpate::study::accuracy::variant::Variant;
 use palpate::study::accuracy::verdict::Relevance;
 use std::fs;
+use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 
 /// A plane that rises along x by `slope_deg`.
@@ -53,9 +54,11 @@ fn need(
     let effort = MeasurementCounts { touches, pairs: 2, trials: 0, trial_touches: 1, seed: 0 };
     let mut variants = Variant::effects(&scene).into_iter();
     let (reference, scene) = variants.next().unwrap();
-    let mut whole = AccuracyComparison::new(reference, scene, effort, Some(criterion)).unwrap();
+    let stop = &AtomicBool::new(false);
+    let mut whole =
+        AccuracyComparison::new(reference, scene, effort, Some(criterion), stop).unwrap();
     let (without, scene) = variants.find(|(it, _)| it.effect.as_deref() == Some(effect)).unwrap();
-    whole.add(without, scene).unwrap();
+    whole.add(without, scene, stop).unwrap();
     println!("{effect} at {slope_deg} deg: {:?}", whole.variants[0].beyond);
     whole.variants[0].relevance.unwrap()
 }

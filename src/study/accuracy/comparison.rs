@@ -15,6 +15,7 @@ use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::Rules;
 use palpate_input::tables;
 use serde::Serialize;
+use std::sync::atomic::AtomicBool;
 
 /// Offset of the seeds of held-out targets and trials; larger than any number of them.
 const HELD_OUT: u32 = 1_000_000;
@@ -87,19 +88,21 @@ impl AccuracyComparison {
     /// to zero: a smaller change cannot reverse it.
     ///
     /// # Errors
-    /// If the scene cannot be built, or if the criterion is a verdict and the scene's verdict is
-    /// undecided.
+    /// If `stop` becomes true, the scene cannot be built, or the criterion is a
+    /// verdict and the scene's verdict is undecided.
     pub fn new(
         reference: Variant,
         scene: Scene,
         effort: MeasurementCounts,
         criterion: Option<Criterion>,
+        stop: &AtomicBool,
     ) -> anyhow::Result<Self> {
         let trials = TargetTrials::new(&scene, effort.touches, effort.seed.into());
-        let (mut reference, touches) = reference.measured(&scene, &trials, None, None)?;
+        let (mut reference, touches) = reference.measured(&scene, &trials, None, None, stop)?;
         let rounds = if effort.pairs == 0 { effort.touches } else { effort.pairs };
-        reference.wall_s = median(&wall_times_s([&scene], &trials.targets(), rounds)?.concat());
-        let differences_m = paired_differences(&scene, effort)?;
+        let walls_s = wall_times_s([&scene], &trials.targets(), rounds, stop)?;
+        reference.wall_s = median(&walls_s.concat());
+        let differences_m = paired_differences(&scene, effort, stop)?;
         reference.verdict_m = difference(&differences_m, None);
         let criterion = match criterion {
             Some(Criterion::Verdict(m)) => Some(Criterion::Verdict(Some(margin_m(m, &reference)?))),
@@ -122,9 +125,9 @@ impl AccuracyComparison {
     /// Measures a variant and adds it.
     ///
     /// # Errors
-    /// If its scene cannot be built.
-    pub fn add(&mut self, variant: Variant, scene: Scene) -> anyhow::Result<()> {
-        let mut variant = self.measure(variant, &scene)?;
+    /// If `stop` becomes true, or its scene cannot be built.
+    pub fn add(&mut self, variant: Variant, scene: Scene, stop: &AtomicBool) -> anyhow::Result<()> {
+        let mut variant = self.measure(variant, &scene, stop)?;
         variant.relevance = self.relevance(&variant).filter(|_| variant.effect.is_some());
         self.variants.push(variant);
         self.scenes.push(scene);
@@ -132,7 +135,12 @@ impl AccuracyComparison {
     }
 
     /// Measures a variant; a variant with invalid settings stays unmeasured.
-    fn measure(&self, variant: Variant, scene: &Scene) -> anyhow::Result<Variant> {
+    fn measure(
+        &self,
+        variant: Variant,
+        scene: &Scene,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Variant> {
         if !Rules::is_satisfied(scene) {
             return Ok(variant);
         }
@@ -140,15 +148,16 @@ impl AccuracyComparison {
             Some(Criterion::Touches(tolerance)) => Some(tolerance),
             _ => None,
         };
-        let (variant, _) = variant.measured(scene, &self.trials, Some(&self.touches), tolerance)?;
+        let reference = Some(&*self.touches);
+        let (variant, _) = variant.measured(scene, &self.trials, reference, tolerance, stop)?;
         let targets = self.trials.targets();
         let (walls_s, ratios): (Vec<f64>, Vec<f64>) = match self.effort.pairs {
-            0 => (wall_times_s([scene], &targets, self.effort.touches)?.concat(), Vec::new()),
-            pairs => (wall_times_s([&self.scene, scene], &targets, pairs)?.iter())
+            0 => (wall_times_s([scene], &targets, self.effort.touches, stop)?.concat(), Vec::new()),
+            pairs => (wall_times_s([&self.scene, scene], &targets, pairs, stop)?.iter())
                 .map(|[reference_s, wall_s]| (*wall_s, wall_s / reference_s))
                 .unzip(),
         };
-        let differences_m = paired_differences(scene, self.effort)?;
+        let differences_m = paired_differences(scene, self.effort, stop)?;
         // If many trials fail, the remaining ones are not comparable.
         let ended = self.differences_m.iter().flatten().count() as f64;
         let change = difference(&differences_m, Some(&self.differences_m))
@@ -199,8 +208,11 @@ impl AccuracyComparison {
     /// be removed.
     ///
     /// # Errors
-    /// If a scene cannot be built.
-    pub fn without_unneeded_effects(&self) -> anyhow::Result<Option<(Variant, Scene)>> {
+    /// If `stop` becomes true, or a scene cannot be built.
+    pub fn without_unneeded_effects(
+        &self,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Option<(Variant, Scene)>> {
         let is_spare = |variant: &Variant| self.relevance(variant) == Some(Relevance::NotNeeded);
         let mut spare: Vec<&Variant> = self.variants.iter().filter(|it| is_spare(it)).collect();
         let ratio = |variant: &Variant| variant.time_ratio.unwrap_or(f64::NAN);
@@ -214,7 +226,7 @@ impl AccuracyComparison {
             let mut on = switches().into_iter().filter(|switch| switch.is_on(scene));
             let Some(switch) = on.find(|switch| switch.name == *effect) else { continue };
             let less = toggle(scene, &switch);
-            let variant = self.measure(Variant::named(name), &less)?;
+            let variant = self.measure(Variant::named(name), &less, stop)?;
             best = is_spare(&variant).then_some((variant, less)).or(best);
         }
         Ok(best)
@@ -223,13 +235,14 @@ impl AccuracyComparison {
     /// Compares the selected scene with the reference on `count` held-out targets or trials.
     ///
     /// # Errors
-    /// If a scene cannot be built.
+    /// If `stop` becomes true, or a scene cannot be built.
     pub fn confirm(
         &self,
         selected: Variant,
         scene: Scene,
         origin: Origin,
         count: Option<u16>,
+        stop: &AtomicBool,
     ) -> anyhow::Result<CheapestScene> {
         let mut effort = MeasurementCounts { seed: self.effort.seed + HELD_OUT, ..self.effort };
         match self.criterion {
@@ -237,9 +250,9 @@ impl AccuracyComparison {
             _ => effort.touches = count.map_or(effort.touches, usize::from),
         }
         let (reference, whole) = (self.reference.clone(), self.scene.clone());
-        let fresh = Self::new(reference, whole, effort, self.criterion)?;
+        let fresh = Self::new(reference, whole, effort, self.criterion, stop)?;
         let unmeasured = Variant::named(selected.name.clone());
-        let mut held_out = fresh.measure(unmeasured, &scene)?;
+        let mut held_out = fresh.measure(unmeasured, &scene, stop)?;
         let ratio = held_out.wall_s.zip(fresh.reference.wall_s).map(|(wall, other)| wall / other);
         held_out.time_ratio = held_out.time_ratio.or(ratio);
         let is_confirmed = match &self.criterion {
@@ -253,11 +266,15 @@ impl AccuracyComparison {
     /// points, and in the step of a simulation with masses.
     ///
     /// # Errors
-    /// If a scene cannot be built or simulated.
-    pub fn orders(&self, scene: &Scene) -> anyhow::Result<Vec<ConvergenceOrder>> {
+    /// If `stop` becomes true, or a scene cannot be built or simulated.
+    pub fn orders(
+        &self,
+        scene: &Scene,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Vec<ConvergenceOrder>> {
         let loads = self.touches.iter().flat_map(|touches| touches.loads.iter().flatten());
         let poses: Vec<TipMotion> = loads.map(|load| load.motion).collect();
-        let in_time_step = in_time_step(scene, &self.trials)?;
+        let in_time_step = in_time_step(scene, &self.trials, stop)?;
         let orders = [in_time_step, in_samples(scene, &poses)?, in_contact(scene)?];
         Ok(orders.into_iter().flatten().collect())
     }
@@ -277,8 +294,10 @@ impl AccuracyComparison {
 fn paired_differences(
     scene: &Scene,
     effort: MeasurementCounts,
+    stop: &AtomicBool,
 ) -> anyhow::Result<Vec<Option<f64>>> {
-    paired_differences_m(scene, effort.seed..effort.seed + effort.trials, effort.trial_touches)
+    let trials = effort.seed..effort.seed + effort.trials;
+    paired_differences_m(scene, trials, effort.trial_touches, stop)
 }
 
 fn margin_m(stated: Option<f64>, reference: &Variant) -> anyhow::Result<f64> {

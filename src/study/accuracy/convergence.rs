@@ -12,6 +12,7 @@ use palpate_explore::backend::Command;
 use palpate_explore::robot::finger::TipMotion;
 use serde::Serialize;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Ticks per second, each compared with the last. A stage takes 20 ms to stop from an approach at
 /// 20 mm/s; ticks longer than a quarter of that do not resolve it.
@@ -91,6 +92,7 @@ impl ConvergenceOrder {
 pub fn in_time_step(
     scene: &Scene,
     trials: &TargetTrials,
+    stop: &AtomicBool,
 ) -> anyhow::Result<Option<ConvergenceOrder>> {
     ConvergenceOrder::new(["time step", "ticks per second"], &TICKS_PER_S, |ticks_per_s| {
         let level = FidelityLevel::new(
@@ -100,7 +102,7 @@ pub fn in_time_step(
             1.0 / ticks_per_s,
         );
         let environment = Arc::new(Environment::build(noise_free(&level.apply(scene)))?);
-        let touches = trials.touch(&environment)?;
+        let touches = trials.touch(&environment, stop)?;
         let loads = touches.iter().flat_map(|touches| &touches.loads);
         Ok(Some(loads.map(|load| load.as_ref().map_or(f64::NAN, |it| it.force_n)).collect()))
     })

@@ -5,13 +5,14 @@ use super::convergence::ConvergenceOrder;
 use super::deviation::Quantity;
 use super::switches::with_all_effects;
 use super::tolerance::{Criterion, Origin};
+use super::touches::{Interrupted, check};
 use super::variant::Variant;
 use crate::sim::Scene;
 use crate::study::needs_zone;
 use anyhow::{bail, ensure};
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Default touches per level.
 // heuristic: the finest level takes seconds per touch.
@@ -174,26 +175,66 @@ impl AccuracyResult {
         })
     }
 
+    /// Measures what the specification asks for and adds each finished comparison.
+    ///
+    /// # Errors
+    /// [`Interrupted`] once `stop` is true; otherwise see [`run`].
+    fn measure(
+        &mut self,
+        spec: &AccuracySpec,
+        stop: &AtomicBool,
+        progress: &mut Progress,
+    ) -> anyhow::Result<()> {
+        let Scope { has_levels, has_effects, .. } = spec.scope()?;
+        if has_levels {
+            let effort = spec.effort(LEVEL_TOUCHES, false);
+            let variants = Variant::levels(&spec.scene);
+            let compared = compare(variants, effort, spec.tolerance, stop, progress)?;
+            self.orders = uninterrupted(compared.orders(&spec.scene, stop))?.unwrap_or_default();
+            progress(AccuracyProgress::Levels(&compared, &self.orders))?;
+            self.levels = Some(compared);
+        }
+        if has_effects {
+            let variants = Variant::effects(&spec.effects_scene());
+            let effort = spec.effort(EFFECT_TOUCHES, true);
+            let compared = compare(variants, effort, spec.tolerance, stop, progress)?;
+            progress(AccuracyProgress::Effects(&compared))?;
+            self.effects = Some(compared);
+        }
+        check(stop)?;
+        self.cheapest = self.cheapest(spec, stop)?;
+        Ok(())
+    }
+
     /// Returns the cheapest scene within the tolerance, confirmed on held-out targets or trials.
-    fn cheapest(&self, spec: &AccuracySpec) -> anyhow::Result<Option<CheapestScene>> {
+    fn cheapest(
+        &self,
+        spec: &AccuracySpec,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Option<CheapestScene>> {
         let (Some(tolerance), Some(compared)) = (spec.tolerance, self.compared()) else {
             return Ok(None);
         };
         let (selected, fresh) = match tolerance {
             _ if self.origin == Origin::Scene => {
-                (compared.without_unneeded_effects()?, Some(HELD_OUT_TARGETS))
+                (compared.without_unneeded_effects(stop)?, Some(HELD_OUT_TARGETS))
             }
             Criterion::Touches(tolerance) => (compared.cheapest(&tolerance, self.origin), None),
             Criterion::Verdict(_) => (None, None),
         };
         let fresh = spec.held_out.or(fresh.filter(|_| !spec.is_verdict()));
-        let confirm = |(selected, scene)| compared.confirm(selected, scene, self.origin, fresh);
+        let confirm =
+            |(selected, scene)| compared.confirm(selected, scene, self.origin, fresh, stop);
         selected.map(confirm).transpose()
     }
 }
 
-/// Compares the scene's levels and effects until `stop` becomes true; what has been measured until
-/// then is returned. `progress` is called with each measured variant and each comparison.
+/// Function that is called with the progress of a study.
+type Progress<'a> = dyn FnMut(AccuracyProgress) -> anyhow::Result<()> + 'a;
+
+/// Compares the scene's levels and effects until `stop` becomes true; the variants that have been
+/// measured until then are returned, if their reference has. `progress` is called with each measured
+/// variant and each comparison.
 ///
 /// # Errors
 /// If [`AccuracySpec::check`] fails, a scene cannot be built, the scene's verdict is undecided, or
@@ -201,52 +242,45 @@ impl AccuracyResult {
 pub fn run(
     spec: &AccuracySpec,
     stop: &AtomicBool,
-    progress: &mut dyn FnMut(AccuracyProgress) -> anyhow::Result<()>,
+    progress: &mut Progress,
 ) -> anyhow::Result<AccuracyResult> {
-    let Scope { has_levels, has_effects, origin } = spec.scope()?;
+    let Scope { origin, .. } = spec.scope()?;
     let (levels, orders, effects, cheapest) = Default::default();
     let mut result = AccuracyResult { levels, orders, effects, origin, cheapest };
-    let is_stopped = || stop.load(Ordering::Relaxed);
-    if has_levels {
-        let effort = spec.effort(LEVEL_TOUCHES, false);
-        let variants = Variant::levels(&spec.scene);
-        let compared = compare(variants, effort, spec.tolerance, stop, progress)?;
-        if !is_stopped() {
-            result.orders = compared.orders(&spec.scene)?;
-        }
-        progress(AccuracyProgress::Levels(&compared, &result.orders))?;
-        result.levels = Some(compared);
-    }
-    if has_effects && !is_stopped() {
-        let variants = Variant::effects(&spec.effects_scene());
-        let effort = spec.effort(EFFECT_TOUCHES, true);
-        let compared = compare(variants, effort, spec.tolerance, stop, progress)?;
-        progress(AccuracyProgress::Effects(&compared))?;
-        result.effects = Some(compared);
-    }
-    if !is_stopped() {
-        result.cheapest = result.cheapest(spec)?;
-    }
+    uninterrupted(result.measure(spec, stop, progress))?;
     Ok(result)
 }
 
+/// Returns `None` for a measurement that was [`Interrupted`].
+fn uninterrupted<T>(measured: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
+    match measured {
+        Err(error) if error.is::<Interrupted>() => Ok(None),
+        other => other.map(Some),
+    }
+}
+
 /// Measures variants until `stop` becomes true; the first variant is the reference.
+///
+/// # Errors
+/// [`Interrupted`] if `stop` becomes true before the reference is measured.
 fn compare(
     variants: Vec<(Variant, Scene)>,
     effort: MeasurementCounts,
     criterion: Option<Criterion>,
     stop: &AtomicBool,
-    progress: &mut dyn FnMut(AccuracyProgress) -> anyhow::Result<()>,
+    progress: &mut Progress,
 ) -> anyhow::Result<AccuracyComparison> {
     progress(AccuracyProgress::Begin(variants.len()))?;
     let mut variants = variants.into_iter();
     let Some((reference, scene)) = variants.next() else {
         bail!("no variant of the scene can be simulated")
     };
-    let mut comparison = AccuracyComparison::new(reference, scene, effort, criterion)?;
+    let mut comparison = AccuracyComparison::new(reference, scene, effort, criterion, stop)?;
     progress(AccuracyProgress::Variant)?;
-    for (variant, scene) in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
-        comparison.add(variant, scene)?;
+    for (variant, scene) in variants {
+        if uninterrupted(comparison.add(variant, scene, stop))?.is_none() {
+            break;
+        }
         progress(AccuracyProgress::Variant)?;
     }
     Ok(comparison)

@@ -5,7 +5,6 @@ use crate::sim::environment::ObjectShape;
 use crate::sim::finger::FingertipState;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use palpate_explore::backend::Fault;
 use palpate_explore::backend::trace::{Tick, Ticks, TracedBackend};
 use palpate_explore::belief::HeightField;
 use palpate_explore::evidence::{Contact, End, Outcome};
@@ -20,6 +19,7 @@ use palpate_gp::math::seed;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Test points along each side of the zone for the error of an estimated surface.
@@ -33,6 +33,19 @@ const TRIAL: usize = 10;
 /// Distance from the deepest point within which the finger counts as at rest: far above rounding,
 /// far below one tick of any approach.
 const REST_TOLERANCE_M: f64 = 1e-7;
+
+/// Error of a measurement that was stopped on request.
+#[derive(Debug, thiserror::Error)]
+#[error("stopped on request")]
+pub struct Interrupted;
+
+/// Checks that `stop` is false.
+///
+/// # Errors
+/// [`Interrupted`] if it is true.
+pub(super) fn check(stop: &AtomicBool) -> Result<(), Interrupted> {
+    if stop.load(Ordering::Relaxed) { Err(Interrupted) } else { Ok(()) }
+}
 
 /// Targets, grouped in trials of ten.
 #[derive(Clone, Debug)]
@@ -57,13 +70,17 @@ impl TargetTrials {
     /// Touches the targets in a [`noise_free`] scene; returns one result per trial.
     ///
     /// # Errors
-    /// If the robot cannot be simulated or moved to its start.
-    pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<TouchResults>> {
+    /// [`Interrupted`] once `stop` is true; if the robot cannot be simulated or moved to its start.
+    pub fn touch(
+        &self,
+        environment: &Arc<Environment>,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Vec<TouchResults>> {
         let simulator = Simulator::new(Arc::clone(environment))?;
         let trials = self.targets.par_iter().enumerate();
-        Ok(trials
-            .map(|(i, targets)| touch_all(&simulator, targets, self.first + i as u64))
-            .collect::<Result<_, Fault>>()?)
+        trials
+            .map(|(i, targets)| touch_all(&simulator, targets, self.first + i as u64, stop))
+            .collect()
     }
 }
 
@@ -93,12 +110,13 @@ pub struct TouchResults {
 /// Touches every target with the simulator of a [`noise_free`] scene.
 ///
 /// # Errors
-/// If the robot cannot be moved to its start.
+/// [`Interrupted`] once `stop` is true; if the robot cannot be moved to its start.
 pub fn touch_all(
     simulator: &Simulator,
     targets: &[Target],
     seed: u64,
-) -> Result<TouchResults, Fault> {
+    stop: &AtomicBool,
+) -> anyhow::Result<TouchResults> {
     let environment = simulator.environment();
     let (mut probe, ticks): (Box<dyn Probe>, _) = match (simulator.body()?, environment.chain()) {
         (Some(body), Some(chain)) => {
@@ -109,6 +127,7 @@ pub fn touch_all(
     };
     let mut touches = TouchResults::default();
     for target in targets {
+        check(stop)?;
         let outcome = environment.task().approach(target).map(|approach| probe.touch(&approach));
         touches.faults += usize::from(matches!(outcome, Some(Err(_))));
         let contact = outcome.and_then(Result::ok).and_then(|outcome| outcome.contact().cloned());
@@ -195,11 +214,13 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
 /// machine affects all scenes alike.
 ///
 /// # Errors
-/// If a scene cannot be built or its robot cannot be moved to its start.
+/// [`Interrupted`] once `stop` is true; if a scene cannot be built or its robot cannot be moved to
+/// its start.
 pub fn wall_times_s<const N: usize>(
     scenes: [&Scene; N],
     targets: &[Target],
     rounds: usize,
+    stop: &AtomicBool,
 ) -> anyhow::Result<Vec<[f64; N]>> {
     let mut probes = Vec::new();
     for scene in scenes {
@@ -208,6 +229,7 @@ pub fn wall_times_s<const N: usize>(
     }
     let mut times_s = Vec::with_capacity(rounds);
     for (round, target) in targets.iter().cycle().take(rounds).enumerate() {
+        check(stop)?;
         let mut walls_s = [f64::NAN; N];
         // The order alternates, because the second scene finds warm caches.
         for k in (0..N).map(|k| (k + round) % N) {

@@ -13,6 +13,7 @@ use palpate_explore::evidence::Contact;
 use palpate_input::config::Rules;
 use serde::Serialize;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Share of the touches that may exceed a tolerance.
 pub const EXCEEDANCE_MAX: f64 = 0.05;
@@ -110,9 +111,10 @@ impl Variant {
         trials: &TargetTrials,
         reference: Option<&[TouchResults]>,
         tolerance: Option<&Tolerance>,
+        stop: &AtomicBool,
     ) -> anyhow::Result<(Self, Vec<TouchResults>)> {
         let environment = Arc::new(Environment::build(noise_free(scene))?);
-        let touches = trials.touch(&environment)?;
+        let touches = trials.touch(&environment, stop)?;
         let reference = reference.unwrap_or(&touches);
         let deviations = |quantity: Quantity| quantity.deviations(&touches, reference);
         let spread =

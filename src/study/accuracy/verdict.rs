@@ -1,14 +1,17 @@
 //! Comparison of two planners in a scene, and the relevance of a change in it.
 
+use super::touches::check;
 use crate::experiment::metrics::truth::Truth;
 use crate::experiment::statistics::PairedDifference;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::{Environment, Scene};
+use palpate_explore::backend::Fault;
 use palpate_explore::planner;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Test points along each side of the zone.
 // heuristic: the default of experiments.
@@ -50,11 +53,12 @@ impl Relevance {
 /// RMSE of `active` minus that of `random`, m, per trial; `None` if one of them failed.
 ///
 /// # Errors
-/// If the scene cannot be built.
+/// [`Interrupted`](super::touches::Interrupted) once `stop` is true; if the scene cannot be built.
 pub fn paired_differences_m(
     scene: &Scene,
     trials: Range<u32>,
     touches: u32,
+    stop: &AtomicBool,
 ) -> anyhow::Result<Vec<Option<f64>>> {
     let names = ["active", "random"];
     let ([Some(active), Some(random)], false) = (names.map(planner::by_name), trials.is_empty())
@@ -71,11 +75,16 @@ pub fn paired_differences_m(
         return Ok(Vec::new());
     };
     let rmse_m = |planner, number| {
-        let row = simulation.trial(planner, number);
+        let mut probe = simulation.probe(number).ok()?;
+        let row = simulation.trial_with(&mut *probe, planner, number, &mut |_| {
+            check(stop).map(|()| None).map_err(|_| Fault::Stopped { time_s: 0.0 })
+        });
         row.touches.last().and_then(|touch| Some(touch.metrics?.rmse_m))
     };
     let advantage = |number| Some(rmse_m(active, number)? - rmse_m(random, number)?);
-    Ok(trials.into_par_iter().map(advantage).collect())
+    let differences_m = trials.into_par_iter().map(advantage).collect();
+    check(stop)?;
+    Ok(differences_m)
 }
 
 /// Mean of `a`, or of `a` minus `b` over the trials in which both are known.
