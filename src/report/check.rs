@@ -50,6 +50,10 @@ pub fn remarks(held: &CheckResult, rules: &CheckOptions, most: u32) -> Vec<Strin
     let settings = "settings or the object's file differ from the baseline";
     let mut remarks: Vec<String> =
         (!held.same_settings).then(|| settings.into()).into_iter().collect();
+    remarks.extend(held.unreachable_share.map(|share| {
+        let percent = 100.0 * share;
+        format!("{percent:.0} % of the surface is out of the finger's reach and left out")
+    }));
     for planner in &held.planners {
         let name = &planner.name;
         remarks.extend(planner.failed.as_ref().map(|(count, reason)| {

@@ -5,7 +5,7 @@
 //! log RMSE), divided by that of the reference planner in the same trial, so that objects of
 //! different sizes count equally. Smaller is better; the reference has score 1.
 
-use super::check::measures::CHECK_MEASURES;
+use super::check::measures::mean_log_error;
 use crate::experiment::metrics::silhouette::TENTHS;
 use crate::experiment::planner_names::ORACLE;
 use crate::experiment::row::{TouchRow, TrialRow, planner_rows};
@@ -125,12 +125,11 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<SuiteComparison,
 
 /// Mean log RMSE of a planner's trials; a failed one counts with its last belief to the end.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
-    let of = CHECK_MEASURES[0].value;
     if !run.completed_planners().contains(&planner) {
         return HashMap::new();
     }
     planner_rows(&run.rows, planner)
-        .filter_map(|row| Some((row.trial, of(row, &run.experiment)?)))
+        .filter_map(|row| Some((row.trial, mean_log_error(row, &run.experiment)?)))
         .collect()
 }
 

@@ -1,10 +1,12 @@
 //! Tests of the regression test of planners (`palpate check`).
 
 use crate::common::program::palpate;
+use palpate::experiment::measure::REACHABLE_RMSE;
 use palpate::experiment::{Experiment, Simulation, runner};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{self, Offer, Plan, PlanError, Planner, PlannerEntry};
 use palpate::math::seed;
+use palpate::report::check::remarks;
 use palpate::study::check::baseline::TrialLine;
 use palpate::study::check::measures::CHECK_MEASURES;
 use palpate::study::check::regression::planner_verdict;
@@ -102,6 +104,37 @@ fn baseline(simulation: &Simulation) -> StoredBaseline {
     let jobs = runner::missing_jobs(simulation, &[]).unwrap();
     let rows = runner::run_in_memory(simulation, jobs, 0, &stop, &|_| ()).unwrap();
     StoredBaseline::new(simulation, &rows, "a test")
+}
+
+/// In a zone with places out of reach, only the reachable part is judged; its share is stated.
+#[test]
+fn the_reachable_part_decides_where_a_zone_has_another() {
+    let file = Path::new("experiments/container.toml");
+    let sets = [
+        "trials=2",
+        "touches=8",
+        "initial_touches=4",
+        "grid=15",
+        "planners=[\"active\"]",
+        "scene.finger.radius_m=0.03",
+    ];
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    let part = Simulation::new(Experiment::load(file, &sets).unwrap()).unwrap();
+    let share = part.truth().unreachable_share().unwrap();
+    let row = part.trial(planner::by_name("active").unwrap(), 0);
+    let line = TrialLine::of(&row, part.experiment());
+    let logs = (4..=8).map(|n| REACHABLE_RMSE.value(&row, n).unwrap().ln()).sum::<f64>() / 5.0;
+    assert!((line.values["mean_log_reachable_rmse"] - logs).abs() < 1e-12);
+    for whole in ["mean_log_rmse", "log_rmse", "log_1_minus_centred_r"] {
+        assert!(!line.values.contains_key(whole), "{whole}");
+    }
+    let stop = AtomicBool::new(false);
+    let rules = CheckOptions::default();
+    let held = run_check(&part, &baseline(&part), &rules, 0, &stop, &|_| ()).unwrap();
+    let stated = format!("{:.0} % of the surface is out of the finger's reach", 100.0 * share);
+    assert!(remarks(&held, &rules, 2).iter().any(|remark| remark.starts_with(&stated)));
+    let whole = baseline(&simulation(&SHORT));
+    assert!(whole.lines[0].values.contains_key("mean_log_rmse"));
 }
 
 /// Equal rows are identical; a removed planner, or other trials, are missing.
@@ -241,6 +274,7 @@ fn one_check(
     for trial in 0..50 {
         let [was, is] = [old, new]
             .map(|entry| TrialLine::of(&simulation.trial(entry, trial), simulation.experiment()));
+        differences.retain(|(judged, _)| is.values.contains_key(judged.id));
         for (judged, values) in &mut differences {
             values.push(is.values[judged.id] - was.values[judged.id]);
         }

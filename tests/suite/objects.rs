@@ -3,7 +3,7 @@
 use crate::common::program::palpate;
 use palpate::experiment::sweep::sweep_cases;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::study::check::measures::CHECK_MEASURES;
+use palpate::study::check::measures::mean_log_error;
 use palpate::study::compare::{Entrant, ObjectResult, SuiteComparison, gap_closed, geometric_mean};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -65,7 +65,7 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
         let logs = rows.map(|row| {
             let is_whole = row.failure.is_none();
             assert!(is_whole && row.touches.iter().all(|it| it.fallback.is_none()), "{name}");
-            (CHECK_MEASURES[0].value)(&row, simulation.experiment()).unwrap()
+            mean_log_error(&row, simulation.experiment()).unwrap()
         });
         logs.sum::<f64>() / f64::from(trials)
     };

@@ -1,7 +1,7 @@
 //! Measures of the regression test.
 
 use crate::experiment::Experiment;
-use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE, ROBOT_TIME};
+use crate::experiment::measure::{CENTRED_R, CHAMFER, REACHABLE_RMSE, RMSE, ROBOT_TIME};
 use crate::experiment::row::{TouchRow, TrialRow};
 use serde::Serialize;
 
@@ -32,11 +32,35 @@ fn log(value: f64) -> f64 {
     value.max(LOG_FLOOR).ln()
 }
 
+/// Whether a part of the surface is out of the finger's reach; the other part is then judged.
+fn is_part(row: &TrialRow) -> bool {
+    let metrics = row.touches.iter().filter_map(|touch| touch.metrics.as_ref());
+    metrics.into_iter().any(|it| it.reachable_rmse_m.is_some() && it.unreachable_rmse_m.is_some())
+}
+
 /// Error of a trial in metres: the RMSE over a zone, the Chamfer distance around a whole object;
 /// `None` if it was not computed. It is at least [`ERROR_FLOOR_M`].
 fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
     let error_m = RMSE.value(row, touches).or_else(|| CHAMFER.value(row, touches))?;
     Some(error_m.max(ERROR_FLOOR_M))
+}
+
+/// Error of a trial as [`error_m`] has it, over the reachable part of a surface that has another one.
+fn reachable_error_m(row: &TrialRow, touches: u32) -> Option<f64> {
+    let error_m = REACHABLE_RMSE.value(row, touches).filter(|_| is_part(row))?;
+    Some(error_m.max(ERROR_FLOOR_M))
+}
+
+/// Mean logarithm of an error over the touches of a trial that ended; `None` without an error.
+fn mean_log(
+    row: &TrialRow,
+    of: &Experiment,
+    error_m: fn(&TrialRow, u32) -> Option<f64>,
+) -> Option<f64> {
+    let whole = row.touches.len() >= of.touches as usize || row.failure.is_some();
+    let logs = (of.first_fit()..=of.touches).filter_map(|n| error_m(row, n).map(log));
+    let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
+    (whole && count > 0.0).then(|| sum / count)
 }
 
 fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Option<f64> {
@@ -45,23 +69,34 @@ fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Optio
     (!planned.is_empty()).then(|| count as f64 / planned.len() as f64)
 }
 
-/// Measures of the test. The first decides: the mean over the touches detects a loss that the last
-/// touch hides, and needs the fewest trials of all measures.
+/// Mean logarithm of the error of the whole surface over the touches of a trial.
+pub fn mean_log_error(row: &TrialRow, of: &Experiment) -> Option<f64> {
+    mean_log(row, of, error_m)
+}
+
+/// Measures of the test. The first that a trial has decides: the mean over the touches detects a
+/// loss that the last touch hides, and needs the fewest trials of all measures.
 pub static CHECK_MEASURES: &[CheckMeasure] = &[
+    CheckMeasure::log(
+        "mean_log_reachable_rmse",
+        "mean log error over the touches, reachable part",
+        |row, of| mean_log(row, of, reachable_error_m),
+    ),
     CheckMeasure::log("mean_log_rmse", "mean log error over the touches", |row, of| {
-        let after = of.first_fit()..=of.touches;
-        let whole = row.touches.len() >= of.touches as usize || row.failure.is_some();
-        let logs = after.filter_map(|n| error_m(row, n).map(log));
-        let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
-        (whole && count > 0.0).then(|| sum / count)
+        mean_log_error(row, of).filter(|_| !is_part(row))
     }),
+    CheckMeasure::log(
+        "log_reachable_rmse",
+        "error after the last touch, reachable part",
+        |row, of| reachable_error_m(row, of.touches).map(log),
+    ),
     CheckMeasure::log("log_rmse", "error after the last touch", |row, of| {
-        error_m(row, of.touches).map(log)
+        error_m(row, of.touches).filter(|_| !is_part(row)).map(log)
     }),
     CheckMeasure::log(
         "log_1_minus_centred_r",
         "1 − centred R after the last touch",
-        |row, of| CENTRED_R.value(row, of.touches).map(|r| log(1.0 - r)),
+        |row, of| CENTRED_R.value(row, of.touches).filter(|_| !is_part(row)).map(|r| log(1.0 - r)),
     ),
     CheckMeasure::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
     CheckMeasure::log("log_time", "robot time", |row, of| {

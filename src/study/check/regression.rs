@@ -19,6 +19,8 @@ pub struct CheckResult {
     pub same_settings: bool,
     /// Whether the test was stopped before all verdicts were decided.
     pub is_stopped: bool,
+    /// Share of the surface that the finger cannot reach, which no measure judges.
+    pub unreachable_share: Option<f64>,
     /// Lines of the trials run.
     pub rows: Vec<TrialLine>,
 }
@@ -102,7 +104,9 @@ pub fn run_check(
     let planners =
         names.iter().chain(others).map(|name| planner_of(baseline, rules, &rows, name)).collect();
     let same_settings = baseline.header.settings == settings_hash(experiment);
-    Ok(CheckResult { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
+    let unreachable_share = simulation.truth().unreachable_share();
+    let is_stopped = stop.load(Ordering::Relaxed);
+    Ok(CheckResult { planners, same_settings, is_stopped, unreachable_share, rows })
 }
 
 /// Runs all trials of an experiment for a baseline, and the first of each planner again: a planner
