@@ -257,12 +257,19 @@ def target_of(planned: Any) -> list[float] | str:
     Raises:
         PlannerError: if it is something else.
     """
+    if planned is None:
+        raise PlannerError("the planner returned None: allowed is a target (is a `return` missing in plan?)")
     try:
         if isinstance(planned, Mapping):
             return json.dumps(planned, default=lambda array: np.asarray(array).tolist())
-        return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
+        coordinates = np.asarray(planned, dtype=float)
     except (TypeError, ValueError) as error:
         raise PlannerError(f"the planner returned {planned!r}, which is not a target: {error}") from None
+    if coordinates.ndim > 1 and coordinates.size != coordinates.shape[-1]:
+        raise PlannerError(
+            f"the planner returned an array of shape {coordinates.shape}: allowed is one target, such as places[i]"
+        )
+    return [float(at) for at in coordinates.ravel()]
 
 
 def format_exception(error: BaseException) -> str:

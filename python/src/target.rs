@@ -41,14 +41,14 @@ impl TargetInput {
             }
             Self::Coordinates(coordinates) => coordinates,
         };
-        let wanted = region.tap_dimension();
-        if coordinates.len() != wanted {
-            let of = if region.zone().is_some() { "of this zone" } else { "around an object" };
-            let found = coordinates.len();
+        let (wanted, found) = (region.tap_dimension(), coordinates.len());
+        if found != wanted {
             return Err(format!(
-                "the target has {found} coordinates, a target {of} needs {wanted}"
+                "the planned target has {found} coordinates: allowed are {wanted}, {}",
+                region.bounds()
             ));
         }
-        region.target(coordinates).ok_or_else(|| "the target has no direction".into())
+        let target = region.target(coordinates);
+        target.ok_or_else(|| "the planned target has no direction".into())
     }
 }

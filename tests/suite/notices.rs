@@ -1,6 +1,7 @@
 //! Tests of warnings about likely mistakes in valid scenes and runs.
 
 use crate::common::program::{fails, palpate, stderr};
+use palpate::experiment::store::Run;
 use std::fs;
 use std::path::Path;
 use std::process::Output;
@@ -199,4 +200,18 @@ fn a_soft_finger_of_another_size_is_told_what_it_costs() {
     );
     let values = stderr(&show("0.007"));
     assert!(!values.contains("finger.radius_m"), "{values}");
+}
+
+#[test]
+fn a_planner_that_repeats_a_target_is_noted() {
+    let folder = folder("container.toml", &[]);
+    table(&run(&folder, &[]));
+    let mut run = Run::read(&folder.path().join("runs/it")).unwrap();
+    assert_eq!(run.notices(), Vec::<String>::new());
+    for (from, to) in [(2, 5), (5, 9)] {
+        run.rows[0].touches[to].target = run.rows[0].touches[from].target.clone();
+    }
+    let planner = &run.rows[0].planner;
+    let [notice] = &run.notices()[..] else { panic!("{:?}", run.notices()) };
+    assert!(notice.starts_with(&format!("{planner}: 2 touches at a target")), "{notice}");
 }

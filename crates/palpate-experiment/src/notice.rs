@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use crate::measure::{CENTRED_R, Measure, R};
 use crate::metrics::shape::TrueShape;
 use crate::metrics::truth::Truth;
-use crate::row::{TrialRow, planner_rows};
+use crate::row::{TouchRow, TrialRow, planner_rows};
 use crate::statistics::summary;
 use palpate_explore::task::Zone;
 use palpate_input::format::counted;
@@ -86,6 +86,7 @@ pub(super) fn run_notices(
 ) -> Vec<String> {
     let mut notices = truth_notices(experiment.scene.zone.as_ref(), truth);
     notices.extend(experiment.planners.iter().filter_map(|planner| few_contacts(rows, planner)));
+    notices.extend(experiment.planners.iter().filter_map(|planner| repeats(rows, planner)));
     notices.extend(uninformative_r(experiment, rows));
     notices
 }
@@ -113,6 +114,21 @@ fn few_contacts(rows: &[TrialRow], planner: &str) -> Option<String> {
         (touches().filter(|touch| touch.contact().is_some()).count(), touches().count());
     is_few(contacts, of)
         .then(|| format!("{planner}: only {contacts} of {of} touches made a usable contact"))
+}
+
+/// Notice about a planner that plans a target again in the same trial, which built-in ones avoid.
+fn repeats(rows: &[TrialRow], planner: &str) -> Option<String> {
+    let again = |row: &TrialRow| {
+        let is_known = |(i, touch): &(usize, &TouchRow)| {
+            row.touches[..*i].iter().any(|earlier| earlier.target == touch.target)
+        };
+        row.touches.iter().enumerate().filter(is_known).count()
+    };
+    let repeated: usize = planner_rows(rows, planner).map(again).sum();
+    (repeated > 0).then(|| {
+        let repeated = counted(repeated, "touch");
+        format!("{planner}: {repeated} at a target that its trial had before; a repeated touch adds little")
+    })
 }
 
 fn uninformative_r(experiment: &Experiment, rows: &[TrialRow]) -> Option<String> {

@@ -87,11 +87,21 @@ impl Region {
         }
     }
 
-    /// Describes a target that is not in the region, or cannot be reached in it.
-    pub fn outside(&self) -> &'static str {
+    /// Describes the targets in the region.
+    pub fn bounds(&self) -> String {
         match self {
-            Self::Zone(_) => "outside the zone",
-            Self::Ball(_) => "outside the ball, or unreachable",
+            Self::Zone(zone) => {
+                let side =
+                    |(axis, [low, high]): (_, [f64; 2])| format!("{axis} from {low} to {high}");
+                let sides: Vec<String> =
+                    ["x", "z"].into_iter().zip(zone.sides()).map(side).collect();
+                format!("a place in the zone, {} m", sides.join(", "))
+            }
+            Self::Ball(ball) => {
+                let [x, y, z] = ball.centre_w.into();
+                let radius_m = ball.radius_m;
+                format!("an aimed point within {radius_m} m of [{x}, {y}, {z}], and a direction")
+            }
         }
     }
 
