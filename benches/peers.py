@@ -41,6 +41,8 @@ torch.set_default_dtype(torch.double)
 TRIALS, TOUCHES = 10, 50
 BIRD_TRIALS, BIRD_TOUCHES = 3, 120
 TOY_BOX = [(-2.0, 2.0)]
+# Length of a unit of Eq. 4 in scenes/toy.toml, m.
+TOY_UNIT_M = 0.01
 TEST = np.linspace(*TOY_BOX[0], 401)[:, None]
 
 
@@ -172,7 +174,7 @@ def main():
         _, ours = palpate("toy", os.path.join(folder, "timed"), 10 * TRIALS, 2)
         heights, box, bird_starts = bird(os.path.join(folder, "bird"))
         _, ours_bird = palpate("bird", os.path.join(folder, "timed_bird"), 10 * BIRD_TRIALS, 2)
-    starts = [[touch["target"]["place"] for touch in touches[:3]] for touches in trials]
+    starts = [[[at / TOY_UNIT_M for at in touch["target"]["place"]] for touch in touches[:3]] for touches in trials]
     curves = [[touch["metrics"]["r"] for touch in touches[2:]] for touches in trials]
     score = lambda model: correlation(toy(TEST[:, 0]), model.mean(TEST))
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")

@@ -28,7 +28,7 @@ def test_constructors_have_the_settings_of_files():
 
 
 def test_an_experiment_of_settings_is_that_of_the_file(tmp_path):
-    table = {"simulator": "analytic", "function": "toy", "zone": {"x_m": [-2, 2]}}
+    table = {"simulator": "analytic", "function": "toy", "zone": {"x_m": [-0.02, 0.02]}}
     settings = {"planners": ["random", own.Middle], "trials": 2, "touches": 6, "seed": 3, "gp": {"noise": [0.01, 0.1]}}
     (tmp_path / "mine.toml").write_text(
         'name = "toy"\nscene = "toy"\nplanners = ["random", "own:Middle"]\ntrials = 2\ntouches = 6\n'
@@ -76,7 +76,7 @@ def test_what_is_wrong_is_said_without_a_file():
     with pytest.raises(ConfigError, match="gp.nose.*did you mean `noise`"):
         palpate.Experiment(scene="toy", gp={"nose": [0.1, 0.2]})
     with pytest.raises(ConfigError, match="radius_m"):
-        palpate.Scene(simulator="analytic", function="toy", zone={"x_m": [-2, 2]}, finger={"radius_m": -1.0})
+        palpate.Scene(simulator="analytic", function="toy", zone={"x_m": [-0.02, 0.02]}, finger={"radius_m": -1.0})
     with pytest.raises(TypeError, match="write_mesh"):
         palpate.Experiment(scene=palpate.Scene.from_mesh(*sphere(12), x_m=(-0.02, 0.02), z_m=(0.49, 0.51)))
     # A limit that depends on a setting of the run names both.

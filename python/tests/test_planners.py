@@ -56,7 +56,7 @@ def test_a_function_of_the_belief_is_a_planner(isolate):
     run = toy.run([middle, functools.partial(at, 0.25), own.Middle], trials=1, isolate=isolate)
     assert run.trials()["failure"].isna().all()
     last = run.touches().query("touch == 4").set_index("planner")["target_x_m"]
-    lower, upper = -2.0, 2.0
+    lower, upper = -0.02, 0.02
     assert last["test_planners:middle"] == 0.5 * (lower + upper)
     assert last["test_planners:at(0.25)"] == lower + 0.25 * (upper - lower)
 
@@ -86,7 +86,7 @@ def test_an_own_planner_makes_strokes():
     [
         (own.Raises, "planner raised ValueError: no idea"),
         (own.NotANumber, "the planned target is not finite = [NaN]"),
-        (own.Outside, "the planned target is outside the region = [3.0]: allowed is a place in the zone, x from -2 to 2 m"),
+        (own.Outside, "the planned target is outside the region = [1.02]: allowed is a place in the zone, x from -0.02 to 0.02 m"),
         (own.Many, "5 coordinates: allowed are 1, a place in the zone"),
         (own.Nowhere, "the planner returned None"),
         (own.Places, "an array of shape (2, 1): allowed is one target"),
@@ -193,7 +193,7 @@ def test_planners_are_classes_partials_functions_or_instances(planner, name):
     touches = run.touches().query("planner == @name and touch > 3")
     # A planner that counts its plans starts from 0 in each trial.
     each = touches.pivot(index="touch", columns="trial", values="target_x_m")
-    expected = -2 + 4 * (0.3 * np.arange(1, 5) % 1.0)
+    expected = -0.02 + 0.04 * (0.3 * np.arange(1, 5) % 1.0)
     assert np.allclose(each, expected[:, None], atol=1e-12)
     if name.endswith("<lambda>"):
         with pytest.raises(PlannerError, match="isolate=True"):

@@ -35,7 +35,7 @@ fn runs() -> Vec<Run> {
             row
         })
         .to_vec();
-    let small = CURVE.replace("[-2.0, 2.0]", "[-0.05, 0.05]");
+    let small = CURVE.replace("[-0.02, 0.02]", "[-0.05, 0.05]");
     let flat = SURFACE.replace("[-0.07, 0.07]", "[-0.01, 0.01]");
     let mut ended = run(SURFACE);
     ended.rows.iter_mut().for_each(|row| row.touches.truncate(5));
@@ -126,7 +126,7 @@ fn px_per_mm(svg: &str) -> [f64; 2] {
 fn a_millimetre_is_as_long_on_both_axes() {
     let narrow = SURFACE.replace("[-0.07, 0.07]", "[-0.4, 0.4]");
     let flat = SURFACE.replace("[-0.07, 0.07]", "[-0.01, 0.01]");
-    let curve = CURVE.replace("[-2.0, 2.0]", "[-0.05, 0.05]");
+    let curve = CURVE.replace("[-0.02, 0.02]", "[-0.05, 0.05]");
     for (settings, names) in [
         (SURFACE, ["acquisition", "targets"]),
         (&narrow, ["acquisition", "targets"]),

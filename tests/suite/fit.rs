@@ -71,7 +71,7 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let experiment = Experiment::load(&root.join("experiments/toy.toml"), &[]).unwrap();
     let simulation = Simulation::new(experiment).unwrap();
-    let bounds = search_box(MeanModel::Zero, vec![(0.02, 4.0).into()]);
+    let bounds = search_box(MeanModel::Zero, vec![(2e-4, 0.04).into()]);
     let (mut fits, mut warm, mut cold) = (0, 0, 0);
     for (number, name) in [(0, "active"), (1, "active"), (2, "active"), (3, "random")] {
         let planner = planner::by_name(name).unwrap();

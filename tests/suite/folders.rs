@@ -211,7 +211,8 @@ fn a_run_folder_moves_to_another_user() {
         fs::create_dir(home.path().join("models")).unwrap();
         fs::rename(at(user, "mesh.obj"), home.path().join("models/mesh.obj")).unwrap();
         let scene = fs::read_to_string(at(user, "scene.toml")).unwrap();
-        fs::write(at(user, "scene.toml"), scene.replace("mesh.obj", "models/mesh.obj")).unwrap();
+        let scene = scene.replace("mesh.obj", "models/mesh.obj") + "datum_y_m = 0.5\n";
+        fs::write(at(user, "scene.toml"), scene).unwrap();
     }
     let run = |user: usize, more: &[&str]| {
         let run = ["run", "small.toml", "--set", "trials=4", "--no-report"];
@@ -238,9 +239,9 @@ fn a_run_folder_moves_to_another_user() {
     assert_ok(&run(1, &["--out", "first"]));
     assert!(rows(1, "first") == rows(0, "whole"));
 
-    // Another file of the same name is another experiment.
+    // Another mesh of the same name is another experiment.
     let mesh = homes[1].path().join("models/mesh.obj");
-    fs::write(&mesh, fs::read_to_string(&mesh).unwrap() + "# edited\n").unwrap();
+    fs::write(&mesh, fs::read_to_string(&mesh).unwrap().replace("v 0 0 1", "v 0 0 2")).unwrap();
     let refused = run(1, &["--out", "first"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("scene.object.mesh"), "{}", stderr(&refused));

@@ -26,7 +26,9 @@ static BIRD: LazyLock<Arc<Environment>> = LazyLock::new(|| environment("bird.tom
 #[test]
 fn the_toy_is_read_where_it_is_asked() {
     let toy = environment("toy.toml", &[]);
-    for (x, height_m) in [(-1.7, 1.0), (0.125, 2.0), (-0.125, 0.0), (1.0, 1.0)] {
+    // Eq. 4 of Yi et al. 2016, in units of 10 mm.
+    for (x, y) in [(-1.7, 1.0), (0.125, 2.0), (-0.125, 0.0), (1.0, 1.0)] {
+        let (x, height_m) = (0.01 * x, 0.01 * y);
         let contact = contact(&toy, &[x]);
         assert!((contact.p_wc.y - height_m).abs() < 1e-12, "{x}: {}", contact.p_wc.y);
         assert_eq!(contact.p_wc.x, x);

@@ -113,30 +113,37 @@ impl SimulatorKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AnalyticCurve {
-    /// Sine bump of Yi et al. 2016, Eq. 4: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.
+    /// Sine bump of Yi et al. 2016, Eq. 4: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π, in
+    /// units of 10 mm.
     Toy,
 }
+
+/// Length of a unit of [`AnalyticCurve::Toy`].
+// heuristic: Eq. 4 has no unit; its curve becomes as wide as an object of the experiments.
+const TOY_UNIT_M: f64 = 0.01;
 
 impl AnalyticCurve {
     /// Returns the height at `x`.
     pub fn height_m(self, x: f64) -> f64 {
         match self {
-            Self::Toy if x.abs() <= 1.0 => (4.0 * PI * x).sin() + 1.0,
-            Self::Toy => 1.0,
+            Self::Toy if x.abs() <= TOY_UNIT_M => {
+                TOY_UNIT_M * ((4.0 * PI * x / TOY_UNIT_M).sin() + 1.0)
+            }
+            Self::Toy => TOY_UNIT_M,
         }
     }
 
     /// Returns the smallest and largest height.
     pub fn heights_m(self) -> [f64; 2] {
         match self {
-            Self::Toy => [0.0, 2.0],
+            Self::Toy => [0.0, 2.0 * TOY_UNIT_M],
         }
     }
 
     /// Returns the slope at `x`; at a kink, the slope of the side nearer to 0.
     pub fn slope(self, x: f64) -> f64 {
         match self {
-            Self::Toy if x.abs() <= 1.0 => 4.0 * PI * (4.0 * PI * x).cos(),
+            Self::Toy if x.abs() <= TOY_UNIT_M => 4.0 * PI * (4.0 * PI * x / TOY_UNIT_M).cos(),
             Self::Toy => 0.0,
         }
     }

@@ -24,7 +24,7 @@ grid = 41
 [scene]
 simulator = "analytic"
 function = "toy"
-zone = { x_m = [-2.0, 2.0] }
+zone = { x_m = [-0.02, 0.02] }
 "#;
 
 pub const SURFACE: &str = r#"
