@@ -31,7 +31,7 @@ call replaces the files unless you edited them.
 Unit: glTF is in metres by its standard. Other files may state a unit in a comment. Otherwise it is mm for STL, and else the one of mm, \
 cm and m that gives a size that a finger can explore, 30 to 400 mm; if none does, the mesh is scaled to 150 mm. A stated unit is never \
 scaled. Up: y for glTF by its standard, then a \
-comment, then a flat base, then y for OBJ and z for others. If the evidence is ambiguous, palpate asks; without a terminal, or with --yes, \
+comment, then the only plane of the file that the object stands on, then a flat base, then the most stable pose. If the evidence is ambiguous, palpate asks; without a terminal, or with --yes, \
 it takes the most plausible value and says so.")]
 pub(super) struct Args {
     /// Mesh file; a shipped one, such as models/suite/mug.glb, is found in every folder.

@@ -231,4 +231,11 @@ fn a_body_that_cannot_go_around_is_refused() {
     let far = scene("container_around_pa10.toml", &["object.position_m=[0, -3, 0.5]"]);
     let far = Simulator::new(Arc::new(Environment::build(far).unwrap())).unwrap();
     assert!(far.check_reach().unwrap_err().to_string().contains("64 directions"));
+    // An object whose middle is at the height of its table.
+    let ball = environment("container_around.toml", &[]).task().ball().copied().unwrap();
+    let table = format!("whole_object.lowest_m={}", ball.centre_w.z);
+    let table = Simulator::new(environment("container_around.toml", &[&table])).unwrap();
+    let error = table.check_reach().unwrap_err().to_string();
+    let stated = format!("the finger stays above {:.3} m", ball.centre_w.z);
+    assert!(error.contains(&stated) && error.contains("whole_object.lowest_m"), "{error}");
 }

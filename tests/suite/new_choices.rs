@@ -4,7 +4,10 @@ use crate::common::program::{fails, palpate, stderr, succeeds};
 use crate::common::shapes::{box_mesh, point, sphere_mesh};
 use nalgebra::{Point3, Vector3};
 use palpate::geometry::mesh::Mesh;
-use palpate::sim::placement::{UpAxis, explorable_scale, plausible_units, resting_axis};
+use palpate::sim::placement::{
+    UpAxis, explorable_scale, ground_axes, plausible_units, resting_axis, stability_deg,
+    stable_axis,
+};
 use palpate::sim::scene::Unit;
 use palpate::sim::{Environment, Scene};
 use std::fmt::Write;
@@ -212,13 +215,55 @@ fn a_flat_base_tells_which_axis_is_up() {
     assert_eq!(resting_axis(&box_mesh(Point3::origin(), point(0.1, 0.12, 0.11))), None);
     // An OBJ file with z up stands, as its base is below.
     let folder = TempDir::new().unwrap();
-    write(&folder, "bowl.obj", obj("", &turned(&bowl, Vector3::z()), |p| 1e3 * p));
+    let raised = |p: Vector3<f64>| 1e3 * (p + Vector3::z());
+    write(&folder, "bowl.obj", obj("", &turned(&bowl, Vector3::z()), raised));
     let said = new(&folder, &["bowl.obj"]);
     assert!(said.contains("up z: it rests on a flat base") && !said.contains("note:"), "{said}");
     // A comment comes before a base, an option before a comment.
     write(&folder, "bowl.obj", obj("y-up", &turned(&bowl, Vector3::z()), |p| 1e3 * p));
     assert!(new(&folder, &["bowl.obj"]).contains("up y: its comment \"y-up\""));
     assert!(new(&folder, &["bowl.obj", "--up", "-x"]).contains("up -x: --up -x"));
+}
+
+/// A box stands on its smallest height, and falls when its middle is beyond an edge: at
+/// atan(width / height). A cylinder is as stable on both ends, so neither is clearly up.
+#[test]
+fn stability_is_the_angle_at_which_a_box_falls() {
+    let slab = box_mesh(point(0.0, 0.0, 0.0), point(0.2, 0.05, 0.1));
+    for (up, width, height) in [
+        (UpAxis::X, 0.05, 0.2),
+        (UpAxis::Y, 0.1, 0.05),
+        (UpAxis::Z, 0.05, 0.1),
+        (UpAxis::MinusY, 0.1, 0.05),
+    ] {
+        let angle_deg = f64::atan2(width, height).to_degrees();
+        let found_deg = stability_deg(&slab, up);
+        assert!((found_deg - angle_deg).abs() < 0.1, "{up:?} {found_deg} {angle_deg}");
+    }
+    let all = [UpAxis::X, UpAxis::Y, UpAxis::Z];
+    let (up, angle_deg) = stable_axis(&slab, &all).unwrap();
+    assert_eq!((up, angle_deg.round()), (UpAxis::Y, 63.0));
+    assert_eq!(stable_axis(&slab, &[UpAxis::Y, UpAxis::MinusY]), None);
+    // An egg on its end falls when it is touched.
+    assert!(stability_deg(&egg(|_| false), UpAxis::X) < 10.0);
+}
+
+/// Scans and designs stand on a plane of their file, also upright bottles that would be more stable
+/// on their sides.
+#[test]
+fn the_plane_that_an_object_stands_on_tells_which_axis_is_up() {
+    let bottle = |at: Point3<f64>| box_mesh(at, at + Vector3::new(0.04, 0.03, 0.2));
+    let standing = bottle(point(-0.3, 0.2, -0.002));
+    assert_eq!(ground_axes(&standing), [UpAxis::Z]);
+    assert_eq!(ground_axes(&bottle(point(0.0, 0.2, 0.0))), [UpAxis::X, UpAxis::Z]);
+    assert_eq!(ground_axes(&bottle(point(0.1, 0.2, 0.1))), []);
+    let folder = TempDir::new().unwrap();
+    write(&folder, "bottle.obj", obj("", &standing, |p| 1e3 * p));
+    let said = new(&folder, &["bottle.obj"]);
+    assert!(said.contains("up z: it stands on the plane z = 0 of its file"), "{said}");
+    assert!(!said.contains("note:"), "{said}");
+    write(&folder, "egg.obj", obj("", &egg(|_| false), |p| 1e3 * p));
+    assert!(new(&folder, &["egg.obj"]).contains("note: the up axis is a guess"));
 }
 
 #[test]

@@ -68,8 +68,15 @@ pub fn scan_notice(contacts: usize, rmse_m: Option<f64>) -> String {
     format!("the truth is a scan of {}{off}", counted(contacts, "contact"))
 }
 
-/// Notice about a whole object with an unreachable part.
+/// Notice about a whole object with an unreachable part, or of which the inside is unknown.
 pub fn shape_notice(shape: &TrueShape) -> Option<String> {
+    if !shape.is_closed() {
+        return Some(
+            "the object's surface is not closed: volume, intersection over union and the errors of its \
+             reachable part are not computed (object.fill_holes closes holes; palpate show names them)"
+                .into(),
+        );
+    }
     let reachable = shape.reachable_share().filter(|reachable| *reachable < FULL_SHARE)?;
     Some(format!(
         "the finger can touch {:.0} % of the object's surface by straight paths from all sides; the \

@@ -2,6 +2,7 @@
 
 use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 use nalgebra::Point3;
+use std::collections::hash_map::Entry;
 
 use super::holes::find_holes;
 use super::mesh::Mesh;
@@ -19,7 +20,8 @@ pub const MAX_COORDINATE_M: f64 = 1e4;
 /// In this order: vertices at equal positions are merged (renderers split them at seams of normals
 /// and textures; −0 equals 0); degenerate triangles are removed (a repeated vertex, or a height
 /// that is negligible relative to the longest side or the rounding of the coordinates); of
-/// triangles with the same three vertices the first is kept; winding is made consistent over each
+/// triangles with the same three vertices the first is kept, and its reverse if both are a fin on
+/// other triangles, so that a closed surface stays closed; winding is made consistent over each
 /// edge-connected component, outward if it is closed, by majority of its triangles if it is open;
 /// unused vertices are removed.
 ///
@@ -138,9 +140,10 @@ fn remove_invalid(
     report: &mut MeshReport,
 ) -> (Vec<[u32; 3]>, Vec<u32>) {
     let rounding_m = rounding_m(vertices);
-    let mut seen = HashSet::with_capacity(raw.triangles.len());
-    let mut kept = Vec::with_capacity(raw.triangles.len());
+    let mut seen = HashMap::with_capacity(raw.triangles.len());
+    let mut kept: Vec<[u32; 3]> = Vec::with_capacity(raw.triangles.len());
     let mut sources = Vec::with_capacity(raw.triangles.len());
+    let mut duplicates = Vec::new();
     for (number, triangle) in raw.triangles.iter().enumerate() {
         let triangle = triangle.map(|vertex| canonical[vertex as usize]);
         let element = || raw.triangle_element(number);
@@ -148,16 +151,48 @@ fn remove_invalid(
             report.degenerate_removed.add(element);
             continue;
         }
-        let mut key = triangle;
-        key.sort_unstable();
-        if seen.insert(key) {
+        match seen.entry(sorted(triangle)) {
+            Entry::Vacant(first) => {
+                first.insert(kept.len());
+                kept.push(triangle);
+                sources.push(number as u32);
+            }
+            Entry::Occupied(first) => duplicates.push((number, triangle, *first.get())),
+        }
+    }
+    let paired: HashSet<usize> = duplicates.iter().map(|(.., first)| *first).collect();
+    let mut edges: HashMap<[u32; 2], usize> = HashMap::new();
+    if !paired.is_empty() {
+        let single = kept.iter().enumerate().filter(|(i, _)| !paired.contains(i));
+        for side in single.flat_map(|(_, triangle)| sides(*triangle)) {
+            *edges.entry(sorted(side)).or_default() += 1;
+        }
+    }
+    // A face and its reverse enclose nothing. On a surface that is closed without them they are a
+    // fin, and one alone would open it; apart from others they are a sheet, which has one face.
+    let mut fins = HashSet::new();
+    for (number, triangle, first) in duplicates {
+        let is_reverse = sides(kept[first]).iter().all(|side| !sides(triangle).contains(side));
+        let others = sides(triangle).map(|side| edges.get(&sorted(side)).copied().unwrap_or(0));
+        let is_on_surface = others.iter().all(|count| count % 2 == 0) && others != [0; 3];
+        if is_reverse && is_on_surface && fins.insert(first) {
             kept.push(triangle);
             sources.push(number as u32);
         } else {
-            report.duplicates_removed.add(element);
+            report.duplicates_removed.add(|| raw.triangle_element(number));
         }
     }
     (kept, sources)
+}
+
+fn sorted<const N: usize>(mut vertices: [u32; N]) -> [u32; N] {
+    vertices.sort_unstable();
+    vertices
+}
+
+/// Directed sides of a triangle.
+fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
 }
 
 /// Removes unused vertices, keeping the order of the others.

@@ -13,7 +13,7 @@ use palpate_explore::backend::interlock::InterlockSettings;
 use palpate_explore::backend::{Backend, Fault};
 use palpate_explore::probe::Probe;
 use palpate_explore::probe::interlocks::with_interlocks;
-use palpate_explore::probe::servo::{Servo, check_reach};
+use palpate_explore::probe::servo::{Servo, check_directions, check_reach};
 use palpate_geometry::distance::OrientedBox;
 use palpate_input::error::InputError;
 use std::sync::Arc;
@@ -74,17 +74,18 @@ impl Simulator {
         notices
     }
 
-    /// Checks that the scene's arm or stage can reach all of its zone.
+    /// Checks that the scene's arm or stage can reach all of its zone, or that a finger can reach a
+    /// whole object.
     ///
     /// # Errors
-    /// If a part of the zone is out of reach.
+    /// If a part of the zone, or the whole object, is out of reach.
     pub fn check_reach(&self) -> Result<(), InputError> {
         let environment = &self.environment;
         match (environment.scene().simulator, environment.robot()) {
             (SimulatorKind::Kinematic | SimulatorKind::Dynamic, Some(robot)) => {
                 check_reach(&robot, environment.task())
             }
-            _ => Ok(()),
+            _ => check_directions(environment.task()),
         }
     }
 

@@ -154,13 +154,14 @@ fn explorable() -> String {
     format!("{} to {}", length(low), length(high))
 }
 
-/// Returns the up axis of a mesh in the frame of its file; `is_y_usual` for a format in which y is
-/// usually up.
+/// Returns the up axis of a mesh in the frame of its file.
+///
+/// The evidence, in this order: the option, the file, the only plane of the file that the object
+/// stands on, a flat base, the most stable pose. Otherwise the most stable of y and z is a guess.
 pub fn up(
     mesh: &Mesh,
     given: Option<UpAxis>,
     stated: &FileStatements,
-    is_y_usual: bool,
     asker: Asker<'_>,
 ) -> Choice<UpAxis> {
     if let Some(up) = given {
@@ -174,19 +175,29 @@ pub fn up(
     if let Some((value, evidence)) = named {
         return Choice { value, evidence };
     }
+    let ground = placement::ground_axes(mesh);
+    if let [value] = ground[..] {
+        let evidence = format!("it stands on the plane {} = 0 of its file", name(&value));
+        return Choice { value, evidence };
+    }
     if let Some((value, share)) = placement::resting_axis(mesh) {
         let percent = 100.0 * share;
         let evidence = format!("it rests on a flat base ({percent:.0} % of its underside)");
         return Choice { value, evidence };
     }
-    let (usual, other) = match is_y_usual {
+    let axes = if ground.is_empty() { all } else { &ground[..] };
+    if let Some((value, stable_deg)) = placement::stable_axis(mesh, axes) {
+        let evidence = format!("its most stable pose, which a tilt of {stable_deg:.0} deg upsets");
+        return Choice { value, evidence };
+    }
+    let stable_deg = |up: UpAxis| placement::stability_deg(mesh, up);
+    let (usual, other) = match stable_deg(UpAxis::Y) > stable_deg(UpAxis::Z) {
         true => (UpAxis::Y, UpAxis::Z),
         false => (UpAxis::Z, UpAxis::Y),
     };
-    let format = if is_y_usual { "OBJ" } else { "STL and PLY" };
     let why = format!(
-        "the up axis is a guess: the file states none, and no flat base decides; {} is taken, as usual in \
-         {format} files; if the object lies on its side in the picture, use for example --up {}",
+        "the up axis is a guess: the file states none, and neither a flat base nor stability decides; {} \
+         is taken; if the object lies on its side in the picture, use for example --up {}",
         name(&usual),
         name(&other)
     );
@@ -204,7 +215,7 @@ pub fn up(
         .collect();
     let (value, is_confirmed) =
         asker.choose("Up axis of the file", &choices, &why).unwrap_or((usual, false));
-    Choice { value, evidence: evidence(is_confirmed, &format!("usual in {format} files")) }
+    Choice { value, evidence: evidence(is_confirmed, "the more stable of y and z") }
 }
 
 /// Returns the command-line name of a value.

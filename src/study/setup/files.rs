@@ -165,7 +165,7 @@ impl MeshPlacement {
             &stated,
             asker,
         );
-        let up = choices::up(&mesh, options.up, &stated, extension == "obj", asker);
+        let up = choices::up(&mesh, options.up, &stated, asker);
         let (metres_per_unit, scale) = (unit.value.0.metres_per_unit(), unit.value.1);
         let size_m = extent(&mesh).max() / read_m * metres_per_unit * scale;
         ensure!(

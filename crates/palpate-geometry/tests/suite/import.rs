@@ -283,6 +283,31 @@ fn repair_knows_open_inverted_and_one_sided() {
     assert!(report.is_closed() && (mesh.volume_m3() - 2.0 / 6.0).abs() < 1e-12, "{report}");
 }
 
+/// A face and its reverse on an edge of a closed surface are a fin, as in many scans: the surface
+/// stays closed, with the same volume. Alone they are a sheet with one face.
+#[test]
+fn a_fin_does_not_open_a_closed_surface() {
+    let fin = TETRA_OBJ.to_owned() + "v 3 3 3\nf 1 2 5\nf 2 1 5\n";
+    let (plain, _) = import_bytes("plain.obj", TETRA_OBJ.as_bytes()).unwrap();
+    let (mesh, report) = import_bytes("fin.obj", fin.as_bytes()).unwrap();
+    assert!(report.is_closed(), "{report}");
+    assert_eq!((report.border_edges.count, report.duplicates_removed.count), (0, 0));
+    assert_eq!((report.non_manifold_edges.count, report.triangles), (1, 6));
+    assert!((mesh.volume_m3() - plain.volume_m3()).abs() < 1e-15);
+    // The same face twice is a duplicate.
+    let (_, report) =
+        import_bytes("twice.obj", fin.replace("f 2 1 5", "f 2 5 1").as_bytes()).unwrap();
+    assert_eq!((report.duplicates_removed.count, report.is_closed()), (1, false));
+    // The reverse of a face of the surface is one too.
+    let doubled = TETRA_OBJ.to_owned() + "f 4 3 2\n";
+    let (_, report) = import_bytes("doubled.obj", doubled.as_bytes()).unwrap();
+    assert_eq!((report.duplicates_removed.count, report.is_closed()), (1, true), "{report}");
+    let sheet = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 3 2 4\nf 2 1 3\nf 2 3 4\n";
+    let (_, report) = import_bytes("sheet.obj", sheet.as_bytes()).unwrap();
+    assert_eq!((report.triangles, report.duplicates_removed.count), (2, 2));
+    assert_eq!((report.border_edges.count, report.is_closed()), (4, false));
+}
+
 #[test]
 fn size_hints_at_the_unit() {
     let (_folder, path) = write("mesh.obj", TETRA_OBJ.as_bytes());

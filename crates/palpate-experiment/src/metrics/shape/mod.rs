@@ -153,6 +153,11 @@ impl TrueShape {
         Self { is_reachable, ..self }
     }
 
+    /// Whether the surface encloses a volume.
+    pub fn is_closed(&self) -> bool {
+        self.volume_m3.is_some()
+    }
+
     /// Share of the area that the finger can touch, if computed.
     pub fn reachable_share(&self) -> Option<f64> {
         let is_reachable = self.is_reachable.as_ref()?;

@@ -30,7 +30,7 @@ pub use crate::task::approach::BEYOND_M;
 pub use home::find_home;
 pub use reach::ArmReach;
 pub(super) use reach::{standoff, turning_point};
-pub use zone_reach::check_reach;
+pub use zone_reach::{check_directions, check_reach};
 
 /// Distance beyond the stand-off up to which a finger moves there directly; a heuristic: smaller
 /// than the height of any object.

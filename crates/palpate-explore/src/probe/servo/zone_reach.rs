@@ -14,27 +14,37 @@ use std::f64::consts::TAU;
 /// Number of places checked along each side of the zone; a heuristic.
 const TRIED_PER_SIDE: usize = 5;
 
+/// Checks that the finger reaches the centre of a whole object's ball from at least one direction;
+/// there is nothing to check in a zone.
+///
+/// # Errors
+/// If it does not; the error names the lowest z that the finger may have.
+pub fn check_directions(task: &Task) -> Result<(), InputError> {
+    let Some(ball) = task.ball().filter(|_| task.unreached(DIRECTIONS).len() == DIRECTIONS) else {
+        return Ok(());
+    };
+    let [_, _, z_m]: [f64; 3] = ball.centre_w.into();
+    let table = match ball.lowest_m {
+        Some(lowest_m) => {
+            format!(": its middle is at z = {z_m:.3} m, and the finger stays above {lowest_m:.3} m")
+        }
+        None => String::new(),
+    };
+    let problem =
+        format!("the finger cannot reach the object from any of {DIRECTIONS} directions{table}");
+    Err(InputError::new(problem).remedy(
+        "move it closer or higher (object.position_m), move arm.base_position_m, or decrease \
+         whole_object.radius_m or whole_object.lowest_m",
+    ))
+}
+
 /// Checks that `robot` reaches the whole zone of the task: in front of each place of a grid, and
-/// at the turning point behind the farthest depth. For a whole object, checks that it reaches the
-/// centre from at least one direction.
+/// at the turning point behind the farthest depth. For a whole object see [`check_directions`].
 ///
 /// # Errors
 /// If it does not; the error names the place with the largest deviation.
 pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), InputError> {
-    let Some(zone) = task.zone() else {
-        let of = DIRECTIONS;
-        let is_any = task.unreached(of).len() < of;
-        return match is_any {
-            true => Ok(()),
-            false => Err(InputError::new(format!(
-                "the finger cannot reach the object from any of {of} directions"
-            ))
-            .remedy(
-                "move it closer (object.position_m), move arm.base_position_m, or decrease \
-                 whole_object.radius_m or whole_object.lowest_m",
-            )),
-        };
-    };
+    let Some(zone) = task.zone() else { return check_directions(task) };
     let places = zone.grid(TRIED_PER_SIDE);
     let of = places.len();
     let missed: Vec<_> =
