@@ -360,7 +360,7 @@ class Exploration:
     robot, which continues from its current state.
 
     Args:
-        settings: settings of the belief, as in an experiment: `gp={"kernel": "rq"}` or `gp__kernel="rq"`.
+        settings: settings of the belief, as in an experiment: `gp={"kernel": "matern_32"}` or `gp__kernel="matern_32"`.
     """
 
     def __new__(cls, scene: Scene, **settings: Any) -> Exploration: ...

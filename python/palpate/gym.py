@@ -221,7 +221,7 @@ class TouchEnv(gymnasium.Env[_Observation, _Action]):
         render_mode: "rgb_array" returns a picture of the belief from `render()`, shape (height, width, 3); "human"
             shows it in a window after each touch. Both need matplotlib.
         randomise: intervals of the scene's settings from which each episode draws values, by their dotted keys.
-        settings: any setting of a scene, and of the belief, as in an experiment: `gp={"kernel": "rq"}`.
+        settings: any setting of a scene, and of the belief, as in an experiment: `gp={"kernel": "matern_32"}`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 4}

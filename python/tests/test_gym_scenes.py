@@ -12,7 +12,7 @@ ID = "Palpate/Touch-v0"
 
 # Touched exactly and at once.
 STROKES = {"scene": "bird", "touch": {"stroke": {"longest_m": 0.03}}}
-STROKES_AROUND = {**STROKES, "scene": "bird_around"}
+STROKES_AROUND = {**STROKES, "scene": "bird_around", "touches": 3, "initial_touches": 1, "grid": 3}
 
 
 def make(**settings):
@@ -27,13 +27,12 @@ def make(**settings):
         STROKES_AROUND,
         {"scene": "container_strokes"},
         {"scene": "container_camera"},
-        {"scene": "container_around_camera", "views": 1},
+        {"scene": "container_around_camera", "views": 1, "touches": 2, "initial_touches": 0, "grid": 3},
         {"scene": "toy", "actions": 5},
         {"scene": "bird", "actions": 3},
         {**STROKES, "actions": 3},
-        {"scene": "bird_around", "actions": 20},
         {**STROKES_AROUND, "actions": 20},
-        {"scene": "bird", "gp": {"kernel": "rq"}},
+        {"scene": "bird", "gp": {"kernel": "matern_32"}},
         {"scene": "digits", "touches": 3},
         {"scene": "bird", "randomise": {"finger.radius_m": (0.004, 0.008)}},
     ],
@@ -57,19 +56,20 @@ def test_an_action_over_a_zone_is_a_stroke_by_its_way():
     row = seen["touches"][2]
     assert row[:4] == pytest.approx(action, abs=1e-6) and row[7] == 1.0
     # The same stroke by hand.
-    exploration = palpate.Exploration(palpate.Scene.load("bird", touch=STROKES["touch"]))
-    zone = exploration.belief.zone
+    scene = palpate.Scene.load("bird", touch=STROKES["touch"])
+    exploration = palpate.Exploration(scene)
+    zone = scene.zone
     middle, half = (zone.lower + zone.upper) / 2, (zone.upper - zone.lower) / 2
     place = middle + half * action[:2].astype(float)
     end = place + 0.03 * action[2:].astype(float)
-    exploration.touch({"stroke": {"place": place.tolist(), "to": end.tolist()}})
-    places, heights_m = exploration.belief.places, exploration.belief.heights_m
-    assert len(belief(env).places) - before == len(places) > 5
+    touch = exploration.touch({"stroke": {"place": place.tolist(), "to": end.tolist()}})
+    assert len(belief(env).places) - before == len(exploration.belief.places) > 2
     unit_m = half.max()
-    first = [*((places[0] - middle) / half), heights_m[0] / unit_m]
-    last = [*((places[-1] - middle) / half), heights_m[-1] / unit_m]
-    assert row[4:7] == pytest.approx(first, abs=1e-5)
-    assert row[8:] == pytest.approx(last, abs=1e-5)
+    assert row[4:7] == pytest.approx([*((touch.place - middle) / half), touch.height_m / unit_m], abs=1e-5)
+    # It ends on the surface, at most a radius beside the place.
+    last = middle + half * row[8:10]
+    assert row[10] * unit_m == pytest.approx(scene.true_height(last), abs=2e-5)
+    assert np.linalg.norm(last - end) < 0.005 < np.linalg.norm(place - end)
 
 
 def test_strokes_end_at_the_border_and_zeros_are_taps():
@@ -87,7 +87,7 @@ def test_strokes_end_at_the_border_and_zeros_are_taps():
 
 
 def test_strokes_around_an_object_go_across_the_approach():
-    env = make(**STROKES_AROUND, touches=6)
+    env = make(**{**STROKES_AROUND, "touches": 6})
     env.reset(seed=1)
     assert env.action_space.shape == (9,)
     lengths = []
