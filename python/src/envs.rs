@@ -63,8 +63,11 @@ impl ParallelExplorations {
             }
         };
         let drawn: Arc<[DrawnSetting]> = drawn.into();
-        let scenes =
-            scenes.iter().map(|it| EpisodeScene::load(py, it.get(), &drawn, &belief, grid));
+        let has_belief = grid > 0 || reward != Reward::None;
+        let load = |scene: &Py<Scene>| {
+            EpisodeScene::load(py, scene.get(), &drawn, &belief, grid, has_belief)
+        };
+        let scenes = scenes.iter().map(load);
         let scenes: Vec<EpisodeScene> = scenes.collect::<PyResult<Vec<_>>>()?;
         let worlds = || scenes.iter().map(EpisodeScene::given);
         let sizes = |world: &ExplorationScene| (world.space().action_size(), world.axes());

@@ -82,11 +82,12 @@ pub(crate) struct EpisodeScene {
     drawn: Arc<[DrawnSetting]>,
     belief: BeliefSettings,
     grid: usize,
+    has_truth: bool,
 }
 
 impl EpisodeScene {
-    /// Prepares a scene; `belief` are `--set` assignments of the table `[gp]`, `grid` is the number
-    /// of points along each side.
+    /// Prepares a scene; `belief` are `--set` assignments of the table `[gp]`, `grid` and `has_truth`
+    /// as in [`ExplorationScene::new`].
     ///
     /// # Errors
     /// `ConfigError`, `SimulationError`, `ValueError`, also for the ends of the drawn settings.
@@ -96,6 +97,7 @@ impl EpisodeScene {
         drawn: &Arc<[DrawnSetting]>,
         belief: &[String],
         grid: usize,
+        has_truth: bool,
     ) -> PyResult<Self> {
         drawn.iter().try_for_each(DrawnSetting::check)?;
         let mut settings = scene.settings().clone();
@@ -110,9 +112,9 @@ impl EpisodeScene {
                 library.complete(&mut settings);
                 library.check_poses(&settings).map_err(errors::scene)?;
             }
-            let given = Arc::new(ExplorationScene::new(simulator, belief.clone(), grid));
+            let given = Arc::new(ExplorationScene::new(simulator, belief.clone(), grid, has_truth));
             let drawn = Arc::clone(drawn);
-            let found = Self { given, settings, mesh, library, drawn, belief, grid };
+            let found = Self { given, settings, mesh, library, drawn, belief, grid, has_truth };
             for end in [0.0, 1.0].into_iter().filter(|_| !found.drawn.is_empty()) {
                 let ends: Vec<_> = found.drawn.iter().map(|setting| setting.at(|| end)).collect();
                 let scene = found.assigned(&ends).map_err(errors::config)?;
@@ -173,6 +175,6 @@ impl EpisodeScene {
         let environment = scene::environment(scene, self.mesh.clone())?;
         let simulator = Simulator::new(Arc::new(environment))?;
         simulator.check_reach()?;
-        Ok(ExplorationScene::new(simulator, self.belief.clone(), self.grid))
+        Ok(ExplorationScene::new(simulator, self.belief.clone(), self.grid, self.has_truth))
     }
 }

@@ -44,9 +44,17 @@ pub(crate) struct ExplorationScene {
 
 impl ExplorationScene {
     /// Creates the scene of episodes in a simulator; `grid` is the number of points along each
-    /// side.
-    pub(crate) fn new(simulator: Simulator, belief: BeliefSettings, grid: usize) -> Self {
-        let truth = GroundTruth::of(simulator.environment(), TRUTH_PER_SIDE);
+    /// side. Without `has_truth` no belief is compared with the ground truth.
+    pub(crate) fn new(
+        simulator: Simulator,
+        belief: BeliefSettings,
+        grid: usize,
+        has_truth: bool,
+    ) -> Self {
+        let truth = match has_truth {
+            true => GroundTruth::of(simulator.environment(), TRUTH_PER_SIDE),
+            false => GroundTruth::Around(None),
+        };
         let space = action_space::of(simulator.environment().task());
         let grid = if grid == 0 { Vec::new() } else { space.grid(grid) };
         Self { simulator, truth, space, grid, belief, library: None }

@@ -166,7 +166,8 @@ def test_frames_have_points_and_tips(strokes, tmp_path):
     has_point = np.arange(most) < touches["points"].to_numpy()[:, None]
     assert np.allclose(found[has_point], points[["x_m", "y_m", "z_m"]]) and (found[~has_point] == 0).all()
     assert np.allclose(np.stack(table["next.tip"])[:, 1], touches["tip_y_m"], atol=1e-6)
-    assert np.allclose(np.stack(table["next.normal"]), touches[["normal_x", "normal_y", "normal_z"]].fillna(0), atol=1e-6)
+    normals = touches[["normal_x", "normal_y", "normal_z"]].fillna(0)
+    assert np.allclose(np.stack(table["next.normal"]), normals, atol=1e-6)
 
 
 def test_strokes_around_an_object_have_ways():

@@ -34,7 +34,12 @@ def test_the_first_example_prints_a_table(page, tmp_path):
 
 
 #: Pages with examples in Python, and the module that a page calls them.
-PAGES = {"docs/many-runs.md": "many_runs", "docs/python.md": "guide", "docs/your-planner.md": "my_planner", "python/README.md": "readme"}
+PAGES = {
+    "docs/many-runs.md": "many_runs",
+    "docs/python.md": "guide",
+    "docs/your-planner.md": "my_planner",
+    "python/README.md": "readme",
+}
 
 #: Imports that a page may leave out.
 IMPORTS = "import concurrent.futures\nimport palpate\nimport submitit\n"

@@ -235,7 +235,8 @@ RANDOM = {
 def test_random_settings_depend_on_the_seed_only():
     found = []
     for threads in (1, 2):
-        envs = palpate.gym.TouchVectorEnv(3, "bird", touches=3, initial_touches=2, grid=4, threads=threads, randomise=RANDOM)
+        settings = {"touches": 3, "initial_touches": 2, "grid": 4, "threads": threads, "randomise": RANDOM}
+        envs = palpate.gym.TouchVectorEnv(3, "bird", **settings)
         _, info = envs.reset(seed=[7, 8, 7])
         found.append([info["randomised"]])
         for _ in range(2):
