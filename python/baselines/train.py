@@ -24,25 +24,25 @@ SEED, ENVS, INITIAL, TOUCHES, STEPS = 1, 64, 3, 30, 800_000
 
 
 class Explorations(VecEnv):
-    """Palpate's environments for Stable-Baselines3; actions are indices of places."""
+    """Palpate's environments for Stable-Baselines3."""
 
     def __init__(self):
         self.envs = gymnasium.make_vec(
             "Palpate/Touch-v0", num_envs=ENVS, scene="toy", touches=TOUCHES, initial_touches=INITIAL,
-            grid=PLACES, reward="error", threads=1,
+            actions=PLACES, grid=PLACES, reward="error", threads=1,
         )
         seen = spaces.Box(-np.inf, np.inf, (2, PLACES), np.float32)
-        super().__init__(ENVS, seen, spaces.Discrete(PLACES))
+        super().__init__(ENVS, seen, self.envs.single_action_space)
         self.begun, self.log_rmse = time.time(), []
 
     def reset(self):
         return self.seen(self.envs.reset(seed=SEED)[0])
 
     def step_async(self, actions):
-        self.targets = (2.0 * actions / (PLACES - 1) - 1.0).astype(np.float32)[:, None]
+        self.actions = actions
 
     def step_wait(self):
-        seen, reward, over, _, info = self.envs.step(self.targets)
+        seen, reward, over, _, info = self.envs.step(self.actions)
         infos = [{} for _ in range(ENVS)]
         if over.any():
             # All episodes have the same length; the next step restarts them.
@@ -52,7 +52,7 @@ class Explorations(VecEnv):
             print(said + f"log RMSE {self.log_rmse[-1]:.2f}", file=sys.stderr)
             for told, last in zip(infos, self.seen(seen)):
                 told["terminal_observation"] = last
-            seen = self.envs.step(self.targets)[0]
+            seen = self.envs.step(self.actions)[0]
         return self.seen(seen), reward.astype(np.float32), over, infos
 
     def seen(self, told):

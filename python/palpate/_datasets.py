@@ -26,6 +26,9 @@ FRAMES_PER_FILE = 100_000
 #: Files in a folder of a LeRobotDataset, its default.
 FILES_PER_CHUNK = 1000
 
+#: Features of a frame that a touch measures, and the beginning of their columns; absent without any.
+MEASURED = {"next.normal": "normal_", "next.contact_sd": "contact_sd_", "next.tip": "tip_"}
+
 #: Quantiles in the statistics of a LeRobotDataset.
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 
@@ -61,6 +64,7 @@ def to_lerobot(
     settings: str,
     trials: pd.DataFrame,
     touches: pd.DataFrame,
+    points: pd.DataFrame,
 ) -> None:
     """Writes a run of `experiment` as a LeRobotDataset."""
     arrow, parquet = _pyarrow()
@@ -70,7 +74,7 @@ def to_lerobot(
     trials = trials[trials["touches"] > 0].reset_index(drop=True)
     if trials.empty:
         raise PalpateError("no trial of the run has a touch; a dataset needs one")
-    features, data = _frames(trials, touches)
+    features, data = _frames(touches, points)
     tasks = [f"Explore {experiment} by touch: planner {planner}" for planner in planners]
     lengths = trials["touches"].to_numpy()
     ends = np.cumsum(lengths)
@@ -151,8 +155,8 @@ def _array(arrow: Any, values: npt.NDArray[Any], dtype: str) -> Any:
     return flat if len(flat) == len(values) else arrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
 
 
-def _frames(trials: pd.DataFrame, touches: pd.DataFrame) -> tuple[dict[str, Any], _Columns]:
-    """Returns the features of the frames, and their columns in the order of `trials`."""
+def _frames(touches: pd.DataFrame, points: pd.DataFrame) -> tuple[dict[str, Any], _Columns]:
+    """Returns the features of the frames, and their columns in the order of `touches`."""
     contact_names = ["contact_x_m", "contact_y_m", "contact_z_m"]
     target_names = [name for name in touches.columns if name.startswith(("target_", "ahead_"))]
     touched = (touches["outcome"] == "contact").to_numpy()
@@ -175,6 +179,8 @@ def _frames(trials: pd.DataFrame, touches: pd.DataFrame) -> tuple[dict[str, Any]
     action = touches[target_names]
     for end in [name for name in touches.columns if name in ("end_x_m", "end_z_m")]:
         action = action.assign(**{end: touches[end].fillna(touches[end.replace("end", "target")])})
+    for way in [name for name in touches.columns if name.startswith("way_")]:
+        action = action.assign(**{way: touches[way].fillna(0.0)})
     data: _Columns = {
         "observation.state": state,
         "action": action.to_numpy(dtype=np.float32),
@@ -184,11 +190,30 @@ def _frames(trials: pd.DataFrame, touches: pd.DataFrame) -> tuple[dict[str, Any]
     }
     contact = [*contact_names, "is_contact"]
     names = {"observation.state": contact, "action": list(action.columns), "next.contact": contact}
+    for feature, start in MEASURED.items():
+        found = [name for name in touches.columns if name.startswith(start)]
+        if found:
+            data[feature] = np.nan_to_num(touches[found].to_numpy(dtype=np.float32))
+            names[feature] = found
+    if (points["point"] > 0).any():
+        data["next.points"], names["next.points"] = _points(touches, points)
+        data["next.point_count"] = touches["points"].to_numpy()
     features = {
         name: {"dtype": str(values.dtype), "shape": list(values.shape[1:]) or [1], "names": names.get(name)}
         for name, values in data.items()
     }
     return features, data
+
+
+def _points(touches: pd.DataFrame, points: pd.DataFrame) -> tuple[npt.NDArray[np.float32], list[str]]:
+    """Returns the points of each touch, zeros after its last one, and the names of the numbers."""
+    number = points["point"].to_numpy()
+    # Points are in the order of the touches.
+    row = np.repeat(np.arange(len(touches)), touches["points"])
+    found = np.zeros((len(touches), int(number.max()) + 1, 3), np.float32)
+    found[row, number] = points[["x_m", "y_m", "z_m"]].to_numpy()
+    names = [f"point_{i}_{axis}_m" for i in range(found.shape[1]) for axis in "xyz"]
+    return found.reshape(len(touches), -1), names
 
 
 def _statistics(data: _Columns) -> dict[str, dict[str, list[float]]]:

@@ -283,11 +283,11 @@ class Scene:
 
     def __new__(cls, *, seed: int = 0, **settings: Unpack[SceneSettings]) -> Scene: ...
     @staticmethod
-    def load(path: str | os.PathLike[str], *, seed: int = 0, **settings: Any) -> Scene:
-        """Loads a scene's file, or a scene of the package by its name (`"bird"`).
+    def load(path: str | os.PathLike[str] | Scene, *, seed: int = 0, **settings: Any) -> Scene:
+        """Loads a scene's file, or a scene of the package by its name (`"bird"`), or changes settings of a scene.
 
         Args:
-            path: path of the file, or name.
+            path: path of the file, name, or a scene.
             seed: seed of the sensor noise.
             settings: any setting of a scene, as in `finger__radius_m=0.001`.
 
@@ -326,6 +326,7 @@ class Scene:
         mesh: tuple[_Array, npt.NDArray[np.int64]] | None = None,
     ) -> Scene: ...
     def _value(self) -> str: ...
+    def _with(self, sets: Sequence[str], seed: int) -> Scene: ...
     def to_toml(self) -> str:
         """Returns all settings, including defaults, as TOML."""
     @property
@@ -357,9 +358,12 @@ class Exploration:
 
     Each touch updates a belief, which is fitted and can be compared with the ground truth. Touches use the scene's
     robot, which continues from its current state.
+
+    Args:
+        settings: settings of the belief, as in an experiment: `gp={"kernel": "matern_32"}` or `gp__kernel="matern_32"`.
     """
 
-    def __new__(cls, scene: Scene) -> Exploration: ...
+    def __new__(cls, scene: Scene, **settings: Any) -> Exploration: ...
     def touch(self, target: Sequence[float] | _Array | dict[str, Any]) -> Touch:
         """Makes a touch at a target and fits the belief.
 
@@ -426,16 +430,21 @@ class PlannerChannel:
 class ParallelExplorations:
     def __new__(
         cls,
-        scenes: Sequence[tuple[str, Sequence[str]]],
+        scenes: Sequence[Scene],
+        drawn: Sequence[dict[str, Any]],
         count: int,
+        *,
         touches: int,
         initial: int,
+        views: int | None,
         grid: int,
+        belief: Sequence[str],
         reward: str,
         threads: int,
     ) -> ParallelExplorations: ...
     @property
     def sizes(self) -> tuple[int, int, int]: ...
+    def finite_actions(self, count: int) -> npt.NDArray[np.float32]: ...
     @property
     def measures(self) -> list[str]: ...
     def belief(self, index: int) -> Belief: ...
@@ -444,7 +453,7 @@ class ParallelExplorations:
 
 @final
 class RecognitionEpisode:
-    def __new__(cls, path: str, sets: Sequence[str], touches: int) -> RecognitionEpisode: ...
+    def __new__(cls, scene: Scene, touches: int, views: int | None = None) -> RecognitionEpisode: ...
     @property
     def classes(self) -> list[str]: ...
     @property
@@ -557,6 +566,7 @@ class Run:
     def rows(self) -> bytes: ...
     def trials(self) -> dict[str, object]: ...
     def touches(self) -> dict[str, object]: ...
+    def points(self) -> dict[str, object]: ...
     def summary(self) -> dict[str, object]: ...
     def compare(self) -> dict[str, Any]: ...
     def curves(self, measure: str | None = None) -> dict[str, Any]: ...

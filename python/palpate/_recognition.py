@@ -16,8 +16,6 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from . import _palpate
-from ._home import find_file
-from ._settings import assignments
 
 __all__ = ["LocateEnv", "RecogniseEnv"]
 
@@ -29,15 +27,15 @@ class _RecognitionEnv(gymnasium.Env[dict[str, Any], dict[str, Any]]):
 
     def __init__(
         self,
-        scene: str | os.PathLike[str] = "lookalikes",
+        scene: str | os.PathLike[str] | _palpate.Scene = "lookalikes",
         *,
         touches: int = 16,
+        views: int | None = None,
         hypotheses: bool = True,
         render_mode: None = None,
         **settings: Any,
     ) -> None:
-        path = os.fspath(find_file(scene, "scenes"))
-        self._core = _palpate.RecognitionEpisode(path, assignments(settings), touches)
+        self._core = _palpate.RecognitionEpisode(_palpate.Scene.load(scene, **settings), touches, views)
         self._hypotheses = hypotheses
         self.classes = self._core.classes
         action, row = self._core.sizes
@@ -115,8 +113,9 @@ class RecogniseEnv(_RecognitionEnv):
     number of the true class in `classes`.
 
     Args:
-        scene: a scene with a table `[library]`.
+        scene: a scene with a table `[library]`: name, path or `palpate.Scene`.
         touches: touches per episode.
+        views: looks of the scene's camera before the touches; default: one from each of its places.
         hypotheses: whether "hypotheses", Palpate's own probabilities of the classes and of none of these, are observed.
         settings: any setting of the scene.
     """

@@ -104,11 +104,20 @@ class Run:
     def touches(self) -> pd.DataFrame:
         """Returns a row per touch: target, contact, hyperparameters, and every measure after it.
 
-        Where there are any: normals and standard deviations of contacts, ends of strokes, pitches. `points` counts the
-        points of the surface that the touch showed. Columns without a value are left out; `attrs["units"]` has the
-        units.
+        Where there are any: normals and standard deviations of contacts; the centre of the fingertip's hemisphere, up
+        to which the finger moved freely (`tip_x_m`), and its attitude, a unit quaternion (`tip_qx`); ends of strokes
+        over a zone, ways of strokes around an object; pitches. `points` counts the points of the surface that the touch
+        showed. Columns without a value are left out; `attrs["units"]` has the units.
         """
         return _frame(self._core.touches())
+
+    def points(self) -> pd.DataFrame:
+        """Returns a row per point of the surface that a touch showed: position, and normal and deviation if measured.
+
+        Point 0 is the contact; those of a pad's patch or along a stroke follow. Positions are in the world frame;
+        `sd_m` is the standard deviation along the normal.
+        """
+        return _frame(self._core.points())
 
     def summary(self) -> pd.DataFrame:
         """Returns a row per planner and number of touches: the columns of `summary.csv`."""
@@ -174,7 +183,7 @@ class Run:
         return self._core.to_toml()
 
     def to_parquet(self, folder: str | os.PathLike[str]) -> None:
-        """Writes the data frames of `trials` and `touches` to `trials.parquet` and `touches.parquet` in `folder`.
+        """Writes the data frames of `trials`, `touches` and `points` to Parquet files of these names in `folder`.
 
         The files' metadata have the run's settings (`palpate.settings`, TOML) and Palpate's version.
 
@@ -183,14 +192,18 @@ class Run:
         """
         from ._datasets import to_parquet
 
-        to_parquet(folder, self.to_toml(), {"trials": self.trials(), "touches": self.touches()})
+        frames = {"trials": self.trials(), "touches": self.touches(), "points": self.points()}
+        to_parquet(folder, self.to_toml(), frames)
 
     def to_lerobot(self, folder: str | os.PathLike[str]) -> None:
         """Writes a LeRobotDataset v3.0 to a new folder: an episode per trial, a frame per touch.
 
         A frame has the previous contact (`observation.state`), the target (`action`), the decrease of the log error
         (`next.reward`) and the contact (`next.contact`). Positions are in metres; the fourth number of a contact is
-        1, or 0 without contact. `fps` is 1: it counts touches, not seconds. The task of an episode names the planner.
+        1, or 0 without contact. Where there are any, normal (`next.normal`), standard deviation (`next.contact_sd`) and
+        fingertip (`next.tip`) follow as in `touches`, and the points of a patch or a stroke (`next.points`, zeros after
+        `next.point_count` points); missing numbers are 0. `fps` is 1: it counts touches, not seconds. The task of an
+        episode names the planner.
 
         Raises:
             ImportError: if pyarrow is not installed.
@@ -198,7 +211,7 @@ class Run:
         """
         from ._datasets import to_lerobot
 
-        to_lerobot(folder, self.name, self.planners, self.to_toml(), self.trials(), self.touches())
+        to_lerobot(folder, self.name, self.planners, self.to_toml(), self.trials(), self.touches(), self.points())
 
     def rows(self) -> bytes:
         """Returns the trials as JSON lines: the bytes of the program's `trials.jsonl`."""

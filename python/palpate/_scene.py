@@ -15,8 +15,10 @@ from ._settings import assignments
 __all__ = ["read_mesh", "write_mesh"]
 
 
-def load(path: str | os.PathLike[str], seed: int, /, **settings: Any) -> _palpate.Scene:
+def load(path: str | os.PathLike[str] | _palpate.Scene, seed: int, /, **settings: Any) -> _palpate.Scene:
     """Implements `Scene.load`."""
+    if isinstance(path, _palpate.Scene):
+        return path._with(assignments(settings), seed)
     return _palpate.Scene._load(os.fspath(find_file(path, "scenes")), assignments(settings), seed)
 
 

@@ -48,6 +48,23 @@ def assignments(settings: Mapping[str, Any]) -> list[str]:
     return [f"{key.replace('__', '.')}={toml(value)}" for key, value in settings.items()]
 
 
+def is_of_belief(key: str) -> bool:
+    """Whether a setting is of the belief: `gp` or a key of this table."""
+    return key.replace("__", ".").split(".")[0] == "gp"
+
+
+def belief_assignments(settings: Mapping[str, Any]) -> list[str]:
+    """Returns `assignments` of settings of the belief.
+
+    Raises:
+        TypeError: if one is of something else, or TOML has no such value.
+    """
+    others = [key for key in settings if not is_of_belief(key)]
+    if others:
+        raise TypeError(f"{others[0]}: allowed are the settings of the belief, gp or gp__KEY")
+    return assignments(settings)
+
+
 def toml(value: Any) -> str:
     """Returns a value as TOML."""
     if hasattr(value, "tolist"):  # numpy

@@ -9,8 +9,10 @@ use palpate::experiment::statistics::curve_table::{columns, curve_table, uncerta
 use palpate::experiment::statistics::equal_error::{EqualError, IntervalEstimate};
 use palpate::experiment::statistics::summary::{self, CurvePoint};
 use palpate::experiment::store::Run;
+use palpate::explore::evidence::Contact;
 use palpate::explore::planner::Fallback;
 use palpate::report::findings;
+use palpate::task::Target;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -95,18 +97,29 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
         };
         some_numbers(&table, name, touches().map(measured))?;
     }
-    let sd_m = |touch: &TouchRow| {
-        let contact = touch.outcome.contact()?;
-        let variance = contact.normal_w.dot(&(contact.covariance_w? * contact.normal_w));
-        Some(variance.max(0.0).sqrt())
-    };
-    some_numbers(&table, "contact_sd_m", touches().map(sd_m))?;
+    let contact_sd_m = |touch: &TouchRow| sd_m(touch.outcome.contact()?);
+    some_numbers(&table, "contact_sd_m", touches().map(contact_sd_m))?;
+    for (axis, name) in ["tip_x_m", "tip_y_m", "tip_z_m"].iter().enumerate() {
+        let tip_m = |touch: &TouchRow| Some(touch.outcome.free()?.p_wt[axis]);
+        some_numbers(&table, name, touches().map(tip_m))?;
+    }
+    for (axis, name) in ["tip_qx", "tip_qy", "tip_qz", "tip_qw"].iter().enumerate() {
+        let part = |touch: &TouchRow| Some(touch.outcome.free()?.r_wt.coords[axis]);
+        some_numbers(&table, name, touches().map(part))?;
+    }
     for (axis, name) in ["end_x_m", "end_z_m"].iter().enumerate() {
         let end = |touch: &TouchRow| {
             let target = Some(&touch.target).filter(|target| target.slide_m() > 0.0)?;
             target.end()?.get(axis).copied()
         };
         some_numbers(&table, name, touches().map(end))?;
+    }
+    for (axis, name) in ["way_x_m", "way_y_m", "way_z_m"].iter().enumerate() {
+        let way_m = |touch: &TouchRow| match &touch.target {
+            Target::StrokeAround { way_w, .. } => Some(way_w[axis]),
+            _ => None,
+        };
+        some_numbers(&table, name, touches().map(way_m))?;
     }
     some_numbers(&table, "pitch_deg", touches().map(|touch| touch.target.pitch_deg()))?;
     counts(&table, "points", touches().map(|touch| touch.outcome.points().len()))?;
@@ -122,6 +135,39 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
         some_numbers(&table, measure.id, values)?;
     }
     Ok(table)
+}
+
+/// Returns the columns of a table with a row per point of the surface that a touch showed: the
+/// contact, then the points of a pad's patch or along a stroke.
+pub(crate) fn points<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
+    let table = PyDict::new(py);
+    let mut all: Vec<(&TrialRow, usize, usize, &Contact)> = Vec::new();
+    for row in &run.rows {
+        for (touch, count) in row.touches.iter().zip(1..) {
+            let points = touch.outcome.points().iter().enumerate();
+            all.extend(points.map(|(number, point)| (row, count, number, point)));
+        }
+    }
+    let points = || all.iter().map(|(.., point)| *point);
+    counts(&table, "trial", all.iter().map(|(row, ..)| row.trial as usize))?;
+    words(&table, "planner", all.iter().map(|(row, ..)| Some(row.planner.as_str())))?;
+    counts(&table, "touch", all.iter().map(|(_, count, ..)| *count))?;
+    counts(&table, "point", all.iter().map(|(_, _, number, _)| *number))?;
+    for (axis, name) in ["x_m", "y_m", "z_m"].iter().enumerate() {
+        numbers(&table, name, points().map(|point| Some(point.p_wc[axis])))?;
+    }
+    for (axis, name) in ["normal_x", "normal_y", "normal_z"].iter().enumerate() {
+        let normal = |point: &Contact| point.has_normal.then(|| point.normal_w[axis]);
+        some_numbers(&table, name, points().map(normal))?;
+    }
+    some_numbers(&table, "sd_m", points().map(sd_m))?;
+    Ok(table)
+}
+
+/// Returns the standard deviation of a contact along its normal, m.
+fn sd_m(contact: &Contact) -> Option<f64> {
+    let variance = contact.normal_w.dot(&(contact.covariance_w? * contact.normal_w));
+    Some(variance.max(0.0).sqrt())
 }
 
 /// Returns a record per planner and number of touches, with the table of `summary.csv`.

@@ -1,9 +1,8 @@
 //! One exploration: an episode of touches with observations and rewards.
 
 use crate::action_space::{self, ActionSpace};
-use crate::errors;
-use crate::fork;
-use crate::known::{self, BeliefErrors, GroundTruth};
+use crate::episode_scene::EpisodeScene;
+use crate::known::{BeliefErrors, BeliefSettings, GroundTruth};
 use palpate::backend::Fault;
 use palpate::experiment::trial;
 use palpate::explore::belief::Belief;
@@ -12,13 +11,11 @@ use palpate::explore::evidence::Contact;
 use palpate::explore::planner::sample::random_target;
 use palpate::explore::recognition::Library;
 use palpate::math::seed;
+use palpate::sim::camera_probe::CameraProbe;
 use palpate::sim::simulator::Simulator;
-use palpate::sim::{Environment, Scene};
-use palpate::task::{Target, Task};
-use pyo3::prelude::*;
+use palpate::task::{Action, Target, Task};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use std::path::Path;
 use std::sync::Arc;
 
 /// Names of the measures of the belief, over a zone and around an object.
@@ -40,49 +37,51 @@ pub(crate) struct ExplorationScene {
     space: Box<dyn ActionSpace>,
     /// Points on which the belief is observed.
     grid: Vec<Vec<f64>>,
+    belief: BeliefSettings,
     /// Objects of the hypotheses.
     library: Option<Arc<Library>>,
 }
 
 impl ExplorationScene {
-    /// Loads a scene's file; `grid` is the number of points along each side.
-    ///
-    /// # Errors
-    /// `ConfigError`, `SimulationError`.
-    pub(crate) fn load(
-        py: Python<'_>,
-        path: &Path,
-        sets: &[String],
+    /// Creates the scene of episodes in a simulator; `grid` is the number of points along each
+    /// side. Without `has_truth` no belief is compared with the ground truth.
+    pub(crate) fn new(
+        simulator: Simulator,
+        belief: BeliefSettings,
         grid: usize,
-    ) -> PyResult<Arc<Self>> {
-        let scene = Scene::load(path, sets).map_err(errors::config)?;
-        fork::detach(py, || {
-            let environment = Arc::new(Environment::build(scene).map_err(errors::scene)?);
-            let truth = GroundTruth::of(&environment, TRUTH_PER_SIDE);
-            let space = action_space::of(environment.task().region());
-            let grid = if grid == 0 { Vec::new() } else { space.grid(grid) };
-            let simulator = Simulator::new(environment).map_err(errors::scene)?;
-            simulator.check_reach().map_err(errors::scene)?;
-            Ok(Arc::new(Self { simulator, truth, space, grid, library: None }))
-        })?
+        has_truth: bool,
+    ) -> Self {
+        let truth = match has_truth {
+            true => GroundTruth::of(simulator.environment(), TRUTH_PER_SIDE),
+            false => GroundTruth::Around(None),
+        };
+        let space = action_space::of(simulator.environment().task());
+        let grid = if grid == 0 { Vec::new() } else { space.grid(grid) };
+        Self { simulator, truth, space, grid, belief, library: None }
     }
 
     /// Creates the scene of an episode of recognition, without a ground truth of the surface.
     pub(crate) fn of_library(simulator: Simulator, library: Arc<Library>) -> Arc<Self> {
-        let space = action_space::of(simulator.environment().task().region());
-        let (truth, grid) = (GroundTruth::Around(None), Vec::new());
-        Arc::new(Self { simulator, truth, space, grid, library: Some(library) })
+        let space = action_space::of(simulator.environment().task());
+        let (truth, grid, belief) = (GroundTruth::Around(None), Vec::new(), Default::default());
+        Arc::new(Self { simulator, truth, space, grid, belief, library: Some(library) })
     }
 
     /// Returns a belief without touches.
     fn empty_belief(&self, random: &mut ChaCha8Rng) -> Belief {
         let environment = self.simulator.environment();
-        let known = known::empty_belief(environment);
+        let known = self.belief.empty_belief(environment);
         let library = self.library.as_ref();
         let hypotheses = library.map(|library| {
             trial::hypotheses(environment, Arc::clone(library), Default::default(), random)
         });
         known.with_hypotheses(hypotheses)
+    }
+
+    /// Number of places of the scene's camera; 0 without one.
+    pub(crate) fn cameras(&self) -> u32 {
+        let camera = &self.simulator.environment().scene().camera;
+        camera.as_ref().map_or(0, |camera| 1 + camera.further.len() as u32)
     }
 
     pub(crate) fn task(&self) -> &Task {
@@ -92,11 +91,6 @@ impl ExplorationScene {
     /// Number of axes of the grid.
     pub(crate) fn axes(&self) -> usize {
         self.task().region().dimension()
-    }
-
-    /// Number of values of an action.
-    pub(crate) fn action(&self) -> usize {
-        self.task().region().tap_dimension()
     }
 
     /// Actions and observations of the region.
@@ -110,9 +104,9 @@ impl ExplorationScene {
         self.space.target(&clamped)
     }
 
-    /// Row of a touch: its target, contact and 1, or zeros without contact.
-    fn touch_row(&self, target: &Target, contact: Option<&Contact>) -> Vec<f64> {
-        let mut row = self.space.row(target, contact);
+    /// Row of a touch, with zeros without contact.
+    fn touch_row(&self, target: &Target, points: &[Contact]) -> Vec<f64> {
+        let mut row = self.space.row(target, points);
         row.resize(self.space.row_size(), 0.0);
         row
     }
@@ -125,6 +119,8 @@ pub(crate) struct EpisodeOptions {
     pub(crate) touches: usize,
     /// Initial random touches.
     pub(crate) initial: usize,
+    /// Looks of the camera before them; `None` for one from each of its places.
+    pub(crate) views: Option<u32>,
     /// Reward of a touch.
     pub(crate) reward: Reward,
     /// Whether the belief is observed.
@@ -163,6 +159,8 @@ pub(crate) struct ExplorationEnv {
     pub(crate) is_over: bool,
     /// Reason of an early end.
     pub(crate) failure: Option<String>,
+    /// Numbers of the settings that were drawn for the episode.
+    pub(crate) drawn: Vec<f64>,
 }
 
 impl ExplorationEnv {
@@ -185,6 +183,7 @@ impl ExplorationEnv {
             reward: 0.0,
             is_over: true,
             failure: None,
+            drawn: Vec::new(),
         })
     }
 
@@ -203,24 +202,50 @@ impl ExplorationEnv {
         self.random = seed::stream(seed, 0, "exploration");
     }
 
-    /// Starts an episode on one of `worlds` with its initial touches.
-    pub(crate) fn begin(&mut self, worlds: &[Arc<ExplorationScene>]) {
-        let world = &worlds[self.random.random_range(0..worlds.len())];
-        let probe = world.simulator.probe(self.random.random());
+    /// Starts an episode on one of `scenes`.
+    pub(crate) fn begin_on(&mut self, scenes: &[EpisodeScene]) {
+        let scene = &scenes[self.random.random_range(0..scenes.len())];
+        match scene.draw(&mut self.random) {
+            Ok((world, drawn)) => {
+                self.drawn = drawn;
+                self.begin(&world);
+            }
+            Err(reason) => {
+                self.drawn.clear();
+                self.clear();
+                self.conclude(Err(reason));
+            }
+        }
+    }
+
+    /// Starts an episode on `world` with its looks and initial touches.
+    pub(crate) fn begin(&mut self, world: &Arc<ExplorationScene>) {
         self.world = Arc::clone(world);
+        self.clear();
+        let seed = self.random.random();
         let belief = world.empty_belief(&mut self.random);
-        self.observations = vec![0.0; self.how.touches * world.space().row_size()];
-        self.believed = vec![0.0; 2 * world.grid.len()];
-        (self.count, self.is_over, self.failure) = (0, false, None);
-        let made = probe.and_then(|probe| {
-            self.episode = Episode::new(self.world.task(), belief, probe);
+        let probe = world.simulator.probe(seed);
+        let started = probe.and_then(|probe| {
+            let camera = CameraProbe::new(probe, world.simulator.environment(), [seed, 0]);
+            self.episode = Episode::new(self.world.task(), belief, camera);
+            let views = self.how.views.unwrap_or(world.cameras());
+            (0..views).try_for_each(|camera| {
+                self.episode.execute(&Target::Look { camera }, &Action::Look { camera }).map(|_| ())
+            })?;
             (0..self.how.initial).try_for_each(|_| {
                 let target = self.anywhere();
                 self.touch_at(&target)
             })
         });
-        self.conclude(made);
-        self.reward = 0.0;
+        self.conclude(started.map_err(|fault| fault.to_string()));
+    }
+
+    /// Clears the observations.
+    fn clear(&mut self) {
+        self.observations = vec![0.0; self.how.touches * self.world.space().row_size()];
+        self.believed = vec![0.0; 2 * self.world.grid.len()];
+        self.measures = [f64::NAN; 3];
+        (self.count, self.reward) = (0, 0.0);
     }
 
     /// Makes a touch at an action.
@@ -228,7 +253,7 @@ impl ExplorationEnv {
         let target = self.world.target(action);
         let before = self.score;
         let made = self.touch_at(&target);
-        self.conclude(made);
+        self.conclude(made.map_err(|fault| fault.to_string()));
         self.reward = if self.failure.is_none() { before - self.score } else { 0.0 };
     }
 
@@ -243,11 +268,11 @@ impl ExplorationEnv {
 
     /// Makes a touch; an unreachable aim counts as a touch without contact.
     fn touch_at(&mut self, target: &Target) -> Result<(), Fault> {
-        let mut met = None;
+        let mut points = Vec::new();
         if let Ok(action) = self.episode.action(target) {
-            met = self.episode.execute(target, &action)?.contact().cloned();
+            points = self.episode.execute(target, &action)?.points().to_vec();
         }
-        let numbers = self.world.touch_row(target, met.as_ref());
+        let numbers = self.world.touch_row(target, &points);
         let row = self.observations[self.count * numbers.len()..].iter_mut();
         row.zip(numbers).for_each(|(to, from)| *to = from as f32);
         self.count += 1;
@@ -256,8 +281,8 @@ impl ExplorationEnv {
 
     /// Fits the belief and computes its observation and score; ends the episode after the last
     /// touch or a failure.
-    fn conclude(&mut self, made: Result<(), Fault>) {
-        let fitted = made.map_err(|fault| fault.to_string()).and_then(|()| self.fit());
+    fn conclude(&mut self, made: Result<(), String>) {
+        let fitted = made.and_then(|()| self.fit());
         self.failure = fitted.err();
         self.is_over = self.failure.is_some() || self.count == self.how.touches;
     }

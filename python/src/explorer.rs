@@ -1,7 +1,7 @@
 //! Interactive exploration: touch by touch, with the belief after each.
 
 use crate::belief::Belief;
-use crate::known::{self, BeliefErrors, GroundTruth};
+use crate::known::{BeliefErrors, BeliefSettings, GroundTruth};
 use crate::scene::{Scene, Touch};
 use crate::target::TargetInput;
 use crate::{errors, exploration, fork};
@@ -34,8 +34,19 @@ const CELLS: u32 = 64;
 
 #[pymethods]
 impl Exploration {
+    /// Creates an exploration; `settings` are those of the belief, as in gp={"kernel": "matern_32"}.
     #[new]
-    fn new(py: Python<'_>, scene: Py<Scene>) -> PyResult<Self> {
+    #[pyo3(signature = (scene, **settings))]
+    fn new(
+        py: Python<'_>,
+        scene: Py<Scene>,
+        settings: Option<Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let settings = settings.unwrap_or_else(|| PyDict::new(py));
+        let module = py.import("palpate._settings")?;
+        let sets: Vec<String> =
+            module.call_method1("belief_assignments", (settings,))?.extract()?;
+        let belief = BeliefSettings::read(scene.get().settings(), &sets).map_err(errors::config)?;
         let environment = scene.get().environment();
         let seed = scene.get().seed();
         let (known, truth) = fork::detach(py, || {
@@ -44,7 +55,7 @@ impl Exploration {
                 let random = &mut stream(seed, 0, "hypotheses");
                 trial::hypotheses(environment, library.known, Default::default(), random)
             });
-            let known = known::empty_belief(environment).with_hypotheses(hypotheses);
+            let known = belief.empty_belief(environment).with_hypotheses(hypotheses);
             Ok::<_, InputError>((known, GroundTruth::of(environment, exploration::TRUTH_PER_SIDE)))
         })?
         .map_err(errors::scene)?;

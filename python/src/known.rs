@@ -1,19 +1,48 @@
 //! Beliefs over a zone or around an object, and their ground truth.
 
+use crate::errors;
+use palpate::config::{ConfigError, Loader};
+use palpate::experiment::Experiment;
 use palpate::experiment::metrics::Metrics;
 use palpate::experiment::metrics::shape::{ShapeMetrics, TrueShape};
 use palpate::experiment::metrics::truth::Truth;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::whole_object::SpatialGpSettings;
-use palpate::sim::Environment;
+use palpate::sim::{Environment, Scene};
 
 pub(crate) use palpate::explore::belief::Belief as Known;
 
-/// Returns an empty belief for `environment` with default settings.
-pub(crate) fn empty_belief(environment: &Environment) -> Known {
-    let scene = environment.scene();
-    let surface = scene.effects.surface();
-    Known::new(environment.task(), &surface, &GpSettings::default(), &SpatialGpSettings::default())
+/// Settings of a belief: table `[gp]` of an experiment, over a zone or around an object.
+#[derive(Clone, Default)]
+pub(crate) struct BeliefSettings {
+    zone: GpSettings,
+    around: SpatialGpSettings,
+}
+
+impl BeliefSettings {
+    /// Reads the settings of a belief on `scene` from `--set` assignments of an experiment.
+    ///
+    /// # Errors
+    /// The first invalid setting.
+    pub(crate) fn read(scene: &Scene, sets: &[String]) -> Result<Self, ConfigError> {
+        if sets.is_empty() {
+            return Ok(Self::default());
+        }
+        let scene = scene.to_toml(true);
+        let text = format!(
+            "name = \"scene\"\nplanners = [\"random\"]\ntrials = 1\ninitial_touches = 1\n\
+             touches = 1\nscene = {scene}\n"
+        );
+        let loader = Loader::from_text(errors::SETTINGS.as_ref(), text)?;
+        let Experiment { gp, space, .. } = Experiment::from_loader(loader, sets)?;
+        Ok(Self { zone: gp, around: space })
+    }
+
+    /// Returns a belief without data for `environment`.
+    pub(crate) fn empty_belief(&self, environment: &Environment) -> Known {
+        let surface = environment.scene().effects.surface();
+        Known::new(environment.task(), &surface, &self.zone, &self.around)
+    }
 }
 
 /// Number of values of a target of `known`.

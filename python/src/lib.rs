@@ -9,6 +9,7 @@ mod belief;
 mod columns;
 mod desk;
 mod envs;
+mod episode_scene;
 mod errors;
 mod executor;
 mod experiment;

@@ -1,20 +1,20 @@
 //! Recognition for Python: hypotheses of a belief, and the core of the Gymnasium environments.
 
+use crate::envs;
 use crate::errors;
 use crate::exploration::{EpisodeOptions, ExplorationEnv, ExplorationScene, Reward};
 use crate::fork;
+use crate::scene::Scene;
 use palpate::experiment::metrics::recognition::NONE;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::recognition::ObjectHypotheses;
 use palpate::math::pose::parts;
 use palpate::math::seed;
-use palpate::sim::Scene;
 use palpate::sim::library::TrueObject;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rand::RngExt;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Probability of each class, and of none of these.
@@ -46,21 +46,24 @@ struct State {
 
 #[pymethods]
 impl RecognitionEpisode {
-    /// A scene's file with its `--set` assignments, and the touches of an episode.
+    /// A scene, the touches of an episode, and the looks of the camera before them; `None` for one
+    /// from each of its places.
     #[new]
-    fn new(py: Python<'_>, path: PathBuf, sets: Vec<String>, touches: u32) -> PyResult<Self> {
-        let scene = Scene::load(&path, &sets).map_err(errors::config)?;
+    #[pyo3(signature = (scene, touches, views = None))]
+    fn new(py: Python<'_>, scene: Py<Scene>, touches: u32, views: Option<u32>) -> PyResult<Self> {
+        let scene = scene.get().settings();
         if scene.library.is_none() || scene.object.is_some() {
             let words = "scene: allowed is one with a table [library] and without [object]";
             return Err(PyValueError::new_err(words));
         }
+        envs::check_views(views, scene.camera.is_some())?;
         if touches < 1 {
             return Err(PyValueError::new_err("touches = 0: allowed are 1 or more"));
         }
-        let experiment = Experiment::with_defaults(&scene, &["random"], 1, touches);
+        let experiment = Experiment::with_defaults(scene, &["random"], 1, touches);
         let simulation = fork::detach(py, || Simulation::new(experiment).map_err(errors::scene))??;
         let (reward, touches) = (Reward::None, touches as usize);
-        let how = EpisodeOptions { touches, initial: 0, reward, believes: false };
+        let how = EpisodeOptions { touches, initial: 0, views, reward, believes: false };
         let state = Mutex::new(begin(&simulation, how, 0)?);
         Ok(Self { simulation, how, state })
     }
@@ -75,7 +78,7 @@ impl RecognitionEpisode {
     #[getter]
     fn sizes(&self) -> (usize, usize) {
         let state = self.lock();
-        (state.episode.world().action(), state.episode.world().space().row_size())
+        (state.episode.world().space().action_size(), state.episode.world().space().row_size())
     }
 
     /// Draws an object and a pose.
@@ -151,6 +154,6 @@ fn begin(simulation: &Simulation, how: EpisodeOptions, seed: u64) -> PyResult<St
     let world = ExplorationScene::of_library(drawn.simulator().clone(), Arc::clone(library));
     let mut episode = ExplorationEnv::new(&world, how).map_err(errors::scene)?;
     episode.seed(seed);
-    episode.begin(std::slice::from_ref(&world));
+    episode.begin(&world);
     Ok(State { episode, object: object.clone() })
 }

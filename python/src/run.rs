@@ -104,6 +104,10 @@ impl Run {
         columns::touches(py, &self.0)
     }
 
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        columns::points(py, &self.0)
+    }
+
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         columns::summary(py, &self.0)
     }

@@ -2,6 +2,7 @@
 
 use crate::ball::Ball;
 use crate::errors;
+use crate::fork;
 use crate::mesh::{Arrays, arrays, mesh_of};
 use crate::pickle::{self, Reduced, Version};
 use crate::places::Places;
@@ -10,9 +11,12 @@ use crate::zone::Zone;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use palpate::backend::Fault;
 use palpate::config::Loader;
+use palpate::error::InputError;
 use palpate::explore::evidence::{Contact, Outcome};
 use palpate::explore::probe::Probe;
 use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::geometry::report::MeshReport;
 use palpate::sim;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
@@ -41,6 +45,31 @@ pub(crate) struct Scene {
 /// Vertices (n, 3), metres, and triangles (m, 3).
 type MeshArrays = (Py<PyArray2<f64>>, Py<PyArray2<i64>>);
 
+/// Mesh with the report of its repair.
+pub(crate) type GivenMesh = (Mesh, MeshReport);
+
+fn given_mesh(py: Python<'_>, mesh: Option<&MeshArrays>) -> PyResult<Option<GivenMesh>> {
+    let read = |(vertices, triangles): &MeshArrays| {
+        mesh_of(&vertices.bind(py).readonly(), &triangles.bind(py).readonly())
+    };
+    mesh.map(read).transpose()
+}
+
+/// Builds the environment of a scene, with the mesh, if there is one, in place of its object.
+///
+/// # Errors
+/// If the scene cannot be built.
+pub(crate) fn environment(
+    scene: sim::Scene,
+    mesh: Option<GivenMesh>,
+) -> Result<Environment, InputError> {
+    let Some((mesh, report)) = mesh else { return Environment::build(scene) };
+    let x_wo = scene.object.as_ref().map(|object| object.x_wo()).unwrap_or_default();
+    let shape =
+        ObjectShape::Mesh { bvh: MeshBvh::new(mesh.transformed(&x_wo)), report: report.into() };
+    Environment::with_shape(scene, shape)
+}
+
 /// Settings as TOML, mesh and seed of a scene.
 type SceneState = (Version, String, Option<MeshArrays>, u64);
 
@@ -52,22 +81,11 @@ impl Scene {
         mesh: Option<MeshArrays>,
         seed: u64,
     ) -> PyResult<Self> {
-        let shape = mesh.as_ref().map(|(vertices, triangles)| {
-            mesh_of(&vertices.bind(py).readonly(), &triangles.bind(py).readonly())
-        });
-        let (shape, scene) = (shape.transpose()?, settings.clone());
-        let simulator = py.detach(|| {
-            let environment = match shape {
-                None => Environment::build(scene),
-                Some((mesh, report)) => {
-                    let x_wo = scene.object.as_ref().map(|object| object.x_wo());
-                    let bvh = MeshBvh::new(mesh.transformed(&x_wo.unwrap_or_default()));
-                    let report = report.into();
-                    Environment::with_shape(scene, ObjectShape::Mesh { bvh, report })
-                }
-            };
-            Simulator::new(Arc::new(environment.map_err(errors::scene)?)).map_err(errors::scene)
-        })?;
+        let (given, scene) = (given_mesh(py, mesh.as_ref())?, settings.clone());
+        let simulator = fork::detach(py, || {
+            let environment = environment(scene, given).map_err(errors::scene)?;
+            Simulator::new(Arc::new(environment)).map_err(errors::scene)
+        })??;
         simulator.check_reach().map_err(errors::scene)?;
         Ok(Self { simulator, settings, mesh, probe: Arc::default(), seed })
     }
@@ -80,6 +98,29 @@ impl Scene {
         };
         let read = loader.and_then(|loader| sim::Scene::from_loader(loader, sets));
         read.map_err(errors::config)
+    }
+
+    /// Returns the settings as read.
+    pub(crate) fn settings(&self) -> &sim::Scene {
+        &self.settings
+    }
+
+    /// Returns the simulator.
+    pub(crate) fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    /// Returns the mesh in place of the object's file, if there is one.
+    ///
+    /// # Errors
+    /// As for [`mesh_of`].
+    pub(crate) fn given_mesh(&self, py: Python<'_>) -> PyResult<Option<GivenMesh>> {
+        given_mesh(py, self.mesh.as_ref())
+    }
+
+    fn mesh_arrays(&self, py: Python<'_>) -> Option<MeshArrays> {
+        let (vertices, triangles) = self.mesh.as_ref()?;
+        Some((vertices.clone_ref(py), triangles.clone_ref(py)))
     }
 
     pub(crate) fn environment(&self) -> &Arc<Environment> {
@@ -226,6 +267,13 @@ impl Scene {
         Self::build(py, Self::read(path.as_deref(), &sets)?, mesh, seed)
     }
 
+    /// Returns the scene after assignments of further settings.
+    fn _with(&self, py: Python<'_>, sets: Vec<String>, seed: u64) -> PyResult<Self> {
+        let text = Loader::from_text(errors::SETTINGS.as_ref(), self.settings.to_toml(false));
+        let read = text.and_then(|loader| sim::Scene::from_loader(loader, &sets));
+        Self::build(py, read.map_err(errors::config)?, self.mesh_arrays(py), seed)
+    }
+
     #[staticmethod]
     fn _restore(
         py: Python<'_>,
@@ -241,11 +289,8 @@ impl Scene {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, SceneState>> {
-        let Self { settings, mesh, seed, .. } = slf.get();
-        let clone = |(vertices, triangles): &MeshArrays| {
-            (vertices.clone_ref(slf.py()), triangles.clone_ref(slf.py()))
-        };
-        let mesh = mesh.as_ref().map(clone);
+        let Self { settings, seed, .. } = slf.get();
+        let mesh = slf.get().mesh_arrays(slf.py());
         pickle::reduced(slf, (pickle::version(), settings.to_toml(false), mesh, *seed))
     }
 

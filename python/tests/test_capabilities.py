@@ -63,12 +63,9 @@ def _gym(action: int, **settings: object) -> None:
     assert info["failure"] is None
 
 
-def _only_taps(what: str) -> Callable[[], None]:
-    def check() -> None:
-        _gym(2, scene="container")
-        raise NotImplementedError(f"an action is a tap; {what}")
-
-    return check
+def _gym_tilt() -> None:
+    _gym(2, scene="container")
+    raise NotImplementedError("an action has no pitch: it is the finger's own")
 
 
 DOORS: dict[str, dict[str, Callable[[], None]]] = {
@@ -82,9 +79,9 @@ DOORS: dict[str, dict[str, Callable[[], None]]] = {
     },
     "Python Gym": {
         "tap": lambda: _gym(2, scene="container"),
-        "tilt": _only_taps("its pitch is the finger's own"),
-        "stroke": _only_taps("for strokes use `Exploration`"),
-        "look": _only_taps("for looks use `Exploration`"),
+        "tilt": _gym_tilt,
+        "stroke": lambda: _gym(4, scene="container_strokes"),
+        "look": lambda: _gym(2, scene="container_camera"),
         "gel patch": lambda: _gym(
             2, scene="container", simulator="kinematic", sensor={"depth_patch": {}}, touch={"press_m": 0.0005}
         ),

@@ -19,6 +19,12 @@ def toy():
 
 
 @pytest.fixture(scope="module")
+def strokes():
+    scene = palpate.Scene.load("bird", touch={"stroke": {"longest_m": 0.02}})
+    return palpate.Experiment(scene=scene, touches=7).run(["random_strokes"], trials=2)
+
+
+@pytest.fixture(scope="module")
 def around():
     settings = {"touches": 10, "initial_touches": 6, "gp.evaluate_every": 2}
     return palpate.Experiment.load("around", **settings).run(["random"], trials=1)
@@ -26,7 +32,9 @@ def around():
 
 def test_parquet_files_are_the_data_frames(toy, tmp_path):
     toy.to_parquet(tmp_path / "new")
-    for name, frame in (("trials", toy.trials()), ("touches", toy.touches())):
+    frames = {"trials": toy.trials(), "touches": toy.touches(), "points": toy.points()}
+    assert {file.stem for file in (tmp_path / "new").iterdir()} == set(frames)
+    for name, frame in frames.items():
         file = tmp_path / f"new/{name}.parquet"
         pd.testing.assert_frame_equal(pd.read_parquet(file), frame)
         metadata = pq.read_schema(file).metadata
@@ -117,6 +125,58 @@ def test_whole_objects_and_rare_evaluations(around, tmp_path):
     assert sum(frames["next.reward"].to_pylist()) == pytest.approx(np.log(errors.iloc[0] / errors.iloc[-1]), abs=1e-5)
     around.to_parquet(tmp_path / "tables")
     pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "tables/touches.parquet"), around.touches())
+
+
+def test_points_are_those_of_each_touch(strokes):
+    touches, points = strokes.touches(), strokes.points()
+    key = ["trial", "planner", "touch"]
+    count = points.groupby(key).size().reindex(pd.MultiIndex.from_frame(touches[key]), fill_value=0)
+    assert count.tolist() == touches["points"].tolist() and count.max() > 10
+    first = points[points["point"] == 0].merge(touches, on=key, suffixes=("", "_contact"))
+    for axis in "xyz":
+        assert (first[f"{axis}_m"] == first[f"contact_{axis}_m"]).all()
+        assert (first[f"normal_{axis}"] == first[f"normal_{axis}_contact"]).all()
+    # A stroke is followed to its end, or up to a wall.
+    last = points.groupby(key).last().join(touches.set_index(key)[["end_x_m", "end_z_m"]]).dropna()
+    assert (np.hypot(last["x_m"] - last["end_x_m"], last["z_m"] - last["end_z_m"]) < 0.01).mean() > 0.5
+
+
+def test_the_tip_rests_on_the_contact(strokes):
+    touches = strokes.touches()
+    contact = touches[["contact_x_m", "contact_y_m", "contact_z_m"]].to_numpy()
+    away_m = np.linalg.norm(touches[["tip_x_m", "tip_y_m", "tip_z_m"]].to_numpy() - contact, axis=1)
+    away_m = away_m[(touches["outcome"] == "contact").to_numpy()]
+    radius_m = float(strokes.to_toml().split("[scene.finger]")[1].split("radius_m = ")[1].split()[0])
+    # A contact beside the hemisphere is farther from its centre.
+    assert (away_m > radius_m - 1e-9).all() and (away_m < radius_m + 1e-9).mean() > 0.5
+    turn = touches[["tip_qx", "tip_qy", "tip_qz", "tip_qw"]].to_numpy()
+    assert np.allclose(np.linalg.norm(turn, axis=1), 1.0)
+
+
+def test_frames_have_points_and_tips(strokes, tmp_path):
+    strokes.to_lerobot(tmp_path / "set")
+    info, frames, _ = read(tmp_path / "set")
+    touches, points = strokes.touches(), strokes.points()
+    most = int(touches["points"].max())
+    assert info["features"]["next.points"]["shape"] == [3 * most]
+    assert info["features"]["next.tip"]["names"][0] == "tip_x_m"
+    table = frames.to_pandas()
+    assert table["next.point_count"].tolist() == touches["points"].tolist()
+    found = np.stack(table["next.points"]).reshape(-1, most, 3)
+    has_point = np.arange(most) < touches["points"].to_numpy()[:, None]
+    assert np.allclose(found[has_point], points[["x_m", "y_m", "z_m"]]) and (found[~has_point] == 0).all()
+    assert np.allclose(np.stack(table["next.tip"])[:, 1], touches["tip_y_m"], atol=1e-6)
+    normals = touches[["normal_x", "normal_y", "normal_z"]].fillna(0)
+    assert np.allclose(np.stack(table["next.normal"]), normals, atol=1e-6)
+
+
+def test_strokes_around_an_object_have_ways():
+    scene = palpate.Scene.load("bird_around", touch={"stroke": {"longest_m": 0.02}})
+    settings = {"touches": 10, "initial_touches": 6}
+    touches = palpate.Experiment(scene=scene, **settings).run(["random_strokes"], trials=1).touches()
+    way = touches[["way_x_m", "way_y_m", "way_z_m"]].dropna().to_numpy()
+    ahead = touches.loc[touches["way_x_m"].notna(), ["ahead_x", "ahead_y", "ahead_z"]].to_numpy()
+    assert np.allclose(np.linalg.norm(way, axis=1), 0.02) and np.allclose((way * ahead).sum(axis=1), 0, atol=1e-9)
 
 
 def test_a_folder_with_files_is_kept(toy, tmp_path):
