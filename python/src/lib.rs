@@ -19,6 +19,7 @@ mod gaussian_process;
 mod known;
 mod mesh;
 mod pickle;
+mod picture;
 mod places;
 mod planner;
 mod program;
@@ -36,6 +37,7 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fork::remember_process();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("COMMIT", program::COMMIT)?;
+    module.add("BENCHMARK", studies::benchmark_name())?;
     module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
     module.add_class::<desk::PlannerChannel>()?;
@@ -54,7 +56,10 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(program::main, module)?)?;
     module.add_function(wrap_pyfunction!(program::planners, module)?)?;
     module.add_function(wrap_pyfunction!(studies::accuracy, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::benchmark, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::benchmark_experiments, module)?)?;
     module.add_function(wrap_pyfunction!(studies::calibrate_band, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::compare, module)?)?;
     module.add_function(wrap_pyfunction!(studies::identify, module)?)?;
     Ok(())
 }

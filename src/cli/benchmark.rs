@@ -6,9 +6,9 @@ use super::output::{Overwrite, make_folder};
 use super::prepare::set_thread_count;
 use super::terminal::{Completion, Verbosity, print};
 use super::trials::{TrialOptions, Trials, completion};
-use crate::experiment::store::write_whole;
+use crate::experiment::store::{Run, write_whole};
 use crate::report::benchmark::{markdown, table};
-use crate::study::benchmark::{self, BenchmarkSpec, PROTOCOL};
+use crate::study::benchmark::{BenchmarkSpec, PROTOCOL};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -56,30 +56,27 @@ pub(super) fn run(args: &Args, talk: Verbosity, host: &Host) -> anyhow::Result<C
     files.iter().try_for_each(|file| args.force.check_file(file))?;
     set_thread_count(args.threads)?;
 
-    let spec = BenchmarkSpec {
-        path: &path,
-        folder: &folder,
-        planners: &args.planner,
-        is_quick: args.quick,
-        commit: host.commit,
-    };
+    let spec = BenchmarkSpec { path: &path, is_quick: args.quick, commit: host.commit };
     let options =
         TrialOptions { threads: args.threads, is_fresh: args.fresh, ..TrialOptions::default() };
     let mut trials = Trials::new(options, talk, host);
-    let (mut is_interrupted, mut is_failed) = (false, false);
-    let result = benchmark::run(&spec, &mut |experiment, part| {
-        match completion(&trials.run(experiment, part)?, talk) {
-            Completion::Interrupted => is_interrupted = true,
+    let (mut runs, mut is_failed) = (Vec::new(), false);
+    for experiment in spec.experiments(&args.planner)? {
+        let part = folder.join(&experiment.name);
+        match completion(&trials.run(experiment, &part)?, talk) {
+            Completion::Interrupted => {
+                let folder = folder.display();
+                talk.note(format!(
+                    "stopped; the trials are in {folder}; repeat the command to continue"
+                ));
+                return Ok(Completion::Interrupted);
+            }
             Completion::Failed => is_failed = true,
             Completion::Done | Completion::Undecided => (),
         }
-        Ok(!is_interrupted)
-    })?;
-    let Some(result) = result else {
-        let folder = folder.display();
-        talk.note(format!("stopped; the trials are in {folder}; repeat the command to continue"));
-        return Ok(Completion::Interrupted);
-    };
+        runs.push((part.display().to_string(), Run::read(&part)?));
+    }
+    let result = spec.result(&runs)?;
     make_folder(&folder)?;
     let [json, table_file] = &files;
     write_whole(json, serde_json::to_string_pretty(&result)? + "\n")?;

@@ -16,6 +16,7 @@ use palpate_input::files;
 use palpate_input::format::hex;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use std::borrow::Borrow;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -185,14 +186,10 @@ pub struct BenchmarkSource<'a> {
     pub commit: &'a str,
 }
 
-/// Protocol and extent of the study.
+/// Protocol of the study, and the program that runs it.
 pub struct BenchmarkSpec<'a> {
     /// File of the protocol.
     pub path: &'a Path,
-    /// Folder of the objects' runs.
-    pub folder: &'a Path,
-    /// Planners beside those of the protocol.
-    pub planners: &'a [String],
     /// Whether objects and trials are left out.
     pub is_quick: bool,
     /// Commit of the build.
@@ -202,51 +199,51 @@ pub struct BenchmarkSpec<'a> {
 /// Number of objects, and the settings, of the quick variant.
 const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 
-/// Runs the protocol: `run_missing` runs the missing trials of an object in a folder and returns
-/// whether all are finished. Returns `None` as soon as they are not.
-///
-/// # Errors
-/// If the protocol cannot be read, or `run_missing` fails.
-pub fn run(
-    spec: &BenchmarkSpec,
-    run_missing: &mut dyn FnMut(Experiment, &Path) -> anyhow::Result<bool>,
-) -> anyhow::Result<Option<BenchmarkResult>> {
-    let sets = if spec.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
-    let mut experiments = cells(spec.path, &sets, spec.planners)?.experiments;
-    if spec.is_quick {
-        experiments.truncate(QUICK.0);
-    }
-    let mut runs = Vec::new();
-    for experiment in experiments {
-        let part = spec.folder.join(&experiment.name);
-        if !run_missing(experiment, &part)? {
-            return Ok(None);
+impl BenchmarkSpec<'_> {
+    /// Loads the experiments of the protocol, one per object, with `planners` beside its own.
+    ///
+    /// # Errors
+    /// If the protocol cannot be read, or a planner is not one.
+    pub fn experiments(&self, planners: &[String]) -> anyhow::Result<Vec<Experiment>> {
+        let sets = if self.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
+        let mut experiments = cells(self.path, &sets, planners)?.experiments;
+        if self.is_quick {
+            experiments.truncate(QUICK.0);
         }
-        runs.push((part.display().to_string(), Run::read(&part)?));
+        Ok(experiments)
     }
-    let mut compared = compare(&runs, REFERENCE)?;
-    let name = spec.path.file_stem().unwrap_or_default().to_string_lossy();
-    name_objects(&mut compared, &name);
-    let source = BenchmarkSource {
-        protocol_sha256: protocol_sha256(spec.path)?,
-        quick: spec.is_quick,
-        commit: spec.commit,
-    };
-    let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
-    Ok(Some(summarise(source, &runs, &compared)))
+
+    /// Returns the results of the finished runs of all experiments, in their order, each with its
+    /// name in messages.
+    ///
+    /// # Errors
+    /// If a file of the protocol cannot be read, or the runs do not belong together.
+    pub fn result<R: Borrow<Run>>(&self, runs: &[(String, R)]) -> anyhow::Result<BenchmarkResult> {
+        let mut compared = compare(runs, REFERENCE)?;
+        let name = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        name_objects(&mut compared, &name);
+        let source = BenchmarkSource {
+            protocol_sha256: protocol_sha256(self.path)?,
+            quick: self.is_quick,
+            commit: self.commit,
+        };
+        let runs: Vec<&Run> = runs.iter().map(|(_, run)| run.borrow()).collect();
+        Ok(summarise(source, &runs, &compared))
+    }
 }
 
 /// Summarises the runs of a benchmark, one per object in the order of `compared.objects`.
-pub fn summarise(
+pub fn summarise<R: Borrow<Run>>(
     source: BenchmarkSource,
-    runs: &[Run],
+    runs: &[R],
     compared: &SuiteComparison,
 ) -> BenchmarkResult {
+    let runs: Vec<&Run> = runs.iter().map(Borrow::borrow).collect();
     let experiment = runs.first().map(|run| &run.experiment);
     let budgets = experiment.map_or(Vec::new(), Experiment::table_touch_counts);
     let count = |of: fn(&Experiment) -> u32| experiment.map_or(0, of);
     let mut planners: Vec<PlannerResult> =
-        compared.contenders.iter().map(|it| planner(it, runs, compared, &budgets)).collect();
+        compared.contenders.iter().map(|it| planner(it, &runs, compared, &budgets)).collect();
     let order = |it: &PlannerResult| it.error.error.unwrap_or(f64::INFINITY);
     planners.sort_by(|a, b| order(a).total_cmp(&order(b)));
     BenchmarkResult {
@@ -268,11 +265,11 @@ pub fn summarise(
 
 fn planner(
     entrant: &Entrant,
-    runs: &[Run],
+    runs: &[&Run],
     compared: &SuiteComparison,
     budgets: &[u32],
 ) -> PlannerResult {
-    let on_object = |(object, run): (&String, &Run), scores: &[f64]| {
+    let on_object = |(object, run): (&String, &&Run), scores: &[f64]| {
         let rows: Vec<&TrialRow> = planner_rows(&run.rows, &entrant.name).collect();
         let failures = rows.iter().filter(|row| row.failure.is_some()).count();
         let after = |&budget: &u32| {
@@ -318,11 +315,11 @@ fn planner(
 /// Error of a planner after some touches, relative to the reference in the same trial.
 fn after(
     entrant: &Entrant,
-    runs: &[Run],
+    runs: &[&Run],
     compared: &SuiteComparison,
     budget: u32,
 ) -> RelativeError {
-    let ratios = |run: &Run| -> Vec<f64> {
+    let ratios = |run: &&Run| -> Vec<f64> {
         let unit = errors_m(run, &compared.reference, budget);
         let mut errors: Vec<(u32, f64)> =
             errors_m(run, &entrant.name, budget).into_iter().collect();
