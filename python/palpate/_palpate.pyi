@@ -11,11 +11,11 @@ from typing_extensions import Unpack
 from ._scene_settings import SceneSettings
 
 __version__: str
-BENCHMARK: str
+PROTOCOL: str
 COMMIT: str
 
 __all__ = [
-    "BENCHMARK",
+    "PROTOCOL",
     "Ball",
     "Belief",
     "COMMIT",
@@ -614,6 +614,6 @@ def identify(
     look: Callable[[int, int], None],
     stop: Callable[[], None],
 ) -> str: ...
-def benchmark_experiments(path: str, is_quick: bool) -> list[Experiment]: ...
+def benchmark_experiments(path: str, objects: str | os.PathLike[str] | None, is_quick: bool) -> list[Experiment]: ...
 def benchmark(path: str, is_quick: bool, runs: Sequence[Run]) -> str: ...
 def compare(runs: Sequence[tuple[str, Run]], against: str) -> str: ...

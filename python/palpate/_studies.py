@@ -174,6 +174,8 @@ def identify(
 def benchmark(
     planners: Sequence[Any] | Mapping[str, Any] = (),
     *,
+    protocol: str | os.PathLike[str] = _palpate.PROTOCOL,
+    objects: str | os.PathLike[str] | None = None,
     quick: bool = False,
     out: str | os.PathLike[str] | None = None,
     fresh: bool = False,
@@ -191,6 +193,8 @@ def benchmark(
 
     Args:
         planners: planners beside those of the protocol, as for `Experiment.run`.
+        protocol: file, or name of one in experiments/suite.
+        objects: folder of the meshes that a protocol with `[objects]` lists.
         quick: run two objects, two trials and 15 touches only, to try out a planner; the result is not comparable.
         out: folder of the runs, one per object, whose existing trials are kept; by default they are kept in memory.
         fresh, threads, progress, limit_s, isolate, executor, trials_per_job: as for `Experiment.run`.
@@ -200,9 +204,9 @@ def benchmark(
         KeyboardInterrupt: after Ctrl-C, when the running trials have finished; with `out` they are kept, and the same
             call continues.
     """
-    path = os.fspath(find_file(_palpate.BENCHMARK, "experiments"))
+    path = os.fspath(find_file(protocol, "experiments/suite"))
     runs = []
-    for core in _palpate.benchmark_experiments(path, quick):
+    for core in _palpate.benchmark_experiments(path, objects, quick):
         experiment = Experiment._of(core)
         run = experiment.run(
             _beside(experiment.planners, planners),

@@ -37,7 +37,7 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fork::remember_process();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("COMMIT", program::COMMIT)?;
-    module.add("BENCHMARK", studies::benchmark_name())?;
+    module.add("PROTOCOL", PROTOCOL)?;
     module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
     module.add_class::<desk::PlannerChannel>()?;

@@ -19,7 +19,7 @@ use palpate::study::accuracy::{
     AccuracyProgress, AccuracyResult, AccuracySpec, run as run_accuracy,
 };
 use palpate::study::band::{self, BandProgress, BandSpec, LEVELS};
-use palpate::study::benchmark::{BenchmarkSpec, PROTOCOL};
+use palpate::study::benchmark::BenchmarkSpec;
 use palpate::study::compare::{
     Entrant, SuiteComparison, compare as compare_runs, gap_closed, geometric_mean,
 };
@@ -177,15 +177,15 @@ pub(crate) fn identify(
     Ok(values.to_string())
 }
 
-/// Name of the benchmark's protocol among the experiments of the package.
-pub(crate) fn benchmark_name() -> String {
-    format!("suite/benchmark-{PROTOCOL}")
-}
-
-/// Loads the experiments of the benchmark's protocol at `path`, one per object.
+/// Loads the experiments of the benchmark's protocol at `path`, one per object; `objects` is the
+/// folder of the meshes that it lists.
 #[pyfunction]
-pub(crate) fn benchmark_experiments(path: PathBuf, is_quick: bool) -> PyResult<Vec<Experiment>> {
-    let spec = BenchmarkSpec { path: &path, is_quick, commit: COMMIT };
+pub(crate) fn benchmark_experiments(
+    path: PathBuf,
+    objects: Option<PathBuf>,
+    is_quick: bool,
+) -> PyResult<Vec<Experiment>> {
+    let spec = BenchmarkSpec { path: &path, objects: objects.as_deref(), is_quick, commit: COMMIT };
     let experiments = spec.experiments(&[]).map_err(errors::study)?;
     Ok(experiments.into_iter().map(Experiment).collect())
 }
@@ -200,7 +200,7 @@ pub(crate) fn benchmark(
 ) -> PyResult<String> {
     let runs: Vec<(String, &store::Run)> =
         runs.iter().map(|run| (run.get().0.experiment.name.clone(), &run.get().0)).collect();
-    let spec = BenchmarkSpec { path: &path, is_quick, commit: COMMIT };
+    let spec = BenchmarkSpec { path: &path, objects: None, is_quick, commit: COMMIT };
     let result = fork::detach(py, || spec.result(&runs))?.map_err(errors::study)?;
     let table = benchmark_table::table(&result);
     let document = serde_json::to_string_pretty(&result).map_err(errors::other)? + "\n";

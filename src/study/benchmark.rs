@@ -5,8 +5,10 @@
 
 use super::check::measures::ERROR_FLOOR_M;
 use super::compare::{Entrant, SuiteComparison, compare, gap_closed, geometric_mean, name_objects};
+use super::objects;
 use super::run::cells;
 use crate::experiment::Experiment;
+use crate::experiment::measure::{self, Measure};
 use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::median;
@@ -17,11 +19,11 @@ use palpate_input::format::hex;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::borrow::Borrow;
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 
-/// Version of the protocol. A new one needs a new file in `experiments/suite`.
-pub const PROTOCOL: &str = "3";
+/// Default protocol, a file in `experiments/suite`. A changed protocol is a new file.
+pub const PROTOCOL: &str = "benchmark-3";
 
 /// Planner whose errors are the unit.
 pub const REFERENCE: &str = "sobol";
@@ -38,7 +40,7 @@ const FILE_MAX: u64 = 1 << 30;
 /// Results of all planners on all objects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BenchmarkResult {
-    /// Version of the protocol.
+    /// Name of the protocol.
     pub protocol: String,
     /// SHA-256 of the protocol's files.
     pub protocol_sha256: String,
@@ -91,6 +93,9 @@ pub struct PlannerResult {
     pub trials: usize,
     /// Failed trials on all objects; they have no error.
     pub failures: usize,
+    /// Mean over the objects of each measure of a whole object after each budget.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<&'static str, Vec<Option<f64>>>,
     /// Results on each object.
     pub objects: Vec<PlannerOnObject>,
 }
@@ -109,6 +114,9 @@ pub struct PlannerOnObject {
     pub trials: usize,
     /// Failed trials.
     pub failures: usize,
+    /// Mean of each measure of a whole object after each budget, by its name in files.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<&'static str, Vec<Option<f64>>>,
 }
 
 /// Error relative to the reference with its 95 % bootstrap interval; both `None` without a trial.
@@ -178,6 +186,8 @@ fn strings(value: &toml::Value, found: &mut Vec<String>) {
 
 /// Program and protocol of a benchmark.
 pub struct BenchmarkSource<'a> {
+    /// Name of the protocol.
+    pub protocol: String,
     /// SHA-256 of the protocol's files.
     pub protocol_sha256: String,
     /// Whether objects and trials were left out.
@@ -190,21 +200,34 @@ pub struct BenchmarkSource<'a> {
 pub struct BenchmarkSpec<'a> {
     /// File of the protocol.
     pub path: &'a Path,
+    /// Folder of the user's objects, for a protocol with `[objects]`.
+    pub objects: Option<&'a Path>,
     /// Whether objects and trials are left out.
     pub is_quick: bool,
     /// Commit of the build.
     pub commit: &'a str,
 }
 
-/// Number of objects, and the settings, of the quick variant.
+/// Number of scenes, and the settings, of the quick variant.
 const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
+
+/// Settings of the quick variant of a protocol with the user's objects, which has all objects.
+const QUICK_OBJECTS: [&str; 2] = ["trials=1", "touches=20"];
 
 impl BenchmarkSpec<'_> {
     /// Loads the experiments of the protocol, one per object, with `planners` beside its own.
     ///
     /// # Errors
-    /// If the protocol cannot be read, or a planner is not one.
+    /// If the protocol or an object cannot be read, or a planner is not one.
     pub fn experiments(&self, planners: &[String]) -> anyhow::Result<Vec<Experiment>> {
+        if let Some((list, folder)) = objects::list(self.path, self.objects)? {
+            let sets = QUICK_OBJECTS.map(String::from);
+            let sets = if self.is_quick { &sets[..] } else { &[] };
+            let load = |(name, mesh): &(String, PathBuf)| {
+                list.experiment(self.path, (name, mesh), sets, planners)
+            };
+            return list.meshes(folder)?.iter().map(load).collect();
+        }
         let sets = if self.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
         let mut experiments = cells(self.path, &sets, planners)?.experiments;
         if self.is_quick {
@@ -223,6 +246,7 @@ impl BenchmarkSpec<'_> {
         let name = self.path.file_stem().unwrap_or_default().to_string_lossy();
         name_objects(&mut compared, &name);
         let source = BenchmarkSource {
+            protocol: name.clone().into_owned(),
             protocol_sha256: protocol_sha256(self.path)?,
             quick: self.is_quick,
             commit: self.commit,
@@ -247,7 +271,7 @@ pub fn summarise<R: Borrow<Run>>(
     let order = |it: &PlannerResult| it.error.error.unwrap_or(f64::INFINITY);
     planners.sort_by(|a, b| order(a).total_cmp(&order(b)));
     BenchmarkResult {
-        protocol: PROTOCOL.into(),
+        protocol: source.protocol,
         protocol_sha256: source.protocol_sha256,
         quick: source.quick,
         palpate: env!("CARGO_PKG_VERSION").into(),
@@ -280,6 +304,7 @@ fn planner(
             object: object.clone(),
             error: RelativeError::new(&[scores]),
             error_m: budgets.iter().map(after).collect(),
+            measures: shape_means(run, &rows, budgets),
             trials: rows.len() - failures,
             failures,
         }
@@ -308,8 +333,57 @@ fn planner(
         after: budgets.iter().map(|&budget| after(entrant, runs, compared, budget)).collect(),
         trials: objects.iter().map(|object| object.trials).sum(),
         failures: objects.iter().map(|object| object.failures).sum(),
+        measures: means_over(&objects, budgets.len()),
         objects,
     }
+}
+
+/// Measures of a whole object in a benchmark.
+const SHAPE_MEASURES: [&str; 7] = [
+    "chamfer_share",
+    "reachable_chamfer_share",
+    "f_1_mm",
+    "f_2_mm",
+    "reached_2_mm",
+    "iou",
+    "volume_error",
+];
+
+/// Mean of each measure of a whole object over trials, after each budget; empty for a zone.
+fn shape_means(
+    run: &Run,
+    rows: &[&TrialRow],
+    budgets: &[u32],
+) -> BTreeMap<&'static str, Vec<Option<f64>>> {
+    if run.experiment.scene.whole_object.is_none() {
+        return BTreeMap::new();
+    }
+    let measures = SHAPE_MEASURES.into_iter().filter_map(measure::by_id);
+    let after = |measure: &Measure| {
+        let mean_after =
+            |budget: &u32| mean(rows.iter().filter_map(|row| measure.value(row, *budget)));
+        budgets.iter().map(mean_after).collect()
+    };
+    measures.map(|measure| (measure.id, after(measure))).collect()
+}
+
+/// Means over the objects that have a value.
+fn means_over(
+    objects: &[PlannerOnObject],
+    budgets: usize,
+) -> BTreeMap<&'static str, Vec<Option<f64>>> {
+    let names = objects.first().map(|object| object.measures.keys()).into_iter().flatten();
+    let after = |name: &'static str| {
+        let values =
+            |i: usize| objects.iter().filter_map(move |it| *it.measures.get(name)?.get(i)?);
+        (0..budgets).map(|i| mean(values(i))).collect()
+    };
+    names.map(|name| (*name, after(name))).collect()
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Error of a planner after some touches, relative to the reference in the same trial.
