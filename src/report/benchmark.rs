@@ -80,8 +80,8 @@ pub fn shapes(result: &BenchmarkResult) -> Option<Table> {
     Some(table)
 }
 
-/// Returns the measures of whole objects as CSV, a row for each object, planner, budget and measure:
-/// the mean over trials in SI units. `None` for a protocol of zones.
+/// Returns the measures of whole objects as CSV: for each object, planner, budget and measure the
+/// mean over trials, in SI units. `None` for a protocol of zones.
 pub fn csv(result: &BenchmarkResult) -> Option<String> {
     result.planners.first().filter(|planner| !planner.measures.is_empty())?;
     let mut text = String::from("object,planner,touches,measure,mean,trials\n");
@@ -109,7 +109,9 @@ pub fn markdown(result: &BenchmarkResult) -> String {
         false => "",
     };
     let shapes = shapes(result).map_or(String::new(), |table| {
-        let measures = "Means over trials and objects. Chamfer: mean of the mean distances true → estimated and estimated → true; reachable: mean distance of the surface that the finger can touch.";
+        let measures = "Means over trials and objects. Chamfer: mean of the mean distances true → \
+                        estimated and estimated → true; reachable: mean distance of the surface that the \
+                        finger can touch.";
         format!("\n{}\n{measures}\n", table.markdown())
     });
     format!(
