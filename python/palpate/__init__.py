@@ -10,14 +10,23 @@ next touch. All quantities are in SI units, and names end with the unit.
 
 from typing import TYPE_CHECKING, Any
 
-from . import errors
+from . import colours, errors
 from ._check import Check, check
 from ._experiment import Experiment
 from ._palpate import Ball, Belief, Exploration, Scene, Touch, Zone, __version__
 from ._palpate import planners as _planners
+from ._results import (
+    AccuracyResult,
+    BandResult,
+    BenchmarkResult,
+    CheapestScene,
+    ConvergenceOrder,
+    IdentifyResult,
+    SuiteComparison,
+)
 from ._run import Comparison, Run
 from ._scene import read_mesh, write_mesh
-from ._studies import accuracy, calibrate_band, identify
+from ._studies import accuracy, benchmark, calibrate_band, compare, identify
 
 if TYPE_CHECKING:
     from ._gaussian_process import GaussianProcess
@@ -27,26 +36,40 @@ PLANNERS: tuple[str, ...] = tuple(_planners())
 
 __all__ = [
     "PLANNERS",
+    "AccuracyResult",
     "Ball",
+    "BandResult",
     "Belief",
+    "BenchmarkResult",
+    "CheapestScene",
     "Check",
     "Comparison",
+    "ConvergenceOrder",
     "Experiment",
     "Exploration",
     "GaussianProcess",
+    "IdentifyResult",
     "Run",
     "Scene",
+    "SuiteComparison",
     "Touch",
     "Zone",
     "__version__",
     "accuracy",
+    "benchmark",
     "calibrate_band",
     "check",
+    "colours",
+    "compare",
     "errors",
     "identify",
     "read_mesh",
     "write_mesh",
 ]
+
+
+def __dir__() -> list[str]:
+    return list(__all__)
 
 
 def __getattr__(name: str) -> Any:

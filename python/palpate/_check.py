@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 from ._experiment import Experiment
+from ._html import picture, preformatted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,16 +20,20 @@ __all__ = ["Check", "check"]
 PASSED = ("accepted", "identical", "better", "ok")
 
 
+@dataclass(frozen=True, repr=False)
 class Check:
-    """Result of a regression test."""
+    """Result of a regression test.
 
-    def __init__(self, found: dict[str, Any]) -> None:
-        #: Worst verdict of all planners: identical, better, ok, undecided, worse or missing; or accepted.
-        self.verdict: str = found["verdict"]
-        #: Remarks, a sentence each.
-        self.remarks: list[str] = found["remarks"]
-        self._table = found["table"]
-        self._text = found["text"]
+    Attributes:
+        verdict: worst verdict of all planners: identical, better, ok, undecided, worse or missing; or accepted.
+        remarks: remarks, a sentence each.
+    """
+
+    verdict: str
+    remarks: list[str]
+    _table: dict[str, list[Any]]
+    _text: str
+    _svg: str | None = None
 
     @property
     def passed(self) -> bool:
@@ -34,13 +41,13 @@ class Check:
         return self.verdict in PASSED
 
     def raise_if_worse(self) -> None:
-        """Raises an AssertionError with the table, unless the test passed; for pytest and scripts.
+        """Raises an AssertionError with verdict, measures and numbers, unless the test passed; for pytest and scripts.
 
         Raises:
             AssertionError: if a planner is worse, missing or undecided.
         """
         if not self.passed:
-            raise AssertionError(f"planners: {self.verdict}\n{self!r}")
+            raise AssertionError("\n".join([*(self._failures() or [self.verdict]), *self.remarks]))
 
     def table(self) -> pd.DataFrame:
         """Returns a row per planner and measure: change and its 95 % interval, percent; verdict; trials."""
@@ -48,8 +55,31 @@ class Check:
 
         return pd.DataFrame(self._table)
 
+    def _failures(self) -> list[str]:
+        """Returns a line per measure that does not pass, the worst first: pytest's summary has the first line only."""
+        rows = zip(*(self._table[name] for name in COLUMNS), strict=True)
+        failed = [row for row in rows if row[-2] not in PASSED]
+        return [_line(*row) for row in sorted(failed, key=lambda row: row[-2] != self.verdict)]
+
     def __repr__(self) -> str:
+        return f"Check({self.verdict})"
+
+    def __str__(self) -> str:
         return "\n".join([self._text.rstrip(), *self.remarks, self.verdict])
+
+    def _repr_html_(self) -> str:
+        shown = picture(self._svg) if self._svg else preformatted(self._text)
+        return shown + "".join(f"<p>{escape(remark)}</p>" for remark in self.remarks)
+
+
+#: Columns of the table.
+COLUMNS = ("planner", "measure", "change_percent", "low_percent", "high_percent", "verdict", "trials")
+
+
+def _line(planner: str, measure: str, change: float, low: float, high: float, verdict: str, trials: int) -> str:
+    """Returns a row of the table as text."""
+    numbers = f": {measure} {change:+.1f} % (95 % interval {low:+.1f} to {high:+.1f} %)" if measure else ""
+    return f"{verdict}: {planner}{numbers}, {trials} trials"
 
 
 def check(
@@ -61,6 +91,7 @@ def check(
     tolerance: float = 0.05,
     max_trials: int = 50,
     threads: int = 0,
+    progress: bool | None = None,
 ) -> Check:
     """Tests planners for regressions against a stored baseline, as the command `palpate check` does.
 
@@ -75,6 +106,7 @@ def check(
         tolerance: largest relative increase in error that still passes.
         max_trials: maximum number of trials per planner.
         threads: number of threads, 0 for all cores.
+        progress: as for `Experiment.run`.
 
     Raises:
         PalpateError: if the baseline cannot be read, or its trials do not pair with the experiment's.
@@ -83,8 +115,7 @@ def check(
     loaded = experiment if isinstance(experiment, Experiment) else Experiment.load(experiment)
     if not 1e-4 <= tolerance <= 10:
         raise ValueError(f"tolerance = {tolerance}: allowed is 0.0001 to 10")
-    found = loaded._check(os.fspath(baseline), planners, accept, tolerance, max_trials, threads)
+    found = loaded._check(os.fspath(baseline), planners, accept, tolerance, max_trials, threads, progress)
     if found is None:
-        written = {"verdict": "accepted", "remarks": [], "table": {}, "text": f"baseline in {os.fspath(baseline)}"}
-        return Check(written)
-    return Check(found)
+        return Check("accepted", [], {}, f"baseline in {os.fspath(baseline)}")
+    return Check(found["verdict"], found["remarks"], found["table"], found["text"], found["svg"])

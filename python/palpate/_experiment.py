@@ -83,6 +83,12 @@ class Experiment:
         experiment._load(find_file(path, "experiments"), settings)
         return experiment
 
+    @classmethod
+    def _of(cls, core: _palpate.Experiment) -> Experiment:
+        experiment = cls.__new__(cls)
+        experiment._own, experiment._core = {}, core
+        return experiment
+
     @property
     def name(self) -> str:
         """Name of the experiment."""
@@ -135,7 +141,7 @@ class Experiment:
         out: str | os.PathLike[str] | None = None,
         fresh: bool = False,
         threads: int = 0,
-        progress: bool = False,
+        progress: bool | None = None,
         limit_s: float | None = LIMIT_S,
         isolate: bool = False,
         on_error: str = "record",
@@ -161,7 +167,7 @@ class Experiment:
             fresh: delete the existing trials.
             threads: number of threads, 0 for all cores; with an executor the threads of each job, 0 for one. Results
                 do not depend on it.
-            progress: print progress to stderr.
+            progress: show the progress; by default in a notebook, and if stderr is a terminal.
             limit_s: time limit for a target of your own planners, seconds; None means no limit, which also avoids the
                 overhead of a thread.
             isolate: run each of your own planners in its own process, which can be killed; they must be picklable.
@@ -188,28 +194,28 @@ class Experiment:
             raise ValueError(f'on_error = {on_error!r}: allowed are "record", "raise"')
         core, workers = self._prepared(planners, trials, threads, limit_s, isolate)
 
-        look = Progress(self.name, progress)
         folder = None if out is None else os.fspath(out)
         raises = on_error == "raise"
-        if executor is None:
-            own, stop = list(workers.items()), partial(_stop, workers)
-            try:
-                found = core.run(own, out=folder, fresh=fresh, threads=threads, raises=raises, look=look, stop=stop)
-            except PlannerError as error:
-                causes = (it.error for it in workers.values() if isinstance(it, ThreadPlannerFactory))
-                raise error from next((cause for cause in causes if cause is not None), None)
-        else:
-            found = run_on(
-                core,
-                workers,
-                executor,
-                trials_per_job,
-                out=folder,
-                fresh=fresh,
-                threads=threads,
-                raises=raises,
-                look=look,
-            )
+        with Progress(self.name, progress) as look:
+            if executor is None:
+                own, stop = list(workers.items()), partial(_stop, workers)
+                try:
+                    found = core.run(own, out=folder, fresh=fresh, threads=threads, raises=raises, look=look, stop=stop)
+                except PlannerError as error:
+                    causes = (it.error for it in workers.values() if isinstance(it, ThreadPlannerFactory))
+                    raise error from next((cause for cause in causes if cause is not None), None)
+            else:
+                found = run_on(
+                    core,
+                    workers,
+                    executor,
+                    trials_per_job,
+                    out=folder,
+                    fresh=fresh,
+                    threads=threads,
+                    raises=raises,
+                    look=look,
+                )
         run = Run(found)
         rows: dict[str, Any] = run._core.trials()
         failed = [i for i, failure in enumerate(rows["failure"]) if failure is not None and rows["planner"][i] in workers]
@@ -232,19 +238,21 @@ class Experiment:
         tolerance: float,
         max_trials: int,
         threads: int,
+        progress: bool | None,
     ) -> dict[str, Any] | None:
         core, workers = self._prepared(planners, max_trials, threads, LIMIT_S, False)
 
-        return core.check(
-            list(workers.items()),
-            baseline=baseline,
-            accept=accept,
-            tolerance=tolerance,
-            threads=threads,
-            is_partial=planners is not None,
-            look=Progress(self.name, False),
-            stop=partial(_stop, workers),
-        )
+        with Progress(self.name, progress) as look:
+            return core.check(
+                list(workers.items()),
+                baseline=baseline,
+                accept=accept,
+                tolerance=tolerance,
+                threads=threads,
+                is_partial=planners is not None,
+                look=look,
+                stop=partial(_stop, workers),
+            )
 
     def _prepared(
         self,

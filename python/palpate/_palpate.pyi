@@ -11,9 +11,11 @@ from typing_extensions import Unpack
 from ._scene_settings import SceneSettings
 
 __version__: str
+PROTOCOL: str
 COMMIT: str
 
 __all__ = [
+    "PROTOCOL",
     "Ball",
     "Belief",
     "COMMIT",
@@ -31,7 +33,10 @@ __all__ = [
     "Zone",
     "__version__",
     "accuracy",
+    "benchmark",
+    "benchmark_experiments",
     "calibrate_band",
+    "compare",
     "identify",
     "main",
     "planners",
@@ -39,6 +44,9 @@ __all__ = [
 ]
 
 _Array = npt.NDArray[np.float64]
+
+#: PNG with IPython's metadata.
+_Picture = tuple[bytes, dict[str, float]]
 
 class _Hyperparameters(TypedDict):
     """Hyperparameters of a fit."""
@@ -70,6 +78,7 @@ class Zone:
         """Places on an even grid, shape (per_side ** d, d), metres."""
     def to_world(self, places: npt.ArrayLike, heights_m: npt.ArrayLike) -> _Array:
         """Points (..., 3) in the world frame of places (..., d) and heights (...) above the datum, metres."""
+    def _repr_png_(self) -> _Picture | None: ...
     def __copy__(self) -> Zone: ...
     def __deepcopy__(self, _memo: Any) -> Zone: ...
 
@@ -232,6 +241,7 @@ class Belief:
             Vertices (n, 3), metres; triangles (m, 3), counter-clockwise from outside; and the standard deviation of the
             surface along the normal at each vertex, shape (n,), metres.
         """
+    def _repr_png_(self) -> _Picture | None: ...
     def __copy__(self) -> Belief: ...
     def __deepcopy__(self, _memo: Any) -> Belief: ...
 
@@ -351,6 +361,7 @@ class Scene:
         """True height above the datum, metres, at places (..., d); NaN outside the object."""
     def mesh(self) -> tuple[_Array, npt.NDArray[np.uint32]] | None:
         """Object in the world frame: vertices (n, 3), metres, and triangles (m, 3); None for an analytic surface."""
+    def _repr_png_(self) -> _Picture | None: ...
 
 @final
 class Exploration:
@@ -391,6 +402,7 @@ class Exploration:
         Names are those of rows: `rmse_m`, `centred_r` and others over a zone; `chamfer_m`, `f_1`, `f_3`,
         `volume_error`, `iou`, `coverage` and others around an object. Missing values are left out.
         """
+    def _repr_png_(self) -> _Picture | None: ...
 
 @final
 class Fitted:
@@ -612,3 +624,6 @@ def identify(
     look: Callable[[int, int], None],
     stop: Callable[[], None],
 ) -> str: ...
+def benchmark_experiments(path: str, objects: str | os.PathLike[str] | None, is_quick: bool) -> list[Experiment]: ...
+def benchmark(path: str, is_quick: bool, runs: Sequence[Run]) -> str: ...
+def compare(runs: Sequence[tuple[str, Run]], against: str) -> str: ...

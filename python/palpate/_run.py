@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _palpate, colours
+from ._html import page, picture
 from ._palpate import Ball, Belief, Zone
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class Comparison:
         self.measure: str = found["measure"]
         self._table = found["table"]
         self._equal_error = found["equal_error"]
+        self._html: str = found["html"] + picture(found["svg"])
 
     def table(self) -> pd.DataFrame:
         """Returns a row per planner, baseline and measure, after the last touch.
@@ -54,9 +56,15 @@ class Comparison:
         """
         return _frame(self._equal_error)
 
-    def __repr__(self) -> str:
+    def _sentences(self) -> list[str]:
         sentences = [*self.verdicts, self.conclusion or "The planners cannot be compared."]
-        return "\n".join(dict.fromkeys(sentences))
+        return list(dict.fromkeys(sentences))
+
+    def __repr__(self) -> str:
+        return "\n".join(self._sentences())
+
+    def _repr_html_(self) -> str:
+        return "".join(f"<p>{escape(it)}</p>\n" for it in self._sentences()) + self._html
 
 
 class Run:
@@ -222,7 +230,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         conclusion = self._core.compare()["conclusion"] or ""
-        return f"<p><b>{escape(self.name)}</b></p>\n{self._core.html()}<p>{escape(conclusion)}</p>"
+        return page(self.name, f"{self._core.html()}<p>{escape(conclusion)}</p>")
 
     def __repr__(self) -> str:
         return f"Run({self.name}: {', '.join(self.planners)})"

@@ -1,18 +1,24 @@
-"""Studies: accuracy of a scene, calibration of the band, identification of an object."""
+"""Studies: accuracy of a scene, calibration of the band, identification of an object, benchmark, comparison of runs."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from . import _palpate
+from ._executor import Executor
+from ._experiment import Experiment
 from ._home import HOME, find_file
+from ._planners import LIMIT_S
 from ._progress import Progress
+from ._results import AccuracyResult, BandResult, BenchmarkResult, IdentifyResult, SuiteComparison
+from ._run import Run
 from ._settings import assignments
 
-__all__ = ["accuracy", "calibrate_band", "identify"]
+__all__ = ["accuracy", "benchmark", "calibrate_band", "compare", "identify"]
 
 
 def accuracy(
@@ -27,13 +33,13 @@ def accuracy(
     trial_touches: int = 30,
     seed: int = 0,
     full: bool = False,
-    progress: bool = False,
+    progress: bool | None = None,
     **settings: Any,
-) -> dict[str, Any]:
+) -> AccuracyResult:
     """Measures error and time of a scene's levels and effects, as the command `palpate accuracy` does.
 
         found = palpate.accuracy("bird_finger", against="scene", tolerance="0.2mm")
-        pandas.json_normalize(found["effects"]["variants"])
+        found.table().query("study == 'effects'")
 
     Args:
         scene: a scene's file, or the name of a scene of the package.
@@ -47,12 +53,8 @@ def accuracy(
         trial_touches: touches per trial.
         seed: seed of the targets.
         full: start from the scene with every effect that its simulator supports.
-        progress: print progress to stderr.
+        progress: as for `Experiment.run`.
         settings: settings of the scene, as for `Scene.load`.
-
-    Returns:
-        `scene`; `levels` and `effects`, each None or with a `reference` and its `variants`, a dict each; `orders` of
-        convergence; `cheapest`, None or with `selected`, `held_out`, `is_confirmed` and the `scene` as TOML.
 
     Raises:
         ConfigError: if a setting is invalid.
@@ -68,17 +70,18 @@ def accuracy(
         _within("seed", seed, 0, 65535),
     )
     path = find_file(scene, "scenes")
-    found = _palpate.accuracy(
-        os.fspath(path),
-        assignments(settings),
-        against=against,
-        tolerance=tolerance,
-        counts=counts,
-        is_full=full,
-        look=Progress(path.stem, progress, "variants"),
-        stop=_ignore,
-    )
-    return _decoded(found)
+    with Progress(path.stem, progress, "variants") as look:
+        found = _palpate.accuracy(
+            os.fspath(path),
+            assignments(settings),
+            against=against,
+            tolerance=tolerance,
+            counts=counts,
+            is_full=full,
+            look=look,
+            stop=_ignore,
+        )
+    return AccuracyResult._of(json.loads(found))
 
 
 def calibrate_band(
@@ -86,25 +89,21 @@ def calibrate_band(
     *,
     test: bool = False,
     trials: int = 4,
-    progress: bool = False,
+    progress: bool | None = None,
     **settings: Any,
-) -> dict[str, Any]:
+) -> BandResult:
     """Learns the 95 % band from objects of known shape, as the command `palpate calibrate --band` does.
 
         found = palpate.calibrate_band("suite/choosing", touches=60)
-        palpate.Experiment(scene="bird", gp={"band": found["band"]})
-        pandas.DataFrame(found["coverage"])
+        palpate.Experiment(scene="bird", gp={"band": found.band})
+        found.table()
 
     Args:
         experiment: file of an experiment over zones, best with a sweep of scenes, or the name of one of the package.
         test: test the experiment's own band instead of learning one.
         trials: trials per planner and object.
-        progress: print progress to stderr.
+        progress: as for `Experiment.run`.
         settings: settings of the experiment, as for `Experiment.load`.
-
-    Returns:
-        `band`, the table `gp.band` of an experiment, or None if it was tested; `coverage`, a dict for each object and
-        number of touches, by a band that was learned without the object.
 
     Raises:
         ConfigError: if a setting is invalid.
@@ -113,11 +112,10 @@ def calibrate_band(
     """
     path = find_file(experiment, "experiments")
     _within("trials", trials, 1, 1000)
-    look = Progress(path.stem, progress, "touches")
     sets = assignments(settings)
-    return _decoded(
-        _palpate.calibrate_band(os.fspath(path), sets, trials=trials, is_test=test, look=look, stop=_ignore)
-    )
+    with Progress(path.stem, progress, "touches") as look:
+        found = _palpate.calibrate_band(os.fspath(path), sets, trials=trials, is_test=test, look=look, stop=_ignore)
+    return BandResult._of(json.loads(found))
 
 
 def identify(
@@ -128,13 +126,13 @@ def identify(
     sure: float = 0.95,
     touches: int = 30,
     trial: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
     **settings: Any,
-) -> dict[str, Any]:
+) -> IdentifyResult:
     """Identifies an object of a library, and its pose, by touch in simulation, as `palpate identify` does.
 
         found = palpate.identify("models/lookalikes", "lookalikes")
-        pandas.DataFrame(found["history"])
+        found.object, found.table()
 
     Args:
         library: folder with the meshes of the objects that may be there, here or of the package.
@@ -143,12 +141,8 @@ def identify(
         sure: probability at which the object counts as identified, 0.5 to below 1.
         touches: largest number of touches.
         trial: trial number, which draws object and pose.
-        progress: print progress to stderr.
+        progress: as for `Experiment.run`.
         settings: settings of the scene or experiment, as for `Scene.load`.
-
-    Returns:
-        `object` ("none" for none of the library), `confidence`, `is_sure`, `touches`, `pose`, `probabilities`, in a
-        simulated scene `error`, and `history`, the probabilities after each touch.
 
     Raises:
         ConfigError: if a setting is invalid.
@@ -161,23 +155,126 @@ def identify(
     path, folder = find_file(scene, "scenes"), Path(library)
     if not folder.is_dir() and (HOME / folder).is_dir():
         folder = HOME / folder
-    found = _palpate.identify(
-        os.fspath(folder),
-        os.fspath(path),
-        assignments(settings),
-        planner=planner,
-        sure=sure,
-        touches=_within("touches", touches, 1, 500),
-        trial=_within("trial", trial, 0, 2**32 - 2),
-        look=Progress(path.stem, progress, "touches"),
-        stop=_ignore,
-    )
-    return _decoded(found)
+    touches, trial = _within("touches", touches, 1, 500), _within("trial", trial, 0, 2**32 - 2)
+    with Progress(path.stem, progress, "touches") as look:
+        found = _palpate.identify(
+            os.fspath(folder),
+            os.fspath(path),
+            assignments(settings),
+            planner=planner,
+            sure=sure,
+            touches=touches,
+            trial=trial,
+            look=look,
+            stop=_ignore,
+        )
+    return IdentifyResult._of(json.loads(found))
 
 
-def _decoded(text: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(text)
-    return found
+def benchmark(
+    planners: Sequence[Any] | Mapping[str, Any] = (),
+    *,
+    protocol: str | os.PathLike[str] = _palpate.PROTOCOL,
+    objects: str | os.PathLike[str] | None = None,
+    quick: bool = False,
+    out: str | os.PathLike[str] | None = None,
+    fresh: bool = False,
+    threads: int = 0,
+    progress: bool | None = None,
+    limit_s: float | None = LIMIT_S,
+    isolate: bool = False,
+    executor: Executor | None = None,
+    trials_per_job: int = 1,
+) -> BenchmarkResult:
+    """Compares planners by a fixed protocol of objects, touches, trials and seeds, as `palpate benchmark` does.
+
+        found = palpate.benchmark(["my_planner:MyPlanner"], quick=True)
+        found.table()
+
+    Args:
+        planners: planners beside those of the protocol, as for `Experiment.run`.
+        protocol: file, or name of one in experiments/suite.
+        objects: folder of the meshes that a protocol with `[objects]` lists.
+        quick: run two objects, two trials and 15 touches only, to try out a planner; the result is not comparable.
+        out: folder of the runs, one per object, whose existing trials are kept; by default they are kept in memory.
+        fresh, threads, progress, limit_s, isolate, executor, trials_per_job: as for `Experiment.run`.
+
+    Raises:
+        PlannerError, TypeError, ValueError, RunFolderError: as for `Experiment.run`.
+        KeyboardInterrupt: after Ctrl-C, when the running trials have finished; with `out` they are kept, and the same
+            call continues.
+    """
+    path = os.fspath(find_file(protocol, "experiments/suite"))
+    runs = []
+    for core in _palpate.benchmark_experiments(path, objects, quick):
+        experiment = Experiment._of(core)
+        run = experiment.run(
+            _beside(experiment.planners, planners),
+            out=None if out is None else Path(out, experiment.name),
+            fresh=fresh,
+            threads=threads,
+            progress=progress,
+            limit_s=limit_s,
+            isolate=isolate,
+            executor=executor,
+            trials_per_job=trials_per_job,
+        )
+        runs.append(run._core)
+    return BenchmarkResult._of(json.loads(_palpate.benchmark(path, quick, runs)))
+
+
+def _beside(own: list[str], planners: Sequence[Any] | Mapping[str, Any]) -> list[Any]:
+    """Returns the planners of an experiment, and those of `planners` that it does not name.
+
+    Raises:
+        TypeError: if `planners` is not a list or a mapping.
+    """
+    if isinstance(planners, (str, type)) or not isinstance(planners, (Sequence, Mapping)):
+        raise TypeError(f"planners = {planners!r}: allowed is a list, [{planners!r}]")
+    more = planners.items() if isinstance(planners, Mapping) else planners
+    return [*own, *(planner for planner in more if not (isinstance(planner, str) and planner in own))]
+
+
+def compare(
+    runs: Sequence[Run | str | os.PathLike[str]] | Mapping[str, Run | str | os.PathLike[str]],
+    *,
+    against: str = "random",
+) -> SuiteComparison:
+    """Compares the planners of several runs, as the command `palpate compare` does.
+
+        palpate.compare(["runs/toy", "runs/bird"]).table()
+        palpate.compare({"before": old_run, "after": new_run}).conclusion
+
+    Runs of experiments with different names are runs on different objects. Runs of one experiment are compared with
+    each other; their names tell them apart.
+
+    Args:
+        runs: runs, or folders of runs; or a mapping from names to them.
+        against: reference planner; errors are divided by its errors.
+
+    Raises:
+        PalpateError: if the reference planner has no trials of an object, or runs of one experiment do not pair.
+        RunFolderError: if a folder is not a run's, or damaged.
+        TypeError: if `runs` is not a list or a mapping.
+        ValueError: if there is no run, or runs of one experiment have the same name.
+    """
+    if isinstance(runs, (str, os.PathLike, Run)) or not isinstance(runs, (Sequence, Mapping)):
+        raise TypeError(f"runs = {runs!r}: allowed is a list, [{runs!r}]")
+    if not runs:
+        raise ValueError("runs = []: allowed is at least one run")
+    each = runs.items() if isinstance(runs, Mapping) else ((_run_name(run), run) for run in runs)
+    opened = [(name, run if isinstance(run, Run) else Run.open(run)) for name, run in each]
+    seen: set[tuple[str, str]] = set()
+    for name, run in opened:
+        if (name, run.name) in seen:
+            raise ValueError(f'two runs of {run.name} have the name {name}: allowed is a mapping, {{"NAME": run, ...}}')
+        seen.add((name, run.name))
+    found = _palpate.compare([(name, run._core) for name, run in opened], against)
+    return SuiteComparison._of(json.loads(found))
+
+
+def _run_name(run: Run | str | os.PathLike[str]) -> str:
+    return run.name if isinstance(run, Run) else os.fspath(run)
 
 
 def _ignore() -> None:

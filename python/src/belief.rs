@@ -6,6 +6,7 @@ use crate::fork;
 use crate::known::{Known, target_numbers};
 use crate::mesh::triangles_of;
 use crate::pickle::{self, Reduced, Version};
+use crate::picture::{self, Picture};
 use crate::places::{Places, rows, seen_at};
 use crate::recognition;
 use crate::zone::Zone;
@@ -19,6 +20,7 @@ use palpate::format::counted;
 use palpate::gp::Posterior;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::reduction::VarianceReduction;
+use palpate::report;
 use palpate::task::{Aim, Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -510,6 +512,11 @@ impl Belief {
 
     fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         slf
+    }
+
+    /// Picture for notebooks: mean and width of the band over a zone, or the surface of an object.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Picture<'py>>> {
+        picture::png(py, || report::belief::picture(&self.0))
     }
 
     fn __repr__(&self) -> String {

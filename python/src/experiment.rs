@@ -184,7 +184,7 @@ impl Experiment {
             }
             let run = || run_check(&simulation, &old, &rules, threads, stop, &tick);
             let result = callbacks.watched(py, total, run)?.map_err(errors::other)?;
-            return check_table(py, &result, &rules, self.0.trials).map(Some);
+            return check_table(py, &self.0, &result, &rules).map(Some);
         };
         let run = || baseline_rows(&simulation, threads, stop, &tick);
         let rows = callbacks.watched(py, total, run)?.map_err(errors::other)?;
@@ -232,12 +232,12 @@ impl Experiment {
     }
 }
 
-/// Returns verdict, remarks and the columns of the table of a check.
+/// Returns verdict, remarks, the columns of the table, and text and figure of a check.
 fn check_table<'py>(
     py: Python<'py>,
+    experiment: &experiment::Experiment,
     result: &CheckResult,
     rules: &CheckOptions,
-    most: u32,
 ) -> PyResult<Bound<'py, PyDict>> {
     let rows = result.planners.iter().flat_map(|planner| {
         let line = |(title, change, verdict): (_, Option<_>, _)| {
@@ -258,9 +258,10 @@ fn check_table<'py>(
     table.set_item("trials", rows.iter().map(|row| row.4).collect::<Vec<_>>())?;
     let found = PyDict::new(py);
     found.set_item("verdict", check::word(result.verdict()).to_lowercase())?;
-    found.set_item("remarks", check::remarks(result, rules, most))?;
+    found.set_item("remarks", check::remarks(result, rules, experiment.trials))?;
     found.set_item("table", table)?;
     found.set_item("text", check::table(result).text())?;
+    found.set_item("svg", check::draw(&experiment.name, result, rules))?;
     Ok(found)
 }
 

@@ -2,6 +2,7 @@
 
 use crate::belief::Belief;
 use crate::known::{BeliefErrors, BeliefSettings, GroundTruth};
+use crate::picture::{self, Picture};
 use crate::scene::{Scene, Touch};
 use crate::target::TargetInput;
 use crate::{errors, exploration, fork};
@@ -13,6 +14,7 @@ use palpate::explore::evidence::Outcome;
 use palpate::explore::view::SeenSurface;
 use palpate::format::counted;
 use palpate::math::seed::stream;
+use palpate::report;
 use palpate::sim::camera_probe::CameraProbe;
 use palpate::sim::library::LoadedLibrary;
 use palpate::task::Target;
@@ -104,6 +106,11 @@ impl Exploration {
             values.set_item(name, value.as_f64())?;
         }
         Ok(Some(values))
+    }
+
+    /// Picture of the belief for notebooks.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Picture<'py>>> {
+        picture::png(py, || report::belief::picture(&self.lock().belief().clone()))
     }
 
     fn __repr__(&self) -> String {

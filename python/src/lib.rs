@@ -20,6 +20,7 @@ mod gaussian_process;
 mod known;
 mod mesh;
 mod pickle;
+mod picture;
 mod places;
 mod planner;
 mod program;
@@ -37,6 +38,7 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fork::remember_process();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("COMMIT", program::COMMIT)?;
+    module.add("PROTOCOL", PROTOCOL)?;
     module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
     module.add_class::<desk::PlannerChannel>()?;
@@ -55,7 +57,10 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(program::main, module)?)?;
     module.add_function(wrap_pyfunction!(program::planners, module)?)?;
     module.add_function(wrap_pyfunction!(studies::accuracy, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::benchmark, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::benchmark_experiments, module)?)?;
     module.add_function(wrap_pyfunction!(studies::calibrate_band, module)?)?;
+    module.add_function(wrap_pyfunction!(studies::compare, module)?)?;
     module.add_function(wrap_pyfunction!(studies::identify, module)?)?;
     Ok(())
 }

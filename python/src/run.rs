@@ -15,7 +15,7 @@ use palpate::experiment::metrics::truth::Truth;
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::store::{self, resolved};
 use palpate::geometry::mesh::Mesh;
-use palpate::report::{findings, tables};
+use palpate::report::{figures, findings, tables};
 use palpate::task;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -126,7 +126,7 @@ impl Run {
     }
 
     /// Comparison of the planners with the baselines: sentences, the better planner, the measure
-    /// that decides, and the columns of two tables.
+    /// that decides, the columns of two tables, and one table and the error's curves to show.
     fn compare<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let run = &self.0;
         let analysis = py.detach(|| Analysis::new(run));
@@ -137,6 +137,10 @@ impl Run {
         found.set_item("measure", run.error_measure().id)?;
         found.set_item("table", columns::comparisons(py, &analysis.comparisons)?)?;
         found.set_item("equal_error", columns::equal_errors(py, &analysis.equal_errors)?)?;
+        let tables = tables::comparison::comparisons(run, &analysis.comparisons);
+        let tables: String = tables.iter().map(|table| table.html("palpate")).collect();
+        found.set_item("html", tables)?;
+        found.set_item("svg", fork::detach(py, || figures::draw_error(run))?)?;
         Ok(found)
     }
 

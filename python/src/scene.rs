@@ -5,6 +5,7 @@ use crate::errors;
 use crate::fork;
 use crate::mesh::{Arrays, arrays, mesh_of};
 use crate::pickle::{self, Reduced, Version};
+use crate::picture::{self, Picture};
 use crate::places::Places;
 use crate::target::TargetInput;
 use crate::zone::Zone;
@@ -17,6 +18,7 @@ use palpate::explore::probe::Probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::geometry::report::MeshReport;
+use palpate::report;
 use palpate::sim;
 use palpate::sim::Environment;
 use palpate::sim::environment::ObjectShape;
@@ -353,6 +355,14 @@ impl Scene {
     /// counter-clockwise from outside; None for an analytic surface.
     fn mesh<'py>(&self, py: Python<'py>) -> PyResult<Option<Arrays<'py>>> {
         self.environment().mesh().map(|mesh| arrays(py, mesh)).transpose()
+    }
+
+    /// Picture for notebooks: the object with its zone or its ball, or the curve.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Picture<'py>>> {
+        let environment = self.environment();
+        let height_m = |place: &[f64]| environment.true_height_m(place);
+        let mesh = environment.mesh();
+        picture::png(py, || report::scene::picture(environment.task(), mesh, &height_m, &[]))
     }
 
     fn __repr__(&self) -> String {

@@ -1,11 +1,28 @@
-//! Studies: accuracy, the calibration of the band, and identification, as JSON.
+//! Studies: accuracy, the calibration of the band, identification, the comparison of runs, and the
+//! benchmark, as JSON with the text and the figure of the commands.
 
 use crate::errors;
 use crate::experiment::{Experiment, RunCallbacks};
+use crate::fork;
+use crate::program::COMMIT;
+use crate::run::Run;
+use palpate::error::InputError;
+use palpate::experiment::store;
+use palpate::report::tables::accuracy::{effects, levels};
+use palpate::report::{
+    accuracy as accuracy_figure, benchmark as benchmark_table, compare as suite,
+    identify as identified, reliability,
+};
 use palpate::sim::Scene;
 use palpate::study::accuracy::tolerance::{Criterion, Origin};
-use palpate::study::accuracy::{AccuracyProgress, AccuracySpec, run as run_accuracy};
-use palpate::study::band::{self, BandProgress, BandSpec};
+use palpate::study::accuracy::{
+    AccuracyProgress, AccuracyResult, AccuracySpec, run as run_accuracy,
+};
+use palpate::study::band::{self, BandProgress, BandSpec, LEVELS};
+use palpate::study::benchmark::BenchmarkSpec;
+use palpate::study::compare::{
+    Entrant, SuiteComparison, compare as compare_runs, gap_closed, geometric_mean,
+};
 use palpate::study::identify::{IdentifySpec, run as run_identify};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -62,6 +79,10 @@ pub(crate) fn accuracy(
     if let Some(cheapest) = &found.cheapest {
         values["cheapest"]["scene"] = cheapest.toml().map_err(errors::study)?.into();
     }
+    let AccuracyResult { levels: of_levels, orders, effects: of_effects, .. } = &found;
+    let texts = [of_levels.as_ref().map(|it| levels(it, orders)), of_effects.as_ref().map(effects)];
+    values["text"] = texts.into_iter().flatten().collect::<Vec<_>>().join("\n\n").into();
+    values["svg"] = accuracy_figure::draw(of_levels.as_ref(), orders, of_effects.as_ref()).into();
     Ok(values.to_string())
 }
 
@@ -101,7 +122,18 @@ pub(crate) fn calibrate_band(
     let run = || band::run(spec, &callbacks.is_stopped, &progress);
     let found = callbacks.watched(py, total, run)?.map_err(errors::study)?;
     let found = found.ok_or_else(|| errors::other("stopped"))?;
-    Ok(json!({"band": found.band, "coverage": found.coverage}).to_string())
+    let shares = found.reliability.iter().flat_map(|(touches, shares)| {
+        let row = |(p, share)| json!({"touches": touches, "probability": p, "share": share});
+        LEVELS.into_iter().zip(*shares).map(row).collect::<Vec<_>>()
+    });
+    let values = json!({
+        "band": found.band,
+        "coverage": found.coverage,
+        "reliability": shares.collect::<Vec<_>>(),
+        "text": reliability::table(&found.coverage),
+        "svg": reliability::draw(&found.reliability),
+    });
+    Ok(values.to_string())
 }
 
 /// Identifies an object of a library in the scene or experiment at `path`, as the command
@@ -141,5 +173,85 @@ pub(crate) fn identify(
     values["is_sure"] = found.is_sure.into();
     values["touches"] = found.touches.into();
     values["history"] = Value::Array(history);
+    values["text"] = identified::conclusion(&found).into();
     Ok(values.to_string())
+}
+
+/// Loads the experiments of the benchmark's protocol at `path`, one per object; `objects` is the
+/// folder of the meshes that it lists.
+#[pyfunction]
+pub(crate) fn benchmark_experiments(
+    path: PathBuf,
+    objects: Option<PathBuf>,
+    is_quick: bool,
+) -> PyResult<Vec<Experiment>> {
+    let spec = BenchmarkSpec { path: &path, objects: objects.as_deref(), is_quick, commit: COMMIT };
+    let experiments = spec.experiments(&[]).map_err(errors::study)?;
+    Ok(experiments.into_iter().map(Experiment).collect())
+}
+
+/// Results of the finished runs of all experiments of the benchmark's protocol at `path`.
+#[pyfunction]
+pub(crate) fn benchmark(
+    py: Python<'_>,
+    path: PathBuf,
+    is_quick: bool,
+    runs: Vec<Py<Run>>,
+) -> PyResult<String> {
+    let runs: Vec<(String, &store::Run)> =
+        runs.iter().map(|run| (run.get().0.experiment.name.clone(), &run.get().0)).collect();
+    let spec = BenchmarkSpec { path: &path, objects: None, is_quick, commit: COMMIT };
+    let result = fork::detach(py, || spec.result(&runs))?.map_err(errors::study)?;
+    let table = benchmark_table::table(&result);
+    let document = serde_json::to_string_pretty(&result).map_err(errors::other)? + "\n";
+    let mut values = json!(result);
+    values["text"] = table.text().into();
+    values["html"] = table.html("palpate").into();
+    values["document"] = document.into();
+    Ok(values.to_string())
+}
+
+/// Compares runs, each with its name, relative to the planner `against`, as the command
+/// `palpate compare` does.
+#[pyfunction]
+pub(crate) fn compare(
+    py: Python<'_>,
+    runs: Vec<(String, Py<Run>)>,
+    against: String,
+) -> PyResult<String> {
+    let runs: Vec<(String, &store::Run)> =
+        runs.iter().map(|(name, run)| (name.clone(), &run.get().0)).collect();
+    let found = fork::detach(py, || -> Result<Value, _> {
+        let compared = compare_runs(&runs, &against)?;
+        Ok(json!({
+            "reference": compared.reference,
+            "objects": compared.objects,
+            "planners": compared.contenders.iter().map(|it| &it.name).collect::<Vec<_>>(),
+            "conclusion": suite::conclusion(&compared),
+            "table": suite::file(&compared).json(),
+            "overall": over_all_objects(&compared),
+            "text": suite::text(&compared).trim_end(),
+            "html": suite::overall(&compared).html("palpate"),
+            "svg": suite::profiles(&compared),
+        }))
+    })?;
+    found.map(|found| found.to_string()).map_err(|error: InputError| errors::other(error))
+}
+
+/// Returns the error of each planner over all objects, relative to the reference, with its interval,
+/// and the share of the gap from random to the oracle that it closes.
+fn over_all_objects(compared: &SuiteComparison) -> Vec<Value> {
+    let objects: Vec<usize> = (0..compared.objects.len()).collect();
+    let row = |it: &Entrant| {
+        let error = geometric_mean(&it.scores(), suite::SEED);
+        let ends = error.and_then(|error| error.interval);
+        json!({
+            "planner": it.name,
+            "error": error.map(|error| error.value),
+            "error_low": ends.map(|[low, _]| low),
+            "error_high": ends.map(|[_, high]| high),
+            "gap_closed": gap_closed(compared, it, &objects, suite::SEED).map(|gap| gap.value),
+        })
+    };
+    compared.contenders.iter().map(row).collect()
 }

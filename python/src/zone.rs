@@ -2,8 +2,10 @@
 
 use crate::errors;
 use crate::pickle::{self, Reduced, Version};
+use crate::picture::{self, Picture};
 use crate::places::{Places, rows};
 use numpy::{PyArray1, PyArrayDyn};
+use palpate::report;
 use palpate::task;
 use pyo3::prelude::*;
 
@@ -80,6 +82,11 @@ impl Zone {
 
     fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         slf
+    }
+
+    /// Picture of its extent for notebooks.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Picture<'py>>> {
+        picture::png(py, || Some(report::scene::zone(&self.0)))
     }
 
     fn __repr__(&self) -> String {

@@ -33,7 +33,8 @@ def test_a_planner_is_checked_against_its_baseline(experiment, tmp_path):
     same = palpate.check(experiment, baseline, [own.Middle], max_trials=6)
     assert same.passed and same.verdict == "identical"
     same.raise_if_worse()
-    assert list(same.table().planner) == ["own:Middle"] and "identical" in repr(same)
+    assert list(same.table().planner) == ["own:Middle"]
+    assert repr(same) == "Check(identical)" and "own:Middle" in str(same)
     # Another planner is added to the file, and the first one is kept.
     palpate.check(experiment, baseline, ["sobol"], accept="sobol too", max_trials=6)
     assert palpate.check(experiment, baseline, [own.Middle, "sobol"], max_trials=6).verdict == "identical"
@@ -47,6 +48,45 @@ def test_a_planner_is_checked_against_its_baseline(experiment, tmp_path):
         palpate.check(experiment, tmp_path / "none.jsonl", [own.Middle])
     with pytest.raises(ValueError, match="tolerance"):
         palpate.check(experiment, baseline, [own.Middle], tolerance=0.0)
+
+
+class Corner(own.Middle):
+    """Touches only a part of the zone."""
+
+    def plan(self, belief):
+        return self.zone.lower + 0.1 * (super().plan(belief) - self.zone.lower)
+
+
+def test_the_message_of_a_failure_has_verdict_measure_and_numbers(experiment, tmp_path):
+    baseline = tmp_path / "middle.jsonl"
+    palpate.check(experiment, baseline, [("test_check:Mine", own.Middle)], accept="first", max_trials=20)
+    worse = palpate.check(experiment, baseline, [("test_check:Mine", Corner)], max_trials=20)
+    assert worse.verdict == "worse" and not worse.passed
+    with pytest.raises(AssertionError) as raised:
+        worse.raise_if_worse()
+    first, *others = str(raised.value).splitlines()
+    row = worse.table().query("verdict == 'worse'").iloc[0]
+    interval = f"95 % interval {row.low_percent:+.1f} to {row.high_percent:+.1f} %"
+    assert first == f"worse: test_check:Mine: {row.measure} {row.change_percent:+.1f} % ({interval}), {row.trials} trials"
+    failed = worse.table().query("verdict in ('worse', 'undecided', 'missing')")
+    assert len(others) == len(failed) - 1 + len(worse.remarks)
+
+
+def test_pytest_shows_the_numbers_of_a_failure_in_its_summary(experiment, tmp_path):
+    baseline = tmp_path / "middle.jsonl"
+    palpate.check(experiment, baseline, [own.Middle, "sobol"], accept="first", max_trials=4)
+    (tmp_path / "test_ci.py").write_text(
+        "import palpate\n\ndef test_planners():\n"
+        "    toy = palpate.Experiment.load('toy', touches=15, initial_touches=3, grid=101)\n"
+        f"    palpate.check(toy, {str(baseline)!r}, ['sobol', 'random'], max_trials=4).raise_if_worse()\n\n"
+        "def test_passed():\n"
+        "    toy = palpate.Experiment.load('toy', touches=15, initial_touches=3, grid=101)\n"
+        f"    assert palpate.check(toy, {str(baseline)!r}, ['random'], max_trials=4).passed\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_ci.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert "AssertionError: missing: random, 0 trials" in done.stdout, done.stdout
+    assert "where False = Check(missing).passed" in done.stdout, done.stdout
 
 
 def test_an_edited_planner_is_worse_on_the_command_line(tmp_path):
@@ -77,6 +117,47 @@ def test_a_planner_that_stays_in_a_corner_is_last_in_the_benchmark(tmp_path):
     result = json.loads((tmp_path / "runs" / "benchmark-3-quick" / "benchmark.json").read_text())
     assert result["protocol"] == "3" and result["quick"]
     assert result["planners"][-1]["name"] == "my_planner:Corner"
+
+
+def test_the_benchmark_of_the_command_and_of_python_are_equal(tmp_path, program):
+    corner = GOOD.replace("at * (", "0.1 * at * (").replace("Spread", "Corner")
+    (tmp_path / "corner_planner.py").write_text(corner)
+    sys.path.insert(0, str(tmp_path))
+    try:
+        found = palpate.benchmark(["corner_planner:Corner", "sobol"], quick=True, out=tmp_path / "runs")
+        again = palpate.benchmark(["corner_planner:Corner"], quick=True, out=tmp_path / "runs")
+    finally:
+        sys.path.remove(str(tmp_path))
+    assert again == found and again.to_json() == found.to_json(), "the second call continues a finished benchmark"
+    command = [sys.executable, "-m", "palpate", "-q", "benchmark", "--quick", "--planner", "corner_planner:Corner"]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    written = (tmp_path / "runs/benchmark-3-quick/benchmark.json").read_text()
+    assert json.loads(found.to_json()) == json.loads(written)
+    assert found.quick and found.planners[-1] == "corner_planner:Corner" and "sobol" in found.planners
+    table = found.table().set_index("planner")
+    assert table.error["sobol"] == pytest.approx(1.0) and (table.error.to_numpy() == np.sort(table.error)).all()
+    assert table.error_low["corner_planner:Corner"] > 1 and table.worse_on["corner_planner:Corner"] == 2
+    per_object = found.per_object()
+    assert len(per_object) == len(table) * len(found.objects)
+    means = np.exp(np.log(per_object.groupby("planner").error.agg(list).apply(np.array)).apply(np.mean))
+    assert means["corner_planner:Corner"] == pytest.approx(table.error["corner_planner:Corner"])
+    assert "corner_planner:Corner" in str(found) and found._repr_html_().count("<tr>") == 1 + len(table)
+
+
+def test_an_interrupted_benchmark_keeps_its_trials(tmp_path):
+    code = (
+        "import os, signal, threading, palpate\n"
+        "threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        f"palpate.benchmark(out={str(tmp_path / 'runs')!r})"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stderr.rstrip().endswith("KeyboardInterrupt"), done.stderr
+    rows = sum(len(file.read_bytes().splitlines()) for file in tmp_path.glob("runs/*/trials.jsonl"))
+    assert rows > 0
+    with pytest.raises(TypeError, match="allowed is a list"):
+        palpate.benchmark("active", quick=True)
+    with pytest.raises(PlannerError):
+        palpate.benchmark([own.Nothing], quick=True)
 
 
 def test_errors_of_planners_are_recorded_or_raised(experiment, tmp_path):

@@ -20,7 +20,6 @@ mod live;
 mod live_page;
 mod new;
 mod output;
-mod picture;
 mod plan;
 mod prepare;
 mod progress;

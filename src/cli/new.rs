@@ -2,11 +2,11 @@
 
 use super::find::{find_input, is_experiment};
 use super::output::{Overwrite, make_folder, sealed};
-use super::picture::picture;
 use super::prepare::prepare_environment;
 use super::terminal::{Completion, Verbosity, print, print_stderr};
 use crate::experiment::experiment::is_name_character;
 use crate::experiment::store::write_whole;
+use crate::report::scene::picture;
 use crate::sim::Scene;
 use crate::sim::placement::{ObjectSide, UpAxis};
 use crate::sim::scene::Unit;
@@ -153,7 +153,8 @@ pub(super) fn write(args: &Args, talk: Verbosity) -> anyhow::Result<Written> {
     let environment = prepare_environment(Scene::load(&scene, &[])?, talk)?;
     environment.notices().iter().for_each(|notice| talk.note(notice));
     placed.narrow_zone(&options).iter().for_each(|notice| talk.note(notice));
-    if let Some(svg) = picture(&environment, None) {
+    let height_m = |place: &[f64]| environment.true_height_m(place);
+    if let Some(svg) = picture(environment.task(), environment.mesh(), &height_m, &[]) {
         write_whole(&drawn, &svg)?;
         written.push(drawn.display().to_string());
     }

@@ -1,7 +1,6 @@
 //! Description of a scene: `palpate show SCENE`.
 
 use super::camera;
-use super::picture::picture;
 use super::prepare::{prepare_environment, prepare_simulator};
 use super::slow_steps::report_slow_steps;
 use super::terminal::Verbosity;
@@ -10,6 +9,7 @@ use crate::experiment::metrics::truth::Truth;
 use crate::experiment::notice;
 use crate::experiment::store;
 use crate::report::files::write_as;
+use crate::report::scene::picture;
 use crate::sim::environment::ObjectShape;
 use crate::sim::{Environment, Scene, mjcf};
 use anyhow::{Context, bail, ensure};
@@ -47,8 +47,10 @@ pub(super) fn describe(scene: Scene, files: SceneFiles, talk: Verbosity) -> anyh
     }
     if let Some(path) = files.picture {
         let shape = whole_object.as_ref().and_then(|(_, shape)| shape.as_ref());
-        let svg =
-            picture(&environment, shape).context("--picture: this scene has no object to draw")?;
+        let spots = shape.map(TrueShape::reachable_samples).unwrap_or_default();
+        let height_m = |place: &[f64]| environment.true_height_m(place);
+        let svg = picture(environment.task(), environment.mesh(), &height_m, &spots);
+        let svg = svg.context("--picture: this scene has no object to draw")?;
         write_as(path, &svg)?;
         text += &format!("picture: {}\n", path.display());
     }

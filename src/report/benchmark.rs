@@ -49,6 +49,58 @@ pub fn table(result: &BenchmarkResult) -> Table {
     table
 }
 
+/// Names of measures of a whole object, each with its column, after the last budget.
+const SHAPES: [(&str, &str, f64); 5] = [
+    ("reachable_chamfer_share", "reachable, % of the diagonal", 100.0),
+    ("f_1_mm", "F at 1 mm", 1.0),
+    ("f_2_mm", "F at 2 mm", 1.0),
+    ("reached_2_mm", "reached within 2 mm, %", 100.0),
+    ("iou", "IoU", 1.0),
+];
+
+/// Returns the table of the estimated shapes: the Chamfer distance in percent of the diagonal after
+/// each budget, and other measures after the last; `None` for a protocol of zones.
+pub fn shapes(result: &BenchmarkResult) -> Option<Table> {
+    result.planners.first().filter(|planner| !planner.measures.is_empty())?;
+    let chamfer =
+        |budget: &u32| Column::new(format!("Chamfer, %, after {budget}")).unit("%", 100.0, 2);
+    let other = |(_, title, factor): &(&str, &str, f64)| {
+        Column::new(*title).unit("", *factor, if *factor > 1.0 { 2 } else { 3 })
+    };
+    let columns = result.budgets.iter().map(chamfer).chain(SHAPES.iter().map(other));
+    let mut table = Table::new(std::iter::once(Column::new("planner")).chain(columns));
+    for planner in &result.planners {
+        let after = |name: &str| planner.measures.get(name).cloned().unwrap_or_default();
+        let last = |(name, ..): &(&str, &str, f64)| after(name).last().copied().flatten();
+        let mut row: Vec<Cell> = vec![planner.name.as_str().into()];
+        row.extend(after("chamfer_share").into_iter().map(Cell::from));
+        row.extend(SHAPES.iter().map(last).map(Cell::from));
+        table.rows.push(row);
+    }
+    Some(table)
+}
+
+/// Returns the measures of whole objects as CSV: for each object, planner, budget and measure the
+/// mean over trials, in SI units. `None` for a protocol of zones.
+pub fn csv(result: &BenchmarkResult) -> Option<String> {
+    result.planners.first().filter(|planner| !planner.measures.is_empty())?;
+    let mut text = String::from("object,planner,touches,measure,mean,trials\n");
+    for planner in &result.planners {
+        for object in &planner.objects {
+            for (measure, values) in &object.measures {
+                for (touches, value) in result.budgets.iter().zip(values) {
+                    let value = value.map_or(String::new(), |value| value.to_string());
+                    text += &format!(
+                        "{},{},{touches},{measure},{value},{}\n",
+                        object.object, planner.name, object.trials
+                    );
+                }
+            }
+        }
+    }
+    Some(text)
+}
+
 /// Returns the table as Markdown, with what is needed to compare it with another one.
 pub fn markdown(result: &BenchmarkResult) -> String {
     let BenchmarkResult { protocol, protocol_sha256, palpate, commit, .. } = result;
@@ -56,10 +108,16 @@ pub fn markdown(result: &BenchmarkResult) -> String {
         true => "Quick variant, a part of the protocol: to try out only, not comparable.\n\n",
         false => "",
     };
+    let shapes = shapes(result).map_or(String::new(), |table| {
+        let measures = "Means over trials and objects. Chamfer: mean of the mean distances true → \
+                        estimated and estimated → true; reachable: mean distance of the surface that the \
+                        finger can touch.";
+        format!("\n{}\n{measures}\n", table.markdown())
+    });
     format!(
         "Palpate benchmark, protocol {protocol} (SHA-256 {protocol_sha256}), Palpate {palpate} (commit \
          {commit}). {} objects, {} trials of each planner on each, {} initial and {} planned \
-         touches.\n\n{quick}{}\n{}\n",
+         touches.\n\n{quick}{}\n{}\n{shapes}",
         result.objects.len(),
         result.trials,
         result.initial_touches,

@@ -23,7 +23,7 @@ use palpate_input::format::counted;
 use std::path::{Path, PathBuf};
 
 /// Seed of all bootstraps.
-const SEED: u64 = 0;
+pub const SEED: u64 = 0;
 
 /// Returns a planner's error on one object, relative to the reference.
 fn error_on(contender: &Entrant, object: usize) -> Option<IntervalEstimate> {
@@ -140,7 +140,7 @@ pub fn note(against: &str) -> String {
 }
 
 /// Returns the verdict as a sentence; `None` without other planners than the reference.
-fn sentence(compared: &SuiteComparison) -> Option<String> {
+pub fn conclusion(compared: &SuiteComparison) -> Option<String> {
     let against = &compared.reference;
     let others = compared.contenders.iter().filter(|it| it.name != *against);
     let groups = others.map(|it| {
@@ -181,7 +181,7 @@ pub fn html(name: &str, question: &str, compared: &SuiteComparison) -> String {
     let figures = figures.map(|(id, svg, caption)| {
         svg.map_or(String::new(), |svg| figure(id, &svg, explained(&caption)))
     });
-    let verdict = sentence(compared);
+    let verdict = conclusion(compared);
     let verdict = verdict
         .map_or(String::new(), |it| format!("<p class=\"verdict\">{}</p>\n", explained(&it)));
     page("Palpate suite", name, question, &[verdict, over_all, figures.concat(), each].concat())

@@ -4,6 +4,7 @@ pub mod accuracy;
 #[cfg(feature = "pictures")]
 pub mod animation;
 pub mod axes;
+pub mod belief;
 pub mod benchmark;
 pub mod camera_view;
 pub mod canvas;
@@ -31,6 +32,7 @@ pub mod reliability;
 pub mod relief;
 pub mod replay;
 pub mod scan;
+pub mod scene;
 pub mod sensors;
 pub mod solid;
 pub mod style;

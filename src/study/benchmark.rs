@@ -5,8 +5,10 @@
 
 use super::check::measures::ERROR_FLOOR_M;
 use super::compare::{Entrant, SuiteComparison, compare, gap_closed, geometric_mean, name_objects};
+use super::objects;
 use super::run::cells;
 use crate::experiment::Experiment;
+use crate::experiment::measure::{self, Measure};
 use crate::experiment::row::{TrialRow, planner_rows};
 use crate::experiment::statistics::equal_error::IntervalEstimate;
 use crate::experiment::statistics::median;
@@ -16,11 +18,12 @@ use palpate_input::files;
 use palpate_input::format::hex;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use std::collections::HashMap;
-use std::path::Path;
+use std::borrow::Borrow;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 
-/// Version of the protocol. A new one needs a new file in `experiments/suite`.
-pub const PROTOCOL: &str = "3";
+/// Default protocol, a file in `experiments/suite`. A changed protocol is a new file.
+pub const PROTOCOL: &str = "benchmark-3";
 
 /// Planner whose errors are the unit.
 pub const REFERENCE: &str = "sobol";
@@ -37,7 +40,7 @@ const FILE_MAX: u64 = 1 << 30;
 /// Results of all planners on all objects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BenchmarkResult {
-    /// Version of the protocol.
+    /// Name of the protocol.
     pub protocol: String,
     /// SHA-256 of the protocol's files.
     pub protocol_sha256: String,
@@ -90,6 +93,9 @@ pub struct PlannerResult {
     pub trials: usize,
     /// Failed trials on all objects; they have no error.
     pub failures: usize,
+    /// Mean over the objects of each measure of a whole object after each budget.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<&'static str, Vec<Option<f64>>>,
     /// Results on each object.
     pub objects: Vec<PlannerOnObject>,
 }
@@ -108,6 +114,9 @@ pub struct PlannerOnObject {
     pub trials: usize,
     /// Failed trials.
     pub failures: usize,
+    /// Mean of each measure of a whole object after each budget, by its name in files.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<&'static str, Vec<Option<f64>>>,
 }
 
 /// Error relative to the reference with its 95 % bootstrap interval; both `None` without a trial.
@@ -177,6 +186,8 @@ fn strings(value: &toml::Value, found: &mut Vec<String>) {
 
 /// Program and protocol of a benchmark.
 pub struct BenchmarkSource<'a> {
+    /// Name of the protocol.
+    pub protocol: String,
     /// SHA-256 of the protocol's files.
     pub protocol_sha256: String,
     /// Whether objects and trials were left out.
@@ -185,72 +196,82 @@ pub struct BenchmarkSource<'a> {
     pub commit: &'a str,
 }
 
-/// Protocol and extent of the study.
+/// Protocol of the study, and the program that runs it.
 pub struct BenchmarkSpec<'a> {
     /// File of the protocol.
     pub path: &'a Path,
-    /// Folder of the objects' runs.
-    pub folder: &'a Path,
-    /// Planners beside those of the protocol.
-    pub planners: &'a [String],
+    /// Folder of the user's objects, for a protocol with `[objects]`.
+    pub objects: Option<&'a Path>,
     /// Whether objects and trials are left out.
     pub is_quick: bool,
     /// Commit of the build.
     pub commit: &'a str,
 }
 
-/// Number of objects, and the settings, of the quick variant.
+/// Number of scenes, and the settings, of the quick variant.
 const QUICK: (usize, [&str; 2]) = (2, ["trials=2", "touches=15"]);
 
-/// Runs the protocol: `run_missing` runs the missing trials of an object in a folder and returns
-/// whether all are finished. Returns `None` as soon as they are not.
-///
-/// # Errors
-/// If the protocol cannot be read, or `run_missing` fails.
-pub fn run(
-    spec: &BenchmarkSpec,
-    run_missing: &mut dyn FnMut(Experiment, &Path) -> anyhow::Result<bool>,
-) -> anyhow::Result<Option<BenchmarkResult>> {
-    let sets = if spec.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
-    let mut experiments = cells(spec.path, &sets, spec.planners)?.experiments;
-    if spec.is_quick {
-        experiments.truncate(QUICK.0);
-    }
-    let mut runs = Vec::new();
-    for experiment in experiments {
-        let part = spec.folder.join(&experiment.name);
-        if !run_missing(experiment, &part)? {
-            return Ok(None);
+/// Settings of the quick variant of a protocol with the user's objects, which has all objects.
+const QUICK_OBJECTS: [&str; 2] = ["trials=1", "touches=20"];
+
+impl BenchmarkSpec<'_> {
+    /// Loads the experiments of the protocol, one per object, with `planners` beside its own.
+    ///
+    /// # Errors
+    /// If the protocol or an object cannot be read, or a planner is not one.
+    pub fn experiments(&self, planners: &[String]) -> anyhow::Result<Vec<Experiment>> {
+        if let Some((list, folder)) = objects::list(self.path, self.objects)? {
+            let sets = QUICK_OBJECTS.map(String::from);
+            let sets = if self.is_quick { &sets[..] } else { &[] };
+            let load = |(name, mesh): &(String, PathBuf)| {
+                list.experiment(self.path, (name, mesh), sets, planners)
+            };
+            return list.meshes(folder)?.iter().map(load).collect();
         }
-        runs.push((part.display().to_string(), Run::read(&part)?));
+        let sets = if self.is_quick { QUICK.1.map(String::from).to_vec() } else { Vec::new() };
+        let mut experiments = cells(self.path, &sets, planners)?.experiments;
+        if self.is_quick {
+            experiments.truncate(QUICK.0);
+        }
+        Ok(experiments)
     }
-    let mut compared = compare(&runs, REFERENCE)?;
-    let name = spec.path.file_stem().unwrap_or_default().to_string_lossy();
-    name_objects(&mut compared, &name);
-    let source = BenchmarkSource {
-        protocol_sha256: protocol_sha256(spec.path)?,
-        quick: spec.is_quick,
-        commit: spec.commit,
-    };
-    let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
-    Ok(Some(summarise(source, &runs, &compared)))
+
+    /// Returns the results of the finished runs of all experiments, in their order, each with its
+    /// name in messages.
+    ///
+    /// # Errors
+    /// If a file of the protocol cannot be read, or the runs do not belong together.
+    pub fn result<R: Borrow<Run>>(&self, runs: &[(String, R)]) -> anyhow::Result<BenchmarkResult> {
+        let mut compared = compare(runs, REFERENCE)?;
+        let name = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        name_objects(&mut compared, &name);
+        let source = BenchmarkSource {
+            protocol: name.clone().into_owned(),
+            protocol_sha256: protocol_sha256(self.path)?,
+            quick: self.is_quick,
+            commit: self.commit,
+        };
+        let runs: Vec<&Run> = runs.iter().map(|(_, run)| run.borrow()).collect();
+        Ok(summarise(source, &runs, &compared))
+    }
 }
 
 /// Summarises the runs of a benchmark, one per object in the order of `compared.objects`.
-pub fn summarise(
+pub fn summarise<R: Borrow<Run>>(
     source: BenchmarkSource,
-    runs: &[Run],
+    runs: &[R],
     compared: &SuiteComparison,
 ) -> BenchmarkResult {
+    let runs: Vec<&Run> = runs.iter().map(Borrow::borrow).collect();
     let experiment = runs.first().map(|run| &run.experiment);
     let budgets = experiment.map_or(Vec::new(), Experiment::table_touch_counts);
     let count = |of: fn(&Experiment) -> u32| experiment.map_or(0, of);
     let mut planners: Vec<PlannerResult> =
-        compared.contenders.iter().map(|it| planner(it, runs, compared, &budgets)).collect();
+        compared.contenders.iter().map(|it| planner(it, &runs, compared, &budgets)).collect();
     let order = |it: &PlannerResult| it.error.error.unwrap_or(f64::INFINITY);
     planners.sort_by(|a, b| order(a).total_cmp(&order(b)));
     BenchmarkResult {
-        protocol: PROTOCOL.into(),
+        protocol: source.protocol,
         protocol_sha256: source.protocol_sha256,
         quick: source.quick,
         palpate: env!("CARGO_PKG_VERSION").into(),
@@ -268,11 +289,11 @@ pub fn summarise(
 
 fn planner(
     entrant: &Entrant,
-    runs: &[Run],
+    runs: &[&Run],
     compared: &SuiteComparison,
     budgets: &[u32],
 ) -> PlannerResult {
-    let on_object = |(object, run): (&String, &Run), scores: &[f64]| {
+    let on_object = |(object, run): (&String, &&Run), scores: &[f64]| {
         let rows: Vec<&TrialRow> = planner_rows(&run.rows, &entrant.name).collect();
         let failures = rows.iter().filter(|row| row.failure.is_some()).count();
         let after = |&budget: &u32| {
@@ -283,6 +304,7 @@ fn planner(
             object: object.clone(),
             error: RelativeError::new(&[scores]),
             error_m: budgets.iter().map(after).collect(),
+            measures: shape_means(run, &rows, budgets),
             trials: rows.len() - failures,
             failures,
         }
@@ -311,18 +333,67 @@ fn planner(
         after: budgets.iter().map(|&budget| after(entrant, runs, compared, budget)).collect(),
         trials: objects.iter().map(|object| object.trials).sum(),
         failures: objects.iter().map(|object| object.failures).sum(),
+        measures: means_over(&objects, budgets.len()),
         objects,
     }
+}
+
+/// Measures of a whole object in a benchmark.
+const SHAPE_MEASURES: [&str; 7] = [
+    "chamfer_share",
+    "reachable_chamfer_share",
+    "f_1_mm",
+    "f_2_mm",
+    "reached_2_mm",
+    "iou",
+    "volume_error",
+];
+
+/// Mean of each measure of a whole object over trials, after each budget; empty for a zone.
+fn shape_means(
+    run: &Run,
+    rows: &[&TrialRow],
+    budgets: &[u32],
+) -> BTreeMap<&'static str, Vec<Option<f64>>> {
+    if run.experiment.scene.whole_object.is_none() {
+        return BTreeMap::new();
+    }
+    let measures = SHAPE_MEASURES.into_iter().filter_map(measure::by_id);
+    let after = |measure: &Measure| {
+        let mean_after =
+            |budget: &u32| mean(rows.iter().filter_map(|row| measure.value(row, *budget)));
+        budgets.iter().map(mean_after).collect()
+    };
+    measures.map(|measure| (measure.id, after(measure))).collect()
+}
+
+/// Means over the objects that have a value.
+fn means_over(
+    objects: &[PlannerOnObject],
+    budgets: usize,
+) -> BTreeMap<&'static str, Vec<Option<f64>>> {
+    let names = objects.first().map(|object| object.measures.keys()).into_iter().flatten();
+    let after = |name: &'static str| {
+        let values =
+            |i: usize| objects.iter().filter_map(move |it| *it.measures.get(name)?.get(i)?);
+        (0..budgets).map(|i| mean(values(i))).collect()
+    };
+    names.map(|name| (*name, after(name))).collect()
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Error of a planner after some touches, relative to the reference in the same trial.
 fn after(
     entrant: &Entrant,
-    runs: &[Run],
+    runs: &[&Run],
     compared: &SuiteComparison,
     budget: u32,
 ) -> RelativeError {
-    let ratios = |run: &Run| -> Vec<f64> {
+    let ratios = |run: &&Run| -> Vec<f64> {
         let unit = errors_m(run, &compared.reference, budget);
         let mut errors: Vec<(u32, f64)> =
             errors_m(run, &entrant.name, budget).into_iter().collect();

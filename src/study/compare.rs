@@ -15,6 +15,7 @@ use crate::experiment::store::Run;
 use palpate_gp::math::seed;
 use palpate_input::error::InputError;
 use rand::RngExt;
+use std::borrow::Borrow;
 use std::collections::HashMap;
 
 /// Planner with zero gain; the [`ORACLE`] has the full gain.
@@ -73,11 +74,16 @@ impl Entrant {
 ///
 /// # Errors
 /// If the first run of an object lacks that planner, or runs of one name have different trials.
-pub fn compare(runs: &[(String, Run)], against: &str) -> Result<SuiteComparison, InputError> {
+pub fn compare<R: Borrow<Run>>(
+    runs: &[(String, R)],
+    against: &str,
+) -> Result<SuiteComparison, InputError> {
+    let runs: Vec<(&str, &Run)> =
+        runs.iter().map(|(folder, run)| (folder.as_str(), run.borrow())).collect();
     let mut objects: Vec<String> = Vec::new();
     let mut units: Vec<HashMap<u32, f64>> = Vec::new();
     let mut contenders: Vec<Entrant> = Vec::new();
-    for (folder, run) in runs {
+    for &(folder, run) in &runs {
         let name = &run.experiment.name;
         let of_name = || runs.iter().filter(|(_, other)| other.experiment.name == *name);
         let pairing = |run: &Run| {

@@ -20,6 +20,7 @@ pub mod check;
 pub mod compare;
 pub mod export;
 pub mod identify;
+pub mod objects;
 pub mod planners;
 pub mod run;
 pub mod sensors;

@@ -184,6 +184,10 @@ impl Experiment {
             let remedy = "use palpate run, or one of its combinations: runs/NAME/resolved.toml";
             return Err(loader.wrong_kind("a sweep of experiments", remedy));
         }
+        if loader.has("objects") {
+            let remedy = "use palpate benchmark FILE --objects FOLDER";
+            return Err(loader.wrong_kind("a protocol on objects of a folder", remedy));
+        }
         if !loader.has("scene") && !loader.has("planners") && loader.has("zone") {
             return Err(loader.wrong_kind(
                 "a scene",

@@ -51,6 +51,23 @@ pub static MEASURES: &[Measure] = &[
         .from(Source::Shape(|it| it.reachable_chamfer_m))
         .aggregated(Aggregate::Median)
         .untabled(),
+    measure(
+        Minimise,
+        "reachable_chamfer_share",
+        "distance, reachable surface, share of the diagonal",
+        PERCENT,
+    )
+    .from(Source::Shape(|it| Some(it.reachable_chamfer_m? / it.chamfer_m? * it.chamfer_share?)))
+    .untabled(),
+    measure(Maximise, "f_1_mm", "F-score at 1 mm", SHARE)
+        .from(Source::Shape(|it| Some(it.f_mm?[0])))
+        .untabled(),
+    measure(Maximise, "f_2_mm", "F-score at 2 mm", SHARE)
+        .from(Source::Shape(|it| Some(it.f_mm?[1])))
+        .untabled(),
+    measure(Maximise, "reached_2_mm", "reachable surface within 2 mm", SHARE)
+        .from(Source::Shape(|it| it.reached_2_mm))
+        .untabled(),
     measure(Maximise, "f_1", "F-score at 1 % of the diagonal", SHARE)
         .from(Source::Shape(|it| Some(it.f_1)))
         .drawn(PanelAxis::UpToOne),

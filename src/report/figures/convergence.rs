@@ -39,7 +39,7 @@ fn caption(run: &Run) -> String {
     )
 }
 
-const WIDTH: f64 = 1100.0;
+const MARGIN_PX: f64 = 16.0;
 const LEFT_PX: f64 = 70.0;
 const PANEL: (f64, f64) = (446.0, 262.0);
 const GAP: (f64, f64) = (96.0, 78.0);
@@ -54,15 +54,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     if !run.truth.is_known() && run.experiment.scene.whole_object.is_none() {
         return Ok(None);
     }
-    let planners = &run.experiment.planners;
-    let curves: Vec<Curve> = planners
-        .iter()
-        .map(|planner| (style::planner(planners, planner), planner))
-        .map(|(colour, planner)| (colour, summary::curve(&run.experiment, &run.rows, planner)))
-        .collect();
+    let curves = curves(run);
     let points = || curves.iter().flat_map(|(_, points)| points);
-    let Some(first) = points().map(|point| point.touches).min() else { return Ok(None) };
-    let x = Axis::counts(first.into(), run.experiment.touches.into(), 6.0);
     let shown: Vec<&Measure> = MEASURES
         .iter()
         .filter(|measure| match measure.scale {
@@ -80,24 +73,57 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let over_time = shown.iter().filter(|_| times.is_some()).filter(is_over_time);
     let panels: Vec<(&Measure, bool)> =
         over_touches.chain(over_time.map(|measure| (*measure, true))).collect();
+    let dashed = constant_r(run).map(|_| (Swatch::Line(constant_line()), "R of any constant"));
+    Ok(draw_panels(run, &curves, 2, &panels, times.as_ref(), dashed))
+}
+
+/// Draws the error of the planners over touches alone; `None` without an error.
+pub fn draw_error(run: &Run) -> Option<String> {
+    let (curves, error) = (curves(run), run.error_measure());
+    let mut points = curves.iter().flat_map(|(_, points)| points);
+    points.any(|point| point.of(error).is_some()).then_some(())?;
+    draw_panels(run, &curves, 1, &[(error, false)], None, None)
+}
+
+fn curves(run: &Run) -> Vec<Curve> {
+    let planners = &run.experiment.planners;
+    planners
+        .iter()
+        .map(|planner| (style::planner(planners, planner), planner))
+        .map(|(colour, planner)| (colour, summary::curve(&run.experiment, &run.rows, planner)))
+        .collect()
+}
+
+/// Draws panels of measures, each over touches or over `times`, in columns; `None` without a touch.
+fn draw_panels(
+    run: &Run,
+    curves: &[Curve],
+    columns: usize,
+    panels: &[(&Measure, bool)],
+    times: Option<&Axis>,
+    more: Option<(Swatch, &str)>,
+) -> Option<String> {
+    let points = curves.iter().flat_map(|(_, points)| points);
+    let first = points.map(|point| point.touches).min()?;
+    let x = Axis::counts(first.into(), run.experiment.touches.into(), 6.0);
     let swatches = curves
         .iter()
-        .zip(planners)
+        .zip(&run.experiment.planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
-    let dashed = constant_r(run).map(|_| (Swatch::Line(constant_line()), "R of any constant"));
-    let rows = panels.len().div_ceil(2) as f64;
-    let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
-    let legend_px = WIDTH - 2.0 * LEFT_PX;
-    let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
     let step = [PANEL.0 + GAP.0, PANEL.1 + GAP.1];
-    let entries = swatches.chain(dashed);
+    let width = columns as f64 * step[0] + MARGIN_PX;
+    let rows = panels.len().div_ceil(columns) as f64;
+    let size = [width, 66.0 - 12.0 + rows * step[1]];
+    let legend_px = width - 2.0 * LEFT_PX;
+    let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
+    let entries = swatches.chain(more);
     let mut sheet = FigureLayout::new(size, first, step, legend_px, "", entries);
-    for (i, (measure, over_time)) in panels.into_iter().enumerate() {
-        let area = sheet.area(i % 2, (i / 2) as f64);
-        let time_axis = times.as_ref().filter(|_| over_time);
-        draw_measure(&mut sheet.canvas, area, run, measure, &x, time_axis, &curves);
+    for (i, (measure, over_time)) in panels.iter().enumerate() {
+        let area = sheet.area(i % columns, (i / columns) as f64);
+        let time_axis = times.filter(|_| *over_time);
+        draw_measure(&mut sheet.canvas, area, run, measure, &x, time_axis, curves);
     }
-    Ok(Some(sheet.canvas.finish()))
+    Some(sheet.canvas.finish())
 }
 
 fn draw_measure(

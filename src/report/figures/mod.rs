@@ -8,6 +8,7 @@ pub(super) mod surfaces;
 pub(super) mod targets;
 
 pub use super::whole_object::FIGURE as SOLIDS;
+pub use convergence::draw_error;
 pub use surfaces::FIGURE as SURFACES;
 
 use crate::experiment::store::Run;

@@ -39,6 +39,13 @@ pub struct ShapeMetrics {
     pub f_1: f64,
     /// F-score at 3 % of the diagonal.
     pub f_3: f64,
+    /// F-scores at 1 and 2 mm; absent in rows of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_mm: Option<[f64; 2]>,
+    /// Share of the reachable true surface within 2 mm of the estimated one; none without a
+    /// reachable surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reached_2_mm: Option<f64>,
     /// Estimated volume divided by the true one, minus 1; none for an open true surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volume_error: Option<f64>,
@@ -200,6 +207,7 @@ impl TrueShape {
         let chamfer_m = ways_m[0].zip(ways_m[1]).map(|(to_m, from_m)| 0.5 * to_m + 0.5 * from_m);
         let reached = self.is_reachable.iter().flatten().zip(&from_true_m);
         let reached_m = reached.filter_map(|(is_reachable, way_m)| is_reachable.then_some(*way_m));
+        let reached_m: Vec<f64> = reached_m.collect();
         let f_at = |share| f_score(&from_true_m, &from_believed_m, share * self.diagonal_m);
         let error = |believed: f64, truly: f64| round_share(believed / truly - 1.0);
         let volume_error = self.volume_m3.map(|volume_m3| error(believed.volume_m3(), volume_m3));
@@ -207,7 +215,9 @@ impl TrueShape {
         ShapeMetrics {
             chamfer_m,
             chamfer_share: chamfer_m.map(|chamfer_m| round_share(chamfer_m / self.diagonal_m)),
-            reachable_chamfer_m: mean(reached_m),
+            reached_2_mm: share(reached_m.iter().copied(), |way_m| way_m <= 2e-3).map(round_share),
+            reachable_chamfer_m: mean(reached_m.into_iter()),
+            f_mm: Some([1e-3, 2e-3].map(|way_m| f_score(&from_true_m, &from_believed_m, way_m))),
             f_1: f_at(0.01),
             f_3: f_at(0.03),
             volume_error: volume_error.filter(|error| error.is_finite()),
@@ -224,6 +234,8 @@ impl TrueShape {
             volume_error: self.volume_m3.map(|_| -1.0),
             area_error: -1.0,
             iou: self.volume_m3.map(|_| 0.0),
+            f_mm: Some([0.0; 2]),
+            reached_2_mm: self.is_reachable.as_ref().map(|_| 0.0),
             ..ShapeMetrics::default()
         }
     }
