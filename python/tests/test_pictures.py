@@ -19,7 +19,7 @@ def pixels(shown):
     png, metadata = shown
     image = np.round(255 * pyplot.imread(io.BytesIO(png)))[..., :3]
     assert image.shape[1] == 2 * metadata["width"] <= 2 * 900, "it fits in a cell, and is sharp"
-    assert len(png) < 200_000, "a notebook with some pictures stays small"
+    assert len(png) < 300_000, "a notebook with some pictures stays small"
     return image.astype(int)
 
 
@@ -83,9 +83,10 @@ def test_results_are_shown_as_pages(tmp_path):
     experiment = palpate.Experiment.load("toy", touches=12, initial_touches=3, grid=101)
     comparison = experiment.run(["sobol", "random"], trials=6).compare()
     text = comparison._repr_html_()
-    assert text.count("<table") == 1 and text.count("<svg") == 1 and "median" in text
+    # A drawing clips its parts in drawings of their own.
+    assert text.count("<table") == 1 and text.count("<svg style") == 1 and "median" in text
     assert colours.planner("sobol") in text and colours.planner("random") in text
     palpate.check(experiment, tmp_path / "base.jsonl", [own.Middle, "sobol"], accept="first", max_trials=6)
     check = palpate.check(experiment, tmp_path / "base.jsonl", [own.Middle, "sobol"], max_trials=6)
     text = check._repr_html_()
-    assert text.count("<svg") == 1 and "own:Middle" in text and "toy: identical" in text
+    assert text.count("<svg style") == 1 and "own:Middle" in text and "toy: identical" in text

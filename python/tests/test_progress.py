@@ -69,7 +69,7 @@ def test_tests_and_pipes_are_silent(capsys):
 def test_a_notebook_shows_it_and_stores_none():
     code = "from palpate._progress import Progress\nimport time\nwith Progress('toy', None) as look:\n"
     long = nbformat.v4.new_code_cell(f"{code}    time.sleep(0.6)\n    look(1, 3)")
-    kept = nbformat.v4.new_code_cell(f"{code}    time.sleep(0.6)\n    look(1, 3)\n    raise SystemExit")
+    kept = nbformat.v4.new_code_cell(f"{code}    time.sleep(0.6)\n    look(1, 3)\n    raise RuntimeError")
     off = nbformat.v4.new_code_cell(code.replace("None", "False") + "    time.sleep(0.6)\n    look(1, 3)")
     notebook = nbformat.v4.new_notebook(cells=[long, kept, off])
     updates = []

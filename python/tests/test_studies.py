@@ -19,7 +19,7 @@ def test_effects_of_a_scene_are_measured():
     assert (measured.contact_low_m <= measured.contact_mean_m).all()
     assert (measured.contact_mean_m <= measured.contact_high_m).all()
     assert (measured.contact_p95_m <= measured.contact_max_m).all()
-    assert "without skin" in str(found) and found._repr_html_().count("<svg") == 1
+    assert "without skin" in str(found) and found._repr_html_().count("<svg style") == 1
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.scene = "another"
     with pytest.raises(ValueError, match="tolerance"):
@@ -42,7 +42,7 @@ def test_a_band_is_learned_and_used():
     for _, shares in found.reliability().groupby("touches").share:
         assert shares.is_monotonic_increasing
     assert found.reliability().share.between(0, 1).all()
-    assert "mean" in str(found) and found._repr_html_().count("<svg") == 1
+    assert "mean" in str(found) and found._repr_html_().count("<svg style") == 1
     with pytest.raises(PalpateError, match="gp.band"):
         palpate.calibrate_band("suite/six", test=True, trials=1, gp__band="likelihood", **few)
 
@@ -80,7 +80,7 @@ def test_runs_are_compared_as_the_command_does(tmp_path, program):
     assert palpate.compare([tmp_path / "toy", tmp_path / "container"]) == found
     assert palpate.compare(list(runs.values()), against="sobol").reference == "sobol"
     html = found._repr_html_()
-    assert html.count("<svg") == 1 and html.count("<tr>") == 3
+    assert html.count("<svg style") == 1 and html.count("<tr>") == 3
 
 
 def test_runs_of_one_experiment_are_told_apart_by_their_names(tmp_path):

@@ -4,7 +4,7 @@
 //! machine.
 
 use anyhow::{Context, anyhow};
-use png::{ColorType, Encoder};
+use png::{AdaptiveFilterType, ColorType, Compression, Encoder};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 use std::sync::{Arc, LazyLock};
@@ -72,6 +72,8 @@ pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, pixels.width(), pixels.height());
     encoder.set_color(ColorType::Rgba);
+    encoder.set_compression(Compression::Best);
+    encoder.set_adaptive_filter(AdaptiveFilterType::Adaptive);
     encoder.add_text_chunk("Software".into(), "Palpate".into())?;
     encoder.write_header()?.write_image_data(&rgba.collect::<Vec<u8>>())?;
     Ok(bytes)
