@@ -4,8 +4,8 @@
 #     bash experiments/slurm/submit.sh EXPERIMENT SHARDS [OUT] [SBATCH OPTIONS…]
 #     bash experiments/slurm/submit.sh bird 8 runs/bird --partition=long --cpus-per-task=16
 #
-# PALPATE is the program, by default `palpate`, or target/release/palpate in a checkout. Submit the same line again to continue killed
-# tasks; finished shards end at once.
+# PALPATE is the program, by default `palpate`, or target/release/palpate in a checkout. Submit the same line again
+# to continue killed tasks; finished shards end at once.
 set -euo pipefail
 experiment=${1:?experiment}
 shards=${2:?number of shards}
