@@ -34,7 +34,7 @@ RULES = [
     (r"make |cargo |cd python/baselines|python train\.py", "checkout", "", "builds or tests the repository"),
     (r"palpate run toy .*policy:Trained", "checkout", "", "the planner lies in python/baselines; test_planners.py"),
     (r"palpate (serve|register experiments/|doctor --arm|export --topic)", "robot", "", "tests/suite/lab*.rs"),
-    (r"palpate (run|live|show) (real_|my-experiment|my-ur5e|my-scene)", "robot", "", "tests/suite/lab*.rs"),
+    (r"palpate (run|live|show|identify \S+) (real_|my-experiment|my-ur5e|my-scene)", "robot", "", "tests/suite/lab*.rs"),
     (r"ros2 |chronyc ", "robot", "", "commands of ROS and of the robot's computer"),
     (r"palpate live", "parsed", "", "serves until it is stopped; tests/suite/live.rs"),
     (r"bash experiments/slurm", "parsed", "", "needs Slurm; tests/clusters/test.sh"),
