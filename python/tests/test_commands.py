@@ -45,12 +45,12 @@ RULES = [
     (r"palpate run (suite_library|lookalikes)", "run", f"{SHORTEST} --set recognition.particles=16", "slow touches"),
     (r"palpate run \S*(finger|pa10|strokes|around|suite|arm/|soft/)", "run", SHORTEST, "slow touches"),
     (r"palpate run mug\.toml .*stroke", "run", SHORTEST, "slow touches"),
-    (r"palpate run .*objects\.toml", "run", f"{SHORT} --set touches=22", "slow touches"),
+    (r"palpate run bird( |$)", "run", f"{SHORT} --set touches=60", "a later line exports touch 60"),
     (r"palpate run", "run", SHORT, "fewer trials"),
     (r"palpate report .*report\.trial", "run", "--set report.trial=1", "there are two trials"),
     (r"palpate check \S+\.mcap", "run", "", ""),
     (r"palpate check", "run", "--max-trials 4", "the first four trials are compared byte by byte"),
-    (r"palpate calibrate --band", "run", "--trials 1 --set touches=6", "fewer touches"),
+    (r"palpate calibrate --band", "run", "--trials 1 --set touches=8", "fewer touches"),
     (r"palpate |export |mkdir ", "run", "", ""),
 ]
 #: A name that stands for another, which a command in a sentence may have.
