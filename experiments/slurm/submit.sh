@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # Runs an experiment as an array of a few large shards, waits, and merges them:
 #
-#     experiments/slurm/submit.sh EXPERIMENT SHARDS [OUT] [SBATCH OPTIONS…]
-#     experiments/slurm/submit.sh bird 8 runs/bird --partition=long --cpus-per-task=16
+#     bash experiments/slurm/submit.sh EXPERIMENT SHARDS [OUT] [SBATCH OPTIONS…]
+#     bash experiments/slurm/submit.sh bird 8 runs/bird --partition=long --cpus-per-task=16
 #
-# PALPATE is the path of the program (target/release/palpate). Submit the same line again to continue killed
-# tasks; finished shards end at once.
+# PALPATE is the program, by default `palpate`, or target/release/palpate in a checkout. Submit the same line again
+# to continue killed tasks; finished shards end at once.
 set -euo pipefail
 experiment=${1:?experiment}
 shards=${2:?number of shards}
 out=${3:-runs/$(basename "$experiment" .toml)}
 shift $(($# < 3 ? $# : 3))
-palpate=${PALPATE:-target/release/palpate}
+palpate=${PALPATE:-$(command -v palpate || echo target/release/palpate)}
 mkdir -p "$(dirname "$out")"
 
 array=$(sbatch --parsable --array="1-$shards" --job-name=palpate --output="$out-%a.log" "$@" <<EOF

@@ -166,12 +166,8 @@ impl Scene {
     pub(crate) fn target(&self, target: &TargetInput) -> PyResult<(task::Target, task::Approach)> {
         let task = self.environment().task();
         let found = target.in_region(task.region()).map_err(PyValueError::new_err)?;
-        let approach = task.approach(&found).filter(|_| task.contains(&found));
-        let approach = approach.ok_or_else(|| {
-            let beyond = task.region().outside();
-            PyValueError::new_err(format!("{:?} is {beyond}", found.numbers()))
-        })?;
-        Ok((found, approach))
+        let approach = task.approach_in_region(&found);
+        Ok((found.clone(), approach.map_err(|error| PyValueError::new_err(error.to_string()))?))
     }
 }
 

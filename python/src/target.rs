@@ -44,11 +44,11 @@ impl TargetInput {
         let (wanted, found) = (region.tap_dimension(), coordinates.len());
         if found != wanted {
             return Err(format!(
-                "the planned target has {found} coordinates: allowed are {wanted}, {}",
+                "the target has {found} coordinates: allowed are {wanted}, {}",
                 region.bounds()
             ));
         }
         let target = region.target(coordinates);
-        target.ok_or_else(|| "the planned target has no direction".into())
+        target.ok_or_else(|| "the target has no direction".into())
     }
 }

@@ -85,8 +85,8 @@ def test_an_own_planner_makes_strokes():
     ("planner", "words"),
     [
         (own.Raises, "planner raised ValueError: no idea"),
-        (own.NotANumber, "the planned target is not finite = [NaN]"),
-        (own.Outside, "the planned target is outside the region = [1.02]: allowed is a place in the zone, x from -0.02 to 0.02 m"),
+        (own.NotANumber, "the target is not finite = [NaN]"),
+        (own.Outside, "the target is outside the region = [1.02]: allowed is a place in the zone, x from -0.02 to 0.02 m"),
         (own.Many, "5 coordinates: allowed are 1, a place in the zone"),
         (own.Nowhere, "the planner returned None"),
         (own.Places, "an array of shape (2, 1): allowed is one target"),

@@ -1,24 +1,33 @@
 //! Command `palpate list`.
 
-use super::find::{EXPERIMENTS, SCENES, file_stems, find};
+use super::find::{EXPERIMENTS, SCENES, file_stems, find, located};
+use super::output::make_folder;
 use super::terminal::{Completion, print};
 use crate::experiment::Experiment;
 use crate::experiment::measure::MEASURES;
 use crate::experiment::planner_names;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
+use anyhow::{Context, ensure};
+use palpate_input::{files, shipped};
 use schemars::schema_for;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   palpate list                 everything that has a name
   palpate list planners
+  palpate list files           all files that come with the program
+  palpate list --copy experiments/slurm
   palpate list --reference > reference.md")]
 pub(super) struct Args {
-    /// Kind to list [default: all].
+    /// Kind to list [default: all but files].
     kind: Option<Kind>,
+    /// Copy a shipped file or folder to the same path here; keeps files that exist; may be
+    /// repeated.
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["kind", "reference"])]
+    copy: Vec<PathBuf>,
     /// Print every command, setting and column as Markdown.
     #[arg(long, conflicts_with = "kind")]
     reference: bool,
@@ -37,6 +46,8 @@ enum Kind {
     Measures,
     /// Simulated effects: tables of [effects] in a scene.
     Effects,
+    /// Shipped files: experiments, scenes, models, baselines, and files for Slurm and CI.
+    Files,
 }
 
 /// Returns pairs of name and description.
@@ -47,6 +58,7 @@ const KINDS: &[(Kind, &str, Lister)] = &[
     (Kind::Planners, "planners (planners = [\"NAME\"])", planners),
     (Kind::Measures, "measures", measures),
     (Kind::Effects, "effects ([effects.NAME])", effects),
+    (Kind::Files, "shipped files (palpate list --copy PATH)", shipped_files),
 ];
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
@@ -54,7 +66,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Completion> {
         print(super::reference().trim_end())?;
         return Ok(Completion::Done);
     }
-    let wanted = KINDS.iter().filter(|(kind, ..)| args.kind.is_none_or(|wanted| wanted == *kind));
+    if !args.copy.is_empty() {
+        copy(&args.copy)?;
+        return Ok(Completion::Done);
+    }
+    let is_wanted = |kind: Kind| args.kind.map_or(kind != Kind::Files, |wanted| wanted == kind);
+    let wanted = KINDS.iter().filter(|(kind, ..)| is_wanted(*kind));
     let sections: Vec<String> =
         wanted.map(|(_, title, lines)| format!("{title}\n{}", two_columns(&lines()))).collect();
     print(sections.join("\n").trim_end())?;
@@ -101,8 +118,41 @@ fn effects() -> Vec<[String; 2]> {
         .collect()
 }
 
+fn shipped_files() -> Vec<[String; 2]> {
+    let line = |path: PathBuf| [path.display().to_string(), String::new()];
+    shipped::files().into_iter().map(line).collect()
+}
+
+/// Copies shipped files, or all files of shipped folders, to the same paths in the working folder.
+fn copy(paths: &[PathBuf]) -> anyhow::Result<()> {
+    let shipped = shipped::files();
+    for path in paths {
+        let mut copied = shipped.iter().filter(|file| file.starts_with(path)).peekable();
+        ensure!(
+            copied.peek().is_some(),
+            "{}: no such shipped file; `palpate list files` lists all",
+            path.display()
+        );
+        for file in copied {
+            let name = file.display();
+            if file.exists() {
+                print(&format!("{name} exists and is kept"))?;
+                continue;
+            }
+            let source = located(file);
+            let bytes = files::bytes(&source, u64::MAX);
+            let bytes = bytes.with_context(|| source.display().to_string())?;
+            file.parent().map_or(Ok(()), make_folder)?;
+            files::replace(file, bytes).with_context(|| name.to_string())?;
+            print(&format!("wrote {name}"))?;
+        }
+    }
+    Ok(())
+}
+
 /// Formats names and descriptions as two indented columns.
 pub(super) fn two_columns(lines: &[[String; 2]]) -> String {
     let width = lines.iter().map(|[name, _]| name.chars().count()).max().unwrap_or(0);
-    lines.iter().map(|[name, about]| format!("  {name:<width$}  {about}\n")).collect()
+    let line = |[name, about]: &[String; 2]| format!("  {name:<width$}  {about}");
+    lines.iter().map(|each| format!("{}\n", line(each).trim_end())).collect()
 }

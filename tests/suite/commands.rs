@@ -67,6 +67,22 @@ fn shipped_files_are_found_in_an_empty_folder() {
     for path in ["paper/bird-10", "experiments/paper/bird-10.toml"] {
         run(&["run", path, "--plan", "2"]);
     }
+    let files = run(&["list", "files"]);
+    let baseline = "experiments/baselines/toy.jsonl";
+    let submit = "experiments/slurm/submit.sh";
+    assert!([baseline, submit].iter().all(|name| files.lines().any(|line| line.trim() == *name)));
+    assert!(!listed.contains(submit), "{listed}");
+    fs::create_dir_all(folder.path().join("experiments/baselines")).unwrap();
+    fs::write(folder.path().join(baseline), "mine").unwrap();
+    let said = run(&["list", "--copy", "experiments/baselines", "--copy", submit]);
+    assert!(said.contains(&format!("{baseline} exists and is kept")), "{said}");
+    assert_eq!(fs::read_to_string(folder.path().join(baseline)).unwrap(), "mine");
+    for name in [submit, "experiments/baselines/bird.jsonl"] {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+        let copied = fs::read(folder.path().join(name)).unwrap();
+        assert_eq!(copied, fs::read(source).unwrap(), "{name}");
+    }
+    fails(folder.path(), &["list", "--copy", "experiments/none"], &["palpate list files"]);
     run(&["new", "models/suite/mug.glb"]);
     assert!(run(&["show", "mug-scene.toml"]).contains("mug.glb"));
     assert_eq!(homes().count(), 1, "nothing else is written");
@@ -172,6 +188,7 @@ fn options_of_another_input_are_refused() {
         (&["compare", "toy", "--sensors", "biotac", "--svg", "it.svg"], with),
         (&["compare", "toy", "--sensors", "biotac,skin"], "gelsight_mini"),
         (&["list", "planners", "--reference"], with),
+        (&["list", "planners", "--copy", "models"], with),
         (&["--completions", "bash", "list"], "--completions"),
         (&["--quiet"], "--help"),
     ] {

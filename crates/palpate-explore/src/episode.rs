@@ -105,19 +105,7 @@ impl<'a> Episode<'a> {
                 )));
             }
         }
-        let (region, numbers) = (self.task.region(), target.numbers());
-        let refused = |problem: &str| {
-            let problem = format!("the planned target is {problem}");
-            InputError::new(problem).value(format!("{numbers:?}")).allowed(region.bounds())
-        };
-        if !numbers.iter().all(|number| number.is_finite()) {
-            return Err(refused("not finite"));
-        }
-        if !region.contains(target) {
-            return Err(refused("outside the region"));
-        }
-        let approach = self.task.approach(target);
-        let approach = approach.ok_or_else(|| refused("out of the finger's reach"))?;
+        let approach = self.task.approach_in_region(target)?;
         Ok(match target {
             Target::Custom { name, parameters, .. } => {
                 Action::Custom { name: name.clone(), approach, parameters: parameters.clone() }

@@ -1,6 +1,7 @@
 //! Lookup of shipped files by name: `bird` finds `scenes/bird.toml`.
 
 use crate::format;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Environment variable: the folder that contains the folders of shipped files if they are neither
@@ -34,7 +35,7 @@ pub fn locate(path: &Path, home: Option<&Path>) -> Option<PathBuf> {
 
 /// Returns the sorted names of the files that [`find`] finds.
 pub fn names(folder: &str, home: Option<&Path>) -> Vec<String> {
-    let files = folders(folder, home).filter_map(|folder| std::fs::read_dir(folder).ok());
+    let files = folders(folder, home).filter_map(|folder| fs::read_dir(folder).ok());
     let stem = |path: PathBuf| -> Option<String> {
         let is_toml = path.extension().is_some_and(|extension| extension == "toml");
         Some(path.file_stem()?.to_str()?.to_owned()).filter(|_| is_toml)
@@ -44,6 +45,30 @@ pub fn names(folder: &str, home: Option<&Path>) -> Vec<String> {
     names.sort();
     names.dedup();
     names
+}
+
+/// Returns the sorted paths of all shipped files, relative to the folder that contains theirs:
+/// the program's, that of [`HOME`], or the working directory.
+pub fn files() -> Vec<PathBuf> {
+    let mut roots = folders("", None).skip(1);
+    let root = roots.find(|root| FOLDERS.iter().all(|name| root.join(name).is_dir()));
+    let root = root.unwrap_or_default();
+    let mut files = Vec::new();
+    FOLDERS.iter().for_each(|name| add_files(&root, Path::new(name), &mut files));
+    files.sort();
+    files
+}
+
+/// Adds the paths, relative to `root`, of the files in its `folder` and below.
+fn add_files(root: &Path, folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(root.join(folder)).into_iter().flatten().flatten() {
+        let path = folder.join(entry.file_name());
+        match entry.file_type() {
+            Ok(kind) if kind.is_dir() => add_files(root, &path, files),
+            Ok(kind) if kind.is_file() => files.push(path),
+            _ => {}
+        }
+    }
 }
 
 /// Returns the end of a message about a `name` that [`find`] does not find: the most similar of

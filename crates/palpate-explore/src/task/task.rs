@@ -261,6 +261,26 @@ impl Task {
         directions(of).filter(is_missed).collect()
     }
 
+    /// Returns the approach of a target in the region.
+    ///
+    /// # Errors
+    /// If the target is not finite, outside the region, or out of the finger's reach.
+    pub fn approach_in_region(&self, target: &Target) -> Result<Approach, InputError> {
+        let numbers = target.numbers();
+        let refused = |problem: &str| {
+            InputError::new(format!("the target is {problem}"))
+                .value(format!("{numbers:?}"))
+                .allowed(self.region.bounds())
+        };
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(refused("not finite"));
+        }
+        if !self.region.contains(target) {
+            return Err(refused("outside the region"));
+        }
+        self.approach(target).ok_or_else(|| refused("out of the finger's reach"))
+    }
+
     /// Returns the approach of `target`: along the zone's axis for a place, with the finger's own
     /// pitch or the target's, straight through the point for an aim. Returns `None` if the target
     /// does not match the region's kind, or cannot be reached.
