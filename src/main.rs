@@ -10,8 +10,8 @@ use std::process::ExitCode;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
-    let is_here =
-        ["experiments/toy.toml", "scenes/toy.toml"].iter().all(|it| Path::new(it).is_file());
+    let files = ["experiments/toy.toml", "scenes/toy.toml", "models/bird.glb"];
+    let is_here = files.iter().all(|it| Path::new(it).is_file());
     if std::env::var_os(HOME).is_none()
         && !is_here
         && let Some(folder) = embedded::folder()

@@ -140,8 +140,8 @@ def test_an_own_planner_goes_around_an_object(mug, run, isolate):
 @pytest.mark.parametrize(
     ("planner", "words"),
     [
-        (around.Flat, "3 coordinates, a target around an object needs 6"),
-        (around.Beyond, "outside the ball"),
+        (around.Flat, "3 coordinates: allowed are 6, an aimed point within"),
+        (around.Beyond, "the target is outside the region"),
         (around.Zoned, "has a parameter zone"),
         (around.Mistaken, "`variance` exists only for a zone"),
     ],

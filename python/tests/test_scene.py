@@ -63,7 +63,7 @@ def test_what_is_wrong_is_said():
         palpate.Scene.load("bird", finger__radius_m=-1.0)
     scene = palpate.Scene.load("toy")
     assert scene.mesh() is None
-    with pytest.raises(ValueError, match="outside the zone"):
+    with pytest.raises(ValueError, match="outside the region"):
         scene.touch([99.0])
     vertices_m, triangles = sphere(4)
     with pytest.raises(SimulationError):

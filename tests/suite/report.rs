@@ -220,6 +220,8 @@ const SHAPE: ShapeMetrics = ShapeMetrics {
     reachable_chamfer_m: Some(0.001),
     f_1: 0.6,
     f_3: 0.9,
+    f_mm: Some([0.4, 0.7]),
+    reached_2_mm: Some(0.95),
     volume_error: Some(-0.02),
     area_error: 0.01,
     iou: Some(0.8),

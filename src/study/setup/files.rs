@@ -10,6 +10,7 @@ use palpate_geometry::holes::Hole;
 use palpate_geometry::import::{import_with, statements};
 use palpate_geometry::mesh::Mesh;
 use palpate_gp::math::pose::pose;
+use palpate_input::shipped;
 use std::path::PathBuf;
 
 /// Mesh, and the choices that the user makes about it.
@@ -210,7 +211,8 @@ impl MeshPlacement {
         let (unit, scale) = unit.value;
         let mesh = match options.mesh.is_relative() && options.is_beside {
             true => options.mesh.clone(),
-            false => std::path::absolute(&options.mesh)?,
+            false => shipped::portable(&options.mesh.canonicalize()?)
+                .map_or_else(|| std::path::absolute(&options.mesh), Ok)?,
         };
         let mesh = toml::Value::from(mesh.to_string_lossy().into_owned());
         let mut others = String::new();
