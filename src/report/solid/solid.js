@@ -38,6 +38,7 @@ function viewOf(canvas) {
     truth = data.truth && meshOf(data.truth);
     truthTints = truth && Uint8Array.from(truth.positions, (_, i) => data.colours.truth[i % 3]);
     scales = {
+      plain: { stops: data.colours.height, at: () => 0.6, ticks: [] },
       deviation: deviationScale(data.deviation_range),
       error: data.error_range && errorScale(data.error_range[1], "error: inside the true surface | outside"),
     };
@@ -174,7 +175,7 @@ function viewOf(canvas) {
     take();
     const { context, width, height, ratio } = pen(canvas);
     const frame = frameOf(state);
-    const values = frame[state.colour] ?? new Float32Array(frame.deviation.length).fill(NaN);
+    const values = frame[state.colour] ?? frame.deviation.map(() => NaN);
     const eye = camera(width, height);
     const isHidden = hider(frame.mesh, eye.at);
     // At any zoom, the colour bar below stays visible.
@@ -190,6 +191,7 @@ function viewOf(canvas) {
       const isLast = i === shown.length - 1;
       const point = eye.at(touch.contact ?? touch.aim);
       if (isLast) drawArrow(context, touch, eye.at, isHidden, onPaper(pair));
+      if (touch.path.length) return drawStroke(context, touch.path.map(eye.at), pair, isHidden, isLast);
       const kind = touch.contact === null ? "miss" : isHidden(point) ? "hidden" : "seen";
       drawTouch(context, point, pair, kind, isLast);
     });
