@@ -76,11 +76,13 @@ function draw() {
     for (const planner of told.planners) {
       const panel = panels.get(planner.name);
       const index = data.planners.findIndex(({ name }) => name === planner.name);
-      if (!panel?.canvas.clientWidth || index < 0) continue;
+      // Without a belief, as of the planners against a person, there is nothing to show.
+      if (panel) panel.canvas.hidden = index < 0;
+      if (!panel?.canvas.clientWidth) continue;
       const frame = data.planners[index].frames[0];
       panel.view ??= viewOf(panel.canvas);
       panel.view({ ...shared, planner: index, frame: 0, next: nextOf(planner) });
-      panel.score.textContent = ` after ${frame.touches} touches${frame.score ? `: ${frame.score}` : ""}`;
+      panel.score.textContent = ` Belief after ${frame.touches} touches${frame.score ? `: ${frame.score}` : ""}`;
     }
   });
 }
@@ -211,6 +213,8 @@ function showCurves() {
   for (const { colours, errors } of told.planners) {
     const points = errors.filter(([, value]) => value > 0).map(([touches, value]) => `${x(touches).toFixed(1)},${y(value).toFixed(1)}`);
     parts.push(`<polyline fill="none" stroke="${onPaper(colours)}" stroke-width="2" points="${points.join(" ")}"/>`);
+    const [left, top] = points.at(-1)?.split(",") ?? [];
+    if (top) parts.push(`<circle cx="${left}" cy="${top}" r="3" fill="${onPaper(colours)}"/>`);
   }
   parts.push(`<text x="${(LEFT + RIGHT) / 2}" y="${BOTTOM + 34}" text-anchor="middle">touches</text>`);
   find("curve").innerHTML = parts.join("");
@@ -240,7 +244,7 @@ function show(state) {
   for (const planner of state.planners) {
     const panel = panelOf(planner);
     panel.figure.style.setProperty("--own", onPaper(planner.colours));
-    panel.status.textContent = ` ${WORDS[planner.status]}, ${planner.touches} of ${state.touches}${planner.last ? `, ${planner.last}` : ""}${planner.time_s ? `, ${planner.time_s.toFixed(1)} s` : ""}. Belief`;
+    panel.status.textContent = ` ${WORDS[planner.status]}, ${planner.touches} of ${state.touches}${planner.last ? `, ${planner.last}` : ""}${planner.time_s ? `, ${planner.time_s.toFixed(1)} s` : ""}.`;
     showBars(panel.bars, planner.hypotheses ?? []);
     panel.canvas.setAttribute("aria-label", `The belief of ${planner.name} after ${planner.touches} touches`);
   }

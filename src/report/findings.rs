@@ -9,8 +9,8 @@ use crate::experiment::measure::{
 use crate::experiment::metrics::constant_r;
 use crate::experiment::row::{TouchRow, planner_rows};
 use crate::experiment::statistics::comparison::PairedComparison;
-use crate::experiment::statistics::{self, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint};
+use crate::experiment::statistics::{self, curve_table};
 use crate::experiment::store::Run;
 use palpate_input::format::counted;
 
@@ -439,7 +439,7 @@ fn recognition(run: &Run) -> Option<String> {
         let named: Vec<Option<f64>> = named.collect();
         let right: Vec<f64> = named.iter().copied().flatten().collect();
         let from = statistics::median(&right)
-            .map_or(String::new(), |from| format!(", from touch {from} on (median)"));
+            .map_or(String::new(), |from| format!(", from touch {} on (median)", from.ceil()));
         let trials = counted(named.len(), "trial");
         (!named.is_empty()).then(|| format!("{name} in {} of {trials}{from}", right.len()))
     };

@@ -90,7 +90,16 @@ fn parts(svg: &str) -> Option<String> {
     };
     let block = |parts: &[(&str, String, String)]| {
         let drawn: String = parts.iter().filter_map(part).collect();
-        format!("<div class=\"parts {}\">\n{drawn}</div>\n", parts[0].0)
+        // As many panels are side by side as in the drawing.
+        let ends = parts.iter().filter_map(|(_, area, _)| {
+            let numbers: Vec<f64> = area.split(' ').filter_map(|it| it.parse().ok()).collect();
+            Some([*numbers.first()?, numbers.first()? + numbers.get(2)?])
+        });
+        let [left, right] = ends.fold([f64::INFINITY, 0.0], |[left, right], end| {
+            [f64::min(left, end[0]), f64::max(right, end[1])]
+        });
+        let (kind, most) = (parts[0].0, (right - left).ceil());
+        format!("<div class=\"parts {kind}\" style=\"max-width:{most}px\">\n{drawn}</div>\n")
     };
     Some(marked.chunk_by(|a, b| a.0 == b.0).map(block).collect())
 }

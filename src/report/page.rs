@@ -97,7 +97,11 @@ fn headline(run: &Run) -> String {
     let name = measure.title.chars().take(1).flat_map(char::to_uppercase);
     let name: String = name.chain(measure.title.chars().skip(1)).collect();
     let title = format!("{name} after {}", counted(run.experiment.touches, "touch"));
-    let note = format!("{statistic} of {}; [{band}].", summary::finished(run));
+    let band = match values.iter().any(|(.., interval)| interval.is_some()) {
+        true => format!("; [{band}]"),
+        false => String::new(),
+    };
+    let note = format!("{statistic} of {}{band}.", summary::finished(run));
     format!(
         "<section class=\"headline\">\n<h2>{}</h2>\n<dl>\n{}</dl>\n<p class=\"note\">{}</p>\n\
          </section>\n",

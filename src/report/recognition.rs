@@ -106,10 +106,10 @@ pub fn title(name: &str) -> &str {
 /// Returns the likeliest hypothesis, whether it is right, and how far its surface is off.
 fn score(found: &RecognitionMetrics) -> String {
     let verdict = found.error.as_ref().map_or(String::new(), |error| {
-        let off = error.distance_m.map(|m| format!(", pose error (ADD-S) {} mm", digits(1e3 * m)));
-        match found.is_right() {
-            Some(true) => format!(", right{}", off.unwrap_or_default()),
-            _ => format!(", wrong: the object is {}", error.object),
+        match (found.is_right(), error.distance_m) {
+            (Some(true), None) => ", right".into(),
+            (Some(true), Some(m)) => format!(", right, ADD-S {} mm", digits(1e3 * m)),
+            _ => format!(", wrong: it is {}", error.object),
         }
     });
     format!("{} ({:.2}){verdict}", title(&found.object), found.confidence())

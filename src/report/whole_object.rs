@@ -158,7 +158,8 @@ pub fn frame(
     Ok(Some(SurfaceFrame {
         touches: count,
         sd_m: surface.offsets_m(&mesh.0),
-        error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error_m(bvh, p_w)).collect()),
+        error_m: truth
+            .map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error_m(bvh, p_w)).collect()),
         score: shape.map(score).unwrap_or_default(),
         hypotheses: Vec::new(),
         seen_w: belief.seen().iter().flat_map(|it| it.elements()).map(|it| it.p_w).collect(),

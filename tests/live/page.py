@@ -214,6 +214,7 @@ def main() -> None:
             assert words in legend, f"{words} is not in {legend}"
         for words in ["approach of the last touch", "95 % band"]:
             assert words not in legend, f"{words} is in {legend}"
+        assert page.locator("#numbers input").first.evaluate("it => getComputedStyle(it).opacity") == "1"
         below = page.locator("#exact").bounding_box()["y"]
         for part in ["#panels", "#target", ".time", ".legend"]:
             box = page.locator(part).bounding_box()

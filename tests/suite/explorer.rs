@@ -73,7 +73,8 @@ fn views_have_the_paths_of_strokes() {
     let run = strokes();
     let data = zone::data(&run, &|_| vec![20]).unwrap().unwrap();
     let mut seen = 0;
-    for (planner, values) in run.experiment.planners.iter().zip(data["planners"].as_array().unwrap())
+    for (planner, values) in
+        run.experiment.planners.iter().zip(data["planners"].as_array().unwrap())
     {
         let row = run.rows.iter().find(|row| row.planner == *planner).unwrap();
         for (touch, path) in row.touches.iter().zip(values["paths"].as_array().unwrap()) {
@@ -193,10 +194,8 @@ fn recognitions(region: &str) -> Run {
         run.experiment.scene.whole_object = Some(toml::from_str("lowest_m = 0.4").unwrap());
         for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
             let p_w = zone.point(&touch.target.numbers(), 0.0);
-            touch.target = Target::Aim(palpate::explore::task::Aim {
-                p_w,
-                direction_w: zone.ahead_w(),
-            });
+            touch.target =
+                Target::Aim(palpate::explore::task::Aim { p_w, direction_w: zone.ahead_w() });
             (touch.fit, touch.metrics) = (None, None);
         }
     }
@@ -217,14 +216,13 @@ fn a_recognised_object_is_at_its_estimated_pose() {
         let [found, wanted] = [truth.mesh().bounds(), mesh.bounds()];
         assert!((found.0 - wanted.0).amax() < 1e-12 && (found.1 - wanted.1).amax() < 1e-12);
         let counts = |_: &str| vec![8, 20];
-        let sequences =
-            whole_object::sequences(&run, &["active"], &counts, Some(&truth)).unwrap();
+        let sequences = whole_object::sequences(&run, &["active"], &counts, Some(&truth)).unwrap();
         let [before, after] = &sequences[0].frames[..] else { panic!("{region}") };
         assert_eq!(before.hypotheses[0], ("bottle".to_owned(), 0.7));
-        assert!(before.score.ends_with("wrong: the object is box"), "{}", before.score);
+        assert!(before.score.ends_with("wrong: it is box"), "{}", before.score);
         assert_eq!(after.hypotheses[0], ("box".to_owned(), 0.9));
         assert_eq!(after.hypotheses[1].0, "none of these");
-        assert!(after.score.starts_with("box (0.90), right, pose error"), "{}", after.score);
+        assert!(after.score.starts_with("box (0.90), right, ADD-S 5.00 mm"), "{}", after.score);
         let back = Vector3::new(-5e-3, 0.0, 0.0);
         let bvh = MeshBvh::new(mesh.clone());
         for p_w in &after.mesh.0 {

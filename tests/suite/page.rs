@@ -309,7 +309,10 @@ fn the_page_fits_every_width_on_light_and_dark_paper() {
             assert!(number(said("canvas texts")[0]) > 5.0, "{place}");
             let headline = said("headline")[0];
             assert!(number(headline) >= 1.8, "{place}: {headline:?}");
-            assert!(headline[3].starts_with("RMSE after 20 touches random 2.00 mm"), "{headline:?}");
+            assert!(
+                headline[3].starts_with("RMSE after 20 touches random 2.00 mm"),
+                "{headline:?}"
+            );
             assert_eq!(said("headline first")[0][2], "true", "{place}");
             assert_eq!(said("others folded")[0][2..], ["true", "true"], "{place}");
             for line in said("sheet") {

@@ -105,7 +105,7 @@ pub fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T
 }
 
 /// Sentence that explains the drawing of strokes.
-pub const STROKES: &str = " Lines: strokes, from the dot at their begin to their end.";
+pub const STROKES: &str = " Blue and red lines: strokes, from the dot at their begin to their end.";
 
 /// Largest number of points of a stroke.
 // heuristic: more would not be visible.

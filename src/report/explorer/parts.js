@@ -63,7 +63,7 @@ function writer(context) {
   return (text, x, y, align) => {
     const { width } = context.measureText(text);
     const left = x - width * { left: 0, center: 0.5, right: 1 }[align];
-    const box = [left - 3, y - 10, left + width + 3, y + 3];
+    const box = [left - 3, y - 9, left + width + 3, y + 2];
     if (boxes.some(([a, b, c, d]) => box[0] < c && a < box[2] && box[1] < d && b < box[3])) return;
     boxes.push(box);
     context.textAlign = align;

@@ -1,7 +1,8 @@
 //! Interactive view of beliefs over a zone: values on a grid after many touch counts, in few bytes.
 
 use super::{
-    Counts, InteractiveView, LEAST_SHARE, PARTS, STROKES, counts, encode, encode_log, short, thinned,
+    Counts, InteractiveView, LEAST_SHARE, PARTS, STROKES, counts, encode, encode_log, short,
+    thinned,
 };
 use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;

@@ -29,7 +29,9 @@ pub(crate) const OTHERS: ReportFigure =
 /// Returns whether a measure decides between planners: the error that ranks them, the
 /// RMSE, that at held-out touches, and the share of recognised objects.
 fn decides(run: &Run, measure: &Measure) -> bool {
-    [run.error_measure(), &RMSE, &VERIFICATION_RMSE, &RECOGNISED].iter().any(|it| it.id == measure.id)
+    [run.error_measure(), &RMSE, &VERIFICATION_RMSE, &RECOGNISED]
+        .iter()
+        .any(|it| it.id == measure.id)
 }
 
 /// Returns the score R (Eq. 5) of any positive constant.
@@ -39,16 +41,15 @@ fn constant_r(run: &Run) -> Option<f64> {
 
 fn caption(run: &Run) -> String {
     format!(
-        "Error of the belief against the number of touches and the robot's time; n = {}; all planners share \
-         the {}. {BANDS}",
+        "What decides between planners, against the touches and, if the robot moves, its time; \
+         n = {}; all planners share the {}. {BANDS}",
         finished(run),
         counted(run.experiment.initial_touches, "initial touch")
     )
 }
 
 /// Sentence on the bands of a panel.
-const BANDS: &str =
-    "Bands: one standard error of a mean, 95 % bootstrap interval of a median.";
+const BANDS: &str = "Bands: one standard error of a mean, 95 % bootstrap interval of a median.";
 
 fn others_caption(run: &Run) -> String {
     let score = constant_r(run).map_or(String::new(), |score| {
@@ -67,7 +68,7 @@ fn others_caption(run: &Run) -> String {
 const ROOM: [f64; 4] = [64.0, 28.0, 16.0, 44.0];
 /// Size and number in a row of the panels of the measures that decide, and of the others.
 // heuristic: a panel with its numbers is as wide as a phone.
-const PANELS: [([f64; 2], usize); 2] = [([352.0, 250.0], 2), ([274.0, 190.0], 3)];
+const PANELS: [([f64; 2], usize); 2] = [([344.0, 250.0], 2), ([274.0, 190.0], 3)];
 
 /// Height of the legend.
 const LEGEND_PX: f64 = 38.0;
@@ -92,7 +93,7 @@ fn draw(run: &Run, is_first: bool) -> anyhow::Result<Option<String>> {
     let points = || curves.iter().flat_map(|(_, points)| points);
     let Some(first) = points().map(|point| point.touches).min() else { return Ok(None) };
     let x = Axis::counts(first.into(), run.experiment.touches.into(), 6.0);
-    let shown: Vec<&Measure> = MEASURES
+    let mut shown: Vec<&Measure> = MEASURES
         .iter()
         .filter(|measure| match measure.scale {
             PanelAxis::Undrawn => false,
@@ -102,6 +103,8 @@ fn draw(run: &Run, is_first: bool) -> anyhow::Result<Option<String>> {
         .filter(|measure| points().any(|point| point.of(measure).is_some()))
         .filter(|measure| decides(run, measure) == is_first)
         .collect();
+    let first = if scene.library.is_some() { &RECOGNISED } else { run.error_measure() };
+    shown.sort_by_key(|measure| measure.id != first.id);
     let over_touches = shown.iter().map(|measure| (*measure, false));
     let is_over_time =
         |measure: &&&Measure| measure.is_error && measure.aggregate == Aggregate::Both;
@@ -115,7 +118,9 @@ fn draw(run: &Run, is_first: bool) -> anyhow::Result<Option<String>> {
         .zip(planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
     let is_r = shown.iter().any(|measure| measure.id == R.id);
-    let dashed = constant_r(run).filter(|_| is_r).map(|_| (Swatch::Line(constant_line()), "R of any constant"));
+    let dashed = constant_r(run)
+        .filter(|_| is_r)
+        .map(|_| (Swatch::Line(constant_line()), "R of any constant"));
     if panels.is_empty() {
         return Ok(None);
     }

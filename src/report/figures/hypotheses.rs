@@ -189,7 +189,8 @@ impl ConfusionMatrix {
     /// Draws the matrix, with the names of the recognised objects in `names_px` below it.
     fn draw(&self, canvas: &mut Canvas, area: Area, names_px: f64) {
         let place = area.width / self.names.len().max(1) as f64;
-        let row = |number: usize| self.counts.iter().filter(move |((truth, _), _)| *truth == number);
+        let row =
+            |number: usize| self.counts.iter().filter(move |((truth, _), _)| *truth == number);
         for ((truth, object), (count, is_right)) in &self.counts {
             let all: usize = row(*truth).map(|(_, (count, _))| count).sum();
             let colour = if *is_right { TRUTH } else { PLANNED };

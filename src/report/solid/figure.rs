@@ -15,6 +15,8 @@ use palpate_geometry::solids::Triangles;
 use palpate_input::format::counted;
 
 const PANEL: (f64, f64) = (236.0, 258.0);
+/// Width of a letter of a title, and of the rest of a title beside the planner's name.
+const TITLE_PX: [f64; 2] = [7.2, 215.0];
 const MARGIN: (f64, f64) = (20.0, 40.0);
 const FOOT_PX: f64 = 72.0;
 /// Width for the scale bar, and length of the colour bar.
@@ -55,7 +57,10 @@ pub fn figure(
     }
 
     let columns = counts.len() + usize::from(truth.is_some());
-    let width = (columns as f64 * PANEL.0).max(WIDTH_MIN_PX);
+    let letters = sequences.iter().map(|sequence| sequence.planner.chars().count());
+    let title_px = TITLE_PX[0] * letters.max().unwrap_or(0) as f64 + TITLE_PX[1];
+    let panel_px = PANEL.0.max(title_px);
+    let width = (columns as f64 * panel_px).max(WIDTH_MIN_PX);
     let is_missed = touches().any(|touch| touch.contact_w.is_none());
     let is_seen = drawn.iter().any(|frame| !frame.seen_w.is_empty());
     let entries = touch_entries().into_iter().chain(is_missed.then_some(MISS));
@@ -65,8 +70,9 @@ pub fn figure(
     let entries = entries.chain(green);
     let rows = sequences.iter().flat_map(|it| [false, true].map(|is_behind| (it, is_behind)));
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows.clone().count() as f64 * PANEL.1 + FOOT_PX];
-    let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = FigureLayout::new(size, first, PANEL.into(), width, ON_RELIEF, entries);
+    let first = Area { left: MARGIN.0, top: MARGIN.1, width: panel_px, height: PANEL.1 };
+    let step = [panel_px, PANEL.1];
+    let mut sheet = FigureLayout::new(size, first, step, width, ON_RELIEF, entries);
     let px_per_m = scale(&points, first);
     for (row, (sequence, is_behind)) in rows.enumerate() {
         let view = |column: usize, sheet: &mut FigureLayout| {

@@ -21,7 +21,7 @@ function viewOf(canvas) {
   const LIGHT = axes(FIRST).map((row) => dot(row, unitVector(SHADING.light)));
   // Opacity of the true surface in front of the belief, and the least distance for it, relative to
   // the size.
-  const [OPACITY, LIFT] = [0.62, 0.004];
+  const [OPACITY, LIFT, VEIL] = [0.62, 0.004, 0.4];
   const FOOT = 74;
   let known, truth, truthTints, scales;
   const paintAll = painter(() => window.draw());
@@ -82,7 +82,9 @@ function viewOf(canvas) {
       shift: [2 * middle[0] / width - 1, 1 - 2 * middle[1] / height, 0],
       light: LIGHT, ambient: SHADING.ambient,
     };
-    const over = isTruthShown && { mesh: truth, tints: truthTints, opacity: OPACITY, lift: 0.4 * LIFT };
+    // The true object is a veil over the whole of a recognised one.
+    const [opacity, lift] = frame.hypotheses.length ? [VEIL, -0.5] : [OPACITY, 0.4 * LIFT];
+    const over = isTruthShown && { mesh: truth, tints: truthTints, opacity, lift };
     return paintAll(view, { mesh: frame.mesh, tints }, over);
   }
 
